@@ -1,0 +1,111 @@
+# The only build file. `make help` lists the targets.
+#
+# Objects, binaries and everything that a run writes go to $(B): build/ or, for the sanitizer
+# builds, build/asan and build/tsan.
+
+B ?= build
+PREFIX ?= /usr/local
+CC ?= cc
+CFLAGS ?= -O2 -g
+SANITIZE ?=
+
+WARNINGS = -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes -Wvla
+# -fno-math-errno lets loops with sqrtf vectorise; -ffp-contract=off keeps results the same on
+# machines with and without fused multiply-add.
+ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -I. $(WARNINGS) -fno-math-errno -ffp-contract=off \
+             -fstack-protector-strong -pthread $(SANITIZE) $(EXR_CFLAGS) $(CFLAGS)
+ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
+
+# deploy/install-deps.sh puts these in place; the variables are only expanded when a compiler runs.
+EXR_CFLAGS = $(shell pkg-config --cflags OpenEXR)
+EXR_LIBS = -lOpenEXRCore
+COMMON_LIBS = -lcjson -lm
+IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -lz
+SERVER_LIBS = -lmicrohttpd -lsqlite3 -larchive -lseccomp $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
+CLIENT_LIBS = -lcurl -larchive $(COMMON_LIBS)
+EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/embree4/rtcore.h),-lembree4,-lembree3)
+
+COMMON_SRC = $(wildcard common/*.c)
+# The engine's libraries stay out of the client: it links only these.
+CLIENT_COMMON_SRC = $(filter-out common/image.c common/exr.c common/png.c common/jpeg.c common/hdr.c,$(COMMON_SRC))
+CLIENT_SRC = $(wildcard client/*.c)
+SERVER_SRC = $(wildcard server/*.c server/*/*.c)
+SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
+CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
+TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c)
+BENCH_SRC = $(wildcard tests/bench/*.c)
+FUZZ_SRC = $(wildcard tests/fuzz/*.c)
+
+obj = $(patsubst %.c,$(B)/obj/%.o,$(1))
+TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
+BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
+FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
+
+.PHONY: all help deps demo test tests bench asan tsan install clean
+.SECONDARY:
+.DELETE_ON_ERROR:
+
+all: $(B)/unbaked $(B)/unbake ## build the daemon and the client
+
+help: ## list the targets
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-10s %s\n", $$1, $$2}' Makefile
+
+deps: ## install the Debian packages that are missing (root or sudo)
+	@deploy/install-deps.sh
+
+$(B)/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
+
+$(B)/libcommon.a: $(call obj,$(COMMON_SRC))
+	@rm -f $@
+	ar rcs $@ $^
+$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC))
+	@rm -f $@
+	ar rcs $@ $^
+$(B)/libclient.a: $(call obj,$(CLIENT_LIB_SRC))
+	@rm -f $@
+	ar rcs $@ $^
+
+$(B)/unbaked: $(call obj,server/main.c) $(B)/libserver.a $(B)/libcommon.a
+	$(CC) $(ALL_LDFLAGS) -o $@ $^ $(SERVER_LIBS)
+
+$(B)/unbake: $(call obj,client/main.c $(CLIENT_LIB_SRC) $(CLIENT_COMMON_SRC))
+	$(CC) $(ALL_LDFLAGS) -o $@ $^ $(CLIENT_LIBS)
+
+$(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommon.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl
+
+tests: all $(TEST_BIN) $(FUZZ_BIN)
+
+demo: deps ## make a room, reconstruct it, show where the pictures are
+	@$(MAKE) --no-print-directory all
+	@tests/demo.sh $(B)
+
+test: deps ## build and run all tests; T=name runs one (T=adam)
+	@$(MAKE) --no-print-directory tests
+	@tests/run.sh $(B) $(T)
+
+bench: deps ## print the speed ratios and write build/bench.json
+	@$(MAKE) --no-print-directory all $(BENCH_BIN)
+	@tests/bench/run.sh $(B)
+
+asan: ## run the tests under the address and undefined-behaviour sanitizers
+	@$(MAKE) --no-print-directory B=build/asan CFLAGS="-O1 -g" \
+	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" tests
+	@tests/run.sh build/asan $(T)
+
+tsan: ## run the tests under the thread sanitizer
+	@$(MAKE) --no-print-directory B=build/tsan CFLAGS="-O1 -g" SANITIZE="-fsanitize=thread" tests
+	@tests/run.sh build/tsan $(T)
+
+install: all ## install under PREFIX (/usr/local)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/unbake
+	install -m 755 $(B)/unbaked $(B)/unbake $(DESTDIR)$(PREFIX)/bin
+	install -m 644 config/unbaked.conf $(DESTDIR)$(PREFIX)/share/unbake/unbaked.conf
+
+clean: ## remove what was built
+	rm -rf build
+
+-include $(shell find $(B)/obj -name '*.d' 2>/dev/null)

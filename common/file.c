@@ -1,0 +1,162 @@
+/* file.c -- see file.h. */
+#include "common/file.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include "common/mem.h"
+
+enum status file_read(const char *path, struct buf *out, struct error *err) {
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot open %s", path);
+    enum status status = STATUS_OK;
+    char chunk[65536];
+    for (;;) {
+        ssize_t got = read(fd, chunk, sizeof chunk);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0) {
+            status = error_set_errno(err, errno, "cannot read %s", path);
+            break;
+        }
+        if (got == 0)
+            break;
+        if (!buf_append(out, chunk, (size_t)got)) {
+            status = error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", path, out->limit);
+            break;
+        }
+    }
+    close(fd);
+    return status;
+}
+
+enum status file_write_all(int fd, const void *data, size_t length, const char *path,
+                           struct error *err) {
+    const char *at = data;
+    while (length > 0) {
+        ssize_t wrote = write(fd, at, length);
+        if (wrote < 0 && errno == EINTR)
+            continue;
+        if (wrote < 0)
+            return error_set_errno(err, errno, "cannot write %s", path);
+        at += wrote;
+        length -= (size_t)wrote;
+    }
+    return STATUS_OK;
+}
+
+static char *parent_of(const char *path) {
+    const char *slash = strrchr(path, '/');
+    if (!slash)
+        return mem_strdup(".");
+    return slash == path ? mem_strdup("/") : mem_strndup(path, (size_t)(slash - path));
+}
+
+enum status file_sync_parent(const char *path, struct error *err) {
+    char *dir = parent_of(path);
+    enum status status = STATUS_OK;
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0 || fsync(fd) != 0)
+        status = error_set_errno(err, errno, "cannot sync folder %s", dir);
+    if (fd >= 0)
+        close(fd);
+    mem_free(dir);
+    return status;
+}
+
+enum status file_replace(const char *path, const void *data, size_t length, struct error *err) {
+    char *temporary = mem_printf("%s.tmp-XXXXXX", path);
+    enum status status = STATUS_OK;
+    int fd = mkostemp(temporary, O_CLOEXEC);
+    if (fd < 0) {
+        status = error_set_errno(err, errno, "cannot create a temporary file beside %s", path);
+        goto out;
+    }
+    status = file_write_all(fd, data, length, path, err);
+    if (status == STATUS_OK && (fchmod(fd, 0640) != 0 || fsync(fd) != 0))
+        status = error_set_errno(err, errno, "cannot sync %s", path);
+    if (close(fd) != 0 && status == STATUS_OK)
+        status = error_set_errno(err, errno, "cannot close %s", path);
+    if (status == STATUS_OK && rename(temporary, path) != 0)
+        status = error_set_errno(err, errno, "cannot rename to %s", path);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err);
+    else
+        unlink(temporary);
+out:
+    mem_free(temporary);
+    return status;
+}
+
+enum status file_make_dirs(const char *path, struct error *err) {
+    char *partial = mem_strdup(path);
+    enum status status = STATUS_OK;
+    for (char *at = partial + 1; status == STATUS_OK; at++) {
+        if (*at != '/' && *at != '\0')
+            continue;
+        char kept = *at;
+        *at = '\0';
+        if (mkdir(partial, 0750) != 0 && errno != EEXIST)
+            status = error_set_errno(err, errno, "cannot create folder %s", partial);
+        *at = kept;
+        if (kept == '\0')
+            break;
+    }
+    mem_free(partial);
+    return status;
+}
+
+/* Removes what `name` is inside the folder `dir_fd`. `path` is for messages. */
+static enum status remove_at(int dir_fd, const char *name, const char *path, struct error *err) {
+    if (unlinkat(dir_fd, name, 0) == 0 || errno == ENOENT)
+        return STATUS_OK;
+    if (errno != EISDIR && errno != EPERM)
+        return error_set_errno(err, errno, "cannot remove %s", path);
+    int fd = openat(dir_fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot open folder %s", path);
+    DIR *dir = fdopendir(fd);
+    if (!dir) {
+        enum status status = error_set_errno(err, errno, "cannot list folder %s", path);
+        close(fd);
+        return status;
+    }
+    enum status status = STATUS_OK;
+    struct dirent *entry;
+    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
+            continue;
+        char *inner = file_join(path, entry->d_name);
+        status = remove_at(dirfd(dir), entry->d_name, inner, err);
+        mem_free(inner);
+    }
+    closedir(dir);
+    if (status == STATUS_OK && unlinkat(dir_fd, name, AT_REMOVEDIR) != 0 && errno != ENOENT)
+        status = error_set_errno(err, errno, "cannot remove folder %s", path);
+    return status;
+}
+
+enum status file_remove_tree(const char *path, struct error *err) {
+    return remove_at(AT_FDCWD, path, path, err);
+}
+
+enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err) {
+    struct statvfs info;
+    if (statvfs(path, &info) != 0)
+        return error_set_errno(err, errno, "cannot ask how full the disk of %s is", path);
+    *bytes = (uint64_t)info.f_bavail * (uint64_t)info.f_frsize;
+    return STATUS_OK;
+}
+
+char *file_join(const char *dir, const char *name) {
+    size_t length = strlen(dir);
+    return mem_printf("%s%s%s", dir, length && dir[length - 1] == '/' ? "" : "/", name);
+}

@@ -1,0 +1,38 @@
+/* file.h -- whole files and safe replacement of files. */
+#ifndef UNBAKE_COMMON_FILE_H
+#define UNBAKE_COMMON_FILE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/buf.h"
+#include "common/error.h"
+
+/* Appends the whole file to *out; STATUS_LIMIT when it does not fit out's limit. */
+enum status file_read(const char *path, struct buf *out, struct error *err);
+
+/* Replaces `path` with `length` bytes so that a reader (or a crash) sees the old or the new
+ * content and never a part: a temporary name beside it, fsync, rename, fsync of the folder. */
+enum status file_replace(const char *path, const void *data, size_t length, struct error *err);
+
+/* Writes all of `data` to fd, through short writes and EINTR. `path` is for the message. */
+enum status file_write_all(int fd, const void *data, size_t length, const char *path,
+                           struct error *err);
+
+/* fsync of the folder that holds `path`, so that a rename in it is durable. */
+enum status file_sync_parent(const char *path, struct error *err);
+
+/* Creates the folder and its parents (0750); an existing one is no error. */
+enum status file_make_dirs(const char *path, struct error *err);
+
+/* Removes a file or a whole tree, never following a symbolic link; absent is no error. */
+enum status file_remove_tree(const char *path, struct error *err);
+
+/* Bytes free to an unprivileged process on the file system of `path`. */
+enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err);
+
+/* "a" + "b" -> "a/b"; the caller's (mem_free). */
+char *file_join(const char *dir, const char *name);
+
+#endif

@@ -1,0 +1,79 @@
+/* image.h -- pictures in memory and the files they come from and go to.
+ *
+ * Pixels are float, interleaved, top row first. Readers accept what an uploaded bundle may
+ * hold, so every size is capped (IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS) before memory is asked
+ * for, and damage is STATUS_INPUT with a sentence, never a crash. Thread-safe: no shared
+ * state. exr.c is the only include of OpenEXRCore, png.c of libpng, jpeg.c of libjpeg. */
+#ifndef UNBAKE_COMMON_IMAGE_H
+#define UNBAKE_COMMON_IMAGE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+
+#define IMAGE_MAX_SIDE 65536
+#define IMAGE_MAX_PIXELS ((size_t)1 << 29)
+#define IMAGE_MAX_CHANNELS 64
+
+struct image {
+    uint32_t width, height;
+    uint32_t channel_count;
+    char (*channel)[64]; /* [channel_count] names, "R" "G" "B" "A" "base_color.R"; owned */
+    float *pixel;        /* [height][width][channel_count]; owned */
+};
+
+/* How the values of a file relate to linear light, as the reader found them. */
+enum image_encoding {
+    IMAGE_LINEAR, /* EXR, Radiance: linear light, unbounded */
+    IMAGE_SRGB    /* PNG, JPEG: as stored, in [0, 1]; linear only after image_srgb_to_linear */
+};
+
+struct image_info {
+    enum image_encoding encoding;
+    int bits;              /* per channel as stored: 8, 16, 32 */
+    /* From EXIF where present, else 0. */
+    double exposure_time_sec, iso, f_number;
+    int orientation;       /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
+};
+
+void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
+                const char *const *channel); /* zero pixels; names are copied */
+void image_release(struct image *image);
+
+/* Index of a channel by its exact name; -1 when absent. */
+int image_channel(const struct image *image, const char *name);
+
+/* Reads EXR, PNG, JPEG or Radiance HDR by content (not by extension). Channels come in the
+ * order R, G, B, A first where they exist, then the rest by name; grey PNG/JPEG and an EXR
+ * with only Y become R = G = B. info may be NULL. */
+enum status image_read(const char *path, struct image *image, struct image_info *info,
+                       struct error *err);
+
+/* The same without reading pixels: only width, height, channels and info. */
+enum status image_probe(const char *path, struct image *image, struct image_info *info,
+                        struct error *err);
+
+enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
+
+/* Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these
+ * channels; the same pixels give the same bytes. Overwrites `path` in place: callers that
+ * need atomicity write a temporary name. */
+enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
+                            bool tiled, struct error *err);
+
+/* Writes an 8-bit sRGB PNG of the first three channels (or the one there is, as grey), values
+ * times `scale`, clamped to [0, 1], converted from linear. Non-finite values become magenta. */
+enum status image_write_png(const char *path, const struct image *image, float scale,
+                            struct error *err);
+
+/* The sRGB transfer function (IEC 61966-2-1), value by value. */
+float image_srgb_to_linear(float value);
+float image_linear_to_srgb(float value);
+
+/* IEEE 754 half precision, round to nearest even; overflow becomes infinity. */
+uint16_t image_half_from_float(float value);
+float image_float_from_half(uint16_t half);
+
+#endif

@@ -1,0 +1,37 @@
+/* protocol.h -- the words that daemon, worker and client share over HTTP. */
+#ifndef UNBAKE_COMMON_PROTOCOL_H
+#define UNBAKE_COMMON_PROTOCOL_H
+
+#define PROTOCOL_DEFAULT_PORT 7117
+#define PROTOCOL_DEFAULT_SERVER "http://127.0.0.1:7117"
+
+#define UNBAKE_VERSION "0.1.0"
+
+/* Event types of GET /v1/jobs/{id}/events. */
+#define EVENT_STATE "state"
+#define EVENT_PROGRESS "progress"
+#define EVENT_METRIC "metric"
+#define EVENT_PREVIEW "preview"
+#define EVENT_OUTPUT "output"
+#define EVENT_LOG "log"
+
+/* Job states; see server/job/job.h for the diagram. */
+#define JOB_STATE_QUEUED "queued"
+#define JOB_STATE_RUNNING "running"
+#define JOB_STATE_PAUSED "paused"
+#define JOB_STATE_SUCCEEDED "succeeded"
+#define JOB_STATE_FAILED "failed"
+#define JOB_STATE_CANCELLED "cancelled"
+
+/* Scene states. */
+#define SCENE_STATE_RECEIVING "receiving"
+#define SCENE_STATE_CHECKING "checking"
+#define SCENE_STATE_READY "ready"
+#define SCENE_STATE_REJECTED "rejected"
+
+#define MIME_JSON "application/json"
+#define MIME_PROBLEM "application/problem+json"
+#define MIME_SSE "text/event-stream"
+#define MIME_NDJSON "application/x-ndjson"
+
+#endif

@@ -1,0 +1,59 @@
+/* settings.h -- the settings of a job: one table, from which the daemon checks submissions,
+ * the client prints help and the report lists what a run used.
+ *
+ * Values travel as JSON: {"texture_size": 2048, "method": "listing1"}. */
+#ifndef UNBAKE_COMMON_SETTINGS_H
+#define UNBAKE_COMMON_SETTINGS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/json.h"
+
+enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE };
+
+struct setting {
+    const char *name;
+    enum setting_type type;
+    const char *unit;           /* "texels", "s", ...; "" where there is none */
+    double minimum, maximum;    /* inclusive, for numbers */
+    const char *choices;        /* "a|b|c" for SETTING_CHOICE */
+    const char *default_text;
+    const char *help;           /* one sentence */
+};
+
+/* The table in alphabetical order; *count entries; static storage. */
+const struct setting *settings_table(size_t *count);
+const struct setting *settings_find(const char *name);
+
+/* The valid name nearest to `name` by edit distance, or NULL when none is near. */
+const char *settings_nearest(const char *name);
+
+/* What a job uses: one value per table entry, defaults filled in. */
+struct settings {
+    double *number;      /* [table count]: numbers and booleans (0 or 1); choices by index */
+};
+
+void settings_init(struct settings *s); /* all defaults */
+void settings_release(struct settings *s);
+double settings_number(const struct settings *s, const char *name); /* name must exist */
+bool settings_bool(const struct settings *s, const char *name);
+const char *settings_choice(const struct settings *s, const char *name); /* static storage */
+
+/* Checks a JSON object and applies it over *s. All problems at once: each appends an object
+ * {"name", "reason", "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. */
+enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
+                           struct error *err);
+
+/* Parses "key=value" from a command line into `object` with the JSON type that the table
+ * gives the key (a string where the key is unknown, so that the daemon can say so). */
+enum status settings_parse_assignment(const char *text, cJSON *object, struct error *err);
+
+/* Every value as a JSON object; the caller's. */
+cJSON *settings_to_json(const struct settings *s);
+/* The table as JSON array, for GET /v1/settings; the caller's. */
+cJSON *settings_describe(void);
+
+#endif

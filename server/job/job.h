@@ -1,0 +1,60 @@
+/* job.h -- what a job is and the states it goes through.
+ *
+ *      queued ──> running ──> succeeded
+ *        │  ▲       │ │ └───> failed      (attempts exhausted, or the input is at fault)
+ *        │  └───────┘ └─────> cancelled
+ *        │  (crash, restart, pre-emption: attempt + 1, resumes from the checkpoint)
+ *        ├──> cancelled
+ *        └──> paused ──> queued | cancelled     running ──> paused (checkpoint, then stop)
+ *
+ *      failed | cancelled ──> queued   only by the user's explicit retry, which is a new life of
+ *                                      the job with its attempts counted from 0 again
+ *
+ * 1. succeeded, failed and cancelled are sinks for everything but retry: exactly one is reached.
+ * 2. A running job has exactly one attempt; a report that names another is refused.
+ * 3. A request to a running job (pause, cancel) is recorded in `wanted` before the worker hears
+ *    of it, so a crash of the daemon in between forgets nothing. */
+#ifndef UNBAKE_JOB_JOB_H
+#define UNBAKE_JOB_JOB_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+
+enum job_state { JOB_QUEUED, JOB_RUNNING, JOB_PAUSED, JOB_SUCCEEDED, JOB_FAILED, JOB_CANCELLED };
+enum job_wanted { JOB_WANT_RUN, JOB_WANT_PAUSE, JOB_WANT_CANCEL };
+enum scene_state { SCENE_RECEIVING, SCENE_CHECKING, SCENE_READY, SCENE_REJECTED };
+
+/* The words of common/protocol.h. Parsing: false for an unknown word. */
+const char *job_state_name(enum job_state state);
+bool job_state_parse(const char *name, enum job_state *state);
+const char *scene_state_name(enum scene_state state);
+bool job_is_terminal(enum job_state state);
+
+#define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
+
+/* A row of the jobs table. Strings are owned; job_release frees them. */
+struct job {
+    int64_t id;
+    int64_t revision;          /* grows by one with every change; the ETag */
+    char scene_id[SCENE_ID_SIZE];
+    char *name;
+    char *labels;              /* JSON object text */
+    char *settings;            /* JSON object text, as submitted */
+    int priority;              /* larger first */
+    enum job_state state;
+    enum job_wanted wanted;
+    int attempt;               /* of the present or last run; 0 before the first */
+    int attempts_left;
+    int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
+    char *stage;               /* last reported; "" before */
+    double progress;           /* 0..1 */
+    double eta_sec;            /* negative: unknown */
+    char *reason;              /* why it failed or is paused, in plain words; "" if not */
+    char *hint;                /* what to do about it; "" if nothing is known */
+};
+
+void job_release(struct job *job);
+
+#endif

@@ -1,0 +1,37 @@
+/* scheduler.h -- decides what runs, spawns workers, reads what they say, buries them.
+ *
+ * Runs on one thread (the daemon's main thread) in scheduler_run, around poll(2). Other threads
+ * change the store and call scheduler_wake. */
+#ifndef UNBAKE_JOB_SCHEDULER_H
+#define UNBAKE_JOB_SCHEDULER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/store/store.h"
+
+struct scheduler_config {
+    const char *data_dir;           /* borrowed; holds scenes/ID/, jobs/ID/ */
+    const char *worker_binary;      /* /proc/self/exe */
+    int max_running;                /* jobs at once */
+    int thread_count;               /* shared between running jobs; 0: all processors */
+    uint64_t worker_memory_bytes;   /* 0: no limit */
+    double checkpoint_interval_sec;
+    double stop_grace_sec;          /* SIGTERM to SIGKILL */
+    bool sandbox;
+};
+
+struct scheduler; /* opaque */
+
+enum status scheduler_new(struct scheduler **s, const struct scheduler_config *config,
+                          struct store *store, struct error *err);
+void scheduler_free(struct scheduler *s);
+/* Reconciles, then works until scheduler_stop; running workers checkpoint and their jobs go back
+ * to the queue before it returns. */
+enum status scheduler_run(struct scheduler *s, struct error *err);
+void scheduler_wake(struct scheduler *s); /* from any thread: look at the store again */
+void scheduler_stop(struct scheduler *s); /* from any thread or a signal handler */
+int scheduler_running(const struct scheduler *s); /* workers alive; any thread */
+
+#endif

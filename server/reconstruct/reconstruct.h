@@ -1,0 +1,75 @@
+/* reconstruct.h -- a whole reconstruction, stage by stage, as the worker runs it.
+ *
+ * All that a later attempt needs is a list of named arrays (struct state_array): textures,
+ * moments, counters. The worker saves and restores them; this side never sees SQL. Everything
+ * else (atlas, acceleration structure, visibility) is rebuilt from the scene, deterministically.
+ * Given the same scene, settings and seed the outcome is the same bytes for any number of
+ * threads and any history of stops and resumes. */
+#ifndef UNBAKE_RECONSTRUCT_RECONSTRUCT_H
+#define UNBAKE_RECONSTRUCT_RECONSTRUCT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/json.h"
+#include "common/parallel.h"
+#include "common/settings.h"
+#include "server/render/world.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
+#include "server/scene/scene.h"
+
+/* A piece of state: plain memory that a checkpoint copies out and a resume copies in. */
+struct state_array {
+    const char *name;
+    void *data;
+    size_t bytes;
+};
+
+struct reconstruction; /* the present state, for previews and outputs */
+
+/* What the surroundings offer. All are called from the thread that runs reconstruct_run. */
+struct reconstruct_hooks {
+    void *user;
+    bool (*stop_requested)(void *user);
+    void (*stage)(void *user, const char *stage);
+    void (*progress)(void *user, const char *stage, double done, double total, double eta_sec);
+    void (*metric)(void *user, const char *series, long step, double value);
+    void (*log)(void *user, const char *message);
+    /* True when a checkpoint / preview is due (the surroundings keep the clock). */
+    bool (*checkpoint_due)(void *user);
+    bool (*preview_due)(void *user);
+    /* Commits all arrays as the newest checkpoint, or fails and leaves the one before. */
+    enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array,
+                                   size_t count, struct error *err);
+    /* Fills the arrays from the newest complete checkpoint; *found false and arrays untouched when there
+     * is none. An array whose stored size differs is STATUS_CORRUPT. */
+    enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found,
+                                   struct error *err);
+    enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
+};
+
+struct reconstruction {
+    const struct scene *scene;       /* borrowed */
+    const struct settings *settings; /* borrowed */
+    struct parallel *pool;           /* borrowed */
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+    float *confidence[2];            /* [height][width] observation count, spread of the radiance */
+    bool *is_emitter;                /* [segment_count] */
+    cJSON *report;                   /* object: figures of each stage, filled as they are known */
+};
+
+/* Runs all stages up to `report`. STATUS_CANCELLED when stopped (a checkpoint was saved). On
+ * STATUS_OK the reconstruction is the caller's (reconstruct_release). */
+enum status reconstruct_run(const struct scene *scene, const struct settings *settings,
+                            struct parallel *pool, const struct reconstruct_hooks *hooks,
+                            struct reconstruction *r, struct error *err);
+void reconstruct_release(struct reconstruction *r);
+
+#endif

@@ -1,0 +1,58 @@
+/* path.h -- path tracing with derivatives: forward once, then backwards over the stored path.
+ *
+ * A batch holds the paths of many camera rays. path_batch_trace estimates each ray's radiance
+ * by next-event estimation with multiple importance sampling and keeps the vertices;
+ * path_batch_backward walks them from the end and turns the derivative of a loss by each ray's
+ * radiance into derivatives by base colour (at every texel that the path touched, through the
+ * texture filter), roughness, specular and emission. Sampling is detached: densities are
+ * constants (Zeltner et al. 2021), so the gradient of the estimator's expectation is unbiased. */
+#ifndef UNBAKE_RENDER_PATH_H
+#define UNBAKE_RENDER_PATH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/vec.h"
+#include "server/render/gradient.h"
+#include "server/render/world.h"
+
+struct path_settings {
+    int max_depth;      /* segments from the camera: 1 emission only, 2 direct light, ... <= 32 */
+    int roulette_depth; /* Russian roulette from this segment on */
+    uint64_t seed;
+};
+
+/* Names the random numbers of one path: a pure function of these and the seed. Consecutive
+ * `sample` numbers with equal other fields are stratified against each other. */
+struct path_key {
+    uint32_t index;     /* texel, or pixel */
+    uint32_t iteration;
+    uint32_t sample;
+};
+
+struct ray {
+    vec3 origin;
+    vec3 direction; /* unit */
+};
+
+struct path_batch; /* scratch of one thread; opaque */
+
+struct path_batch *path_batch_new(size_t capacity, int max_depth);
+void path_batch_free(struct path_batch *batch);
+
+/* radiance[count] out. count <= capacity. Rays are traced from their origin; the first surface
+ * hit is the first vertex. Non-finite estimates become 0 and are counted. Allocates nothing. */
+void path_batch_trace(struct path_batch *batch, const struct world *world,
+                      const struct path_settings *settings, size_t count, const struct ray *ray,
+                      const struct path_key *key, rgb *radiance);
+
+/* Appends to `log` the derivatives for d_radiance[count], the loss's derivative by each ray's
+ * radiance, of the paths that path_batch_trace left in the batch. Materials must not have changed
+ * in between. */
+void path_batch_backward(struct path_batch *batch, const struct world *world,
+                         const rgb *d_radiance, struct gradient_log *log);
+
+/* Rays traced and non-finite samples dropped through this batch since it was made. */
+void path_batch_counts(const struct path_batch *batch, uint64_t *ray_count, uint64_t *dropped_count);
+
+#endif

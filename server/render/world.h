@@ -1,0 +1,38 @@
+/* world.h -- all that a ray can meet: geometry, materials, emitters, distant light. */
+#ifndef UNBAKE_RENDER_WORLD_H
+#define UNBAKE_RENDER_WORLD_H
+
+#include <stddef.h>
+
+#include "common/error.h"
+#include "common/image.h"
+#include "common/parallel.h"
+#include "common/vec.h"
+#include "server/render/accel.h"
+#include "server/render/light.h"
+#include "server/scene/atlas.h"
+#include "server/scene/materials.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+struct world {
+    const struct mesh *mesh;          /* borrowed, all four */
+    const struct segments *segments;
+    const struct atlas *atlas;
+    const struct materials *materials; /* may change between batches: then world_update_lights */
+    struct accel *accel;              /* owned */
+    struct lights *lights;            /* owned */
+};
+
+/* Builds the acceleration structure and the emitter tables. environment (latitude-longitude,
+ * column over width = atan2(x, -z) / 2 pi modulo 1, row over height = acos(y) / pi) may be NULL:
+ * black; it is copied. */
+enum status world_init(struct world *world, const struct mesh *mesh, const struct segments *segments,
+                       const struct atlas *atlas, const struct materials *materials,
+                       const struct image *environment, struct parallel *pool, struct error *err);
+void world_release(struct world *world);
+
+/* Rebuilds the emitter tables after emission changed. */
+void world_update_lights(struct world *world);
+
+#endif

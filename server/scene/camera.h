@@ -1,0 +1,37 @@
+/* camera.h -- pinhole and fisheye cameras with lens distortion.
+ *
+ * Camera axes: x right, y down, z forward. Pixel (i, j) covers [i, i+1) x [j, j+1), its centre
+ * is at +0.5. Distortion: OPENCV (k1 k2 k3 k4 k5 k6, p1 p2: Brown-Conrady, rational) and
+ * OPENCV_FISHEYE (k1..k4, Kannala-Brandt), as OpenCV's calibration page defines them. */
+#ifndef UNBAKE_SCENE_CAMERA_H
+#define UNBAKE_SCENE_CAMERA_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/vec.h"
+
+enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE }; /* pinhole: OPENCV, all zero */
+
+struct camera {
+    enum camera_model model;
+    uint32_t width, height;      /* pixels */
+    float fx, fy, cx, cy;        /* pixels */
+    float k[6];                  /* radial */
+    float p[2];                  /* tangential; OPENCV only */
+    struct rigid camera_from_world, world_from_camera;
+};
+
+/* Projects a world point: closed form. False when it is behind the camera, beyond the angle at
+ * which the distortion folds over, or outside the picture. *depth_m is along the optical axis. */
+bool camera_project(const struct camera *camera, vec3 point, float *x, float *y, float *depth_m);
+
+/* Unit world direction of the ray through pixel place (x, y); inverts the distortion by
+ * Newton's method. False where it does not converge (such pixels are not used). */
+bool camera_direction(const struct camera *camera, float x, float y, vec3 *direction);
+
+static inline vec3 camera_origin(const struct camera *camera) {
+    return camera->world_from_camera.translation;
+}
+
+#endif

@@ -1,0 +1,44 @@
+/* mesh.h -- a triangle mesh as read from a bundle, and the checks that make it fit for use. */
+#ifndef UNBAKE_SCENE_MESH_H
+#define UNBAKE_SCENE_MESH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/vec.h"
+
+#define MESH_MAX_TRIANGLES ((size_t)1 << 28)
+
+struct mesh {
+    size_t vertex_count;
+    vec3 *position;          /* [vertex_count] metres; owned */
+    vec3 *normal;            /* [vertex_count] unit shading normals, or NULL; owned */
+    size_t triangle_count;
+    uint32_t (*index)[3];    /* [triangle_count] vertices, counter-clockwise from the front; owned */
+    uint32_t *face;          /* [triangle_count] face of the input that the triangle was cut from,
+                              * ascending; owned */
+    int64_t *object_id;      /* [triangle_count] the input's object_id, or NULL; owned */
+    size_t face_count;       /* faces of the input, the dropped ones included */
+};
+
+struct mesh_report {
+    size_t degenerate_count; /* triangles without area, dropped */
+    size_t duplicate_count;  /* triangles with the same three vertices as an earlier one, dropped */
+};
+
+void mesh_release(struct mesh *mesh);
+
+/* Checks indices and coordinates (STATUS_INPUT names the first bad face or vertex by its
+ * number), then drops degenerate and duplicate triangles in place, keeping the order; zero or
+ * non-finite normals are replaced by the mean of the adjacent faces'. Fails when no triangle is
+ * left. `name` is for messages. */
+enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report,
+                       struct error *err);
+
+/* Twice the area times the unit geometric normal of a triangle, m^2. */
+vec3 mesh_cross(const struct mesh *mesh, size_t triangle);
+double mesh_area(const struct mesh *mesh); /* total, m^2 */
+void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper);
+
+#endif

@@ -1,0 +1,21 @@
+/* scene.h -- what a bundle holds once it is read: a mesh and photographs. */
+#ifndef UNBAKE_SCENE_SCENE_H
+#define UNBAKE_SCENE_SCENE_H
+
+#include <stddef.h>
+
+#include "server/scene/mesh.h"
+#include "server/scene/photograph.h"
+
+struct scene {
+    struct mesh mesh;
+    struct mesh_report mesh_report;
+    size_t photograph_count;
+    struct photograph *photograph; /* [photograph_count]; owned */
+    size_t warning_count;
+    char **warning;                /* [warning_count] sentences for the user; owned */
+};
+
+void scene_release(struct scene *scene);
+
+#endif

@@ -1,0 +1,24 @@
+/* segment.h -- the division of a mesh into segments: sets of triangles taken for one object.
+ *
+ * Given by the input's object_id, or made automatically as the supplemental of Nimier-David
+ * et al. 2021 describes: connected smooth regions, split where curvature is high. */
+#ifndef UNBAKE_SCENE_SEGMENT_H
+#define UNBAKE_SCENE_SEGMENT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/scene/mesh.h"
+
+struct segments {
+    size_t count;
+    uint32_t *of_triangle; /* [triangle_count], in [0, count); owned */
+    int64_t *id;           /* [count] the input's object_id, or the segment's own number; owned */
+};
+
+void segments_from_object_id(struct segments *s, const struct mesh *mesh); /* needs object_id */
+/* Deterministic; a few seconds for millions of triangles. */
+void segments_automatic(struct segments *s, const struct mesh *mesh);
+void segments_release(struct segments *s);
+
+#endif

@@ -1,0 +1,153 @@
+/* store.h -- state.db: scenes, jobs, events, outputs. The daemon's memory.
+ *
+ * One process, one connection, one mutex around it (SQLite before 3.51.3 can lose writes when two connections'
+ * checkpoint and commit overlap). Every function is one transaction: when it returns STATUS_OK
+ * the change is on disk. Thread-safe. Transitions check the state they start from and answer
+ * STATUS_CONFLICT, with a sentence, when it is another; unknown ids are STATUS_NOT_FOUND.
+ * A transition appends its `state` event in the same transaction. */
+#ifndef UNBAKE_STORE_STORE_H
+#define UNBAKE_STORE_STORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/buf.h"
+#include "common/error.h"
+#include "server/job/job.h"
+
+struct store; /* opaque */
+
+/* Opens or creates DIR/state.db, migrates its schema forward (a newer one is refused), checks
+ * it. The caller holds the data folder's lock. */
+enum status store_open(struct store **store, const char *dir, struct error *err);
+void store_close(struct store *store);
+const char *store_library_version(void); /* SQLite's */
+/* Writes and reads back a row: what /readyz asks. */
+enum status store_probe(struct store *store, struct error *err);
+
+/* Called, outside the store's mutex, after a transaction that appended events to `job_id` (0: a
+ * scene changed). One subscriber; set before threads start. */
+void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user);
+
+/* --- scenes ------------------------------------------------------------------------------ */
+
+struct scene_row {
+    char id[SCENE_ID_SIZE];
+    char *name;
+    enum scene_state state;
+    uint64_t bytes;         /* of the archive */
+    int64_t created_ms;
+    char *problems;         /* JSON array text: [{"file","reason"}]; "[]" if none */
+    char *facts;            /* JSON object text: what the check found; "{}" before */
+};
+void scene_row_release(struct scene_row *row);
+
+/* A complete, durable upload: the row starts in `checking`. Content that is there already is
+ * no error: *existed is set and nothing changes, but a rejected one is checked again. */
+enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
+                            bool *existed, struct error *err);
+enum status store_scene_ready(struct store *store, const char *id, const char *facts, struct error *err);
+enum status store_scene_reject(struct store *store, const char *id, const char *problems,
+                               struct error *err);
+enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
+                            struct error *err);
+/* The row whose id begins with `prefix`, if exactly one does. */
+enum status store_scene_find(struct store *store, const char *prefix, struct scene_row *row,
+                             struct error *err);
+/* Newest first, before (created_ms, id) of a cursor ("" for the first page). rows[limit] out. */
+enum status store_scene_list(struct store *store, const char *cursor, size_t limit,
+                             struct scene_row *rows, size_t *count, char next_cursor[128],
+                             struct error *err);
+/* STATUS_CONFLICT while a job that is not terminal uses it. The caller removes the files after. */
+enum status store_scene_delete(struct store *store, const char *id, struct error *err);
+/* The oldest scene in `checking`; STATUS_NOT_FOUND when there is none. */
+enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE], struct error *err);
+
+/* --- jobs -------------------------------------------------------------------------------- */
+
+struct job_new {
+    const char *scene_id, *name, *labels, *settings;
+    int priority, max_attempts;
+    const char *idempotency_key; /* NULL: none */
+    const char *request_sha256;  /* of the request, compared when the key is known */
+};
+/* queue_limit: STATUS_LIMIT when that many jobs are queued. With a known key: the earlier job's
+ * id and *replayed; STATUS_CONFLICT when the request differs. */
+enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
+                          int64_t *id, bool *replayed, struct error *err);
+enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);
+/* Newest first; state_filter < 0: all; before_id 0: from the newest. jobs[limit] out. */
+enum status store_job_list(struct store *store, int state_filter, int64_t before_id, size_t limit,
+                           struct job *jobs, size_t *count, struct error *err);
+/* NULL / INT_MIN leave a field. expected_revision -1: any; else STATUS_CONFLICT if it differs. */
+enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
+                            const char *name, const char *labels, int priority, struct error *err);
+enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not running */
+/* Highest priority, then oldest, queued job whose scene is ready; STATUS_NOT_FOUND if none. */
+enum status store_job_next(struct store *store, int64_t *id, struct error *err);
+/* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
+enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted,
+                              size_t *count, struct error *err);
+
+/* What users ask. A running job only gets its wish recorded; the scheduler fulfils it. */
+enum status store_job_cancel(struct store *store, int64_t id, struct error *err);
+enum status store_job_pause(struct store *store, int64_t id, struct error *err);
+enum status store_job_resume(struct store *store, int64_t id, struct error *err);
+enum status store_job_retry(struct store *store, int64_t id, int max_attempts, struct error *err);
+
+/* What the scheduler does; `attempt` fences. */
+enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
+enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
+enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,
+                           const char *hint, struct error *err);
+/* Back to the queue; counts_as_attempt false for a stop we asked for (shutdown, pre-emption). */
+enum status store_job_requeue(struct store *store, int64_t id, int attempt, bool counts_as_attempt,
+                              const char *reason, struct error *err);
+enum status store_job_stop_paused(struct store *store, int64_t id, int attempt, const char *reason,
+                                  struct error *err);
+enum status store_job_stop_cancelled(struct store *store, int64_t id, int attempt, struct error *err);
+/* At start: whatever claims to run is queued again (or paused, cancelled, as wanted). */
+enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
+
+/* --- events, outputs --------------------------------------------------------------------- */
+
+/* `type` and `data` (JSON object text) as in common/protocol.h. STATUS_CONFLICT when `attempt`
+ * is not the present one. A progress event also updates the job's row and replaces the last
+ * unreplayed progress event of the attempt, so that a long run does not fill the disk. */
+enum status store_event_add(struct store *store, int64_t job_id, int attempt, const char *type,
+                            const char *data, struct error *err);
+/* Events of a job with id > after, oldest first, at most `limit`, through `each`. */
+enum status store_event_list(struct store *store, int64_t job_id, int64_t after, size_t limit,
+                             void (*each)(void *user, int64_t id, int64_t at_ms, int attempt,
+                                          const char *type, const char *data),
+                             void *user, struct error *err);
+
+struct output_row {
+    char *name;
+    uint64_t bytes;
+    char sha256[65];
+    char *content_type;
+    int64_t updated_ms;
+    int attempt;
+};
+void output_row_release(struct output_row *row);
+enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *name,
+                             uint64_t bytes, const char *sha256, const char *content_type,
+                             struct error *err);
+enum status store_output_get(struct store *store, int64_t job_id, const char *name,
+                             struct output_row *row, struct error *err);
+/* All outputs by name; rows is allocated, the caller's: release each, then mem_free. */
+enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows,
+                              size_t *count, struct error *err);
+
+/* --- figures ----------------------------------------------------------------------------- */
+
+struct store_counts {
+    int64_t jobs_by_state[6], scenes_by_state[4];
+    int64_t attempts, events;
+    uint64_t wal_bytes;
+};
+enum status store_count(struct store *store, struct store_counts *counts, struct error *err);
+
+#endif

@@ -1,0 +1,51 @@
+/* progress.h -- the lines that a worker writes to its pipe, one JSON object each.
+ *
+ *   {"type":"stage","stage":"refine"}
+ *   {"type":"progress","stage":"refine","done":120,"total":1000,"eta_sec":33.5}
+ *   {"type":"metric","series":"loss","step":120,"value":0.0123}
+ *   {"type":"preview","name":"preview/base_color.png", ...as output}
+ *   {"type":"output","name":"base_color.exr","bytes":123,"sha256":"…","content_type":"image/x-exr"}
+ *   {"type":"log","level":"info","message":"…"}
+ *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
+ *   {"type":"problem","file":"images/003.png","reason":"…"}   (scene checks)
+ *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
+ *   {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
+ *
+ * A line is at most PROGRESS_LINE_MAX bytes. Signals go the other way: SIGTERM checkpoint and
+ * stop (exit PROGRESS_EXIT_STOPPED); SIGUSR1 write a preview now; SIGKILL cancel. An output or preview
+ * is announced only after its file is complete under its final name in JOBDIR/out/. */
+#ifndef UNBAKE_WORKER_PROGRESS_H
+#define UNBAKE_WORKER_PROGRESS_H
+
+#include "common/error.h"
+#include "common/json.h"
+
+#define PROGRESS_LINE_MAX 65536
+#define PROGRESS_FD 3 /* where the worker finds its pipe */
+
+/* Exit statuses of a worker. */
+enum progress_exit {
+    PROGRESS_EXIT_OK = 0,
+    PROGRESS_EXIT_FAILED = 1,    /* its "end" line says why */
+    PROGRESS_EXIT_INPUT = 65,    /* the input is at fault: trying again will not help */
+    PROGRESS_EXIT_MEMORY = 71,   /* MEM_EXIT_STATUS */
+    PROGRESS_EXIT_NO_SPACE = 74, /* the disk is full: pause the job */
+    PROGRESS_EXIT_STOPPED = 85   /* asked to stop; a checkpoint is there */
+};
+
+/* Writing, in the worker. A daemon that is gone is no reason to stop: errors are ignored. */
+struct progress {
+    int fd; /* -1: nowhere */
+};
+void progress_stage(struct progress *p, const char *stage);
+void progress_step(struct progress *p, const char *stage, double done, double total, double eta_sec);
+void progress_metric(struct progress *p, const char *series, long step, double value);
+void progress_file(struct progress *p, const char *type, const char *name, uint64_t bytes,
+                   const char *sha256, const char *content_type);
+void progress_log(struct progress *p, const char *level, const char *message);
+void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
+void progress_problem(struct progress *p, const char *file, const char *reason);
+void progress_scene(struct progress *p, cJSON *facts); /* takes facts */
+void progress_end(struct progress *p, enum status status, const char *message, const char *hint);
+
+#endif

@@ -1,0 +1,49 @@
+#!/bin/bash
+# Fails when a folder includes what the design forbids it, or a library's header is included by
+# another file than the one that owns it.
+set -u
+bad=0
+
+# forbid WHERE PATTERN WHY: no file under WHERE may include what matches PATTERN.
+forbid() {
+    local found
+    # shellcheck disable=SC2086
+    found=$(grep -rnE "^#include [\"<]$2" $1 --include='*.[ch]' 2>/dev/null)
+    [ -z "$found" ] && return
+    printf '%s\n%s\n' "$3:" "$found"
+    bad=1
+}
+# own PATTERN FILE...: only these files may include what matches PATTERN.
+own() {
+    local pattern=$1 found
+    shift
+    found=$(grep -rlE "^#include <$pattern" common client server 2>/dev/null | grep -vxF "$(printf '%s\n' "$@")")
+    [ -z "$found" ] && return
+    printf '%s is included by:\n%s\n' "$pattern" "$found"
+    bad=1
+}
+
+engine='server/(ingest|scene|render|reconstruct|export)/'
+forbid common 'server/|client/' 'common depends on nothing of ours'
+forbid client 'server/' 'the client knows only common'
+forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
+forbid server/store "$engine|server/(http|worker)/" 'store never sees the engine, http or the worker'
+forbid server/job "$engine|server/http/" 'job never sees the engine or http'
+forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
+forbid "server/scene server/render server/reconstruct server/ingest server/export" \
+    'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
+forbid server/scene 'server/(render|reconstruct|ingest|export)/' 'scene is data, no rays'
+forbid server/render 'server/(reconstruct|ingest|export)/' 'render sees only scene'
+forbid server/ingest 'server/(render|reconstruct|export)/' 'ingest sees only scene'
+forbid server/reconstruct 'server/(ingest|export)/' 'reconstruct sees only render and scene'
+forbid server/export 'server/(render|reconstruct|ingest)/' 'export sees only scene'
+
+own 'embree[34]/' server/render/accel.c
+own 'microhttpd\.h' server/http/listener.c server/http/mhd.h
+own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
+own 'curl/' client/request.c
+own 'openexr' common/exr.c
+own 'png\.h' common/png.c
+own 'jpeglib\.h' common/jpeg.c
+own 'seccomp\.h' server/worker/sandbox.c
+exit $bad
