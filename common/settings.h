@@ -12,7 +12,7 @@
 #include "common/error.h"
 #include "common/json.h"
 
-enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE };
+enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT };
 
 struct setting {
     const char *name;
@@ -33,14 +33,17 @@ const char *settings_nearest(const char *name);
 
 /* What a job uses: one value per table entry, defaults filled in. */
 struct settings {
-    double *number;      /* [table count]: numbers and booleans (0 or 1); choices by index */
+    double *number; /* [table count] numbers and booleans (0 or 1); choices by index; owned */
+    char **text;    /* [table count] SETTING_TEXT values, NULL for the others; owned */
 };
 
 void settings_init(struct settings *s); /* all defaults */
 void settings_release(struct settings *s);
 double settings_number(const struct settings *s, const char *name); /* name must exist */
 bool settings_bool(const struct settings *s, const char *name);
-const char *settings_choice(const struct settings *s, const char *name); /* static storage */
+/* Whether a SETTING_CHOICE has the value `word`. */
+bool settings_is(const struct settings *s, const char *name, const char *word);
+const char *settings_text(const struct settings *s, const char *name); /* borrowed */
 
 /* Checks a JSON object and applies it over *s. All problems at once: each appends an object
  * {"name", "reason", "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. */

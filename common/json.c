@@ -1,0 +1,229 @@
+/* json.c -- see json.h. */
+#include "common/json.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/buf.h"
+#include "common/file.h"
+#include "common/mem.h"
+
+#define MAX_DEPTH 64
+
+/* Line and column (from 1) of the byte `at`. */
+static void locate(const char *text, const char *at, size_t *line, size_t *column) {
+    *line = 1;
+    *column = 1;
+    for (const char *p = text; p < at; p++) {
+        if (*p == '\n') {
+            (*line)++;
+            *column = 1;
+        } else {
+            (*column)++;
+        }
+    }
+}
+
+/* Depth of brackets outside strings: cJSON's own limit is deeper than our stack should go. */
+static bool too_deep(const char *text, size_t length, const char **where) {
+    int depth = 0;
+    bool in_string = false;
+    for (size_t i = 0; i < length; i++) {
+        char c = text[i];
+        if (in_string) {
+            if (c == '\\')
+                i++;
+            else if (c == '"')
+                in_string = false;
+        } else if (c == '"') {
+            in_string = true;
+        } else if (c == '[' || c == '{') {
+            if (++depth > MAX_DEPTH) {
+                *where = text + i;
+                return true;
+            }
+        } else if (c == ']' || c == '}') {
+            depth--;
+        }
+    }
+    return false;
+}
+
+/* The first key that an object anywhere in the tree holds twice; NULL when there is none. */
+static const char *duplicate_key(const cJSON *value) {
+    for (const cJSON *a = value->child; a; a = a->next) {
+        if (cJSON_IsObject(value)) {
+            for (const cJSON *b = a->next; b; b = b->next) {
+                if (strcmp(a->string, b->string) == 0)
+                    return a->string;
+            }
+        }
+        const char *deeper = duplicate_key(a);
+        if (deeper)
+            return deeper;
+    }
+    return NULL;
+}
+
+/* Whether bytes form UTF-8 without overlong forms or surrogates (RFC 3629). */
+static bool utf8_valid(const unsigned char *s, size_t length, size_t *bad) {
+    size_t i = 0;
+    while (i < length) {
+        unsigned char c = s[i];
+        size_t extra = c < 0x80 ? 0 : c >= 0xc2 && c < 0xe0 ? 1 : c >= 0xe0 && c < 0xf0 ? 2
+                                  : c >= 0xf0 && c < 0xf5 ? 3 : 4;
+        *bad = i;
+        if (extra == 4 || i + extra >= length)
+            return false;
+        for (size_t k = 1; k <= extra; k++) {
+            if ((s[i + k] & 0xc0) != 0x80)
+                return false;
+        }
+        if ((c == 0xe0 && s[i + 1] < 0xa0) || (c == 0xed && s[i + 1] > 0x9f) ||
+            (c == 0xf0 && s[i + 1] < 0x90) || (c == 0xf4 && s[i + 1] > 0x8f))
+            return false;
+        i += extra + 1;
+    }
+    return true;
+}
+
+enum status json_parse(const char *text, size_t length, const char *what, cJSON **value,
+                       struct error *err) {
+    *value = NULL;
+    size_t line, column, bad = 0;
+    const char *where = text;
+    if (length >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
+        text += 3;
+        length -= 3;
+    }
+    if (memchr(text, '\0', length))
+        return error_set(err, STATUS_INPUT, "%s is not JSON: it contains a NUL byte", what);
+    if (!utf8_valid((const unsigned char *)text, length, &bad)) {
+        locate(text, text + bad, &line, &column);
+        return error_set(err, STATUS_INPUT, "%s is not UTF-8: bad byte at line %zu, column %zu",
+                         what, line, column);
+    }
+    if (too_deep(text, length, &where)) {
+        locate(text, where, &line, &column);
+        return error_set(err, STATUS_INPUT,
+                         "%s is nested more than %d deep at line %zu, column %zu", what, MAX_DEPTH,
+                         line, column);
+    }
+    const char *end = NULL;
+    cJSON *parsed = cJSON_ParseWithLengthOpts(text, length, &end, false);
+    if (!parsed) {
+        locate(text, end ? end : text, &line, &column);
+        return error_set(err, STATUS_INPUT, "%s is not JSON: syntax error at line %zu, column %zu",
+                         what, line, column);
+    }
+    while (end < text + length && strchr(" \t\r\n", *end))
+        end++;
+    if (end < text + length) {
+        locate(text, end, &line, &column);
+        cJSON_Delete(parsed);
+        return error_set(err, STATUS_INPUT, "%s has text after the JSON at line %zu, column %zu",
+                         what, line, column);
+    }
+    const char *twice = duplicate_key(parsed);
+    if (twice) {
+        error_set(err, STATUS_INPUT, "%s has the key \"%.100s\" twice in one object", what, twice);
+        cJSON_Delete(parsed);
+        return STATUS_INPUT;
+    }
+    *value = parsed;
+    return STATUS_OK;
+}
+
+enum status json_read(const char *path, size_t limit, cJSON **value, struct error *err) {
+    *value = NULL;
+    struct buf content;
+    buf_init(&content, limit);
+    enum status status = file_read(path, &content, err);
+    if (status == STATUS_OK)
+        status = json_parse(buf_text(&content), content.length, path, value, err);
+    buf_release(&content);
+    return status;
+}
+
+char *json_text(const cJSON *value) {
+    char *printed = cJSON_PrintUnformatted(value);
+    char *text = mem_strdup(printed ? printed : "null");
+    cJSON_free(printed);
+    return text;
+}
+
+static const char *type_name(const cJSON *value) {
+    return cJSON_IsNumber(value)   ? "a number"
+           : cJSON_IsString(value) ? "a string"
+           : cJSON_IsBool(value)   ? "true or false"
+           : cJSON_IsArray(value)  ? "an array"
+           : cJSON_IsObject(value) ? "an object"
+                                   : "null";
+}
+
+/* The member, or NULL when it is absent or null. */
+static const cJSON *member(const cJSON *object, const char *key) {
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, key);
+    return cJSON_IsNull(value) ? NULL : value;
+}
+
+enum status json_number(const cJSON *object, const char *key, const char *what, double fallback,
+                        double *value, struct error *err) {
+    const cJSON *found = member(object, key);
+    *value = fallback;
+    if (!found)
+        return STATUS_OK;
+    if (!cJSON_IsNumber(found))
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a number, found %s", what, key,
+                         type_name(found));
+    if (!isfinite(found->valuedouble))
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" is not a finite number", what, key);
+    *value = found->valuedouble;
+    return STATUS_OK;
+}
+
+enum status json_string(const cJSON *object, const char *key, const char *what,
+                        const char *fallback, const char **value, struct error *err) {
+    const cJSON *found = member(object, key);
+    *value = fallback;
+    if (!found)
+        return STATUS_OK;
+    if (!cJSON_IsString(found))
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a string, found %s", what, key,
+                         type_name(found));
+    *value = found->valuestring;
+    return STATUS_OK;
+}
+
+enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback,
+                      bool *value, struct error *err) {
+    const cJSON *found = member(object, key);
+    *value = fallback;
+    if (!found)
+        return STATUS_OK;
+    if (!cJSON_IsBool(found))
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be true or false, found %s", what, key,
+                         type_name(found));
+    *value = cJSON_IsTrue(found);
+    return STATUS_OK;
+}
+
+void json_add(cJSON *object, const char *key, cJSON *value) {
+    cJSON_AddItemToObject(object, key, value);
+}
+
+void json_add_string(cJSON *object, const char *key, const char *value) {
+    json_add(object, key, value ? cJSON_CreateString(value) : cJSON_CreateNull());
+}
+
+void json_add_number(cJSON *object, const char *key, double value) {
+    json_add(object, key, isfinite(value) ? cJSON_CreateNumber(value) : cJSON_CreateNull());
+}
+
+void json_add_int(cJSON *object, const char *key, int64_t value) {
+    json_add(object, key, cJSON_CreateNumber((double)value));
+}
+
+void json_add_bool(cJSON *object, const char *key, bool value) {
+    json_add(object, key, cJSON_CreateBool(value));
+}

@@ -1,0 +1,353 @@
+/* settings.c -- see settings.h. */
+#include "common/settings.h"
+
+#include <assert.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+
+#define NAME_MAX_LENGTH 64
+#define TEXT_MAX_LENGTH 255
+
+static const struct setting table[] = {
+    {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03",
+     "first step size of base colour; it falls over the run"},
+    {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "4",
+     "photographs that one visit of a texel is compared with"},
+    {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "3",
+     "how many times base colour is first solved at half the size"},
+    {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.05",
+     "first step size of emission, in logarithms of radiance"},
+    {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0",
+     "optimiser steps; 0: as many as time_limit_sec holds"},
+    {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "8",
+     "length of a path from the camera, in segments"},
+    {"method", SETTING_CHOICE, "", 0, 0, "listing1", "listing1",
+     "how materials are found: the published algorithm from a neutral start"},
+    {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15",
+     "time between preview pictures while the job runs"},
+    {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64",
+     "samples per pixel of the held-out re-renders"},
+    {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
+     "first step size of roughness"},
+    {"roulette_depth", SETTING_INT, "segments", 2, 32, NULL, "4",
+     "segment from which Russian roulette may end a path"},
+    {"samples_per_camera", SETTING_INT, "paths", 2, 4096, NULL, "4",
+     "paths for each texel and photograph, split into two independent halves"},
+    {"seed", SETTING_INT, "", 0, 9007199254740991.0, NULL, "1",
+     "names the random numbers: the same seed gives the same bytes"},
+    {"segmentation", SETTING_CHOICE, "", 0, 0, "auto|given|automatic", "auto",
+     "objects from the mesh's object_id, from its shape, or (auto) from whichever is there"},
+    {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
+     "first step size of specular"},
+    {"texels_per_iteration", SETTING_INT, "texels", 64, 16777216, NULL, "16384",
+     "texels chosen in one optimiser step"},
+    {"texels_per_metre", SETTING_REAL, "texels/m", 0, 100000, NULL, "0",
+     "density of the textures; 0: the greatest that texture_size holds"},
+    {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048",
+     "side of the square textures"},
+    {"time_limit_sec", SETTING_REAL, "s", 1, 2592000, NULL, "600",
+     "working time after which the optimiser stops; ignored when iterations is given"},
+    {"transforms", SETTING_TEXT, "", 0, 0, NULL, "transforms.json",
+     "the file of the bundle that lists photographs and cameras"},
+};
+
+#define TABLE_COUNT (sizeof table / sizeof table[0])
+
+const struct setting *settings_table(size_t *count) {
+    *count = TABLE_COUNT;
+    return table;
+}
+
+static int index_of(const char *name) {
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        if (strcmp(table[i].name, name) == 0)
+            return (int)i;
+    }
+    return -1;
+}
+
+const struct setting *settings_find(const char *name) {
+    int i = index_of(name);
+    return i < 0 ? NULL : &table[i];
+}
+
+/* Levenshtein distance of two short words. */
+static size_t edit_distance(const char *a, const char *b) {
+    size_t row[NAME_MAX_LENGTH + 1];
+    size_t n = strlen(b);
+    for (size_t j = 0; j <= n; j++)
+        row[j] = j;
+    for (size_t i = 1; a[i - 1]; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= n; j++) {
+            size_t best = diagonal + (a[i - 1] != b[j - 1]);
+            if (row[j] + 1 < best)
+                best = row[j] + 1;
+            if (row[j - 1] + 1 < best)
+                best = row[j - 1] + 1;
+            diagonal = row[j];
+            row[j] = best;
+        }
+    }
+    return row[n];
+}
+
+const char *settings_nearest(const char *name) {
+    const char *nearest = NULL;
+    size_t best = SIZE_MAX;
+    if (strlen(name) > NAME_MAX_LENGTH)
+        return NULL;
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        size_t distance = edit_distance(name, table[i].name);
+        if (distance < best) {
+            best = distance;
+            nearest = table[i].name;
+        }
+    }
+    return best <= 2 + strlen(name) / 4 ? nearest : NULL;
+}
+
+/* Index of a word in "a|b|c"; -1 when it is not one of them. */
+static int choice_index(const char *choices, const char *word) {
+    size_t length = strlen(word);
+    int index = 0;
+    for (const char *at = choices; *at; index++) {
+        size_t part = strcspn(at, "|");
+        if (part == length && memcmp(at, word, part) == 0)
+            return index;
+        at += part + (at[part] == '|');
+    }
+    return -1;
+}
+
+static void set_default(struct settings *s, size_t i) {
+    const struct setting *t = &table[i];
+    switch (t->type) {
+    case SETTING_INT:
+    case SETTING_REAL:
+        s->number[i] = strtod(t->default_text, NULL);
+        break;
+    case SETTING_BOOL:
+        s->number[i] = strcmp(t->default_text, "true") == 0;
+        break;
+    case SETTING_CHOICE:
+        s->number[i] = choice_index(t->choices, t->default_text);
+        break;
+    case SETTING_TEXT:
+        s->text[i] = mem_strdup(t->default_text);
+        break;
+    }
+}
+
+void settings_init(struct settings *s) {
+    s->number = mem_calloc(TABLE_COUNT, sizeof *s->number);
+    s->text = mem_calloc(TABLE_COUNT, sizeof *s->text);
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        set_default(s, i);
+}
+
+void settings_release(struct settings *s) {
+    for (size_t i = 0; s->text && i < TABLE_COUNT; i++)
+        mem_free(s->text[i]);
+    mem_free(s->text);
+    mem_free(s->number);
+    *s = (struct settings){0};
+}
+
+double settings_number(const struct settings *s, const char *name) {
+    int i = index_of(name);
+    assert(i >= 0);
+    return s->number[i];
+}
+
+bool settings_bool(const struct settings *s, const char *name) {
+    return settings_number(s, name) != 0.0;
+}
+
+static const char *choice_at(const char *choices, int index, char *word, size_t size) {
+    while (index-- > 0)
+        choices += strcspn(choices, "|") + 1;
+    snprintf(word, size, "%.*s", (int)strcspn(choices, "|"), choices);
+    return word;
+}
+
+bool settings_is(const struct settings *s, const char *name, const char *word) {
+    int i = index_of(name);
+    assert(i >= 0 && table[i].type == SETTING_CHOICE);
+    return (int)s->number[i] == choice_index(table[i].choices, word);
+}
+
+const char *settings_text(const struct settings *s, const char *name) {
+    int i = index_of(name);
+    assert(i >= 0 && table[i].type == SETTING_TEXT);
+    return s->text[i];
+}
+
+/* Applies one value; on a problem writes the reason and returns false. */
+static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *reason, size_t size) {
+    const struct setting *t = &table[i];
+    double number = value->valuedouble;
+    int choice;
+    switch (t->type) {
+    case SETTING_INT:
+    case SETTING_REAL:
+        if (!cJSON_IsNumber(value) || !isfinite(number) ||
+            (t->type == SETTING_INT && number != floor(number))) {
+            snprintf(reason, size, "must be %s number", t->type == SETTING_INT ? "a whole" : "a");
+            return false;
+        }
+        if (number < t->minimum || number > t->maximum) {
+            snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g", t->minimum,
+                     t->maximum, *t->unit ? " " : "", t->unit, number);
+            return false;
+        }
+        s->number[i] = number;
+        return true;
+    case SETTING_BOOL:
+        if (!cJSON_IsBool(value)) {
+            snprintf(reason, size, "must be true or false");
+            return false;
+        }
+        s->number[i] = cJSON_IsTrue(value);
+        return true;
+    case SETTING_CHOICE:
+        choice = cJSON_IsString(value) ? choice_index(t->choices, value->valuestring) : -1;
+        if (choice < 0) {
+            snprintf(reason, size, "must be one of %s", t->choices);
+            return false;
+        }
+        s->number[i] = choice;
+        return true;
+    case SETTING_TEXT:
+        if (!cJSON_IsString(value) || !*value->valuestring ||
+            strlen(value->valuestring) > TEXT_MAX_LENGTH) {
+            snprintf(reason, size, "must be a text of 1 to %d bytes", TEXT_MAX_LENGTH);
+            return false;
+        }
+        mem_free(s->text[i]);
+        s->text[i] = mem_strdup(value->valuestring);
+        return true;
+    }
+    return false;
+}
+
+static void add_problem(cJSON *problems, const char *name, const char *reason, const char *hint) {
+    if (!problems)
+        return;
+    cJSON *problem = cJSON_CreateObject();
+    json_add_string(problem, "name", name);
+    json_add_string(problem, "reason", reason);
+    if (hint)
+        json_add_string(problem, "hint", hint);
+    cJSON_AddItemToArray(problems, problem);
+}
+
+enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
+                           struct error *err) {
+    if (!cJSON_IsObject(object)) {
+        add_problem(problems, "settings", "must be an object of names and values", NULL);
+        return error_set(err, STATUS_INPUT, "settings must be a JSON object");
+    }
+    size_t bad = 0;
+    char first[256] = "";
+    for (const cJSON *value = object->child; value; value = value->next) {
+        char reason[256] = "", hint[128] = "";
+        int i = index_of(value->string);
+        if (i < 0) {
+            snprintf(reason, sizeof reason, "there is no such setting");
+            const char *nearest = settings_nearest(value->string);
+            if (nearest)
+                snprintf(hint, sizeof hint, "did you mean %s?", nearest);
+        } else if (apply_one(s, (size_t)i, value, reason, sizeof reason)) {
+            continue;
+        } else {
+            snprintf(hint, sizeof hint, "%.120s", table[i].help);
+        }
+        add_problem(problems, value->string, reason, *hint ? hint : NULL);
+        if (bad++ == 0)
+            snprintf(first, sizeof first, "%.80s: %.160s", value->string, reason);
+    }
+    if (bad == 0)
+        return STATUS_OK;
+    return bad == 1 ? error_set(err, STATUS_INPUT, "setting %s", first)
+                    : error_set(err, STATUS_INPUT, "setting %s (and %zu more)", first, bad - 1);
+}
+
+enum status settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
+    const char *equals = strchr(text, '=');
+    if (!equals || equals == text || equals - text > NAME_MAX_LENGTH)
+        return error_set(err, STATUS_INPUT, "\"%.100s\" is not of the form name=value", text);
+    char name[NAME_MAX_LENGTH + 1];
+    snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
+    const char *value = equals + 1;
+    if (cJSON_GetObjectItemCaseSensitive(object, name))
+        return error_set(err, STATUS_INPUT, "setting %s is given twice", name);
+    const struct setting *t = settings_find(name);
+    char *end = NULL;
+    double number = strtod(value, &end);
+    bool is_number = *value && !*end && isfinite(number);
+    if (t && (t->type == SETTING_INT || t->type == SETTING_REAL) && is_number)
+        json_add_number(object, name, number);
+    else if (t && t->type == SETTING_BOOL && (!strcmp(value, "true") || !strcmp(value, "false")))
+        json_add_bool(object, name, value[0] == 't');
+    else
+        json_add_string(object, name, value); /* the daemon says what is wrong with it */
+    return STATUS_OK;
+}
+
+static void add_value(cJSON *object, const char *key, size_t i, const struct settings *s) {
+    const struct setting *t = &table[i];
+    char word[NAME_MAX_LENGTH];
+    if (t->type == SETTING_BOOL)
+        json_add_bool(object, key, s->number[i] != 0.0);
+    else if (t->type == SETTING_CHOICE)
+        json_add_string(object, key,
+                        choice_at(t->choices, (int)s->number[i], word, sizeof word));
+    else if (t->type == SETTING_TEXT)
+        json_add_string(object, key, s->text[i]);
+    else
+        json_add_number(object, key, s->number[i]);
+}
+
+cJSON *settings_to_json(const struct settings *s) {
+    cJSON *object = cJSON_CreateObject();
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        add_value(object, table[i].name, i, s);
+    return object;
+}
+
+cJSON *settings_describe(void) {
+    static const char *const type_names[] = {"int", "real", "bool", "choice", "text"};
+    struct settings defaults;
+    settings_init(&defaults);
+    cJSON *list = cJSON_CreateArray();
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        const struct setting *t = &table[i];
+        cJSON *entry = cJSON_CreateObject();
+        json_add_string(entry, "name", t->name);
+        json_add_string(entry, "type", type_names[t->type]);
+        json_add_string(entry, "unit", t->unit);
+        if (t->type == SETTING_INT || t->type == SETTING_REAL) {
+            json_add_number(entry, "minimum", t->minimum);
+            json_add_number(entry, "maximum", t->maximum);
+        }
+        if (t->choices) {
+            cJSON *choices = cJSON_AddArrayToObject(entry, "choices");
+            char word[NAME_MAX_LENGTH];
+            for (const char *at = t->choices; *at; at += strcspn(at, "|"), at += *at == '|')
+                cJSON_AddItemToArray(choices, cJSON_CreateString(
+                                                  choice_at(at, 0, word, sizeof word)));
+        }
+        add_value(entry, "default", i, &defaults);
+        json_add_string(entry, "help", t->help);
+        cJSON_AddItemToArray(list, entry);
+    }
+    settings_release(&defaults);
+    return list;
+}

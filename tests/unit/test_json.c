@@ -1,0 +1,97 @@
+/* json.h: what it refuses beyond cJSON, and where it says the fault is. */
+#include "common/json.h"
+
+#include <dirent.h>
+
+#include "common/buf.h"
+#include "common/file.h"
+#include "common/mem.h"
+#include "tests/check.h"
+
+static enum status parse(const char *text, struct error *err) {
+    cJSON *value = NULL;
+    enum status status = json_parse(text, strlen(text), "body", &value, err);
+    cJSON_Delete(value);
+    return status;
+}
+
+static void test_refusals(void) {
+    struct error err;
+    CHECK(parse("{\"a\":1,\n \"a\":2}", &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "body has the key \"a\" twice in one object");
+    CHECK(parse("{}\n x", &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "body has text after the JSON at line 2, column 2");
+    CHECK(parse("{\"a\":\n  tru}", &err) == STATUS_INPUT);
+    CHECK(strstr(err.message, "line 2") != NULL);
+    CHECK(parse("\"\xc0\xaf\"", &err) == STATUS_INPUT);
+    CHECK(parse("", &err) == STATUS_INPUT);
+    char deep[400];
+    memset(deep, '[', sizeof deep);
+    deep[sizeof deep - 1] = '\0';
+    CHECK(parse(deep, &err) == STATUS_INPUT);
+    CHECK(strstr(err.message, "nested") != NULL);
+    CHECK(parse(" {\"a\": [1, 2.5e3, \"\\u00e9\", null, true]} \n", &err) == STATUS_OK);
+}
+
+static void test_members(void) {
+    cJSON *object = NULL;
+    struct error err;
+    const char *text = "{\"n\":2.5,\"s\":\"x\",\"b\":true,\"z\":null}";
+    CHECK(json_parse(text, strlen(text), "body", &object, &err) == STATUS_OK);
+    double n;
+    const char *s;
+    bool b;
+    CHECK(json_number(object, "n", "body", 0, &n, &err) == STATUS_OK && n == 2.5);
+    CHECK(json_number(object, "z", "body", 7, &n, &err) == STATUS_OK && n == 7);
+    CHECK(json_number(object, "s", "body", 7, &n, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "body: \"s\" must be a number, found a string");
+    CHECK(json_string(object, "s", "body", NULL, &s, &err) == STATUS_OK && strcmp(s, "x") == 0);
+    CHECK(json_bool(object, "b", "body", false, &b, &err) == STATUS_OK && b);
+    CHECK(json_bool(object, "n", "body", false, &b, &err) == STATUS_INPUT);
+    cJSON_Delete(object);
+}
+
+/* The public suite of JSON parsing: y_ must be taken, n_ refused, i_ may be either; none may
+ * crash. cJSON is lenient about numbers and control characters, hence the allowance. */
+static void test_suite(void) {
+    char dir_path[1024];
+    snprintf(dir_path, sizeof dir_path, "%s", check_data("vectors/json-suite/test_parsing"));
+    DIR *dir = opendir(dir_path);
+    CHECK(dir != NULL);
+    size_t taken_wrongly = 0, refused_wrongly = 0, seen = 0;
+    for (struct dirent *e; dir && (e = readdir(dir)) != NULL;) {
+        if (e->d_name[0] == '.')
+            continue;
+        char *file = file_join(dir_path, e->d_name);
+        struct buf content;
+        struct error err;
+        buf_init(&content, 16 << 20);
+        CHECK(file_read(file, &content, &err) == STATUS_OK);
+        cJSON *value = NULL;
+        enum status status = json_parse(buf_text(&content), content.length, e->d_name, &value, &err);
+        seen++;
+        if (e->d_name[0] == 'y' && status != STATUS_OK) {
+            refused_wrongly++;
+            printf("refused: %s: %s\n", e->d_name, err.message);
+        }
+        if (e->d_name[0] == 'n' && status == STATUS_OK) {
+            taken_wrongly++;
+            printf("taken: %s\n", e->d_name);
+        }
+        cJSON_Delete(value);
+        buf_release(&content);
+        mem_free(file);
+    }
+    if (dir)
+        closedir(dir);
+    CHECK_THAT(refused_wrongly <= 2, "%zu valid texts refused", refused_wrongly);
+    CHECK_THAT(taken_wrongly <= 30, "%zu invalid texts taken", taken_wrongly);
+    CHECK(seen > 300);
+}
+
+int main(void) {
+    test_refusals();
+    test_members();
+    test_suite();
+    return check_result();
+}

@@ -1,0 +1,83 @@
+/* The settings table and the way values get into it. */
+#include "common/settings.h"
+
+#include "common/mem.h"
+#include "tests/check.h"
+
+static cJSON *parse(const char *text) {
+    cJSON *value = NULL;
+    struct error err;
+    CHECK(json_parse(text, strlen(text), "test", &value, &err) == STATUS_OK);
+    return value;
+}
+
+static void test_table(void) {
+    size_t count;
+    const struct setting *t = settings_table(&count);
+    struct settings s;
+    settings_init(&s);
+    for (size_t i = 0; i < count; i++) {
+        CHECK_THAT(i == 0 || strcmp(t[i - 1].name, t[i].name) < 0, "%s is out of order", t[i].name);
+        CHECK(t[i].help && *t[i].help && t[i].unit);
+        if (t[i].type == SETTING_INT || t[i].type == SETTING_REAL)
+            CHECK_THAT(s.number[i] >= t[i].minimum && s.number[i] <= t[i].maximum,
+                       "default of %s is out of its range", t[i].name);
+    }
+    /* What settings_to_json writes, settings_apply reads back without a complaint. */
+    cJSON *json = settings_to_json(&s);
+    struct error err;
+    CHECK(settings_apply(&s, json, NULL, &err) == STATUS_OK);
+    cJSON *described = settings_describe();
+    CHECK(cJSON_GetArraySize(described) == (int)count);
+    cJSON_Delete(described);
+    cJSON_Delete(json);
+    settings_release(&s);
+}
+
+static void test_problems_all_at_once(void) {
+    struct settings s;
+    settings_init(&s);
+    cJSON *object = parse("{\"texture_sise\":1,\"seed\":-1,\"iterations\":1.5,\"method\":\"x\","
+                          "\"texture_size\":512,\"transforms\":\"\"}");
+    cJSON *problems = cJSON_CreateArray();
+    struct error err;
+    CHECK(settings_apply(&s, object, problems, &err) == STATUS_INPUT);
+    CHECK(cJSON_GetArraySize(problems) == 5);
+    const cJSON *first = cJSON_GetArrayItem(problems, 0);
+    const char *hint = NULL;
+    CHECK(json_string(first, "hint", "problem", "", &hint, &err) == STATUS_OK);
+    CHECK_STRING(hint, "did you mean texture_size?");
+    CHECK_NEAR(settings_number(&s, "texture_size"), 512, 0);
+    CHECK_NEAR(settings_number(&s, "seed"), 1, 0);
+    cJSON_Delete(problems);
+    cJSON_Delete(object);
+    settings_release(&s);
+}
+
+static void test_assignments(void) {
+    cJSON *object = cJSON_CreateObject();
+    struct error err;
+    CHECK(settings_parse_assignment("texture_size=256", object, &err) == STATUS_OK);
+    CHECK(settings_parse_assignment("method=listing1", object, &err) == STATUS_OK);
+    CHECK(settings_parse_assignment("seed=abc", object, &err) == STATUS_OK);
+    CHECK(settings_parse_assignment("texture_size=1", object, &err) == STATUS_INPUT);
+    CHECK(settings_parse_assignment("novalue", object, &err) == STATUS_INPUT);
+    CHECK(settings_parse_assignment("=3", object, &err) == STATUS_INPUT);
+    char *text = json_text(object);
+    CHECK_STRING(text, "{\"texture_size\":256,\"method\":\"listing1\",\"seed\":\"abc\"}");
+    mem_free(text);
+    struct settings s;
+    settings_init(&s);
+    CHECK(settings_apply(&s, object, NULL, &err) == STATUS_INPUT);
+    CHECK(settings_is(&s, "method", "listing1"));
+    CHECK_STRING(settings_text(&s, "transforms"), "transforms.json");
+    settings_release(&s);
+    cJSON_Delete(object);
+}
+
+int main(void) {
+    test_table();
+    test_problems_all_at_once();
+    test_assignments();
+    return check_result();
+}
