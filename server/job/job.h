@@ -22,15 +22,23 @@
 
 #include "common/error.h"
 
+/* Stored as numbers in state.db: the order is part of its schema. */
 enum job_state { JOB_QUEUED, JOB_RUNNING, JOB_PAUSED, JOB_SUCCEEDED, JOB_FAILED, JOB_CANCELLED };
 enum job_wanted { JOB_WANT_RUN, JOB_WANT_PAUSE, JOB_WANT_CANCEL };
 enum scene_state { SCENE_RECEIVING, SCENE_CHECKING, SCENE_READY, SCENE_REJECTED };
 
+#define JOB_STATE_COUNT 6
+#define SCENE_STATE_COUNT 4
+
 /* The words of common/protocol.h. Parsing: false for an unknown word. */
 const char *job_state_name(enum job_state state);
 bool job_state_parse(const char *name, enum job_state *state);
+const char *job_wanted_name(enum job_wanted wanted); /* "run", "pause", "cancel" */
 const char *scene_state_name(enum scene_state state);
+bool scene_state_parse(const char *name, enum scene_state *state);
 bool job_is_terminal(enum job_state state);
+/* The arrows of the diagram above. */
+bool job_may_become(enum job_state from, enum job_state to);
 
 #define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
 
@@ -49,7 +57,7 @@ struct job {
     int attempts_left;
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
     char *stage;               /* last reported; "" before */
-    double progress;           /* 0..1 */
+    double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
     char *reason;              /* why it failed or is paused, in plain words; "" if not */
     char *hint;                /* what to do about it; "" if nothing is known */

@@ -1,10 +1,15 @@
 /* store.h -- state.db: scenes, jobs, events, outputs. The daemon's memory.
  *
- * One process, one connection, one mutex around it (SQLite before 3.51.3 can lose writes when two connections'
- * checkpoint and commit overlap). Every function is one transaction: when it returns STATUS_OK
- * the change is on disk. Thread-safe. Transitions check the state they start from and answer
- * STATUS_CONFLICT, with a sentence, when it is another; unknown ids are STATUS_NOT_FOUND.
- * A transition appends its `state` event in the same transaction. */
+ * 1. One process, one connection, one mutex around it: SQLite before 3.51.3 can lose
+ *    acknowledged writes when two connections' checkpoint and commit overlap. The connection
+ *    holds an exclusive lock on the file, so a second one is refused, whoever opens it.
+ * 2. Every function is one transaction: when it returns STATUS_OK the change is on disk.
+ * 3. A transition checks the state it starts from and answers STATUS_CONFLICT, with a sentence,
+ *    when that forbids it; unknown ids are STATUS_NOT_FOUND.
+ * 4. A transition appends its `state` event in the same transaction.
+ * 5. Event ids grow over all jobs and are never used twice.
+ *
+ * All functions are thread-safe. */
 #ifndef UNBAKE_STORE_STORE_H
 #define UNBAKE_STORE_STORE_H
 
@@ -47,22 +52,25 @@ void scene_row_release(struct scene_row *row);
  * no error: *existed is set and nothing changes, but a rejected one is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             bool *existed, struct error *err);
-enum status store_scene_ready(struct store *store, const char *id, const char *facts, struct error *err);
+enum status store_scene_ready(struct store *store, const char *id, const char *facts,
+                              struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *problems,
                                struct error *err);
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
                             struct error *err);
-/* The row whose id begins with `prefix`, if exactly one does. */
+/* The row whose id begins with `prefix` (4 to 64 hex digits); STATUS_CONFLICT when several do. */
 enum status store_scene_find(struct store *store, const char *prefix, struct scene_row *row,
                              struct error *err);
 /* Newest first, before (created_ms, id) of a cursor ("" for the first page). rows[limit] out. */
 enum status store_scene_list(struct store *store, const char *cursor, size_t limit,
                              struct scene_row *rows, size_t *count, char next_cursor[128],
                              struct error *err);
-/* STATUS_CONFLICT while a job that is not terminal uses it. The caller removes the files after. */
+/* STATUS_CONFLICT while it is being checked or a job that is not terminal uses it. Terminal jobs
+ * keep its id. The caller removes the files after. */
 enum status store_scene_delete(struct store *store, const char *id, struct error *err);
 /* The oldest scene in `checking`; STATUS_NOT_FOUND when there is none. */
-enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE], struct error *err);
+enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
+                                       struct error *err);
 
 /* --- jobs -------------------------------------------------------------------------------- */
 
@@ -73,7 +81,8 @@ struct job_new {
     const char *request_sha256;  /* of the request, compared when the key is known */
 };
 /* queue_limit: STATUS_LIMIT when that many jobs are queued. With a known key: the earlier job's
- * id and *replayed; STATUS_CONFLICT when the request differs. */
+ * id and *replayed; STATUS_CONFLICT when the request differs. The scene may still be in
+ * `checking`; STATUS_CONFLICT when it is rejected, STATUS_NOT_FOUND when there is none. */
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
                           int64_t *id, bool *replayed, struct error *err);
 enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);
@@ -84,40 +93,51 @@ enum status store_job_list(struct store *store, int state_filter, int64_t before
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
                             const char *name, const char *labels, int priority, struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not running */
-/* Highest priority, then oldest, queued job whose scene is ready; STATUS_NOT_FOUND if none. */
+/* Highest priority, then oldest, queued job whose scene has been checked (ready, or rejected:
+ * such a job is started only to fail); STATUS_NOT_FOUND if none. */
 enum status store_job_next(struct store *store, int64_t *id, struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
-enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted,
-                              size_t *count, struct error *err);
+enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
+                              enum job_wanted *wanted, size_t *count, struct error *err);
 
-/* What users ask. A running job only gets its wish recorded; the scheduler fulfils it. */
+/* What users ask. A running job only gets its wish recorded; the scheduler fulfils it (wake it).
+ * Asking again for what is so already is STATUS_OK and changes nothing. Resume takes back a wish
+ * to pause; retry is for failed and cancelled jobs only. */
 enum status store_job_cancel(struct store *store, int64_t id, struct error *err);
 enum status store_job_pause(struct store *store, int64_t id, struct error *err);
 enum status store_job_resume(struct store *store, int64_t id, struct error *err);
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, struct error *err);
 
-/* What the scheduler does; `attempt` fences. */
+/* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A wish
+ * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
 enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
+/* The input is at fault: trying again will not help. */
 enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,
                            const char *hint, struct error *err);
-/* Back to the queue; counts_as_attempt false for a stop we asked for (shutdown, pre-emption). */
-enum status store_job_requeue(struct store *store, int64_t id, int attempt, bool counts_as_attempt,
-                              const char *reason, struct error *err);
-enum status store_job_stop_paused(struct store *store, int64_t id, int attempt, const char *reason,
-                                  struct error *err);
-enum status store_job_stop_cancelled(struct store *store, int64_t id, int attempt, struct error *err);
-/* At start: whatever claims to run is queued again (or paused, cancelled, as wanted). */
+/* The attempt crashed: back to the queue, or failed when it was the last one. */
+enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
+                            const char *hint, struct error *err);
+/* The attempt was stopped by us (a wish, shutdown): back to the queue, or as was wished. */
+enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason,
+                           struct error *err);
+/* The attempt cannot go on until somebody acts (disk full): paused. */
+enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason,
+                            const char *hint, struct error *err);
+/* At start: whatever claims to run is queued again (or paused, cancelled, as was wished). It does
+ * not count as a failed attempt: the job is not at fault when the daemon or the machine dies. */
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
 
 /* --- events, outputs --------------------------------------------------------------------- */
 
 /* `type` and `data` (JSON object text) as in common/protocol.h. STATUS_CONFLICT when `attempt`
- * is not the present one. A progress event also updates the job's row and replaces the last
- * unreplayed progress event of the attempt, so that a long run does not fill the disk. */
+ * is not the present one. A progress event also updates the job's row (its members stage, done,
+ * total, eta_sec) and replaces the job's progress event before it, so that a long run does not
+ * fill the disk. */
 enum status store_event_add(struct store *store, int64_t job_id, int attempt, const char *type,
                             const char *data, struct error *err);
-/* Events of a job with id > after, oldest first, at most `limit`, through `each`. */
+/* Events of a job with id > after, oldest first, at most `limit`, through `each`, which is called
+ * with the store locked: it copies what it needs and must not call the store. */
 enum status store_event_list(struct store *store, int64_t job_id, int64_t after, size_t limit,
                              void (*each)(void *user, int64_t id, int64_t at_ms, int attempt,
                                           const char *type, const char *data),
@@ -132,9 +152,11 @@ struct output_row {
     int attempt;
 };
 void output_row_release(struct output_row *row);
-enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *name,
-                             uint64_t bytes, const char *sha256, const char *content_type,
-                             struct error *err);
+/* Records a complete file of the job's out/ folder and appends its event (`type` is
+ * EVENT_OUTPUT or EVENT_PREVIEW). STATUS_INPUT when the name is not a plain relative path. */
+enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type,
+                             const char *name, uint64_t bytes, const char *sha256,
+                             const char *content_type, struct error *err);
 enum status store_output_get(struct store *store, int64_t job_id, const char *name,
                              struct output_row *row, struct error *err);
 /* All outputs by name; rows is allocated, the caller's: release each, then mem_free. */
@@ -144,7 +166,7 @@ enum status store_output_list(struct store *store, int64_t job_id, struct output
 /* --- figures ----------------------------------------------------------------------------- */
 
 struct store_counts {
-    int64_t jobs_by_state[6], scenes_by_state[4];
+    int64_t jobs_by_state[JOB_STATE_COUNT], scenes_by_state[SCENE_STATE_COUNT];
     int64_t attempts, events;
     uint64_t wal_bytes;
 };
