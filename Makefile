@@ -31,6 +31,7 @@ CLIENT_COMMON_SRC = $(filter-out common/image.c common/exr.c common/png.c common
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
+EMBEDDED = server/http/openapi.json
 CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
 TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
@@ -57,10 +58,21 @@ $(B)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
 
+# Files that travel inside the binary, as C arrays; declared in server/http/embedded.h.
+$(B)/embed/%.c: %
+	@mkdir -p $(@D)
+	@symbol=$$(printf %s '$(notdir $*)' | tr -c 'a-zA-Z0-9' _); \
+	{ printf '#include "server/http/embedded.h"\nconst unsigned char embedded_%s[] = {\n' "$$symbol"; \
+	  od -An -v -tx1 $< | sed 's/[0-9a-f][0-9a-f]/0x&,/g'; \
+	  printf '};\nconst size_t embedded_%s_size = sizeof embedded_%s;\n' "$$symbol" "$$symbol"; } > $@
+$(B)/obj/embed/%.o: $(B)/embed/%.c
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<
+
 $(B)/libcommon.a: $(call obj,$(COMMON_SRC))
 	@rm -f $@
 	ar rcs $@ $^
-$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC))
+$(B)/libserver.a: $(call obj,$(SERVER_LIB_SRC)) $(patsubst %,$(B)/obj/embed/%.o,$(EMBEDDED))
 	@rm -f $@
 	ar rcs $@ $^
 $(B)/libclient.a: $(call obj,$(CLIENT_LIB_SRC))
