@@ -142,6 +142,8 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
                              void (*each)(void *user, int64_t id, int64_t at_ms, int attempt,
                                           const char *type, const char *data),
                              void *user, struct error *err);
+/* The id of the job's newest event, 0 when it has none: where a stream without history begins. */
+enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err);
 
 struct output_row {
     char *name;
