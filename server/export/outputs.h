@@ -1,0 +1,77 @@
+/* outputs.h -- what a job leaves for its user: textures, previews, the mesh, side-by-sides, the
+ * report.
+ *
+ * Every file is written under a temporary name, synced and renamed, and only then announced: a
+ * reader (or a crash) sees the old content or the new and never a part. The same input gives the
+ * same bytes.
+ *
+ *   base_color.exr  roughness.exr  specular.exr  emission.exr   half, tiled, ZIP; R G B or Y. The
+ *                    values continue EXPORT_MARGIN texels beyond the charts, so that other
+ *                    renderers may filter and make mipmaps
+ *   confidence.exr   float: `count` observations and `spread` of their radiance, by texel
+ *   preview/base_color.png roughness.png specular.png emission.png confidence.png
+ *                    at most EXPORT_PREVIEW_SIZE texels a side
+ *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
+ *   compare/NNN.png  a held-out photograph | its re-render | their difference
+ *   report.json      every setting, version, stage time and metric
+ *   report.html      the same for the eye; needs no other file and no network */
+#ifndef UNBAKE_EXPORT_OUTPUTS_H
+#define UNBAKE_EXPORT_OUTPUTS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/error.h"
+#include "common/image.h"
+#include "common/json.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+#define EXPORT_MARGIN 16         /* texels */
+#define EXPORT_PREVIEW_SIZE 1024 /* texels */
+
+/* A held-out view: both pictures in linear radiance, R G B, of one size. */
+struct export_comparison {
+    const char *name;               /* the photograph's, for labels */
+    const struct image *photograph; /* saturated or masked pixels as they are */
+    const struct image *render;
+};
+
+/* All borrowed. */
+struct export_input {
+    const char *title;                 /* the job's or the scene's name */
+    const struct mesh *mesh;
+    const struct segments *segments;
+    const struct atlas *atlas;
+    const struct inverse_uv *inverse;
+    const struct materials *materials;
+    const float *confidence_count;     /* [height][width] observations */
+    const float *confidence_spread;    /* [height][width] relative spread of their radiance */
+    const bool *is_emitter;            /* [segment_count] */
+    size_t comparison_count;
+    const struct export_comparison *comparison;
+    /* An object. report.json is this plus "segments" (one entry each) and "files". The page draws
+     * these members when they are there, and shows all others as tables:
+     *   "series": {"loss": [[step, value], ...], ...}   one curve each
+     *   "stages": [{"name": "refine", "seconds": 12.3}, ...]
+     *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */
+    const cJSON *report;
+};
+
+/* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or
+ * EVENT_OUTPUT, `name` is relative to the folder. A failure ends the export. */
+typedef enum status export_announce(void *user, const char *type, const char *name,
+                                    const char *content_type, struct error *err);
+
+/* Writes preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
+enum status export_preview(const char *dir, const struct export_input *input,
+                           export_announce *announce, void *user, struct error *err);
+
+/* Writes everything, previews first and the report last. */
+enum status export_outputs(const char *dir, const struct export_input *input,
+                           export_announce *announce, void *user, struct error *err);
+
+#endif
