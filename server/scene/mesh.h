@@ -38,6 +38,13 @@ enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *
 
 /* Twice the area times the unit geometric normal of a triangle, m^2. */
 vec3 mesh_cross(const struct mesh *mesh, size_t triangle);
+/* The point with barycentrics (1 - b1 - b2, b1, b2), metres. */
+static inline vec3 mesh_point(const struct mesh *mesh, size_t triangle, float b1, float b2) {
+    const uint32_t *v = mesh->index[triangle];
+    vec3 p = vec3_scale(mesh->position[v[0]], 1.0f - b1 - b2);
+    p = vec3_mad(p, b1, mesh->position[v[1]]);
+    return vec3_mad(p, b2, mesh->position[v[2]]);
+}
 double mesh_area(const struct mesh *mesh); /* total, m^2 */
 void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper);
 
