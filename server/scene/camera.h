@@ -19,8 +19,16 @@ struct camera {
     float fx, fy, cx, cy;        /* pixels */
     float k[6];                  /* radial */
     float p[2];                  /* tangential; OPENCV only */
+    float fold;                  /* set by camera_find_fold, see there; 0: no limit */
     struct rigid camera_from_world, world_from_camera;
 };
+
+/* Finds where the distortion stops growing and sets `fold`: tan of the angle from the axis
+ * (OPENCV), or that angle in radians (OPENCV_FISHEYE), up to which the model is one-to-one, or
+ * the place well outside the picture where the search ended; 0 without distortion. Beyond it
+ * the polynomial would map directions far outside the view back into the picture. To be called
+ * once after size and lens are set. */
+void camera_find_fold(struct camera *camera);
 
 /* Projects a world point: closed form. False when it is behind the camera, beyond the angle at
  * which the distortion folds over, or outside the picture. *depth_m is along the optical axis. */
