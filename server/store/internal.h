@@ -1,0 +1,41 @@
+/* internal.h -- what the files of the store share and nobody else sees. */
+#ifndef UNBAKE_STORE_INTERNAL_H
+#define UNBAKE_STORE_INTERNAL_H
+
+#include <pthread.h>
+
+#include "server/store/sql.h"
+#include "server/store/store.h"
+
+struct store {
+    pthread_mutex_t mutex; /* around every use of sql */
+    struct sql sql;
+    void (*changed)(void *user, int64_t job_id);
+    void *changed_user;
+};
+
+#define STORE_NOTHING_CHANGED (-1)
+
+/* The schema as steps: step i takes a database of version i to version i + 1. A step that was
+ * ever released is never edited; a change is a new step. */
+extern const char *const schema_steps[];
+extern const int schema_version; /* the number of steps */
+
+/* Reading: the mutex alone. Writing: the mutex and a transaction. store_end commits or, where
+ * `status` is not STATUS_OK, rolls back; unlocks; and tells the subscriber about `changed_job`
+ * (0: a scene) after a commit. */
+void store_lock(struct store *store);
+void store_unlock(struct store *store);
+enum status store_begin(struct store *store, struct error *err);
+enum status store_end(struct store *store, enum status status, int64_t changed_job,
+                      struct error *err);
+
+int64_t store_now_ms(void); /* Unix time */
+
+/* Inside a transaction: appends one event. */
+enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,
+                               const char *data, struct error *err);
+/* Inside a transaction: STATUS_CONFLICT unless the job runs its attempt `attempt`. */
+enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err);
+
+#endif

@@ -1,0 +1,230 @@
+/* jobs.c -- the rows of the jobs table: adding, reading, editing, choosing; see store.h. What
+ * changes a job's state is in transitions.c. */
+#include <limits.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+#define COLUMNS                                                                                \
+    "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
+    " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason, hint"
+
+static void fill(struct job *job, sqlite3_stmt *stmt) {
+    *job = (struct job){
+        .id = sqlite3_column_int64(stmt, 0),
+        .revision = sqlite3_column_int64(stmt, 1),
+        .name = sql_dup(stmt, 3),
+        .labels = sql_dup(stmt, 4),
+        .settings = sql_dup(stmt, 5),
+        .priority = sqlite3_column_int(stmt, 6),
+        .state = (enum job_state)sqlite3_column_int(stmt, 7),
+        .wanted = (enum job_wanted)sqlite3_column_int(stmt, 8),
+        .attempt = sqlite3_column_int(stmt, 9),
+        .attempts_left = sqlite3_column_int(stmt, 10),
+        .created_ms = sqlite3_column_int64(stmt, 11),
+        .started_ms = sqlite3_column_int64(stmt, 12),
+        .finished_ms = sqlite3_column_int64(stmt, 13),
+        .stage = sql_dup(stmt, 14),
+        .progress = sqlite3_column_double(stmt, 15),
+        .eta_sec = sqlite3_column_double(stmt, 16),
+        .reason = sql_dup(stmt, 17),
+        .hint = sql_dup(stmt, 18),
+    };
+    strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
+}
+
+static enum status not_found(int64_t id, struct error *err) {
+    return error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)id);
+}
+
+/* The job that a known idempotency key made; *id stays 0 when the key is new. */
+static enum status find_replay(struct store *store, const struct job_new *job, int64_t *id,
+                               struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false, same = false;
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT id, request_sha256 FROM jobs WHERE idempotency_key = ?",
+                                   "t", job->idempotency_key);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        *id = sqlite3_column_int64(stmt, 0);
+        same = strcmp(sql_text(stmt, 1), job->request_sha256 ? job->request_sha256 : "") == 0;
+        sqlite3_reset(stmt);
+    }
+    if (status != STATUS_OK || !found || same)
+        return status;
+    error_set(err, STATUS_CONFLICT, "the idempotency key made job %lld from another request",
+              (long long)*id);
+    return error_hint(err, "Use a new key for a new request.");
+}
+
+/* Whether one more job may join the queue for this scene. */
+static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit,
+                             struct error *err) {
+    int64_t state, queued;
+    enum status status = sql_int(&store->sql, -1, &state, err,
+                                 "SELECT state FROM scenes WHERE id = ?", "t", job->scene_id);
+    if (status != STATUS_OK)
+        return status;
+    if (state < 0)
+        return error_set(err, STATUS_NOT_FOUND, "there is no scene %s", job->scene_id);
+    if (state == SCENE_REJECTED) {
+        error_set(err, STATUS_CONFLICT, "scene %s was rejected", job->scene_id);
+        return error_hint(err, "GET /v1/scenes/%.12s lists its problems.", job->scene_id);
+    }
+    status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?",
+                     "n", (int)JOB_QUEUED);
+    if (status == STATUS_OK && (uint64_t)queued >= queue_limit)
+        status = error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu",
+                           (long long)queued, queue_limit);
+    return status;
+}
+
+enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
+                          int64_t *id, bool *replayed, struct error *err) {
+    *id = 0;
+    *replayed = false;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    if (job->idempotency_key)
+        status = find_replay(store, job, id, err);
+    if (status == STATUS_OK && *id == 0)
+        status = check_new(store, job, queue_limit, err);
+    if (status == STATUS_OK && *id > 0) {
+        *replayed = true;
+        return store_end(store, status, STORE_NOTHING_CHANGED, err);
+    }
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
+                         " attempts_left, created_ms, idempotency_key, request_sha256)"
+                         " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                         "ttttnnitt", job->scene_id, job->name, job->labels, job->settings,
+                         job->priority, job->max_attempts, store_now_ms(), job->idempotency_key,
+                         job->request_sha256);
+    if (status == STATUS_OK) {
+        *id = sqlite3_last_insert_rowid(store->sql.db);
+        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\",\"attempt\":0}",
+                                    err);
+    }
+    return store_end(store, status, *id, err);
+}
+
+enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *job = (struct job){.eta_sec = -1.0};
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT " COLUMNS " FROM jobs WHERE id = ?", "i", id);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        fill(job, stmt);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? not_found(id, err) : status;
+}
+
+enum status store_job_list(struct store *store, int state_filter, int64_t before_id, size_t limit,
+                           struct job *jobs, size_t *count, struct error *err) {
+    sqlite3_stmt *stmt;
+    *count = 0;
+    int64_t before = before_id > 0 ? before_id : INT64_MAX;
+    store_lock(store);
+    enum status status =
+        state_filter < 0
+            ? sql_query(&store->sql, &stmt, err,
+                        "SELECT " COLUMNS " FROM jobs WHERE id < ? ORDER BY id DESC LIMIT ?", "ii",
+                        before, (int64_t)limit)
+            : sql_query(&store->sql, &stmt, err,
+                        "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ?"
+                        " ORDER BY id DESC LIMIT ?",
+                        "ini", before, state_filter, (int64_t)limit);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (row)
+            fill(&jobs[(*count)++], stmt);
+    }
+    store_unlock(store);
+    return status;
+}
+
+enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
+                            const char *name, const char *labels, int priority,
+                            struct error *err) {
+    int64_t revision;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_int(&store->sql, 0, &revision, err, "SELECT revision FROM jobs WHERE id = ?", "i",
+                     id);
+    if (status == STATUS_OK && revision == 0)
+        status = not_found(id, err);
+    else if (status == STATUS_OK && expected_revision >= 0 && revision != expected_revision)
+        status = error_set(err, STATUS_CONFLICT, "job %lld has revision %lld, not %lld",
+                           (long long)id, (long long)revision, (long long)expected_revision);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE jobs SET revision = revision + 1, name = ifnull(?, name),"
+                         " labels = ifnull(?, labels),"
+                         " priority = CASE WHEN ?3 = ?4 THEN priority ELSE ?3 END WHERE id = ?5",
+                         "ttnni", name, labels, priority, INT_MIN, id);
+    return store_end(store, status, id, err);
+}
+
+enum status store_job_delete(struct store *store, int64_t id, struct error *err) {
+    int64_t state;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_int(&store->sql, -1, &state, err, "SELECT state FROM jobs WHERE id = ?", "i", id);
+    if (status == STATUS_OK && state < 0)
+        status = not_found(id, err);
+    else if (status == STATUS_OK && state == JOB_RUNNING) {
+        error_set(err, STATUS_CONFLICT, "job %lld is running", (long long)id);
+        status = error_hint(err, "Cancel it first.");
+    }
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ?", "i", id);
+    return store_end(store, status, id, err);
+}
+
+enum status store_job_next(struct store *store, int64_t *id, struct error *err) {
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, id, err,
+                                 "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
+                                 " WHERE jobs.state = ? AND scenes.state >= ?"
+                                 " ORDER BY priority DESC, jobs.id LIMIT 1",
+                                 "nn", (int)JOB_QUEUED, (int)SCENE_READY);
+    store_unlock(store);
+    return status == STATUS_OK && *id == 0
+               ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run")
+               : status;
+}
+
+enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
+                              enum job_wanted *wanted, size_t *count, struct error *err) {
+    sqlite3_stmt *stmt;
+    *count = 0;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT id, wanted FROM jobs WHERE state = ?"
+                                   " ORDER BY id LIMIT ?",
+                                   "ni", (int)JOB_RUNNING, (int64_t)limit);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        ids[*count] = sqlite3_column_int64(stmt, 0);
+        wanted[(*count)++] = (enum job_wanted)sqlite3_column_int(stmt, 1);
+    }
+    store_unlock(store);
+    return status;
+}

@@ -1,0 +1,124 @@
+/* outputs.c -- the files that jobs have finished writing; see store.h.
+ *
+ * Names come from a worker, which has read what a stranger uploaded, and end in paths: only plain
+ * relative ones are taken. */
+#include <ctype.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+#define COLUMNS "name, bytes, sha256, content_type, updated_ms, attempt"
+
+static void fill(struct output_row *row, sqlite3_stmt *stmt) {
+    *row = (struct output_row){
+        .name = sql_dup(stmt, 0),
+        .bytes = (uint64_t)sqlite3_column_int64(stmt, 1),
+        .content_type = sql_dup(stmt, 3),
+        .updated_ms = sqlite3_column_int64(stmt, 4),
+        .attempt = sqlite3_column_int(stmt, 5),
+    };
+    snprintf(row->sha256, sizeof row->sha256, "%s", sql_text(stmt, 2));
+}
+
+void output_row_release(struct output_row *row) {
+    mem_free(row->name);
+    mem_free(row->content_type);
+    *row = (struct output_row){0};
+}
+
+/* Letters, digits, '_', '-', '.' and '/' between parts that do not begin with a dot. */
+static bool name_is_plain(const char *name) {
+    size_t length = strlen(name);
+    if (length == 0 || length > 200)
+        return false;
+    for (size_t i = 0; i < length; i++) {
+        bool at_start = i == 0 || name[i - 1] == '/';
+        if (!isalnum((unsigned char)name[i]) && !strchr("_-./", name[i]))
+            return false;
+        if (at_start && (name[i] == '.' || name[i] == '/'))
+            return false;
+    }
+    return name[length - 1] != '/';
+}
+
+enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type,
+                             const char *name, uint64_t bytes, const char *sha256,
+                             const char *content_type, struct error *err) {
+    if (!name_is_plain(name))
+        return error_set(err, STATUS_INPUT, "\"%.100s\" is no name for an output", name);
+    if (strlen(sha256) != 64 || strspn(sha256, "0123456789abcdef") != 64)
+        return error_set(err, STATUS_INPUT, "output %s: \"%.70s\" is no SHA-256", name, sha256);
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = store_fence(store, job_id, attempt, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "INSERT OR REPLACE INTO outputs (job_id, name, bytes, sha256,"
+                         " content_type, updated_ms, attempt) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                         "itittin", job_id, name, (int64_t)bytes, sha256, content_type,
+                         store_now_ms(), attempt);
+    if (status == STATUS_OK) {
+        cJSON *data = cJSON_CreateObject();
+        json_add_string(data, "name", name);
+        json_add_int(data, "bytes", (int64_t)bytes);
+        json_add_string(data, "sha256", sha256);
+        json_add_string(data, "content_type", content_type);
+        char *text = json_text(data);
+        status = store_event_append(store, job_id, attempt, type, text, err);
+        mem_free(text);
+        cJSON_Delete(data);
+    }
+    return store_end(store, status, job_id, err);
+}
+
+enum status store_output_get(struct store *store, int64_t job_id, const char *name,
+                             struct output_row *row, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *row = (struct output_row){0};
+    store_lock(store);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT " COLUMNS " FROM outputs WHERE job_id = ? AND name = ?", "it", job_id,
+                  name);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        fill(row, stmt);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found
+               ? error_set(err, STATUS_NOT_FOUND, "job %lld has no output %.200s",
+                           (long long)job_id, name)
+               : status;
+}
+
+enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows,
+                              size_t *count, struct error *err) {
+    sqlite3_stmt *stmt;
+    size_t capacity = 0;
+    *rows = NULL;
+    *count = 0;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT " COLUMNS " FROM outputs WHERE job_id = ? ORDER BY name",
+                                   "i", job_id);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        if (*count == capacity) {
+            capacity = capacity ? capacity * 2 : 16;
+            *rows = mem_realloc_array(*rows, capacity, sizeof **rows);
+        }
+        fill(&(*rows)[(*count)++], stmt);
+    }
+    store_unlock(store);
+    return status;
+}

@@ -1,0 +1,223 @@
+/* scenes.c -- the scenes table: uploads, their check and its outcome; see store.h.
+ *
+ *      (upload) ──> checking ──> ready
+ *                     ▲  └─────> rejected
+ *                     └────────────┘ (uploaded again)
+ *
+ * `receiving` exists only while the bytes arrive, and then only in memory: a row means that the
+ * archive is complete and on disk. */
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+#define COLUMNS "id, name, state, bytes, created_ms, problems, facts"
+
+static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
+    *row = (struct scene_row){
+        .name = sql_dup(stmt, 1),
+        .state = (enum scene_state)sqlite3_column_int(stmt, 2),
+        .bytes = (uint64_t)sqlite3_column_int64(stmt, 3),
+        .created_ms = sqlite3_column_int64(stmt, 4),
+        .problems = sql_dup(stmt, 5),
+        .facts = sql_dup(stmt, 6),
+    };
+    snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
+}
+
+void scene_row_release(struct scene_row *row) {
+    mem_free(row->name);
+    mem_free(row->problems);
+    mem_free(row->facts);
+    *row = (struct scene_row){0};
+}
+
+static enum status not_found(const char *id, struct error *err) {
+    return error_set(err, STATUS_NOT_FOUND, "there is no scene %s", id);
+}
+
+/* -1 when there is no such scene. */
+static enum status state_of(struct store *store, const char *id, int64_t *state,
+                            struct error *err) {
+    return sql_int(&store->sql, -1, state, err, "SELECT state FROM scenes WHERE id = ?", "t", id);
+}
+
+enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
+                            bool *existed, struct error *err) {
+    int64_t state = -1;
+    *existed = false;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = state_of(store, id, &state, err);
+    if (status == STATUS_OK && state < 0)
+        status = sql_run(&store->sql, err,
+                         "INSERT INTO scenes (id, name, state, bytes, created_ms)"
+                         " VALUES (?, ?, ?, ?, ?)",
+                         "ttnii", id, name, (int)SCENE_CHECKING, (int64_t)bytes, store_now_ms());
+    else if (status == STATUS_OK && state == SCENE_REJECTED)
+        status = sql_run(&store->sql, err,
+                         "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
+                         (int)SCENE_CHECKING, id);
+    status = store_end(store, status, 0, err);
+    *existed = status == STATUS_OK && state >= 0;
+    return status;
+}
+
+/* The end of a check. */
+static enum status conclude(struct store *store, const char *id, enum scene_state to,
+                            const char *problems, const char *facts, struct error *err) {
+    int64_t state = -1;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = state_of(store, id, &state, err);
+    if (status == STATUS_OK && state < 0)
+        status = not_found(id, err);
+    else if (status == STATUS_OK && state != SCENE_CHECKING)
+        status = error_set(err, STATUS_CONFLICT, "scene %s is %s, not being checked", id,
+                           scene_state_name((enum scene_state)state));
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE scenes SET state = ?, problems = ?, facts = ? WHERE id = ?",
+                         "nttt", (int)to, problems, facts, id);
+    return store_end(store, status, 0, err);
+}
+
+enum status store_scene_ready(struct store *store, const char *id, const char *facts,
+                              struct error *err) {
+    return conclude(store, id, SCENE_READY, "[]", facts, err);
+}
+
+enum status store_scene_reject(struct store *store, const char *id, const char *problems,
+                               struct error *err) {
+    return conclude(store, id, SCENE_REJECTED, problems, "{}", err);
+}
+
+enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
+                            struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *row = (struct scene_row){0};
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT " COLUMNS " FROM scenes WHERE id = ?", "t", id);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        fill(row, stmt);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? not_found(id, err) : status;
+}
+
+enum status store_scene_find(struct store *store, const char *prefix, struct scene_row *row,
+                             struct error *err) {
+    *row = (struct scene_row){0};
+    size_t length = strlen(prefix);
+    if (length < 4 || length >= SCENE_ID_SIZE ||
+        strspn(prefix, "0123456789abcdef") != length)
+        return not_found(prefix, err);
+    sqlite3_stmt *stmt;
+    bool found = false, another = false;
+    store_lock(store);
+    /* 'g' follows every hex digit. */
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT " COLUMNS " FROM scenes"
+                                   " WHERE id >= ?1 AND id < ?1 || 'g' LIMIT 2",
+                                   "t", prefix);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        fill(row, stmt);
+        status = sql_step(&store->sql, stmt, &another, err);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    if (status == STATUS_OK && !found)
+        return not_found(prefix, err);
+    if (status == STATUS_OK && another)
+        status = error_set(err, STATUS_CONFLICT, "more than one scene's id begins with %s", prefix);
+    if (status != STATUS_OK)
+        scene_row_release(row);
+    return status;
+}
+
+enum status store_scene_list(struct store *store, const char *cursor, size_t limit,
+                             struct scene_row *rows, size_t *count, char next_cursor[128],
+                             struct error *err) {
+    long long before_ms = INT64_MAX;
+    char before_id[SCENE_ID_SIZE] = "";
+    char rest;
+    *count = 0;
+    next_cursor[0] = '\0';
+    if (cursor[0] && sscanf(cursor, "%lld-%64[0-9a-f]%c", &before_ms, before_id, &rest) != 2)
+        return error_set(err, STATUS_INPUT, "\"%.64s\" is no cursor of a list of scenes", cursor);
+    sqlite3_stmt *stmt;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT " COLUMNS " FROM scenes WHERE (created_ms, id) < (?, ?)"
+                                   " ORDER BY created_ms DESC, id DESC LIMIT ?",
+                                   "iti", (int64_t)before_ms, before_id, (int64_t)limit + 1);
+    bool row = status == STATUS_OK;
+    while (row && *count <= limit) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        if (*count == limit) { /* one more than asked for: there is another page */
+            if (limit > 0)
+                snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms,
+                         rows[limit - 1].id);
+            sqlite3_reset(stmt);
+            break;
+        }
+        fill(&rows[(*count)++], stmt);
+    }
+    store_unlock(store);
+    return status;
+}
+
+enum status store_scene_delete(struct store *store, const char *id, struct error *err) {
+    int64_t state = -1, user = 0;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = state_of(store, id, &state, err);
+    if (status == STATUS_OK && state < 0)
+        status = not_found(id, err);
+    else if (status == STATUS_OK && state == SCENE_CHECKING)
+        status = error_set(err, STATUS_CONFLICT, "scene %s is being checked", id);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &user, err,
+                         "SELECT id FROM jobs WHERE scene_id = ? AND state <= 2 LIMIT 1", "t", id);
+    if (status == STATUS_OK && user > 0) {
+        error_set(err, STATUS_CONFLICT, "job %lld still uses scene %s", (long long)user, id);
+        status = error_hint(err, "Cancel the job or wait for its end.");
+    }
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
+    return store_end(store, status, 0, err);
+}
+
+enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
+                                       struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT id FROM scenes WHERE state = ?"
+                                   " ORDER BY created_ms, id LIMIT 1",
+                                   "n", (int)SCENE_CHECKING);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        snprintf(id, SCENE_ID_SIZE, "%s", sql_text(stmt, 0));
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found
+               ? error_set(err, STATUS_NOT_FOUND, "no scene waits to be checked")
+               : status;
+}

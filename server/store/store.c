@@ -1,0 +1,154 @@
+/* store.c -- opening, migrating and closing state.db, and its transactions; see store.h. */
+#include "server/store/store.h"
+
+#include <sys/stat.h>
+#include <time.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+int64_t store_now_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+void store_lock(struct store *store) {
+    pthread_mutex_lock(&store->mutex);
+}
+
+void store_unlock(struct store *store) {
+    pthread_mutex_unlock(&store->mutex);
+}
+
+enum status store_begin(struct store *store, struct error *err) {
+    store_lock(store);
+    enum status status = sql_begin(&store->sql, err);
+    if (status != STATUS_OK)
+        store_unlock(store);
+    return status;
+}
+
+enum status store_end(struct store *store, enum status status, int64_t changed_job,
+                      struct error *err) {
+    status = sql_end(&store->sql, status, err);
+    store_unlock(store);
+    if (status == STATUS_OK && changed_job != STORE_NOTHING_CHANGED && store->changed)
+        store->changed(store->changed_user, changed_job);
+    return status;
+}
+
+/* Each step and its version number are one transaction: a crash leaves a whole version. */
+static enum status migrate(struct store *store, struct error *err) {
+    int64_t version;
+    enum status status = sql_int(&store->sql, 0, &version, err, "PRAGMA user_version", "");
+    if (status != STATUS_OK)
+        return status;
+    if (version > schema_version) {
+        error_set(err, STATUS_CONFLICT,
+                  "%s has schema version %lld, this program knows versions up to %d",
+                  store->sql.path, (long long)version, schema_version);
+        return error_hint(err, "Run the newer program that last used this data folder.");
+    }
+    for (; status == STATUS_OK && version < schema_version; version++) {
+        char *number = mem_printf("PRAGMA user_version=%lld", (long long)version + 1);
+        status = sql_begin(&store->sql, err);
+        if (status == STATUS_OK) {
+            status = sql_script(&store->sql, schema_steps[version], err);
+            if (status == STATUS_OK)
+                status = sql_script(&store->sql, number, err);
+            status = sql_end(&store->sql, status, err);
+        }
+        mem_free(number);
+    }
+    return status;
+}
+
+enum status store_open(struct store **out, const char *dir, struct error *err) {
+    *out = NULL;
+    struct store *store = mem_calloc(1, sizeof *store);
+    pthread_mutex_init(&store->mutex, NULL);
+    char *path = file_join(dir, "state.db");
+    enum status status = sql_open(&store->sql, path, SQL_WAL, 0, err);
+    if (status == STATUS_OK)
+        status = sql_check(&store->sql, err);
+    if (status == STATUS_OK)
+        status = migrate(store, err);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err); /* a new file's name is on disk too */
+    mem_free(path);
+    if (status != STATUS_OK)
+        store_close(store);
+    else
+        *out = store;
+    return status;
+}
+
+void store_close(struct store *store) {
+    if (!store)
+        return;
+    sql_close(&store->sql);
+    pthread_mutex_destroy(&store->mutex);
+    mem_free(store);
+}
+
+const char *store_library_version(void) {
+    return sqlite3_libversion();
+}
+
+void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user) {
+    store->changed = changed;
+    store->changed_user = user;
+}
+
+enum status store_probe(struct store *store, struct error *err) {
+    int64_t now = store_now_ms(), found = 0;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err, "INSERT OR REPLACE INTO probe (id, at_ms) VALUES (1, ?)",
+                     "i", now);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &found, err, "SELECT at_ms FROM probe WHERE id = 1", "");
+    if (status == STATUS_OK && found != now)
+        status = error_set(err, STATUS_CORRUPT, "%s: a row read back differs", store->sql.path);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+static enum status count_by_state(struct store *store, const char *text, int64_t *counts,
+                                  size_t limit, struct error *err) {
+    sqlite3_stmt *stmt;
+    enum status status = sql_query(&store->sql, &stmt, err, text, "");
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (row && (uint64_t)sqlite3_column_int64(stmt, 0) < limit)
+            counts[sqlite3_column_int64(stmt, 0)] = sqlite3_column_int64(stmt, 1);
+    }
+    return status;
+}
+
+enum status store_count(struct store *store, struct store_counts *counts, struct error *err) {
+    *counts = (struct store_counts){0};
+    store_lock(store);
+    enum status status = count_by_state(store, "SELECT state, count(*) FROM jobs GROUP BY state",
+                                        counts->jobs_by_state, JOB_STATE_COUNT, err);
+    if (status == STATUS_OK)
+        status = count_by_state(store, "SELECT state, count(*) FROM scenes GROUP BY state",
+                                counts->scenes_by_state, SCENE_STATE_COUNT, err);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &counts->attempts, err,
+                         "SELECT ifnull(sum(attempt), 0) FROM jobs", "");
+    /* The highest id, not the rows that are left: it only grows, as a counter should. */
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &counts->events, err,
+                         "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
+    char *wal = mem_printf("%s-wal", store->sql.path);
+    store_unlock(store);
+    struct stat info;
+    if (status == STATUS_OK && stat(wal, &info) == 0)
+        counts->wal_bytes = (uint64_t)info.st_size;
+    mem_free(wal);
+    return status;
+}

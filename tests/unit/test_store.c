@@ -1,0 +1,619 @@
+/* test_store.c -- state.db: transitions against the table, fencing, keys, events, migration. */
+#include "server/store/store.h"
+
+#include <fcntl.h>
+#include <limits.h>
+#include <pthread.h>
+#include <sqlite3.h>
+
+#include "common/buf.h"
+#include "common/file.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "tests/check.h"
+
+#define SCENE_A "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
+#define SCENE_B "abbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
+#define SCENE_C "aaaacccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
+
+static struct error err;
+
+#define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
+#define IS(call, wanted) CHECK_THAT((call) == (wanted), "%s", err.message)
+
+static char *fresh_dir(void) {
+    char *dir = mem_strdup("/tmp/unbake-test-store-XXXXXX");
+    if (!mkdtemp(dir))
+        exit(1);
+    return dir;
+}
+
+static void drop_dir(char *dir) {
+    OK(file_remove_tree(dir, &err));
+    mem_free(dir);
+}
+
+static void add_ready_scene(struct store *store, const char *id) {
+    bool existed;
+    OK(store_scene_add(store, id, "room", 10, &existed, &err));
+    OK(store_scene_ready(store, id, "{}", &err));
+}
+
+static int64_t add_job(struct store *store, const char *scene, int priority) {
+    struct job_new new = {.scene_id = scene, .name = "n", .labels = "{}", .settings = "{}",
+                          .priority = priority, .max_attempts = 2};
+    int64_t id = 0;
+    bool replayed;
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    CHECK(!replayed);
+    return id;
+}
+
+/* --- transitions ----------------------------------------------------------------------------- */
+
+/* A job in each condition it can be in: the states, and running with each wish. */
+enum condition { QUEUED, RUNNING, PAUSING, CANCELLING, PAUSED, SUCCEEDED, FAILED, CANCELLED, CONDITIONS };
+
+static int64_t job_in(struct store *store, enum condition condition, int *attempt) {
+    int64_t id = add_job(store, SCENE_A, 0);
+    *attempt = 0;
+    if (condition == PAUSED)
+        OK(store_job_pause(store, id, &err));
+    if (condition == CANCELLED)
+        OK(store_job_cancel(store, id, &err));
+    if (condition == QUEUED || condition == PAUSED || condition == CANCELLED)
+        return id;
+    OK(store_job_start(store, id, attempt, &err));
+    if (condition == PAUSING)
+        OK(store_job_pause(store, id, &err));
+    if (condition == CANCELLING)
+        OK(store_job_cancel(store, id, &err));
+    if (condition == SUCCEEDED)
+        OK(store_job_succeed(store, id, *attempt, &err));
+    if (condition == FAILED)
+        OK(store_job_fail(store, id, *attempt, "why", "do", &err));
+    return id;
+}
+
+static enum condition condition_of(struct store *store, int64_t id) {
+    static const enum condition plain[] = {
+        [JOB_QUEUED] = QUEUED, [JOB_RUNNING] = RUNNING, [JOB_PAUSED] = PAUSED,
+        [JOB_SUCCEEDED] = SUCCEEDED, [JOB_FAILED] = FAILED, [JOB_CANCELLED] = CANCELLED};
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    enum condition found = plain[job.state];
+    if (job.wanted != JOB_WANT_RUN) {
+        CHECK(job.state == JOB_RUNNING);
+        found = job.wanted == JOB_WANT_PAUSE ? PAUSING : CANCELLING;
+    }
+    job_release(&job);
+    return found;
+}
+
+static int64_t event_count;
+static char last_event[256];
+static void count_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
+                        const char *data) {
+    (void)user, (void)id, (void)at_ms, (void)attempt, (void)type;
+    event_count++;
+    snprintf(last_event, sizeof last_event, "%s", data);
+}
+
+static int64_t events_of(struct store *store, int64_t id) {
+    event_count = 0;
+    OK(store_event_list(store, id, 0, 1000, count_event, NULL, &err));
+    return event_count;
+}
+
+/* For each action, the condition it leads to from each condition; '-' is STATUS_CONFLICT and
+ * nothing changed, '=' is STATUS_OK and nothing changed. Letters: Queued Running paUsing
+ * caNcelling Paused Succeeded Failed Cancelled. */
+static void test_transitions(void) {
+    enum action { CANCEL, PAUSE, RESUME, RETRY, START, SUCCEED, FAIL, CRASH, STOP, BLOCK, ACTIONS };
+    static const char letters[] = "QRUNPSFC";
+    static const char *const table[ACTIONS] = {
+        /*           QRUNPSFC */
+        [CANCEL] =  "CNN=C--=",
+        [PAUSE] =   "PU=-=---",
+        [RESUME] =  "==R-Q---",
+        [RETRY] =   "------QQ",
+        [START] =   "R-------",
+        [SUCCEED] = "-SSC----",
+        [FAIL] =    "-FFC----",
+        [CRASH] =   "-QPC----",
+        [STOP] =    "-QPC----",
+        [BLOCK] =   "-PPC----",
+    };
+    char *dir = fresh_dir();
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    for (int action = 0; action < ACTIONS; action++) {
+        for (int from = 0; from < CONDITIONS; from++) {
+            int attempt, started;
+            int64_t id = job_in(store, (enum condition)from, &attempt);
+            int64_t before = events_of(store, id);
+            enum status status = STATUS_INTERNAL;
+            switch ((enum action)action) {
+            case CANCEL: status = store_job_cancel(store, id, &err); break;
+            case PAUSE: status = store_job_pause(store, id, &err); break;
+            case RESUME: status = store_job_resume(store, id, &err); break;
+            case RETRY: status = store_job_retry(store, id, 3, &err); break;
+            case START: status = store_job_start(store, id, &started, &err); break;
+            case SUCCEED: status = store_job_succeed(store, id, attempt, &err); break;
+            case FAIL: status = store_job_fail(store, id, attempt, "r", "h", &err); break;
+            case CRASH: status = store_job_crash(store, id, attempt, "r", "h", &err); break;
+            case STOP: status = store_job_stop(store, id, attempt, "r", &err); break;
+            case BLOCK: status = store_job_block(store, id, attempt, "r", "h", &err); break;
+            case ACTIONS: break;
+            }
+            char wanted = table[action][from];
+            CHECK_THAT((status == STATUS_CONFLICT) == (wanted == '-'), "action %d from %c: %s",
+                       action, letters[from], err.message);
+            CHECK(status == STATUS_OK || status == STATUS_CONFLICT);
+            bool same = wanted == '-' || wanted == '=';
+            char found = letters[condition_of(store, id)];
+            CHECK_THAT(found == (same ? letters[from] : wanted), "action %d from %c gave %c",
+                       action, letters[from], found);
+            CHECK_THAT(events_of(store, id) == before + !same, "action %d from %c: events", action,
+                       letters[from]);
+        }
+    }
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- the life of attempts -------------------------------------------------------------------- */
+
+static void test_attempts(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    int64_t id = add_job(store, SCENE_A, 0);
+    int first, second, third;
+    struct job job;
+    OK(store_job_start(store, id, &first, &err));
+    OK(store_job_crash(store, id, first, "signal 11", "", &err));
+    OK(store_job_start(store, id, &second, &err));
+    CHECK(second == first + 1);
+
+    /* The first attempt's process is still there and reports: every report is refused. */
+    IS(store_event_add(store, id, first, EVENT_LOG, "{}", &err), STATUS_CONFLICT);
+    IS(store_output_put(store, id, first, EVENT_OUTPUT, "a.exr", 1, SCENE_A, "x/y", &err),
+       STATUS_CONFLICT);
+    IS(store_job_succeed(store, id, first, &err), STATUS_CONFLICT);
+    IS(store_job_fail(store, id, first, "", "", &err), STATUS_CONFLICT);
+    IS(store_job_crash(store, id, first, "", "", &err), STATUS_CONFLICT);
+    IS(store_job_stop(store, id, first, "", &err), STATUS_CONFLICT);
+    IS(store_job_block(store, id, first, "", "", &err), STATUS_CONFLICT);
+    CHECK(condition_of(store, id) == RUNNING);
+
+    /* A stop that we asked for costs no attempt, the second crash is the last. */
+    OK(store_job_stop(store, id, second, "shutdown", &err));
+    OK(store_job_start(store, id, &third, &err));
+    OK(store_job_crash(store, id, third, "signal 6", "try less", &err));
+    OK(store_job_get(store, id, &job, &err));
+    CHECK(job.state == JOB_FAILED && job.attempt == third && job.attempts_left == 0);
+    CHECK_STRING(job.reason, "signal 6");
+    CHECK_STRING(job.hint, "try less");
+    CHECK(job.finished_ms > 0);
+    job_release(&job);
+    CHECK(strstr((events_of(store, id), last_event), "\"reason\":\"signal 6\"") != NULL);
+
+    /* A retry is a new life, but numbers of attempts are not used again. */
+    OK(store_job_retry(store, id, 2, &err));
+    OK(store_job_start(store, id, &first, &err));
+    CHECK(first == third + 1);
+    OK(store_job_get(store, id, &job, &err));
+    CHECK(job.attempts_left == 2 && job.reason[0] == '\0' && job.finished_ms == 0);
+    job_release(&job);
+    store_close(store);
+    drop_dir(dir);
+}
+
+static void test_reconcile(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    size_t requeued;
+    int attempt;
+    int64_t id[CONDITIONS];
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    for (int i = 0; i < CONDITIONS; i++)
+        id[i] = job_in(store, (enum condition)i, &attempt);
+    store_close(store);
+    OK(store_open(&store, dir, &err));
+    OK(store_reconcile(store, &requeued, &err));
+    CHECK(requeued == 3);
+    static const enum condition after[CONDITIONS] = {
+        [QUEUED] = QUEUED, [RUNNING] = QUEUED, [PAUSING] = PAUSED, [CANCELLING] = CANCELLED,
+        [PAUSED] = PAUSED, [SUCCEEDED] = SUCCEEDED, [FAILED] = FAILED, [CANCELLED] = CANCELLED};
+    for (int i = 0; i < CONDITIONS; i++)
+        CHECK_THAT(condition_of(store, id[i]) == after[i], "condition %d", i);
+    struct job job;
+    OK(store_job_get(store, id[RUNNING], &job, &err));
+    CHECK(job.attempts_left == 2); /* a restart is not the job's fault */
+    job_release(&job);
+    OK(store_reconcile(store, &requeued, &err));
+    CHECK(requeued == 0);
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- jobs -------------------------------------------------------------------------------------- */
+
+static void test_queue(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    bool existed, replayed;
+    int64_t next = 0, ids[8];
+    enum job_wanted wanted[8];
+    size_t count;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    IS(store_job_next(store, &next, &err), STATUS_NOT_FOUND);
+    add_ready_scene(store, SCENE_A);
+    OK(store_scene_add(store, SCENE_B, "unchecked", 1, &existed, &err));
+    int64_t waits = add_job(store, SCENE_B, 100);
+    int64_t low = add_job(store, SCENE_A, -1), old = add_job(store, SCENE_A, 1);
+    int64_t young = add_job(store, SCENE_A, 1);
+    int64_t order[] = {old, young, low};
+    for (size_t i = 0; i < 3; i++) {
+        OK(store_job_next(store, &next, &err));
+        CHECK(next == order[i]);
+        OK(store_job_start(store, next, &attempt, &err));
+    }
+    IS(store_job_next(store, &next, &err), STATUS_NOT_FOUND);
+    OK(store_scene_reject(store, SCENE_B, "[]", &err));
+    OK(store_job_next(store, &next, &err));
+    CHECK(next == waits);
+    OK(store_job_pause(store, young, &err));
+    OK(store_job_running(store, 8, ids, wanted, &count, &err));
+    CHECK(count == 3 && ids[0] == low && wanted[2] == JOB_WANT_PAUSE && wanted[0] == JOB_WANT_RUN);
+
+    /* Limits, unknown and rejected scenes. */
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
+                          .max_attempts = 3, .idempotency_key = "k1", .request_sha256 = "r1"};
+    int64_t id, again;
+    IS(store_job_add(store, &new, 1, &id, &replayed, &err), STATUS_LIMIT);
+    OK(store_job_add(store, &new, 2, &id, &replayed, &err));
+    CHECK(!replayed);
+    /* The same key answers with the same job, even when the queue is full. */
+    OK(store_job_add(store, &new, 1, &again, &replayed, &err));
+    CHECK(replayed && again == id);
+    new.request_sha256 = "r2";
+    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
+    new.idempotency_key = NULL;
+    new.scene_id = SCENE_B;
+    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
+    new.scene_id = "nothing";
+    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_NOT_FOUND);
+
+    /* Edits. */
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    int64_t revision = job.revision;
+    job_release(&job);
+    OK(store_job_patch(store, id, revision, "new", NULL, INT_MIN, &err));
+    IS(store_job_patch(store, id, revision, "newer", NULL, INT_MIN, &err), STATUS_CONFLICT);
+    OK(store_job_patch(store, id, -1, NULL, "{\"a\":\"b\"}", 7, &err));
+    OK(store_job_get(store, id, &job, &err));
+    CHECK_STRING(job.name, "new");
+    CHECK_STRING(job.labels, "{\"a\":\"b\"}");
+    CHECK(job.priority == 7 && job.revision == revision + 2);
+    job_release(&job);
+    IS(store_job_patch(store, 999, -1, "x", NULL, INT_MIN, &err), STATUS_NOT_FOUND);
+
+    /* Pages. */
+    struct job jobs[3];
+    OK(store_job_list(store, -1, 0, 3, jobs, &count, &err));
+    CHECK(count == 3 && jobs[0].id == id && jobs[2].id == old);
+    for (size_t i = 0; i < count; i++)
+        job_release(&jobs[i]);
+    OK(store_job_list(store, JOB_RUNNING, young, 3, jobs, &count, &err));
+    CHECK(count == 2 && jobs[0].id == old && jobs[1].id == low);
+    for (size_t i = 0; i < count; i++)
+        job_release(&jobs[i]);
+
+    IS(store_job_delete(store, young, &err), STATUS_CONFLICT);
+    OK(store_job_delete(store, id, &err));
+    IS(store_job_get(store, id, &job, &err), STATUS_NOT_FOUND);
+    CHECK(events_of(store, id) == 0);
+    int64_t fresh = add_job(store, SCENE_A, 0);
+    CHECK(fresh > id);
+    struct store_counts counts;
+    OK(store_count(store, &counts, &err));
+    CHECK(counts.jobs_by_state[JOB_RUNNING] == 3 && counts.jobs_by_state[JOB_QUEUED] == 2);
+    CHECK(counts.scenes_by_state[SCENE_REJECTED] == 1 && counts.attempts == 3);
+    OK(store_probe(store, &err));
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- scenes ------------------------------------------------------------------------------------ */
+
+static void test_scenes(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    struct scene_row row, rows[2];
+    bool existed;
+    char id[SCENE_ID_SIZE], cursor[128];
+    size_t count;
+    OK(store_open(&store, dir, &err));
+    IS(store_scene_next_unchecked(store, id, &err), STATUS_NOT_FOUND);
+    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err));
+    CHECK(!existed);
+    OK(store_scene_next_unchecked(store, id, &err));
+    CHECK_STRING(id, SCENE_A);
+    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
+    IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
+    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err)); /* checked again */
+    CHECK(existed);
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(row.state == SCENE_CHECKING && row.bytes == 10);
+    CHECK_STRING(row.problems, "[]");
+    scene_row_release(&row);
+    OK(store_scene_ready(store, SCENE_A, "{\"n\":1}", &err));
+    OK(store_scene_add(store, SCENE_A, "other name", 10, &existed, &err));
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(row.state == SCENE_READY);
+    CHECK_STRING(row.name, "one");
+    CHECK_STRING(row.facts, "{\"n\":1}");
+    scene_row_release(&row);
+
+    OK(store_scene_find(store, "aaaa", &row, &err));
+    scene_row_release(&row);
+    IS(store_scene_find(store, "aaa", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, "bbbb", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, "aaaa%", &row, &err), STATUS_NOT_FOUND);
+    OK(store_scene_add(store, SCENE_C, "odd", 1, &existed, &err));
+    IS(store_scene_find(store, "aaaa", &row, &err), STATUS_CONFLICT);
+    OK(store_scene_reject(store, SCENE_C, "[]", &err));
+    OK(store_scene_delete(store, SCENE_C, &err));
+
+    OK(store_scene_add(store, SCENE_B, "two", 1, &existed, &err));
+    cursor[0] = '\0';
+    size_t seen = 0;
+    do {
+        char at[128];
+        memcpy(at, cursor, sizeof at);
+        OK(store_scene_list(store, at, 1, rows, &count, cursor, &err));
+        seen += count;
+        for (size_t i = 0; i < count; i++)
+            scene_row_release(&rows[i]);
+    } while (cursor[0] && seen < 10);
+    CHECK(seen == 2);
+    IS(store_scene_list(store, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
+
+    int64_t job = add_job(store, SCENE_A, 0);
+    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    OK(store_job_cancel(store, job, &err));
+    OK(store_scene_delete(store, SCENE_A, &err));
+    IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
+    IS(store_job_retry(store, job, 3, &err), STATUS_CONFLICT); /* nothing to work on */
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- events and outputs ------------------------------------------------------------------------ */
+
+struct replay {
+    int64_t last;
+    size_t count, progress_count;
+};
+
+static void replay_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
+                       const char *data) {
+    struct replay *replay = user;
+    (void)data;
+    CHECK(id > replay->last && at_ms > 0 && attempt >= 0);
+    replay->last = id;
+    replay->count++;
+    replay->progress_count += strcmp(type, EVENT_PROGRESS) == 0;
+}
+
+static int64_t changed_job;
+static int changed_count;
+static void on_change(void *user, int64_t job_id) {
+    (void)user;
+    changed_job = job_id;
+    changed_count++;
+}
+
+static void test_events(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    store_on_change(store, on_change, NULL);
+    add_ready_scene(store, SCENE_A);
+    CHECK(changed_job == 0 && changed_count == 2);
+    int64_t id = add_job(store, SCENE_A, 0), other = add_job(store, SCENE_A, 0);
+    OK(store_job_start(store, id, &attempt, &err));
+    CHECK(changed_job == id);
+    for (int i = 0; i < 20; i++) {
+        char text[128];
+        snprintf(text, sizeof text, "{\"stage\":\"refine\",\"done\":%d,\"total\":20,\"eta_sec\":3}", i);
+        OK(store_event_add(store, id, attempt, EVENT_PROGRESS, text, &err));
+        OK(store_event_add(store, id, attempt, EVENT_METRIC, "{\"step\":1}", &err));
+    }
+    IS(store_event_add(store, id, attempt, EVENT_PROGRESS, "{\"done\":", &err), STATUS_INPUT);
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    CHECK_STRING(job.stage, "refine");
+    CHECK_NEAR(job.progress, 0.95, 1e-9);
+    CHECK_NEAR(job.eta_sec, 3.0, 0);
+    job_release(&job);
+
+    /* Replay in pieces sees each event once and in order, and only the newest progress. */
+    struct replay whole = {0}, pieces = {0};
+    OK(store_event_list(store, id, 0, 1000, replay_one, &whole, &err));
+    CHECK(whole.count == 2 + 20 + 1 && whole.progress_count == 1);
+    size_t before;
+    do {
+        before = pieces.count;
+        OK(store_event_list(store, id, pieces.last, 7, replay_one, &pieces, &err));
+    } while (pieces.count > before);
+    CHECK(pieces.count == whole.count && pieces.last == whole.last);
+    CHECK(events_of(store, other) == 1);
+
+    /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
+    static const char *const bad[] = {"", "/etc/passwd", "../x", "a/../b", "a//b", ".hidden",
+                                      "a/.b", "a b", "x/", "caf\xc3\xa9"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err),
+           STATUS_INPUT);
+    IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png",
+                        &err));
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png",
+                        &err));
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A,
+                        "image/x-exr", &err));
+    struct output_row row, *rows;
+    size_t count;
+    OK(store_output_get(store, id, "preview/a.png", &row, &err));
+    CHECK(row.bytes == 2 && row.attempt == attempt);
+    CHECK_STRING(row.sha256, SCENE_B);
+    output_row_release(&row);
+    IS(store_output_get(store, id, "nothing", &row, &err), STATUS_NOT_FOUND);
+    OK(store_output_list(store, id, &rows, &count, &err));
+    CHECK(count == 2);
+    CHECK_STRING(rows[0].name, "base_color.exr");
+    for (size_t i = 0; i < count; i++)
+        output_row_release(&rows[i]);
+    mem_free(rows);
+    CHECK(events_of(store, id) == (int64_t)whole.count + 3);
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- opening ----------------------------------------------------------------------------------- */
+
+static void run_sql(const char *dir, const char *sql) {
+    char *path = file_join(dir, "state.db"), *message = NULL;
+    sqlite3 *db;
+    CHECK(sqlite3_open(path, &db) == SQLITE_OK);
+    CHECK_THAT(sqlite3_exec(db, sql, NULL, NULL, &message) == SQLITE_OK, "%s", message);
+    sqlite3_free(message);
+    sqlite3_close(db);
+    mem_free(path);
+}
+
+static void test_opening(void) {
+    char *dir = fresh_dir();
+    struct store *store, *second;
+    OK(store_open(&store, dir, &err));
+    IS(store_open(&second, dir, &err), STATUS_UNAVAILABLE); /* one connection, ever */
+    CHECK(second == NULL);
+    store_close(store);
+
+    run_sql(dir, "PRAGMA user_version=1000");
+    IS(store_open(&store, dir, &err), STATUS_CONFLICT);
+    CHECK(strstr(err.message, "1000") != NULL && err.hint[0]);
+    drop_dir(dir);
+
+    /* A folder of the first schema. */
+    dir = fresh_dir();
+    struct buf text;
+    buf_init(&text, 1 << 20);
+    OK(file_read("tests/data/state_v1.sql", &text, &err));
+    run_sql(dir, buf_text(&text));
+    buf_release(&text);
+    OK(store_open(&store, dir, &err));
+    struct job job;
+    OK(store_job_get(store, 7, &job, &err));
+    CHECK_STRING(job.name, "first");
+    CHECK(job.priority == 5 && job.attempt == 2 && job.state == JOB_RUNNING);
+    job_release(&job);
+    struct output_row row;
+    OK(store_output_get(store, 7, "base_color.exr", &row, &err));
+    output_row_release(&row);
+    OK(store_event_add(store, 7, 2, EVENT_LOG, "{}", &err));
+    struct replay replay = {0};
+    OK(store_event_list(store, 7, 0, 10, replay_one, &replay, &err));
+    CHECK(replay.count == 2 && replay.last == 42);
+    store_close(store);
+    drop_dir(dir);
+
+    /* Damage in the middle of the file is found at the start. */
+    dir = fresh_dir();
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    for (int i = 0; i < 50; i++)
+        add_job(store, SCENE_A, 0);
+    store_close(store);
+    char *path = file_join(dir, "state.db");
+    int fd = open(path, O_RDWR);
+    char noise[8192];
+    memset(noise, 0x5a, sizeof noise);
+    CHECK(pwrite(fd, noise, sizeof noise, 12288) == (ssize_t)sizeof noise);
+    close(fd);
+    IS(store_open(&store, dir, &err), STATUS_CORRUPT);
+    fd = open(path, O_RDWR | O_TRUNC);
+    CHECK(write(fd, noise, sizeof noise) == (ssize_t)sizeof noise);
+    close(fd);
+    IS(store_open(&store, dir, &err), STATUS_CORRUPT);
+    mem_free(path);
+    drop_dir(dir);
+}
+
+/* Many threads submit with one key: one job comes of it. */
+struct race {
+    struct store *store;
+    int64_t id[50];
+    int made;
+};
+
+static void *submit_many(void *argument) {
+    struct race *race = argument;
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
+                          .max_attempts = 3, .request_sha256 = "r"};
+    for (int i = 0; i < 50; i++) {
+        char key[16];
+        bool replayed;
+        struct error mine;
+        snprintf(key, sizeof key, "key-%d", i);
+        new.idempotency_key = key;
+        if (store_job_add(race->store, &new, 1000, &race->id[i], &replayed, &mine) != STATUS_OK)
+            abort();
+        race->made += !replayed;
+    }
+    return NULL;
+}
+
+static void test_threads(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    struct race race[4] = {{0}};
+    pthread_t thread[4];
+    int made = 0;
+    for (int i = 0; i < 4; i++) {
+        race[i].store = store;
+        CHECK(pthread_create(&thread[i], NULL, submit_many, &race[i]) == 0);
+    }
+    for (int i = 0; i < 4; i++) {
+        pthread_join(thread[i], NULL);
+        made += race[i].made;
+        CHECK(memcmp(race[i].id, race[0].id, sizeof race[0].id) == 0);
+    }
+    CHECK(made == 50);
+    store_close(store);
+    drop_dir(dir);
+}
+
+int main(void) {
+    test_transitions();
+    test_attempts();
+    test_reconcile();
+    test_queue();
+    test_scenes();
+    test_events();
+    test_opening();
+    test_threads();
+    return check_result();
+}
