@@ -1,0 +1,71 @@
+/* photograph.c -- see photograph.h. */
+#include "server/scene/photograph.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "common/mem.h"
+
+void photograph_release(struct photograph *photo) {
+    mem_free(photo->name);
+    mem_free(photo->pixel);
+    mem_free(photo->mask);
+    *photo = (struct photograph){0};
+}
+
+/* As image_float_from_half, inline: a look-up converts twelve values, and a refinement does
+ * millions of look-ups an iteration. No step meets a subnormal float, so the result does not
+ * depend on whether the thread flushes those to zero. */
+static inline float half_to_float(uint16_t half) {
+    uint32_t exponent = (half >> 10) & 31u, mantissa = half & 1023u;
+    float magnitude;
+    if (exponent == 0) {
+        magnitude = (float)mantissa * 0x1p-24f;
+    } else {
+        uint32_t bits = (exponent == 31 ? 255u : exponent + 112u) << 23 | mantissa << 13;
+        memcpy(&magnitude, &bits, sizeof magnitude);
+    }
+    return half & 0x8000u ? -magnitude : magnitude;
+}
+
+/* The two pixels and the weight of the second around place x of a row of `count` pixels. */
+static inline void taps(float x, uint32_t count, size_t index[2], float *weight) {
+    float centred = clampf(x - 0.5f, 0.0f, (float)(count - 1));
+    index[0] = (size_t)centred;
+    index[1] = index[0] + 1 < count ? index[0] + 1 : index[0];
+    *weight = centred - (float)index[0];
+}
+
+bool photograph_sample(const struct photograph *photo, float x, float y,
+                       struct photograph_sample *sample) {
+    uint32_t width = photo->camera.width, height = photo->camera.height;
+    assert(width > 0 && height > 0);
+    size_t column[2], row[2];
+    float wx, wy;
+    taps(x, width, column, &wx);
+    taps(y, height, row, &wy);
+    float value[3] = {0.0f, 0.0f, 0.0f};
+    sample->saturated[0] = sample->saturated[1] = sample->saturated[2] = false;
+    for (int k = 0; k < 4; k++) {
+        float weight = (k & 1 ? wx : 1.0f - wx) * (k & 2 ? wy : 1.0f - wy);
+        if (weight == 0.0f)
+            continue;
+        size_t at = row[k >> 1] * width + column[k & 1];
+        if (photo->mask && photo->mask[at] == 0)
+            return false;
+        for (int c = 0; c < 3; c++) {
+            float tap = half_to_float(photo->pixel[at][c]);
+            sample->saturated[c] |= tap >= photo->clip;
+            value[c] += weight * tap;
+        }
+    }
+    if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
+        return false;
+    float r = 1.0f / (photo->exposure * photo->gain.r), g = 1.0f / (photo->exposure * photo->gain.g),
+          b = 1.0f / (photo->exposure * photo->gain.b);
+    sample->radiance = rgb_make(value[0] * r, value[1] * g, value[2] * b);
+    sample->clip_radiance = rgb_make(photo->clip * r, photo->clip * g, photo->clip * b);
+    return true;
+}

@@ -1,0 +1,69 @@
+/* Bilinear look-ups in a photograph: places, borders, saturation, masks, damaged pixels. */
+#include "server/scene/photograph.h"
+
+#include "common/mem.h"
+#include "tests/check.h"
+
+/* Small whole numbers and halves as IEEE half, by hand: sign 0, bias 15. */
+#define H0 0x0000
+#define H025 0x3400
+#define H1 0x3c00
+#define H2 0x4000
+#define H_INF 0x7c00
+#define H_NAN 0x7e00
+#define H_SUBNORMAL 0x0001 /* 2^-24 */
+
+static struct photograph make(void) {
+    /* 3 x 2, red = column, green = 1 in the lower row, blue = 0.25 */
+    struct photograph p = {.exposure = 1.0f, .gain = {1.0f, 1.0f, 1.0f}, .clip = INFINITY,
+                           .camera = {.width = 3, .height = 2}};
+    p.pixel = mem_calloc(6, sizeof *p.pixel);
+    static const uint16_t red[3] = {H0, H1, H2};
+    for (int i = 0; i < 6; i++) {
+        p.pixel[i][0] = red[i % 3];
+        p.pixel[i][1] = i >= 3 ? H1 : H0;
+        p.pixel[i][2] = H025;
+    }
+    return p;
+}
+
+int main(void) {
+    struct photograph p = make();
+    struct photograph_sample s;
+    CHECK(photograph_sample(&p, 1.5f, 0.5f, &s));
+    CHECK(s.radiance.r == 1.0f && s.radiance.g == 0.0f && s.radiance.b == 0.25f);
+    CHECK(isinf(s.clip_radiance.r) && !s.saturated[0]);
+    CHECK(photograph_sample(&p, 1.75f, 0.75f, &s));
+    CHECK_NEAR(s.radiance.r, 1.25, 1e-6);
+    CHECK_NEAR(s.radiance.g, 0.25, 1e-6);
+    /* Within half a pixel of the border the border's pixel goes on. */
+    CHECK(photograph_sample(&p, 0.0f, 0.0f, &s) && s.radiance.r == 0.0f && s.radiance.g == 0.0f);
+    CHECK(photograph_sample(&p, 2.999f, 1.999f, &s) && s.radiance.r == 2.0f && s.radiance.g == 1.0f);
+
+    p.exposure = 0.5f;
+    p.gain = rgb_make(1.0f, 2.0f, 1.0f);
+    p.clip = 1.0f;
+    CHECK(photograph_sample(&p, 0.75f, 1.5f, &s));
+    CHECK_NEAR(s.radiance.r, 0.5, 1e-6);
+    CHECK_NEAR(s.radiance.g, 1.0, 1e-6);
+    CHECK(s.saturated[0] && s.saturated[1] && !s.saturated[2]); /* a tap of red 1, all of green 1 */
+    CHECK_NEAR(s.clip_radiance.r, 2.0, 1e-6);
+    CHECK_NEAR(s.clip_radiance.g, 1.0, 1e-6);
+    CHECK(photograph_sample(&p, 0.5f, 0.5f, &s) && !s.saturated[0]); /* the neighbour has no weight */
+
+    p.mask = mem_calloc(6, 1);
+    memset(p.mask, 255, 6);
+    p.mask[1] = 0;
+    CHECK(!photograph_sample(&p, 0.75f, 0.5f, &s));
+    CHECK(photograph_sample(&p, 0.5f, 0.5f, &s));
+    p.pixel[3][1] = H_NAN;
+    CHECK(!photograph_sample(&p, 0.5f, 0.9f, &s));
+    p.pixel[3][1] = H_INF;
+    CHECK(!photograph_sample(&p, 0.5f, 0.9f, &s));
+    p.pixel[3][1] = H_SUBNORMAL;
+    p.exposure = 0x1p-20f;
+    CHECK(photograph_sample(&p, 0.5f, 1.5f, &s) && s.radiance.g == 0x1p-5f);
+    photograph_release(&p);
+    CHECK(p.pixel == NULL && p.mask == NULL);
+    return check_result();
+}
