@@ -1,9 +1,9 @@
 /* gradient.h -- derivatives by all material parameters, summed in an order that does not depend
  * on threads or timing.
  *
- * Each work chunk appends to a log of its own: (texel, d rgb) entries and a dense row of
- * per-segment sums. gradient_reduce then adds the logs in chunk order, tile of texels by tile,
- * into dense or sparse sums: the same floating-point additions in the same order, whatever
+ * Each work chunk appends to a log of its own: entries of up to four neighbouring texels, and a
+ * dense row of per-segment sums. gradient_reduce then adds the logs in chunk order, tile of texels
+ * by tile, into sparse sums: the same floating-point additions in the same order, whatever
  * thread did what when. */
 #ifndef UNBAKE_RENDER_GRADIENT_H
 #define UNBAKE_RENDER_GRADIENT_H
@@ -14,23 +14,48 @@
 #include "common/parallel.h"
 #include "common/vec.h"
 
-struct gradient_log; /* of one chunk; opaque */
+/* One look-up's derivative: texels first + {0, 1, width, width + 1} get weight[k] * d. A texel
+ * with weight 0 may lie outside the texture. */
+struct gradient_entry {
+    uint32_t first;
+    float weight[4];
+    rgb d;
+};
+
+/* Sums by the parameters of one segment. */
+struct gradient_segment {
+    double d_roughness, d_specular;
+    double d_emission[3];
+};
+
+/* Of one chunk. Filled by path_batch_backward, or by hand. */
+struct gradient_log {
+    size_t entry_count, entry_capacity;
+    struct gradient_entry *entry; /* owned */
+    size_t segment_count;
+    struct gradient_segment *segment; /* [segment_count] owned */
+};
 
 /* Sums of an iteration. */
 struct gradient {
+    uint32_t width, height;  /* of the texture, texels */
     size_t texel_count;      /* distinct texels touched */
     uint32_t *texel;         /* [texel_count] ascending within a tile, tiles in order; owned */
     rgb *d_base_color;       /* [texel_count] */
-    float *weight;           /* [texel_count] sum over entries of |filter weight|: how much was seen */
+    float *weight;           /* [texel_count] sum over entries of filter weight: how much was seen */
     size_t segment_count;
     double *d_roughness;     /* [segment_count] */
     double *d_specular;      /* [segment_count] */
     double (*d_emission)[3]; /* [segment_count] */
+    struct gradient_scratch *scratch; /* owned */
 };
 
 struct gradient_log *gradient_log_new(size_t segment_count);
 void gradient_log_free(struct gradient_log *log);
-void gradient_log_clear(struct gradient_log *log);
+void gradient_log_clear(struct gradient_log *log); /* keeps the memory */
+
+/* Makes room for `count` more entries and returns the first; entry_count is the caller's to move. */
+struct gradient_entry *gradient_log_reserve(struct gradient_log *log, size_t count);
 
 struct gradient *gradient_new(uint32_t texture_width, uint32_t texture_height, size_t segment_count);
 void gradient_free(struct gradient *gradient);

@@ -3,6 +3,7 @@
 #define UNBAKE_RENDER_WORLD_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/error.h"
 #include "common/image.h"
@@ -15,18 +16,30 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
+/* All that shading needs of a triangle, in one cache line. */
+struct world_triangle {
+    vec3 normal;               /* unit, geometric */
+    float plane;               /* normal . p for points p of the triangle */
+    vec2 corner[3];            /* atlas coordinates, texels */
+    int16_t shading[3][3];     /* unit normals of the corners, times 32767 */
+    int16_t flat;              /* 1: the mesh has no shading normals */
+    uint32_t segment;
+};
+
 struct world {
     const struct mesh *mesh;          /* borrowed, all four */
     const struct segments *segments;
     const struct atlas *atlas;
     const struct materials *materials; /* may change between batches: then world_update_lights */
+    struct world_triangle *triangle;  /* [triangle_count] owned */
     struct accel *accel;              /* owned */
     struct lights *lights;            /* owned */
 };
 
 /* Builds the acceleration structure and the emitter tables. environment (latitude-longitude,
  * column over width = atan2(x, -z) / 2 pi modulo 1, row over height = acos(y) / pi) may be NULL:
- * black; it is copied. */
+ * black; it is copied. The rest must keep still and unchanged until world_release, the contents
+ * of materials excepted. */
 enum status world_init(struct world *world, const struct mesh *mesh, const struct segments *segments,
                        const struct atlas *atlas, const struct materials *materials,
                        const struct image *environment, struct parallel *pool, struct error *err);

@@ -1,0 +1,176 @@
+/* film.c -- see film.h. Rows of pixels are the work chunks; a pixel belongs to one row. */
+#include "server/render/film.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/render/sampler.h"
+
+#define BATCH 1024
+
+struct film {
+    const struct world *world;
+    const struct camera *camera;
+    const struct path_settings *settings;
+    uint32_t spp, iteration; /* spp of one group */
+    struct image *image;
+    struct slot *slot;
+};
+
+/* Scratch of one thread. */
+struct slot {
+    struct path_batch *batch;
+    struct ray *ray;
+    struct path_key *key;
+    uint32_t *pixel; /* column, of each path under way */
+    rgb *radiance;
+    rgb *sum; /* [width][FILM_GROUPS] */
+};
+
+static void trace(struct film *f, struct slot *s, size_t count) {
+    path_batch_trace(s->batch, f->world, f->settings, count, s->ray, s->key, s->radiance);
+    for (size_t i = 0; i < count; i++) {
+        rgb *sum = &s->sum[s->pixel[i] * FILM_GROUPS + s->key[i].iteration % FILM_GROUPS];
+        *sum = rgb_add(*sum, s->radiance[i]);
+    }
+}
+
+static void finish_row(const struct film *f, const struct slot *s, uint32_t y) {
+    for (uint32_t x = 0; x < f->image->width; x++) {
+        float *out = f->image->pixel + ((size_t)y * f->image->width + x) * f->image->channel_count;
+        for (int c = 0; c < 3; c++) {
+            double mean = 0.0, square = 0.0;
+            for (int g = 0; g < FILM_GROUPS; g++) {
+                rgb sum = s->sum[x * FILM_GROUPS + (uint32_t)g];
+                double value = (double)(c == 0 ? sum.r : c == 1 ? sum.g : sum.b) / f->spp;
+                mean += value / FILM_GROUPS;
+                square += value * value / FILM_GROUPS;
+            }
+            out[c] = (float)mean;
+            out[3 + c] = (float)sqrt(fmax(0.0, square - mean * mean) / (FILM_GROUPS - 1));
+        }
+    }
+}
+
+static void render_row(void *user, size_t row, int thread) {
+    struct film *f = user;
+    struct slot *s = &f->slot[thread];
+    uint32_t width = f->image->width, y = (uint32_t)row;
+    for (uint32_t i = 0; i < width * FILM_GROUPS; i++)
+        s->sum[i] = (rgb){0.0f, 0.0f, 0.0f};
+    vec3 origin = camera_origin(f->camera);
+    size_t count = 0;
+    for (uint32_t x = 0; x < width; x++) {
+        for (uint32_t i = 0; i < f->spp * FILM_GROUPS; i++) {
+            struct path_key key = {y * width + x, f->iteration * FILM_GROUPS + i / f->spp, i % f->spp};
+            uint32_t stream = sampler_key(f->settings->seed, key.index, key.iteration);
+            vec2 jitter = sampler_pair(stream, key.sample, 0);
+            s->ray[count].origin = origin;
+            s->key[count] = key;
+            s->pixel[count] = x;
+            if (camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y,
+                                 &s->ray[count].direction))
+                count++;
+            if (count == BATCH) {
+                trace(f, s, count);
+                count = 0;
+            }
+        }
+    }
+    trace(f, s, count);
+    finish_row(f, s, y);
+}
+
+uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
+                     const struct path_settings *settings, uint32_t iteration,
+                     struct parallel *pool, struct image *image) {
+    static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B"};
+    image_init(image, camera->width, camera->height, 6, names);
+    int thread_count = parallel_thread_count(pool);
+    struct slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
+    for (int i = 0; i < thread_count; i++) {
+        slot[i].batch = path_batch_new(BATCH, settings->max_depth);
+        slot[i].ray = mem_array(BATCH, sizeof *slot[i].ray);
+        slot[i].key = mem_array(BATCH, sizeof *slot[i].key);
+        slot[i].pixel = mem_array(BATCH, sizeof *slot[i].pixel);
+        slot[i].radiance = mem_array(BATCH, sizeof *slot[i].radiance);
+        slot[i].sum = mem_array((size_t)camera->width * FILM_GROUPS, sizeof *slot[i].sum);
+    }
+    uint32_t group_spp = (spp + FILM_GROUPS - 1) / FILM_GROUPS;
+    struct film film = {world, camera, settings, group_spp, iteration, image, slot};
+    parallel_for(pool, camera->height, render_row, &film);
+    uint64_t dropped = 0;
+    for (int i = 0; i < thread_count; i++) {
+        uint64_t rays, lost;
+        path_batch_counts(slot[i].batch, &rays, &lost);
+        dropped += lost;
+        path_batch_free(slot[i].batch);
+        mem_free(slot[i].ray);
+        mem_free(slot[i].key);
+        mem_free(slot[i].pixel);
+        mem_free(slot[i].radiance);
+        mem_free(slot[i].sum);
+    }
+    mem_free(slot);
+    return dropped;
+}
+
+enum { BASE_R, BASE_G, BASE_B, ROUGHNESS, SPECULAR, EMISSION_R, EMISSION_G, EMISSION_B, SEGMENT,
+       DEPTH, COVERAGE, CHANNELS };
+
+static void add_hit(const struct film *f, const struct accel_hit *hit, float depth_m, bool first,
+                    float *out) {
+    const struct materials *m = f->world->materials;
+    const struct world_triangle *t = &f->world->triangle[hit->triangle];
+    struct texture_taps taps;
+    vec2 place = atlas_point(f->world->atlas, hit->triangle, hit->b1, hit->b2);
+    texture_taps(&m->base_color, place.x, place.y, &taps);
+    rgb base = texture_gather(&m->base_color, &taps), emission = m->emission[t->segment];
+    const float value[] = {base.r, base.g, base.b, m->roughness[t->segment], m->specular[t->segment],
+                           emission.r, emission.g, emission.b};
+    for (int c = 0; c < SEGMENT; c++)
+        out[c] += value[c];
+    if (first)
+        out[SEGMENT] = (float)t->segment;
+    out[DEPTH] += depth_m;
+    out[COVERAGE] += 1.0f;
+}
+
+static void first_hit_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct film *f = user;
+    uint32_t y = (uint32_t)row;
+    vec3 origin = camera_origin(f->camera);
+    for (uint32_t x = 0; x < f->image->width; x++) {
+        float *out = f->image->pixel + ((size_t)y * f->image->width + x) * CHANNELS;
+        out[SEGMENT] = -1.0f;
+        uint32_t stream = sampler_key(f->settings->seed, y * f->image->width + x, 0);
+        for (uint32_t i = 0; i < f->spp; i++) {
+            vec2 jitter = sampler_pair(stream, i, 0);
+            vec3 direction;
+            struct accel_hit hit;
+            if (!camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &direction) ||
+                !accel_intersect(f->world->accel, origin, direction, 0.0f, INFINITY, &hit))
+                continue;
+            float along = rigid_direction(&f->camera->camera_from_world, direction).z;
+            add_hit(f, &hit, along * hit.distance_m, i == 0, out);
+        }
+        float over_all = 1.0f / (float)f->spp;
+        if (out[COVERAGE] > 0.0f)
+            out[DEPTH] /= out[COVERAGE];
+        for (int c = 0; c < SEGMENT; c++)
+            out[c] *= over_all;
+        out[COVERAGE] *= over_all;
+    }
+}
+
+void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp,
+                            uint64_t seed, struct parallel *pool, struct image *image) {
+    static const char *const names[CHANNELS] = {
+        "base_color.R", "base_color.G", "base_color.B", "roughness", "specular", "emission.R",
+        "emission.G",   "emission.B",   "segment",      "depth",     "coverage"};
+    image_init(image, camera->width, camera->height, CHANNELS, names);
+    struct path_settings settings = {1, 1, seed};
+    struct film film = {world, camera, &settings, spp, 0, image, NULL};
+    parallel_for(pool, camera->height, first_hit_row, &film);
+}

@@ -1,0 +1,245 @@
+/* light.c -- see light.h. */
+#include "server/render/light.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+
+#define PI 3.14159265358979323846
+
+/* weight[count] >= 0, not all 0. */
+static void table_make(struct light_table *t, size_t count, const float *weight) {
+    t->count = count;
+    t->total = 0.0;
+    t->cumulative = mem_array(count + 1, sizeof *t->cumulative);
+    t->guide = mem_array(count + 1, sizeof *t->guide);
+    for (size_t i = 0; i < count; i++)
+        t->total += weight[i];
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        t->cumulative[i] = (float)(sum / t->total);
+        sum += weight[i];
+    }
+    /* Trailing entries of weight 0 must keep an empty range. */
+    t->cumulative[count] = 1.0f;
+    for (size_t i = count; i-- > 0 && weight[i] == 0.0f;)
+        t->cumulative[i] = 1.0f;
+    size_t entry = 0;
+    for (size_t i = 0; i <= count; i++) {
+        while (entry + 1 < count && (double)t->cumulative[entry + 1] * (double)count <= (double)i)
+            entry++;
+        t->guide[i] = (uint32_t)entry;
+    }
+}
+
+static void table_release(struct light_table *t) {
+    mem_free(t->cumulative);
+    mem_free(t->guide);
+    memset(t, 0, sizeof *t);
+}
+
+/* The entry whose range holds u in [0, 1), and where in the range. */
+static uint32_t table_pick(const struct light_table *t, float u, float *probability, float *rest) {
+    float scaled = u * (float)t->count;
+    size_t at = (size_t)scaled < t->count ? (size_t)scaled : t->count - 1;
+    uint32_t low = t->guide[at], high = t->guide[at + 1];
+    /* Rounding of u * count may have passed a boundary: the search's ends are checked. */
+    while (low > 0 && t->cumulative[low] > u)
+        low--;
+    while (high + 1 < t->count && t->cumulative[high + 1] <= u)
+        high++;
+    while (low < high) {
+        uint32_t middle = low + (high - low) / 2;
+        if (t->cumulative[middle + 1] <= u)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    *probability = t->cumulative[low + 1] - t->cumulative[low];
+    *rest = *probability > 0.0f ? (u - t->cumulative[low]) / *probability : 0.5f;
+    return low;
+}
+
+static float row_sine(const struct lights *l, size_t row) {
+    return (float)sin(PI * ((double)row + 0.5) / (double)(l->height - 1));
+}
+
+struct lights *lights_new(const struct image *environment) {
+    struct lights *l = mem_calloc(1, sizeof *l);
+    if (!environment || environment->height < 2)
+        return l;
+    assert(environment->channel_count >= 3);
+    l->width = environment->width;
+    l->height = environment->height;
+    size_t stride = (size_t)l->width + 1;
+    l->environment = mem_array(stride * l->height, sizeof *l->environment);
+    for (size_t y = 0; y < l->height; y++) {
+        for (size_t x = 0; x < stride; x++) {
+            const float *pixel = environment->pixel +
+                                 (y * l->width + x % l->width) * environment->channel_count;
+            for (int c = 0; c < 3; c++)
+                l->environment[y * stride + x][c] =
+                    isfinite(pixel[c]) && pixel[c] > 0.0f ? pixel[c] : 0.0f;
+        }
+    }
+    size_t cell_count = (size_t)l->width * (l->height - 1);
+    float *weight = mem_array(cell_count, sizeof *weight);
+    double total = 0.0;
+    for (size_t y = 0; y + 1 < l->height; y++) {
+        for (size_t x = 0; x < l->width; x++) {
+            float sum = 0.0f;
+            for (size_t k = 0; k < 4; k++) {
+                const float *p = l->environment[(y + k / 2) * stride + x + k % 2];
+                sum += rgb_luminance((rgb){p[0], p[1], p[2]});
+            }
+            weight[y * l->width + x] = sum * row_sine(l, y);
+            total += weight[y * l->width + x];
+        }
+    }
+    if (total > 0.0) {
+        table_make(&l->cells, cell_count, weight);
+        l->environment_chance = 1.0f;
+    }
+    mem_free(weight);
+    return l;
+}
+
+static void release_triangles(struct lights *l) {
+    mem_free(l->triangle);
+    mem_free(l->emission);
+    mem_free(l->area_density);
+    table_release(&l->triangles);
+    l->triangle = NULL;
+    l->triangle_count = 0;
+}
+
+void lights_free(struct lights *l) {
+    if (!l)
+        return;
+    release_triangles(l);
+    table_release(&l->cells);
+    mem_free(l->environment);
+    mem_free(l);
+}
+
+void lights_update(struct lights *l, const struct mesh *mesh, const struct segments *segments,
+                   const struct materials *materials) {
+    release_triangles(l);
+    l->segment_count = segments->count;
+    l->emission = mem_array(segments->count, sizeof *l->emission);
+    memcpy(l->emission, materials->emission, segments->count * sizeof *l->emission);
+    l->area_density = mem_calloc(segments->count, sizeof *l->area_density);
+    for (size_t i = 0; i < mesh->triangle_count; i++)
+        l->triangle_count += rgb_luminance(l->emission[segments->of_triangle[i]]) > 0.0f;
+    float *power = mem_array(l->triangle_count, sizeof *power);
+    l->triangle = mem_array(l->triangle_count, sizeof *l->triangle);
+    size_t at = 0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        uint32_t segment = segments->of_triangle[i];
+        float luminance = rgb_luminance(l->emission[segment]);
+        if (!(luminance > 0.0f))
+            continue;
+        vec3 a = mesh->position[mesh->index[i][0]];
+        vec3 edge1 = vec3_sub(mesh->position[mesh->index[i][1]], a);
+        vec3 edge2 = vec3_sub(mesh->position[mesh->index[i][2]], a);
+        vec3 cross = vec3_cross(edge1, edge2);
+        power[at] = 0.5f * vec3_length(cross) * luminance;
+        l->triangle[at++] = (struct light_triangle){a, edge1, edge2, vec3_normalize(cross), segment};
+    }
+    double total = 0.0;
+    for (size_t i = 0; i < l->triangle_count; i++)
+        total += power[i];
+    l->environment_chance = l->cells.total > 0.0 ? (total > 0.0 ? 0.5f : 1.0f) : 0.0f;
+    if (total > 0.0) {
+        table_make(&l->triangles, l->triangle_count, power);
+        for (size_t s = 0; s < segments->count; s++)
+            l->area_density[s] = (float)((1.0 - (double)l->environment_chance) *
+                                         fmax(0.0, (double)rgb_luminance(l->emission[s])) / total);
+    }
+    mem_free(power);
+}
+
+static void sample_environment(const struct lights *l, float pick, float u, float v,
+                               struct light_sample *s) {
+    float probability, rest;
+    uint32_t cell = table_pick(&l->cells, pick, &probability, &rest);
+    uint32_t row = cell / l->width, column = cell - row * l->width;
+    double phi = 2.0 * PI * ((double)column + 0.5 + (double)u) / (double)l->width;
+    double theta = PI * ((double)row + (double)v) / (double)(l->height - 1);
+    double sine = sin(theta);
+    s->direction = (vec3){(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
+    s->point = s->normal = (vec3){0.0f, 0.0f, 0.0f};
+    s->distance_m = INFINITY;
+    s->segment = LIGHT_ENVIRONMENT;
+    s->radiance = lights_environment(l, s->direction);
+    s->pdf = lights_pdf_environment(l, s->direction);
+}
+
+void lights_sample(const struct lights *l, vec3 point, float pick, float u, float v,
+                   struct light_sample *s) {
+    float chance = l->environment_chance;
+    s->pdf = 0.0f;
+    if (pick < chance) {
+        sample_environment(l, pick / chance, u, v, s);
+        return;
+    }
+    if (!(l->triangles.total > 0.0))
+        return;
+    float probability, rest;
+    float at = fminf((pick - chance) / (1.0f - chance), 0x1.fffffep-1f);
+    const struct light_triangle *t = &l->triangle[table_pick(&l->triangles, at, &probability, &rest)];
+    float root = sqrtf(u);
+    s->point = vec3_mad(vec3_mad(t->corner, root * (1.0f - v), t->edge1), root * v, t->edge2);
+    s->normal = t->normal;
+    vec3 to = vec3_sub(s->point, point);
+    float distance2 = vec3_dot(to, to);
+    s->distance_m = sqrtf(distance2);
+    s->direction = vec3_scale(to, 1.0f / fmaxf(s->distance_m, 1e-20f));
+    s->segment = t->segment;
+    s->radiance = l->emission[t->segment];
+    float cosine = -vec3_dot(s->direction, t->normal);
+    if (cosine > 0.0f && distance2 > 0.0f)
+        s->pdf = lights_pdf_segment(l, t->segment, s->distance_m, cosine);
+}
+
+/* Column and row of a direction in the map, in units of cells, which lie between pixel centres. As
+ * in Mitsuba 3, a column's centre is half a pixel in, and the first and last row are the poles. */
+static void environment_place(const struct lights *l, vec3 d, float *x, float *y) {
+    float turn = atan2f(d.x, -d.z) * (float)(0.5 / PI) - 0.5f / (float)l->width;
+    turn -= floorf(turn);
+    *x = fminf(turn * (float)l->width, (float)l->width * 0x1.fffffep-1f);
+    float bottom = (float)(l->height - 1);
+    *y = clampf(acosf(clampf(d.y, -1.0f, 1.0f)) * (float)(1.0 / PI) * bottom, 0.0f,
+                bottom * 0x1.fffffep-1f);
+}
+
+rgb lights_environment(const struct lights *l, vec3 direction) {
+    if (l->width == 0)
+        return (rgb){0.0f, 0.0f, 0.0f};
+    float x, y;
+    environment_place(l, direction, &x, &y);
+    size_t i = (size_t)x, j = (size_t)y, stride = (size_t)l->width + 1;
+    float fx = x - (float)i, fy = y - (float)j;
+    const float(*p)[3] = (const float(*)[3])l->environment + j * stride + i;
+    float value[3];
+    for (int c = 0; c < 3; c++) {
+        float top = p[0][c] + fx * (p[1][c] - p[0][c]);
+        float bottom = p[stride][c] + fx * (p[stride + 1][c] - p[stride][c]);
+        value[c] = top + fy * (bottom - top);
+    }
+    return (rgb){value[0], value[1], value[2]};
+}
+
+float lights_pdf_environment(const struct lights *l, vec3 direction) {
+    if (!(l->environment_chance > 0.0f))
+        return 0.0f;
+    float x, y;
+    environment_place(l, direction, &x, &y);
+    size_t cell = (size_t)y * l->width + (size_t)x;
+    float probability = l->cells.cumulative[cell + 1] - l->cells.cumulative[cell];
+    float sine = sqrtf(fmaxf(1.0f - direction.y * direction.y, 1e-12f));
+    float cell_angle = (float)(2.0 * PI * PI) / ((float)l->width * (float)(l->height - 1));
+    return l->environment_chance * probability / (cell_angle * sine);
+}

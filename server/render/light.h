@@ -1,0 +1,88 @@
+/* light.h -- what light comes from: emitter triangles and the environment, and how to pick one.
+ *
+ * A triangle of an emitter segment is picked with probability proportional to its power, area
+ * times luminance, and a point on it uniformly; it emits from its front side only. The
+ * environment is a latitude-longitude map, picked by luminance times solid angle, constant
+ * within a cell of the map. With both present each gets half of the samples. */
+#ifndef UNBAKE_RENDER_LIGHT_H
+#define UNBAKE_RENDER_LIGHT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/image.h"
+#include "common/vec.h"
+#include "server/scene/materials.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+#define LIGHT_ENVIRONMENT UINT32_MAX /* in the place of an emitter's segment */
+
+struct light_triangle {
+    vec3 corner, edge1, edge2;
+    vec3 normal; /* unit, geometric, front side */
+    uint32_t segment;
+};
+
+/* A distribution over [0, count): monotone inversion of the cumulative sum, by a table that
+ * starts each search near its end, so that stratified numbers give stratified choices. */
+struct light_table {
+    size_t count;
+    double total;
+    float *cumulative; /* [count + 1], 0 to 1; owned */
+    uint32_t *guide;   /* [count + 1]: first entry whose range reaches i / count; owned */
+};
+
+struct lights {
+    size_t triangle_count;
+    struct light_triangle *triangle; /* owned */
+    struct light_table triangles;
+    size_t segment_count;
+    rgb *emission;           /* [segment_count] owned copy: what the tables were made from */
+    float *area_density;     /* [segment_count] density by area with which a point on a front face
+                              * is picked; 0 for what does not emit; owned */
+    float environment_chance;
+    uint32_t width, height;  /* of the environment; 0 when there is none */
+    float (*environment)[3]; /* [height][width + 1], last column = first; owned */
+    struct light_table cells; /* (height - 1) rows of `width` cells */
+};
+
+/* A sampled direction towards light. */
+struct light_sample {
+    vec3 point, normal; /* on the emitter; normal towards its front */
+    vec3 direction;     /* unit, from the shaded point */
+    float distance_m;   /* INFINITY for the environment */
+    float pdf;          /* by solid angle; 0: nothing to be had */
+    uint32_t segment;   /* or LIGHT_ENVIRONMENT */
+    rgb radiance;
+};
+
+struct lights *lights_new(const struct image *environment);
+void lights_free(struct lights *lights);
+
+/* Rebuilds the tables of triangles; call after emission changed. */
+void lights_update(struct lights *lights, const struct mesh *mesh, const struct segments *segments,
+                   const struct materials *materials);
+
+/* True when anything shines. */
+static inline bool lights_any(const struct lights *lights) {
+    return lights->triangles.total > 0.0 || lights->environment_chance > 0.0f;
+}
+
+/* Picks a direction as seen from `point` for numbers in [0, 1). */
+void lights_sample(const struct lights *lights, vec3 point, float pick, float u, float v,
+                   struct light_sample *sample);
+
+/* Density by solid angle with which lights_sample would have picked the emitter point met by a
+ * ray: at this distance, |cosine| on its front side. */
+static inline float lights_pdf_segment(const struct lights *lights, uint32_t segment,
+                                       float distance_m, float cosine) {
+    return lights->area_density[segment] * distance_m * distance_m / fmaxf(cosine, 1e-6f);
+}
+
+/* The environment's radiance from a unit direction (bilinear), and its density. */
+rgb lights_environment(const struct lights *lights, vec3 direction);
+float lights_pdf_environment(const struct lights *lights, vec3 direction);
+
+#endif
