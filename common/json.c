@@ -7,6 +7,7 @@
 #include "common/buf.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/utf8.h"
 
 #define MAX_DEPTH 64
 
@@ -65,28 +66,6 @@ static const char *duplicate_key(const cJSON *value) {
     return NULL;
 }
 
-/* Whether bytes form UTF-8 without overlong forms or surrogates (RFC 3629). */
-static bool utf8_valid(const unsigned char *s, size_t length, size_t *bad) {
-    size_t i = 0;
-    while (i < length) {
-        unsigned char c = s[i];
-        size_t extra = c < 0x80 ? 0 : c >= 0xc2 && c < 0xe0 ? 1 : c >= 0xe0 && c < 0xf0 ? 2
-                                  : c >= 0xf0 && c < 0xf5 ? 3 : 4;
-        *bad = i;
-        if (extra == 4 || i + extra >= length)
-            return false;
-        for (size_t k = 1; k <= extra; k++) {
-            if ((s[i + k] & 0xc0) != 0x80)
-                return false;
-        }
-        if ((c == 0xe0 && s[i + 1] < 0xa0) || (c == 0xed && s[i + 1] > 0x9f) ||
-            (c == 0xf0 && s[i + 1] < 0x90) || (c == 0xf4 && s[i + 1] > 0x8f))
-            return false;
-        i += extra + 1;
-    }
-    return true;
-}
-
 enum status json_parse(const char *text, size_t length, const char *what, cJSON **value,
                        struct error *err) {
     *value = NULL;
@@ -98,7 +77,7 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
     }
     if (memchr(text, '\0', length))
         return error_set(err, STATUS_INPUT, "%s is not JSON: it contains a NUL byte", what);
-    if (!utf8_valid((const unsigned char *)text, length, &bad)) {
+    if (!utf8_valid(text, length, &bad)) {
         locate(text, text + bad, &line, &column);
         return error_set(err, STATUS_INPUT, "%s is not UTF-8: bad byte at line %zu, column %zu",
                          what, line, column);
