@@ -51,8 +51,15 @@ struct reconstruct_hooks {
     enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
 };
 
+/* A held-out photograph and what the recovered room looks like from there. */
+struct held_out {
+    const char *name;                /* borrowed from the scene */
+    struct image photograph, render; /* linear radiance, R G B, of one size; owned */
+    double msre, psnr_db, ssim;
+};
+
 struct reconstruction {
-    const struct scene *scene;       /* borrowed */
+    struct scene *scene;             /* borrowed */
     const struct settings *settings; /* borrowed */
     struct parallel *pool;           /* borrowed */
     struct segments segments;
@@ -60,14 +67,17 @@ struct reconstruction {
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    float *confidence[2];            /* [height][width] observation count, spread of the radiance */
-    bool *is_emitter;                /* [segment_count] */
-    cJSON *report;                   /* object: figures of each stage, filled as they are known */
+    float *confidence_count;         /* [height][width] photographs that see the texel; owned */
+    float *confidence_spread;        /* [height][width] relative spread of what they show; owned */
+    bool *is_emitter;                /* [segment_count]; owned */
+    size_t held_out_count;
+    struct held_out *held_out;       /* [held_out_count]; owned */
+    cJSON *report;                   /* object: figures of each stage, filled as they are known; owned */
 };
 
-/* Runs all stages up to `report`. STATUS_CANCELLED when stopped (a checkpoint was saved). On
- * STATUS_OK the reconstruction is the caller's (reconstruct_release). */
-enum status reconstruct_run(const struct scene *scene, const struct settings *settings,
+/* Runs all stages up to `report`. Solves unknown exposures in `scene`. STATUS_CANCELLED when
+ * stopped (a checkpoint was saved). Whatever it returns, *r is to be released. */
+enum status reconstruct_run(struct scene *scene, const struct settings *settings,
                             struct parallel *pool, const struct reconstruct_hooks *hooks,
                             struct reconstruction *r, struct error *err);
 void reconstruct_release(struct reconstruction *r);

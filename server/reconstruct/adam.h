@@ -1,0 +1,31 @@
+/* adam.h -- Adam that moves only what was touched (Kingma & Ba 2015, Algorithm 1, sparse form).
+ *
+ * An entry is `width` numbers that are always touched together (the channels of a texel). Its
+ * moments decay, and its bias correction counts, per touch and not per iteration: an entry that
+ * no path reached stays where it is at no cost. */
+#ifndef UNBAKE_RECONSTRUCT_ADAM_H
+#define UNBAKE_RECONSTRUCT_ADAM_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct adam {
+    size_t count;          /* entries */
+    int width;             /* numbers an entry, at most 4 */
+    float beta1, beta2;
+    float *mean;           /* [count][width] first moment, in gradient units; owned */
+    float *square;         /* [count][width] second moment, in gradient units squared; owned */
+    uint16_t *touch_count; /* [count] touches so far, saturating; owned */
+};
+
+void adam_init(struct adam *a, size_t count, int width, float beta1, float beta2);
+void adam_release(struct adam *a);
+/* Forgets the moments of the first `count` entries. */
+void adam_reset(struct adam *a, size_t count);
+
+/* Takes the finite gradient[width] of one entry into its moments and writes the step for rate 1:
+ * step[width] = -mean / sqrt(square), corrected for bias, about 1 in size. Entries are
+ * independent: different ones may be touched at the same time. */
+void adam_touch(struct adam *a, size_t entry, const float *gradient, float *step);
+
+#endif

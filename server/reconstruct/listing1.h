@@ -1,0 +1,23 @@
+/* listing1.h -- the published algorithm (Nimier-David et al. 2021, supplemental, Listing 1).
+ *
+ * An iteration: choose texels evenly over the surface; find the point of each by the inverse UV
+ * map; draw a batch of cameras that see it; connect paths from each camera through the texel and
+ * look up the photograph there; trace with derivatives; compare two independent half-estimates
+ * with the photograph; walk the paths backwards; move every parameter that was touched by Adam.
+ *
+ * From a neutral start: grey base colour, every segment a faint emitter. Base colour is solved
+ * coarse to fine: at level L all texels of a block of 2^L x 2^L move together. After a first part
+ * of the run each segment is declared an emitter or not (emitters.h); from then on the emission
+ * of all others is exactly 0. */
+#ifndef UNBAKE_RECONSTRUCT_LISTING1_H
+#define UNBAKE_RECONSTRUCT_LISTING1_H
+
+#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/views.h"
+
+/* Works on r->materials, r->world and r->is_emitter, from a checkpoint where there is one. Adds
+ * "refine" and the loss curve to r->report. STATUS_CANCELLED when stopped. */
+enum status listing1_run(struct reconstruction *r, const struct views *views,
+                         const struct reconstruct_hooks *hooks, struct error *err);
+
+#endif

@@ -1,0 +1,94 @@
+/* metrics.c -- see metrics.h. */
+#include "server/reconstruct/metrics.h"
+
+#include <math.h>
+
+#define WINDOW 8
+
+static bool pixel_is_finite(const float *a, const float *b) {
+    for (int c = 0; c < 3; c++) {
+        if (!isfinite(a[c]) || !isfinite(b[c]))
+            return false;
+    }
+    return true;
+}
+
+double metrics_msre(const struct image *photograph, const struct image *render, double median) {
+    size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
+    double sum = 0.0;
+    for (size_t i = 0; i < pixels; i++) {
+        const float *r = photograph->pixel + 3 * i, *v = render->pixel + 3 * i;
+        if (!pixel_is_finite(r, v))
+            continue;
+        for (int c = 0; c < 3; c++) {
+            double difference = (double)v[c] - (double)r[c];
+            sum += difference * difference / ((double)r[c] * (double)r[c] + 0.01 * median * median);
+        }
+        count += 3;
+    }
+    return count ? sum / (double)count : 0.0;
+}
+
+static double shown(float radiance, double exposure) {
+    return (double)image_linear_to_srgb(fminf(fmaxf(radiance * (float)exposure, 0.0f), 1.0f));
+}
+
+double metrics_psnr_db(const struct image *photograph, const struct image *render, double exposure) {
+    size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
+    double sum = 0.0;
+    for (size_t i = 0; i < pixels; i++) {
+        const float *r = photograph->pixel + 3 * i, *v = render->pixel + 3 * i;
+        if (!pixel_is_finite(r, v))
+            continue;
+        for (int c = 0; c < 3; c++) {
+            double difference = shown(v[c], exposure) - shown(r[c], exposure);
+            sum += difference * difference;
+        }
+        count += 3;
+    }
+    return count ? 10.0 * log10((double)count / sum) : 0.0;
+}
+
+static double luminance(const struct image *image, size_t pixel, double exposure) {
+    const float *p = image->pixel + 3 * pixel;
+    return 0.2126 * shown(p[0], exposure) + 0.7152 * shown(p[1], exposure) +
+           0.0722 * shown(p[2], exposure);
+}
+
+/* Similarity of one window; NaN when it holds a non-finite pixel. */
+static double window_ssim(const struct image *a, const struct image *b, uint32_t x0, uint32_t y0,
+                          double exposure) {
+    const double n = WINDOW * WINDOW, c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
+    double sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
+    for (uint32_t y = y0; y < y0 + WINDOW; y++) {
+        for (uint32_t x = x0; x < x0 + WINDOW; x++) {
+            size_t pixel = (size_t)y * a->width + x;
+            if (!pixel_is_finite(a->pixel + 3 * pixel, b->pixel + 3 * pixel))
+                return NAN;
+            double va = luminance(a, pixel, exposure), vb = luminance(b, pixel, exposure);
+            sa += va;
+            sb += vb;
+            saa += va * va;
+            sbb += vb * vb;
+            sab += va * vb;
+        }
+    }
+    double ma = sa / n, mb = sb / n;
+    double va = saa / n - ma * ma, vb = sbb / n - mb * mb, cov = sab / n - ma * mb;
+    return (2 * ma * mb + c1) * (2 * cov + c2) / ((ma * ma + mb * mb + c1) * (va + vb + c2));
+}
+
+double metrics_ssim(const struct image *photograph, const struct image *render, double exposure) {
+    double sum = 0.0;
+    size_t count = 0;
+    for (uint32_t y = 0; y + WINDOW <= photograph->height; y += WINDOW / 2) {
+        for (uint32_t x = 0; x + WINDOW <= photograph->width; x += WINDOW / 2) {
+            double s = window_ssim(photograph, render, x, y, exposure);
+            if (!isfinite(s))
+                continue;
+            sum += s;
+            count++;
+        }
+    }
+    return count ? sum / (double)count : 0.0;
+}

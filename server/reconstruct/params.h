@@ -1,0 +1,58 @@
+/* params.h -- the unknowns of a reconstruction and how an optimiser step moves them.
+ *
+ * Base colour moves in [0, 1]; roughness and specular in [ROUGHNESS_MIN, 1] and [0, 1]; emission
+ * in the logarithm of radiance, since lamps outshine walls by factors of thousands. All of it,
+ * with the moments, is the state that a checkpoint holds. */
+#ifndef UNBAKE_RECONSTRUCT_PARAMS_H
+#define UNBAKE_RECONSTRUCT_PARAMS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/parallel.h"
+#include "server/reconstruct/adam.h"
+#include "server/render/gradient.h"
+#include "server/scene/materials.h"
+
+#define PARAMS_ROUGHNESS_MIN 0.05f
+
+/* Step sizes of one iteration. */
+struct params_rates {
+    float base_color;
+    float roughness;
+    float specular;
+    float emission;       /* in logarithms */
+    float emission_decay; /* added downward push, in Adam steps: light that nothing asks for fades */
+};
+
+struct params {
+    struct materials *materials; /* borrowed; what is moved */
+    struct adam base_color;      /* an entry a texel, or a block at coarse levels */
+    struct adam roughness, specular, emission; /* an entry a segment */
+    float (*log_emission)[3];    /* [segment_count]; owned */
+    int level;                   /* blocks of 2^level texels a side move together */
+    /* Scratch of the coarse levels; NULL at level 0; owned. */
+    float (*block_sum)[3];       /* [blocks at level 1] zero between steps */
+    uint32_t *block_stamp;       /* [blocks at level 1] the step that last listed the block */
+    uint32_t stamp;
+    uint32_t *block;             /* [block_capacity] blocks touched in this step */
+    size_t block_capacity;
+};
+
+/* Starts from the materials as they are, emission at `emission` everywhere. */
+void params_init(struct params *p, struct materials *materials, int level, float emission);
+void params_release(struct params *p);
+
+/* Goes to a finer level: the moments of base colour start anew. */
+void params_refine(struct params *p, int level);
+/* Says at which level the moments are that were restored from a checkpoint. */
+void params_set_level(struct params *p, int level);
+
+/* One step against the gradient. */
+void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
+                 struct parallel *pool);
+
+/* Sets the emission of all segments that are not emitters to exactly 0, for good. */
+void params_fix_emitters(struct params *p, const bool *is_emitter);
+
+#endif

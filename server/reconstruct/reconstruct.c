@@ -1,0 +1,143 @@
+/* reconstruct.c -- the stages in their order; see reconstruct.h. */
+#include "server/reconstruct/reconstruct.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "server/reconstruct/exposure.h"
+#include "server/reconstruct/listing1.h"
+#include "server/reconstruct/report.h"
+#include "server/reconstruct/views.h"
+
+/* Where every surface starts: a mid grey, half rough, half glossy. */
+#define NEUTRAL_BASE_COLOR 0.5f
+#define NEUTRAL_ROUGHNESS 0.5f
+#define NEUTRAL_SPECULAR 0.5f
+
+struct run {
+    struct reconstruction *r;
+    const struct reconstruct_hooks *hooks;
+    struct views views;
+    cJSON *stages; /* owned by the report */
+};
+
+static double now_sec(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Announces a stage, runs it, notes its time. */
+static enum status run_stage(struct run *run, const char *name,
+                             enum status (*stage)(struct run *, struct error *), struct error *err) {
+    double begin = now_sec();
+    run->hooks->stage(run->hooks->user, name);
+    enum status status = stage(run, err);
+    cJSON *entry = cJSON_CreateObject();
+    json_add_string(entry, "name", name);
+    json_add_number(entry, "seconds", now_sec() - begin);
+    cJSON_AddItemToArray(run->stages, entry);
+    if (status == STATUS_OK && run->hooks->stop_requested(run->hooks->user))
+        status = error_set(err, STATUS_CANCELLED, "stopped after stage %s", name);
+    return status;
+}
+
+static void make_segments(struct reconstruction *r) {
+    const struct mesh *mesh = &r->scene->mesh;
+    bool given = mesh->object_id && !settings_is(r->settings, "segmentation", "automatic");
+    if (given)
+        segments_from_object_id(&r->segments, mesh);
+    else
+        segments_automatic(&r->segments, mesh);
+    json_add_string(r->report, "segmentation", given ? "given" : "automatic");
+}
+
+static enum status prepare(struct run *run, struct error *err) {
+    struct reconstruction *r = run->r;
+    const struct mesh *mesh = &r->scene->mesh;
+    if (settings_is(r->settings, "segmentation", "given") && !mesh->object_id)
+        return error_set(err, STATUS_INPUT,
+                         "segmentation=given, but the mesh has no object_id per face");
+    make_segments(r);
+    enum status status =
+        atlas_make(&r->atlas, mesh, &r->segments, (uint32_t)settings_number(r->settings, "texture_size"),
+                   (float)settings_number(r->settings, "texels_per_metre"), err);
+    if (status != STATUS_OK)
+        return status;
+    inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
+    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR),
+                   NEUTRAL_ROUGHNESS, NEUTRAL_SPECULAR);
+    r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
+    status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
+    if (status != STATUS_OK)
+        return status;
+    views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
+    size_t solved = exposure_solve(r->scene, &run->views, &r->atlas, &r->inverse);
+    views_update_median(&run->views);
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
+    json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
+    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
+    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
+    json_add_int(figures, "segments", (int64_t)r->segments.count);
+    json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
+    json_add_int(figures, "texture_width", r->atlas.width);
+    json_add_int(figures, "texture_height", r->atlas.height);
+    json_add_number(figures, "texels_per_metre", (double)r->atlas.texels_per_metre);
+    json_add_int(figures, "valid_texels", (int64_t)r->inverse.valid_count);
+    json_add_number(figures, "atlas_utilisation",
+                    (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
+    json_add_int(figures, "training_photographs", (int64_t)run->views.train_count);
+    json_add_int(figures, "exposures_solved", (int64_t)solved);
+    json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
+    return STATUS_OK;
+}
+
+static enum status refine(struct run *run, struct error *err) {
+    return listing1_run(run->r, &run->views, run->hooks, err);
+}
+
+static enum status report(struct run *run, struct error *err) {
+    report_confidence(run->r, &run->views);
+    world_update_lights(&run->r->world);
+    return report_held_out(run->r, &run->views, run->hooks, err);
+}
+
+enum status reconstruct_run(struct scene *scene, const struct settings *settings,
+                            struct parallel *pool, const struct reconstruct_hooks *hooks,
+                            struct reconstruction *r, struct error *err) {
+    *r = (struct reconstruction){.scene = scene, .settings = settings, .pool = pool};
+    r->report = cJSON_CreateObject();
+    json_add_string(r->report, "unbake_version", UNBAKE_VERSION);
+    json_add_string(r->report, "ray_library", accel_library_version());
+    json_add(r->report, "settings", settings_to_json(settings));
+    struct run run = {.r = r, .hooks = hooks};
+    run.stages = cJSON_AddArrayToObject(r->report, "stages");
+    enum status status = run_stage(&run, "prepare", prepare, err);
+    if (status == STATUS_OK)
+        status = run_stage(&run, "refine", refine, err);
+    if (status == STATUS_OK)
+        status = run_stage(&run, "report", report, err);
+    views_release(&run.views);
+    return status;
+}
+
+void reconstruct_release(struct reconstruction *r) {
+    for (size_t i = 0; i < r->held_out_count; i++) {
+        image_release(&r->held_out[i].photograph);
+        image_release(&r->held_out[i].render);
+    }
+    mem_free(r->held_out);
+    mem_free(r->is_emitter);
+    mem_free(r->confidence_count);
+    mem_free(r->confidence_spread);
+    world_release(&r->world);
+    materials_release(&r->materials);
+    inverse_uv_release(&r->inverse);
+    atlas_release(&r->atlas);
+    segments_release(&r->segments);
+    cJSON_Delete(r->report);
+    *r = (struct reconstruction){0};
+}

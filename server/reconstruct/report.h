@@ -1,0 +1,17 @@
+/* report.h -- the last stage: what the held-out photographs say about the result. */
+#ifndef UNBAKE_RECONSTRUCT_REPORT_H
+#define UNBAKE_RECONSTRUCT_REPORT_H
+
+#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/views.h"
+
+/* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A held-out frame
+ * of unknown exposure is compared at the exposure that fits it best. STATUS_CANCELLED when stopped. */
+enum status report_held_out(struct reconstruction *r, const struct views *views,
+                            const struct reconstruct_hooks *hooks, struct error *err);
+
+/* Fills r->confidence_count and r->confidence_spread: how many training photographs see each texel
+ * and the standard deviation of the logarithm of what they show of it. */
+void report_confidence(struct reconstruction *r, const struct views *views);
+
+#endif

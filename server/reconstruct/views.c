@@ -1,0 +1,184 @@
+/* views.c -- see views.h. */
+#include "server/reconstruct/views.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "common/rng.h"
+#include "server/reconstruct/choose.h"
+
+/* Nearest cosine to grazing at which a photograph is still asked. */
+#define MIN_COSINE 0.1f
+/* A corner's hit may leave the plane of another's by this many pixel footprints, plus a
+ * relative slack for rounding, before the pixel counts as a depth edge. */
+#define EDGE_FOOTPRINTS 3.0f
+#define EDGE_RELATIVE 0.002f
+
+struct corner {
+    vec3 point;
+    vec3 normal;
+    float distance_m;
+    uint32_t segment; /* UINT32_MAX: no surface */
+};
+
+struct edge_job {
+    struct views *views;
+    const struct segments *segments;
+    uint32_t train;
+};
+
+static struct corner trace_corner(const struct edge_job *job, const struct camera *camera,
+                                  uint32_t x, uint32_t y) {
+    struct corner corner = {.segment = UINT32_MAX};
+    vec3 direction;
+    struct accel_hit hit;
+    vec3 origin = camera_origin(camera);
+    if (!camera_direction(camera, (float)x, (float)y, &direction) ||
+        !accel_intersect(job->views->accel, origin, direction, 0.0f, INFINITY, &hit))
+        return corner;
+    corner.point = vec3_mad(origin, hit.distance_m, direction);
+    corner.normal = vec3_normalize(mesh_cross(&job->views->scene->mesh, hit.triangle));
+    corner.distance_m = hit.distance_m;
+    corner.segment = job->segments->of_triangle[hit.triangle];
+    return corner;
+}
+
+static bool differ(const struct corner *a, const struct corner *b, float focal) {
+    if (a->segment != b->segment)
+        return true;
+    if (a->segment == UINT32_MAX)
+        return false;
+    vec3 between = vec3_sub(b->point, a->point);
+    float slack = a->distance_m * (EDGE_FOOTPRINTS / focal + EDGE_RELATIVE);
+    return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
+}
+
+/* One row of pixels; the corners of a row are traced twice, which a parallel loop over rows
+ * makes simpler than sharing them. */
+static void mark_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct edge_job *job = user;
+    const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
+    const struct camera *camera = &photo->camera;
+    uint8_t *out = job->views->straddles[job->train] + row * camera->width;
+    uint32_t y = (uint32_t)row;
+    struct corner left_top = trace_corner(job, camera, 0, y);
+    struct corner left_low = trace_corner(job, camera, 0, y + 1);
+    for (uint32_t x = 0; x < camera->width; x++) {
+        struct corner top = trace_corner(job, camera, x + 1, y);
+        struct corner low = trace_corner(job, camera, x + 1, y + 1);
+        out[x] = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
+                 differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
+        left_top = top;
+        left_low = low;
+    }
+}
+
+static int compare_floats(const void *a, const void *b) {
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+void views_update_median(struct views *v) {
+    const size_t per_photo = 4096; /* an even sample */
+    float *value = mem_array(v->train_count * per_photo + 1, sizeof *value);
+    size_t count = 0;
+    for (size_t t = 0; t < v->train_count; t++) {
+        const struct photograph *photo = &v->scene->photograph[v->train[t]];
+        uint32_t w = photo->camera.width, h = photo->camera.height;
+        for (size_t i = 0; i < per_photo; i++) {
+            uint64_t bits = rng_key(t, i, 0);
+            float x = (float)rng_below((uint32_t)bits, w) + 0.5f;
+            float y = (float)rng_below((uint32_t)(bits >> 32), h) + 0.5f;
+            struct photograph_sample sample;
+            if (photograph_sample(photo, x, y, &sample))
+                value[count++] = rgb_mean(sample.radiance);
+        }
+    }
+    qsort(value, count, sizeof *value, compare_floats);
+    v->median_radiance = count && value[count / 2] > 0.0f ? value[count / 2] : 1.0f;
+    mem_free(value);
+}
+
+void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
+                const struct accel *accel, struct parallel *pool) {
+    *v = (struct views){.scene = scene, .accel = accel};
+    v->train = mem_array(scene->photograph_count, sizeof *v->train);
+    v->straddles = mem_array(scene->photograph_count, sizeof *v->straddles);
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        if (!scene->photograph[i].is_test)
+            v->train[v->train_count++] = (uint32_t)i;
+    }
+    for (uint32_t t = 0; t < v->train_count; t++) {
+        const struct camera *camera = &scene->photograph[v->train[t]].camera;
+        v->straddles[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        struct edge_job job = {.views = v, .segments = segments, .train = t};
+        parallel_for(pool, camera->height, mark_row, &job);
+    }
+    views_update_median(v);
+}
+
+void views_release(struct views *v) {
+    for (size_t t = 0; t < v->train_count; t++)
+        mem_free(v->straddles[t]);
+    mem_free(v->straddles);
+    mem_free(v->train);
+    *v = (struct views){0};
+}
+
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    vec3 to_camera = vec3_sub(camera_origin(camera), point);
+    float squared = vec3_dot(to_camera, to_camera);
+    float distance = sqrtf(squared);
+    float cosine = vec3_dot(to_camera, normal);
+    float depth_m;
+    if (!(cosine > MIN_COSINE * distance) ||
+        !camera_project(camera, point, &view->x, &view->y, &depth_m))
+        return false;
+    vec3 direction = vec3_scale(to_camera, 1.0f / distance);
+    vec3 origin = accel_offset(point, normal, direction);
+    if (accel_occluded(v->accel, origin, direction, 0.0f, distance))
+        return false;
+    view->train = train;
+    view->weight = cosine / (squared * distance);
+    return true;
+}
+
+bool views_clean(const struct views *v, const struct view *view) {
+    const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
+    const uint8_t *straddles = v->straddles[view->train];
+    long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
+    for (long dy = 0; dy < 2; dy++) {
+        for (long dx = 0; dx < 2; dx++) {
+            long x = x0 + dx, y = y0 + dy;
+            if (x >= 0 && y >= 0 && x < (long)camera->width && y < (long)camera->height &&
+                straddles[y * (long)camera->width + x])
+                return false;
+        }
+    }
+    return true;
+}
+
+size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, size_t max,
+                  struct view *view) {
+    struct view unclean[VIEWS_PICK_MAX];
+    size_t count = 0, unclean_count = 0;
+    uint32_t cameras = (uint32_t)v->train_count;
+    for (uint32_t i = 0; i < cameras && count < max; i++) {
+        struct view seen;
+        if (!views_sees(v, choose_permute(i, cameras, key), point, normal, &seen))
+            continue;
+        if (views_clean(v, &seen))
+            view[count++] = seen;
+        else if (unclean_count < max)
+            unclean[unclean_count++] = seen;
+    }
+    if (count > 0)
+        return count;
+    for (size_t i = 0; i < unclean_count; i++)
+        view[i] = unclean[i];
+    return unclean_count;
+}

@@ -1,0 +1,55 @@
+/* views.h -- which photographs see a surface point, and what they show there.
+ *
+ * A photograph is consulted only where it is clean: a pixel whose four corner rays meet another
+ * segment or a depth edge mixes two surfaces, and its value belongs to neither. Where no
+ * photograph of a point is clean the unclean ones are taken. Held-out frames are never used. */
+#ifndef UNBAKE_RECONSTRUCT_VIEWS_H
+#define UNBAKE_RECONSTRUCT_VIEWS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/parallel.h"
+#include "server/render/accel.h"
+#include "server/scene/scene.h"
+#include "server/scene/segment.h"
+
+#define VIEWS_PICK_MAX 64
+
+struct views {
+    const struct scene *scene;  /* borrowed */
+    const struct accel *accel;  /* borrowed */
+    size_t train_count;
+    uint32_t *train;            /* [train_count] photographs that may be used; owned */
+    uint8_t **straddles;        /* [train_count][height * width] 1: the pixel mixes surfaces; owned */
+    float median_radiance;      /* of the training pixels (mean of the channels) */
+};
+
+/* What one photograph shows of a point. */
+struct view {
+    uint32_t train;  /* index into views.train */
+    float x, y;      /* place in the picture, pixels */
+    float weight;    /* cosine over squared distance: solid angle per area of surface, relative */
+};
+
+void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
+                const struct accel *accel, struct parallel *pool);
+void views_release(struct views *v);
+/* Takes the median anew, after exposures changed. */
+void views_update_median(struct views *v);
+
+/* Whether training photograph `train` sees the front of the point: frustum, facing, and a
+ * visibility ray. */
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
+                struct view *view);
+
+/* Whether all four pixels that a look-up at the view's place reads are clean. */
+bool views_clean(const struct views *v, const struct view *view);
+
+/* Up to `max` (at most VIEWS_PICK_MAX) photographs that see the point, in an order drawn by
+ * `key`; clean ones only, unless there is none. Returns their number. */
+size_t views_pick(const struct views *v, vec3 point, vec3 geometric_normal, uint32_t key, size_t max,
+                  struct view *view);
+
+#endif
