@@ -1,8 +1,9 @@
 /* inverse_uv.h -- from a texel back to the surface.
  *
- * A texel is valid when its square and a triangle's projection overlap in more than a sliver
- * (exact coverage, not centre sampling): thin triangles get texels too. It belongs to the triangle that
- * holds its centre; failing that, to the overlapping one with the point nearest the centre. */
+ * A texel is valid when a triangle covers any part of it (coverage.h: exact, not sampled at
+ * centres): thin triangles get texels too, and every point of the surface lands on a valid
+ * texel. It belongs to the triangle that holds its centre; failing that, to the covering one with
+ * the point nearest the centre; the lower number among equals. */
 #ifndef UNBAKE_SCENE_INVERSE_UV_H
 #define UNBAKE_SCENE_INVERSE_UV_H
 
@@ -24,12 +25,14 @@ struct inverse_uv {
                            * list are neighbours on the surface; owned */
 };
 
+/* The same for any number of threads. */
 void inverse_uv_make(struct inverse_uv *inverse, const struct atlas *atlas, size_t triangle_count,
                      struct parallel *pool);
 void inverse_uv_release(struct inverse_uv *inverse);
 
 /* Surface point for the place (x, y), in texels, inside the valid texel that contains it:
- * barycentrics on the texel's own triangle, clamped to it. False when the texel is not valid. */
+ * barycentrics on the texel's own triangle, of the point of it nearest the place. False when the
+ * texel is not valid. */
 bool inverse_uv_lookup(const struct inverse_uv *inverse, const struct atlas *atlas, float x, float y,
                        uint32_t *triangle, float *b1, float *b2);
 

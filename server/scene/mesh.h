@@ -9,6 +9,7 @@
 #include "common/vec.h"
 
 #define MESH_MAX_TRIANGLES ((size_t)1 << 28)
+#define MESH_MAX_COORDINATE_M 1e6f /* beyond it single precision resolves no room */
 
 struct mesh {
     size_t vertex_count;
@@ -24,17 +25,22 @@ struct mesh {
 
 struct mesh_report {
     size_t degenerate_count; /* triangles without area, dropped */
-    size_t duplicate_count;  /* triangles with the same three vertices as an earlier one, dropped */
+    size_t duplicate_count;  /* triangles on the same three positions as an earlier one, dropped */
 };
 
 void mesh_release(struct mesh *mesh);
 
 /* Checks indices and coordinates (STATUS_INPUT names the first bad face or vertex by its
- * number), then drops degenerate and duplicate triangles in place, keeping the order; zero or
- * non-finite normals are replaced by the mean of the adjacent faces'. Fails when no triangle is
- * left. `name` is for messages. */
+ * number, from 0), then drops degenerate and duplicate triangles in place, keeping the order:
+ * of two coincident triangles a ray meets either by chance, so only the first can be measured.
+ * Normals are made unit; zero or non-finite ones are replaced by the mean of the adjacent
+ * faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report,
                        struct error *err);
+
+/* Maps each vertex to the lowest-numbered one at the same position (files repeat vertices where
+ * normals differ). The result, [vertex_count], is the caller's (mem_free). */
+uint32_t *mesh_weld(const struct mesh *mesh);
 
 /* Twice the area times the unit geometric normal of a triangle, m^2. */
 vec3 mesh_cross(const struct mesh *mesh, size_t triangle);
@@ -46,6 +52,6 @@ static inline vec3 mesh_point(const struct mesh *mesh, size_t triangle, float b1
     return vec3_mad(p, b2, mesh->position[v[2]]);
 }
 double mesh_area(const struct mesh *mesh); /* total, m^2 */
-void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper);
+void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper); /* of the triangles */
 
 #endif
