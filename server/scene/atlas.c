@@ -1,0 +1,271 @@
+/* atlas.c -- see atlas.h: charts, drawn at a density, packed; the density is searched for.
+ *
+ * Packing works on cells of `cell` texels, 1 up to MAX_GRID texels a side and a power of two
+ * beyond, so its time does not grow with the size. Chart coordinates are rounded to units
+ * (coverage.h) before anything is decided, and charts are moved and turned by whole texels: the
+ * texels that a chart covers in the atlas are exactly those that it was packed with. */
+#include "server/scene/atlas.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/scene/atlas_chart.h"
+#include "server/scene/atlas_pack.h"
+#include "server/scene/coverage.h"
+
+#define MAX_GRID 2048     /* cells a side */
+#define INSET 2           /* units between a chart and its box: more than coverage's margin */
+#define FIRST_FILL 0.72   /* share of the texels that charts take in the first try */
+#define SEARCH_STEP 1.04  /* of the density, until one fits and one does not */
+#define SEARCH_END 1.004  /* ratio of those two at which the search ends */
+#define MIN_FILL 1e-6     /* a density that fills less is not worth having */
+
+/* The charts drawn at one density. */
+struct drawing {
+    struct pack_item *item; /* [chart_count] */
+    uint64_t *bits;
+    size_t bit_capacity;    /* words */
+};
+
+static int32_t units_of(float metres, double density) {
+    return INSET + (int32_t)lrint((double)metres * density * COVERAGE_UNITS);
+}
+
+static struct coverage_triangle place_of(const struct charts *charts, uint32_t triangle,
+                                         double density) {
+    struct coverage_triangle place;
+    for (int c = 0; c < 3; c++) {
+        place.x[c] = units_of(charts->corner[triangle][c].x, density);
+        place.y[c] = units_of(charts->corner[triangle][c].y, density);
+    }
+    return place;
+}
+
+/* Sets the boxes of all charts, in cells of `cell` units; false when one exceeds `grid` cells. */
+static bool measure(struct drawing *drawing, const struct charts *charts, double density,
+                    int32_t cell, uint32_t grid, size_t *words) {
+    *words = 0;
+    for (size_t c = 0; c < charts->count; c++) {
+        double side = (double)fmaxf(charts->extent[c].x, charts->extent[c].y) * density;
+        if (side * COVERAGE_UNITS > (double)grid * cell)
+            return false;
+        struct pack_item *item = &drawing->item[c];
+        item->width = (uint32_t)((units_of(charts->extent[c].x, density) + INSET + cell - 1) / cell);
+        item->height = (uint32_t)((units_of(charts->extent[c].y, density) + INSET + cell - 1) / cell);
+        if (item->width > grid || item->height > grid)
+            return false;
+        *words += item->height * pack_words(item->width);
+    }
+    return true;
+}
+
+/* Draws all charts at the density, in texels per metre. */
+static bool draw(struct drawing *drawing, const struct charts *charts, double density, int32_t cell,
+                 uint32_t grid) {
+    size_t words;
+    if (!measure(drawing, charts, density, cell, grid, &words))
+        return false;
+    if (words > drawing->bit_capacity) {
+        mem_free(drawing->bits);
+        drawing->bits = mem_array(words, sizeof *drawing->bits);
+        drawing->bit_capacity = words;
+    }
+    memset(drawing->bits, 0, words * sizeof *drawing->bits);
+    uint64_t *bits = drawing->bits;
+    for (size_t c = 0; c < charts->count; c++) {
+        struct pack_item *item = &drawing->item[c];
+        size_t stride = pack_words(item->width);
+        item->row = bits;
+        for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++) {
+            struct coverage_triangle place = place_of(charts, charts->triangle[i], density);
+            int32_t y0, y1, x0, x1;
+            coverage_rows(&place, cell, &y0, &y1);
+            for (int32_t y = y0; y <= y1; y++) {
+                coverage_columns(&place, cell, y, &x0, &x1);
+                for (int32_t x = x0; x <= x1; x++)
+                    bits[(size_t)y * stride + (size_t)x / 64] |= UINT64_C(1) << (x % 64);
+            }
+        }
+        bits += item->height * stride;
+    }
+    return true;
+}
+
+static void drawing_release(struct drawing *drawing) {
+    mem_free(drawing->item);
+    mem_free(drawing->bits);
+}
+
+/* The geometry of packing at a size. */
+struct grid {
+    uint32_t size;     /* texels */
+    uint32_t cell;     /* texels */
+    uint32_t cells;    /* a side */
+    uint32_t padding;  /* cells */
+};
+
+static struct grid grid_of(uint32_t size) {
+    struct grid grid = {.size = size, .cell = 1};
+    while (size / grid.cell > MAX_GRID)
+        grid.cell *= 2;
+    grid.cells = size / grid.cell;
+    grid.padding = (ATLAS_PADDING + grid.cell - 1) / grid.cell;
+    return grid;
+}
+
+static bool try_density(struct drawing *drawing, const struct charts *charts, double density,
+                        const struct grid *grid) {
+    int32_t cell = (int32_t)grid->cell * COVERAGE_UNITS;
+    return draw(drawing, charts, density, cell, grid->cells) &&
+           pack(drawing->item, charts->count, grid->cells, grid->padding);
+}
+
+/* Finds about the greatest density that fits and leaves its packing in `best`; 0 when none. */
+static double search_density(struct drawing *best, const struct charts *charts,
+                             const struct grid *grid) {
+    double full = (double)grid->size / sqrt(charts->flat_area); /* charts take all texels */
+    double density = full * sqrt(FIRST_FILL), fits = 0.0, fails = full, step = SEARCH_STEP;
+    struct drawing trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
+    while (density > full * sqrt(MIN_FILL) && (fits == 0.0 || fails / fits > SEARCH_END)) {
+        if (try_density(&trial, charts, density, grid)) {
+            struct drawing old = *best;
+            *best = trial;
+            trial = old;
+            fits = density;
+        } else {
+            fails = density;
+        }
+        if (fits == 0.0) {
+            density /= step;
+            step *= step; /* a mesh in many pieces may be far from the first guess */
+        } else if (fails == full) {
+            density = fmin(fits * SEARCH_STEP, sqrt(fits * full));
+        } else {
+            density = sqrt(fits * fails);
+        }
+    }
+    drawing_release(&trial);
+    return fits;
+}
+
+/* Writes the atlas's corners from the packing of the charts in cells of grid. */
+static void put_corners(struct atlas *atlas, const struct charts *charts,
+                        const struct drawing *drawing, const struct grid *grid, double density) {
+    int32_t cell = (int32_t)grid->cell * COVERAGE_UNITS;
+    for (size_t c = 0; c < charts->count; c++) {
+        const struct pack_item *item = &drawing->item[c];
+        int32_t w = (int32_t)item->width * cell, h = (int32_t)item->height * cell;
+        for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++) {
+            struct coverage_triangle place = place_of(charts, charts->triangle[i], density);
+            vec2 *corner = atlas->corner[charts->triangle[i]];
+            for (int k = 0; k < 3; k++) {
+                int32_t x, y;
+                pack_turn(item->quarter, w, h, place.x[k], place.y[k], &x, &y);
+                corner[k] = (vec2){(float)(x + (int32_t)item->x * cell) / COVERAGE_UNITS,
+                                   (float)(y + (int32_t)item->y * cell) / COVERAGE_UNITS};
+            }
+        }
+    }
+}
+
+/* Texels covered by all charts together; redraws them texel by texel. */
+static size_t covered_texels(struct drawing *drawing, const struct charts *charts, double density) {
+    size_t count = 0, words = 0;
+    draw(drawing, charts, density, COVERAGE_UNITS, UINT32_MAX / COVERAGE_UNITS);
+    for (size_t c = 0; c < charts->count; c++)
+        words += drawing->item[c].height * pack_words(drawing->item[c].width);
+    for (size_t i = 0; i < words; i++)
+        count += (size_t)__builtin_popcountll(drawing->bits[i]);
+    return count;
+}
+
+static void finish(struct atlas *atlas, struct charts *charts, struct drawing *drawing,
+                   const struct grid *grid, double density, size_t triangle_count) {
+    *atlas = (struct atlas){.width = grid->size, .height = grid->size,
+                            .texels_per_metre = (float)density, .chart_count = charts->count};
+    atlas->corner = mem_array(triangle_count, sizeof *atlas->corner);
+    put_corners(atlas, charts, drawing, grid, density);
+    atlas->utilisation = (double)covered_texels(drawing, charts, density) /
+                         ((double)grid->size * grid->size);
+    atlas->chart_of_triangle = charts->of_triangle;
+    charts->of_triangle = NULL;
+}
+
+/* The least power of two that holds `count` charts of one texel each with their padding. */
+static double size_for(size_t count) {
+    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / 0.9;
+    return exp2(ceil(log2(sqrt(cells))));
+}
+
+static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
+                                const struct segments *segments, uint32_t size,
+                                struct error *err) {
+    struct charts charts;
+    struct grid grid = grid_of(size);
+    float texel_m = (float)sqrt(mesh_area(mesh) / FIRST_FILL) / (float)size;
+    charts_make(&charts, mesh, segments, texel_m);
+    struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
+    double density = search_density(&drawing, &charts, &grid);
+    enum status status = STATUS_OK;
+    if (density > 0.0) {
+        finish(atlas, &charts, &drawing, &grid, density, mesh->triangle_count);
+    } else {
+        double needed = fmax(size_for(charts.count), 2.0 * size);
+        status = error_set(err, STATUS_INPUT, "the mesh is in %zu pieces: a texture of %u x %u texels "
+                           "cannot hold them", charts.count, size, size);
+        if (needed <= ATLAS_MAX_SIZE)
+            error_hint(err, "a texture_size of %.0f would", needed);
+        else
+            error_hint(err, "no size up to %d would: join the mesh's pieces", ATLAS_MAX_SIZE);
+    }
+    drawing_release(&drawing);
+    charts_release(&charts);
+    return status;
+}
+
+static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
+                                   const struct segments *segments, float texels_per_metre,
+                                   struct error *err) {
+    struct charts charts;
+    charts_make(&charts, mesh, segments, 1.0f / texels_per_metre);
+    struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
+    double density = (double)texels_per_metre, least = density * sqrt(charts.flat_area);
+    uint32_t size = 64;
+    enum status status = STATUS_OK;
+    for (bool fits = false; !fits && status == STATUS_OK; size *= 2) {
+        if (size > ATLAS_MAX_SIZE) {
+            status = error_set(err, STATUS_INPUT, "%g texels per metre need a texture of %.0f x %.0f "
+                               "texels or more; %d is the most", (double)texels_per_metre, ceil(least),
+                               ceil(least), ATLAS_MAX_SIZE);
+            break;
+        }
+        struct grid grid = grid_of(size);
+        fits = least <= size && try_density(&drawing, &charts, density, &grid);
+        if (fits)
+            finish(atlas, &charts, &drawing, &grid, density, mesh->triangle_count);
+    }
+    drawing_release(&drawing);
+    charts_release(&charts);
+    return status;
+}
+
+enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
+                       uint32_t size, float texels_per_metre, struct error *err) {
+    if (texels_per_metre != 0.0f) {
+        if (!(texels_per_metre > 0.0f) || !isfinite(texels_per_metre))
+            return error_set(err, STATUS_INPUT, "texels per metre: %g is not a positive number",
+                             (double)texels_per_metre);
+        return make_at_density(atlas, mesh, segments, texels_per_metre, err);
+    }
+    if (size == 0 || size > ATLAS_MAX_SIZE)
+        return error_set(err, STATUS_INPUT, "texture size: %u is not within 1 to %d", size,
+                         ATLAS_MAX_SIZE);
+    return make_at_size(atlas, mesh, segments, size, err);
+}
+
+void atlas_release(struct atlas *atlas) {
+    mem_free(atlas->chart_of_triangle);
+    mem_free(atlas->corner);
+    *atlas = (struct atlas){0};
+}
