@@ -1,0 +1,50 @@
+/* findings.c -- see findings.h. */
+#include "server/ingest/findings.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "common/mem.h"
+
+void findings_release(struct findings *f) {
+    for (size_t i = 0; i < f->warning_count && i < FINDINGS_MAX; i++)
+        mem_free(f->warning[i]);
+    mem_free(f->warning);
+    *f = (struct findings){0};
+}
+
+static void add_problem(struct findings *f, const char *file, const char *reason, const char *hint) {
+    if (f->problem_count++ >= FINDINGS_MAX)
+        return;
+    cJSON *problem = cJSON_CreateObject();
+    json_add_string(problem, "file", file);
+    json_add_string(problem, "reason", reason);
+    if (hint[0] != '\0')
+        json_add_string(problem, "hint", hint);
+    cJSON_AddItemToArray(f->problems, problem);
+}
+
+void findings_problem(struct findings *f, const char *file, const char *format, ...) {
+    char reason[1024];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(reason, sizeof reason, format, args);
+    va_end(args);
+    add_problem(f, file, reason, "");
+}
+
+void findings_error(struct findings *f, const char *file, const struct error *err) {
+    add_problem(f, file, err->message, err->hint);
+}
+
+void findings_warning(struct findings *f, const char *format, ...) {
+    if (f->warning_count++ >= FINDINGS_MAX)
+        return;
+    char sentence[1024];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(sentence, sizeof sentence, format, args);
+    va_end(args);
+    f->warning = mem_realloc_array(f->warning, f->warning_count, sizeof *f->warning);
+    f->warning[f->warning_count - 1] = mem_strdup(sentence);
+}

@@ -1,0 +1,96 @@
+/* pose.c -- see pose.h. The nearest rotation is the orthogonal factor of the polar decomposition,
+ * by Newton's iteration (Higham, "Computing the Polar Decomposition", 1986). */
+#include "server/ingest/pose.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#define SHEAR_LIMIT 0.02 /* largest entry of R^T R - 1 that passes for rounding or estimation error */
+
+static double determinant(double m[3][3]) {
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+}
+
+/* out = (m + m^-T) / 2, m^-T being the cofactors over the determinant. */
+static void newton_step(double m[3][3], double out[3][3]) {
+    double det = determinant(m);
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+            double cofactor = m[i1][j1] * m[i2][j2] - m[i1][j2] * m[i2][j1];
+            out[i][j] = 0.5 * (m[i][j] + cofactor / det);
+        }
+    }
+}
+
+static double shear(double m[3][3]) {
+    double worst = 0.0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            double dot = m[0][i] * m[0][j] + m[1][i] * m[1][j] + m[2][i] * m[2][j];
+            worst = fmax(worst, fabs(dot - (i == j ? 1.0 : 0.0)));
+        }
+    }
+    return worst;
+}
+
+/* Makes m a rotation; the sentence of what forbids it, or NULL. */
+static const char *make_rotation(double m[3][3], double *scale) {
+    double det = determinant(m), largest = 0.0;
+    for (int i = 0; i < 9; i++)
+        largest = fmax(largest, fabs(m[i / 3][i % 3]));
+    if (!(fabs(det) > 1e-9 * largest * largest * largest))
+        return "transform_matrix is singular";
+    if (det < 0.0)
+        return "transform_matrix mirrors space (its determinant is negative)";
+    *scale = cbrt(det);
+    for (int i = 0; i < 9; i++)
+        m[i / 3][i % 3] /= *scale;
+    if (!(shear(m) < SHEAR_LIMIT))
+        return "transform_matrix is not a rotation: its axes are not at right angles and of one length";
+    for (int step = 0; step < 6; step++) {
+        double next[3][3];
+        newton_step(m, next);
+        for (int i = 0; i < 9; i++)
+            m[i / 3][i % 3] = next[i / 3][i % 3];
+    }
+    return NULL;
+}
+
+enum status pose_from_matrix(const double matrix[3][4], enum pose_axes axes,
+                             struct rigid *world_from_camera, struct rigid *camera_from_world,
+                             bool *scaled, struct error *err) {
+    double m[3][3], t[3], scale = 1.0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++)
+            if (!isfinite(matrix[i][j]) || fabs(matrix[i][j]) > 1e9)
+                return error_set(err, STATUS_INPUT,
+                                 "transform_matrix holds a number that is not finite or too large "
+                                 "in row %d, column %d", i + 1, j + 1);
+        t[i] = matrix[i][3];
+        for (int j = 0; j < 3; j++)
+            m[i][j] = matrix[i][j];
+    }
+    const char *fault = make_rotation(m, &scale);
+    if (fault)
+        return error_set(err, STATUS_INPUT, "%s", fault);
+    *scaled = fabs(scale - 1.0) > 1e-3;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            double sign = axes == POSE_RIGHT_UP_BACK && j > 0 ? -1.0 : 1.0;
+            world_from_camera->rotation[i][j] = (float)(sign * m[i][j]);
+            camera_from_world->rotation[j][i] = (float)(sign * m[i][j]);
+        }
+    }
+    world_from_camera->translation = vec3_make((float)t[0], (float)t[1], (float)t[2]);
+    /* In double: rigid_inverse would lose the digits that a far origin needs. */
+    double inverse[3];
+    for (int j = 0; j < 3; j++) {
+        double sign = axes == POSE_RIGHT_UP_BACK && j > 0 ? -1.0 : 1.0;
+        inverse[j] = -sign * (m[0][j] * t[0] + m[1][j] * t[1] + m[2][j] * t[2]);
+    }
+    camera_from_world->translation = vec3_make((float)inverse[0], (float)inverse[1], (float)inverse[2]);
+    return STATUS_OK;
+}

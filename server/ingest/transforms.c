@@ -1,0 +1,402 @@
+/* transforms.c -- see transforms.h. */
+#include "server/ingest/transforms.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/ingest/path.h"
+#include "server/ingest/pose.h"
+
+/* One reading: where values come from and where faults go. */
+struct context {
+    const cJSON *root, *frame; /* frame: NULL while the top is read */
+    const char *name;          /* of the file */
+    char place[256];           /* "frames[3] (images/003.png)" */
+    struct findings *findings;
+    bool ok;                   /* no problem since it was set */
+    size_t scaled_count;
+    const cJSON *list[3];      /* train_filenames, val_filenames, test_filenames or NULL */
+    size_t unlisted_count;
+};
+
+static void problem(struct context *c, const char *what) {
+    findings_problem(c->findings, c->name, "%s: %s", c->place, what);
+    c->ok = false;
+}
+
+/* --- values ------------------------------------------------------------------------------ */
+
+/* The frame's value or the file's; fallback when neither says. Looked up in the frame first, so
+ * that a fault at the top is reported once, by read_top. */
+static const cJSON *holder(const struct context *c, const char *key) {
+    const cJSON *own = c->frame ? cJSON_GetObjectItemCaseSensitive(c->frame, key) : NULL;
+    return own && !cJSON_IsNull(own) ? c->frame : c->root;
+}
+
+static double number(struct context *c, const char *key, double fallback) {
+    struct error err;
+    double value;
+    if (json_number(holder(c, key), key, c->place, fallback, &value, &err) != STATUS_OK) {
+        findings_error(c->findings, c->name, &err);
+        c->ok = false;
+        return fallback;
+    }
+    return value;
+}
+
+static const char *string(struct context *c, const cJSON *object, const char *key) {
+    struct error err;
+    const char *value;
+    if (json_string(object, key, c->place, NULL, &value, &err) != STATUS_OK) {
+        findings_error(c->findings, c->name, &err);
+        c->ok = false;
+        return NULL;
+    }
+    return value;
+}
+
+/* A path in the bundle; NULL when absent or at fault. Backslashes, as tools on Windows write
+ * them, separate folders. */
+static char *path(struct context *c, const cJSON *object, const char *key) {
+    const char *value = string(c, object, key);
+    if (!value)
+        return NULL;
+    char *copy = mem_strdup(value), *clean = NULL;
+    for (char *p = copy; *p; p++)
+        if (*p == '\\')
+            *p = '/';
+    struct error err;
+    if (path_clean(copy, &clean, &err) != STATUS_OK) {
+        char text[1400];
+        snprintf(text, sizeof text, "%s %s", key, err.message);
+        problem(c, text);
+    } else if (clean[0] == '\0') {
+        char text[64];
+        snprintf(text, sizeof text, "%s is empty", key);
+        problem(c, text);
+        mem_free(clean);
+        clean = NULL;
+    }
+    mem_free(copy);
+    return clean;
+}
+
+/* --- lens -------------------------------------------------------------------------------- */
+
+static enum camera_model read_model(struct context *c) {
+    static const struct {
+        const char *name;
+        enum camera_model model;
+    } models[] = {
+        {"PINHOLE", CAMERA_OPENCV},      {"SIMPLE_PINHOLE", CAMERA_OPENCV},
+        {"SIMPLE_RADIAL", CAMERA_OPENCV}, {"RADIAL", CAMERA_OPENCV},
+        {"OPENCV", CAMERA_OPENCV},       {"FULL_OPENCV", CAMERA_OPENCV},
+        {"OPENCV_FISHEYE", CAMERA_OPENCV_FISHEYE},
+    };
+    const char *name = string(c, holder(c, "camera_model"), "camera_model");
+    struct error err;
+    bool fisheye = false;
+    if (!name) {
+        if (json_bool(holder(c, "is_fisheye"), "is_fisheye", c->place, false, &fisheye, &err) != STATUS_OK) {
+            findings_error(c->findings, c->name, &err);
+            c->ok = false;
+        }
+        return fisheye ? CAMERA_OPENCV_FISHEYE : CAMERA_OPENCV;
+    }
+    for (size_t i = 0; i < sizeof models / sizeof *models; i++)
+        if (strcmp(name, models[i].name) == 0)
+            return models[i].model;
+    char text[320];
+    snprintf(text, sizeof text,
+             "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
+             "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE", name);
+    problem(c, text);
+    return CAMERA_OPENCV;
+}
+
+/* A value that must be positive where it is given. */
+static double positive(struct context *c, const char *key) {
+    double value = number(c, key, NAN);
+    if (value <= 0.0) {
+        char text[128];
+        snprintf(text, sizeof text, "%s is %.9g, it must be positive", key, value);
+        problem(c, text);
+        return NAN;
+    }
+    return value;
+}
+
+static double side(struct context *c, const char *key) {
+    double value = number(c, key, NAN);
+    if (!isnan(value) && (value < 1.0 || value > IMAGE_MAX_SIDE || value != floor(value))) {
+        char text[128];
+        snprintf(text, sizeof text, "%s is %.9g, it must be a number of pixels", key, value);
+        problem(c, text);
+        return NAN;
+    }
+    return value;
+}
+
+static double angle(struct context *c, const char *key) {
+    double value = number(c, key, NAN);
+    if (!isnan(value) && !(value > 0.0 && value < 3.14)) {
+        char text[128];
+        snprintf(text, sizeof text, "%s is %.9g, it must be an angle in radians below pi", key, value);
+        problem(c, text);
+        return NAN;
+    }
+    return value;
+}
+
+static void read_lens(struct context *c, struct lens *lens) {
+    static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
+    lens->model = read_model(c);
+    lens->width = side(c, "w");
+    lens->height = side(c, "h");
+    lens->fl_x = positive(c, "fl_x");
+    lens->fl_y = positive(c, "fl_y");
+    lens->cx = number(c, "cx", NAN);
+    lens->cy = number(c, "cy", NAN);
+    lens->angle_x = angle(c, "camera_angle_x");
+    lens->angle_y = angle(c, "camera_angle_y");
+    for (int i = 0; i < 6; i++)
+        lens->k[i] = number(c, radial[i], 0.0);
+    lens->p[0] = number(c, "p1", 0.0);
+    lens->p[1] = number(c, "p2", 0.0);
+}
+
+enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
+                              struct camera *camera, struct error *err) {
+    const struct lens *lens = &frame->lens;
+    if ((!isnan(lens->width) && lens->width != width) || (!isnan(lens->height) && lens->height != height))
+        return error_set(err, STATUS_INPUT, "the picture is %u x %u pixels, but frames[%zu] says %.0f x %.0f",
+                         width, height, frame->number, isnan(lens->width) ? width : lens->width,
+                         isnan(lens->height) ? height : lens->height);
+    double fx = lens->fl_x, fy = lens->fl_y;
+    if (isnan(fx) && !isnan(lens->angle_x))
+        fx = 0.5 * width / tan(0.5 * lens->angle_x);
+    if (isnan(fy) && !isnan(lens->angle_y))
+        fy = 0.5 * height / tan(0.5 * lens->angle_y);
+    /* Square pixels unless the file says otherwise. */
+    fx = isnan(fx) ? fy : fx;
+    fy = isnan(fy) ? fx : fy;
+    double cx = isnan(lens->cx) ? 0.5 * width : lens->cx, cy = isnan(lens->cy) ? 0.5 * height : lens->cy;
+    if (!(fx > 1e-3 * width && fx < 1e4 * width && fy > 1e-3 * height && fy < 1e4 * height))
+        return error_set(err, STATUS_INPUT, "a focal length of %.6g x %.6g pixels cannot belong to a picture "
+                         "of %u x %u", fx, fy, width, height);
+    if (!(fabs(cx) < 10.0 * width && fabs(cy) < 10.0 * height))
+        return error_set(err, STATUS_INPUT, "the principal point %.6g, %.6g lies far outside the picture "
+                         "of %u x %u", cx, cy, width, height);
+    *camera = (struct camera){
+        .model = lens->model, .width = width, .height = height,
+        .fx = (float)fx, .fy = (float)fy, .cx = (float)cx, .cy = (float)cy,
+        .world_from_camera = frame->world_from_camera, .camera_from_world = frame->camera_from_world,
+    };
+    for (int i = 0; i < 6; i++)
+        camera->k[i] = (float)lens->k[i];
+    for (int i = 0; i < 2; i++)
+        camera->p[i] = (float)lens->p[i];
+    camera_find_fold(camera);
+    return STATUS_OK;
+}
+
+/* --- pose, exposure, split --------------------------------------------------------------- */
+
+static void read_pose(struct context *c, struct transforms_frame *frame) {
+    const cJSON *matrix = cJSON_GetObjectItemCaseSensitive(c->frame, "transform_matrix"), *row, *cell;
+    double m[4][4] = {{0}};
+    int rows = 0, columns = 0;
+    bool shaped = matrix != NULL;
+    cJSON_ArrayForEach(row, matrix) {
+        columns = 0;
+        cJSON_ArrayForEach(cell, row) {
+            if (rows < 4 && columns < 4)
+                m[rows][columns] = cJSON_IsNumber(cell) ? cell->valuedouble : NAN;
+            columns++;
+        }
+        shaped = shaped && columns == 4;
+        rows++;
+    }
+    if (!shaped || (rows != 3 && rows != 4)) {
+        problem(c, "transform_matrix must be an array of 4 (or 3) rows of 4 numbers");
+        return;
+    }
+    if (rows == 4 && (m[3][0] != 0.0 || m[3][1] != 0.0 || m[3][2] != 0.0 || m[3][3] != 1.0)) {
+        problem(c, "the last row of transform_matrix must be 0 0 0 1");
+        return;
+    }
+    struct error err;
+    bool scaled = false;
+    if (pose_from_matrix((const double(*)[4])m, POSE_RIGHT_UP_BACK, &frame->world_from_camera,
+                         &frame->camera_from_world, &scaled, &err) != STATUS_OK)
+        problem(c, err.message);
+    c->scaled_count += scaled;
+}
+
+double transforms_exposure(double time_sec, double iso, double f_number) {
+    if (!(time_sec > 0.0))
+        return 0.0;
+    return time_sec * (iso > 0.0 ? iso / 100.0 : 1.0) / (f_number > 0.0 ? f_number * f_number : 1.0);
+}
+
+static void read_exposure(struct context *c, struct transforms_frame *frame) {
+    double factor = positive(c, "exposure"), time_sec = positive(c, "exposure_time");
+    double iso = positive(c, "iso"), f_number = positive(c, "f_number");
+    frame->exposure = !isnan(factor) ? factor
+                      : isnan(time_sec) ? 0.0
+                                        : transforms_exposure(time_sec, iso, f_number);
+    frame->exposure_source = !isnan(factor) ? EXPOSURE_FACTOR
+                             : isnan(time_sec) ? EXPOSURE_UNKNOWN
+                                               : EXPOSURE_CAMERA;
+}
+
+static bool is_listed(const cJSON *list, const char *clean) {
+    const cJSON *item;
+    cJSON_ArrayForEach(item, list) {
+        const char *name = cJSON_IsString(item) ? item->valuestring : "";
+        while (strncmp(name, "./", 2) == 0)
+            name += 2;
+        if (strcmp(name, clean) == 0)
+            return true;
+    }
+    return false;
+}
+
+/* False when the frame is in none of the lists that the file has: it is left out, as nerfstudio
+ * does. */
+static bool read_split(struct context *c, struct transforms_frame *frame) {
+    const char *split = string(c, c->frame, "split");
+    frame->is_test = false;
+    if (split) {
+        frame->is_test = strcmp(split, "test") == 0 || strcmp(split, "val") == 0;
+        if (!frame->is_test && strcmp(split, "train") != 0)
+            problem(c, "split must be \"train\", \"test\" or \"val\"");
+        return true;
+    }
+    if (is_listed(c->list[1], frame->file) || is_listed(c->list[2], frame->file)) {
+        frame->is_test = true;
+        return true;
+    }
+    return !c->list[0] || is_listed(c->list[0], frame->file);
+}
+
+/* --- the file ---------------------------------------------------------------------------- */
+
+static void frame_release(struct transforms_frame *frame) {
+    mem_free(frame->file);
+    mem_free(frame->mask);
+}
+
+void transforms_release(struct transforms *t) {
+    for (size_t i = 0; i < t->frame_count; i++)
+        frame_release(&t->frame[i]);
+    mem_free(t->frame);
+    mem_free(t->mesh);
+    mem_free(t->point_cloud);
+    *t = (struct transforms){0};
+}
+
+static bool read_frame(struct context *c, const cJSON *object, struct transforms_frame *frame) {
+    *frame = (struct transforms_frame){.number = frame->number};
+    c->ok = true;
+    c->frame = object;
+    snprintf(c->place, sizeof c->place, "frames[%zu]", frame->number);
+    if (!cJSON_IsObject(object)) {
+        problem(c, "must be an object");
+        return false;
+    }
+    frame->file = path(c, object, "file_path");
+    if (!frame->file) {
+        if (c->ok)
+            problem(c, "no file_path");
+        return false;
+    }
+    snprintf(c->place, sizeof c->place, "frames[%zu] (%.200s)", frame->number, frame->file);
+    frame->mask = path(c, object, "mask_path");
+    struct lens *lens = &frame->lens;
+    read_lens(c, lens);
+    if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) && isnan(lens->angle_y))
+        problem(c, "no focal length: expected fl_x, fl_y or camera_angle_x");
+    read_pose(c, frame);
+    read_exposure(c, frame);
+    bool listed = read_split(c, frame);
+    c->unlisted_count += !listed;
+    return c->ok && listed;
+}
+
+static int by_file(const void *a, const void *b) {
+    const struct transforms_frame *const *x = a, *const *y = b;
+    int order = strcmp((*x)->file, (*y)->file);
+    return order ? order : ((*x)->number > (*y)->number) - ((*x)->number < (*y)->number);
+}
+
+static void find_duplicates(struct context *c, const struct transforms *t) {
+    const struct transforms_frame **sorted = mem_array(t->frame_count, sizeof *sorted);
+    for (size_t i = 0; i < t->frame_count; i++)
+        sorted[i] = &t->frame[i];
+    if (t->frame_count > 1)
+        qsort(sorted, t->frame_count, sizeof *sorted, by_file);
+    for (size_t i = 1; i < t->frame_count; i++)
+        if (strcmp(sorted[i]->file, sorted[i - 1]->file) == 0)
+            findings_problem(c->findings, c->name, "frames[%zu] and frames[%zu] both name %s",
+                             sorted[i - 1]->number, sorted[i]->number, sorted[i]->file);
+    mem_free(sorted);
+}
+
+/* What is wrong at the top is reported here, once, instead of once per frame. */
+static bool read_top(struct context *c, struct transforms *t) {
+    static const char *const lists[3] = {"train_filenames", "val_filenames", "test_filenames"};
+    struct transforms_frame scratch;
+    const cJSON *frames = cJSON_GetObjectItemCaseSensitive(c->root, "frames");
+    snprintf(c->place, sizeof c->place, "at the top");
+    c->ok = true;
+    if (!cJSON_IsObject(c->root) || !cJSON_IsArray(frames)) {
+        problem(c, "expected an object with an array \"frames\"");
+        return false;
+    }
+    if (cJSON_GetArraySize(frames) > TRANSFORMS_MAX_FRAMES) {
+        problem(c, "too many frames");
+        return false;
+    }
+    t->mesh = path(c, c->root, "mesh");
+    t->point_cloud = path(c, c->root, "ply_file_path");
+    for (int i = 0; i < 3; i++) {
+        c->list[i] = cJSON_GetObjectItemCaseSensitive(c->root, lists[i]);
+        if (c->list[i] && !cJSON_IsArray(c->list[i])) {
+            problem(c, "train_filenames, val_filenames and test_filenames must be arrays");
+            return false;
+        }
+    }
+    read_lens(c, &scratch.lens);
+    read_exposure(c, &scratch);
+    return c->ok;
+}
+
+void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f) {
+    struct context c = {.root = root, .name = name, .findings = f};
+    *t = (struct transforms){0};
+    if (!read_top(&c, t))
+        return;
+    const cJSON *frames = cJSON_GetObjectItemCaseSensitive(root, "frames"), *object;
+    t->frame = mem_calloc((size_t)cJSON_GetArraySize(frames), sizeof *t->frame);
+    size_t number_of = 0;
+    cJSON_ArrayForEach(object, frames) {
+        struct transforms_frame *frame = &t->frame[t->frame_count];
+        frame->number = number_of++;
+        if (read_frame(&c, object, frame))
+            t->frame_count++;
+        else
+            frame_release(frame);
+    }
+    find_duplicates(&c, t);
+    if (c.scaled_count > 0)
+        findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out",
+                         name, c.scaled_count);
+    if (c.unlisted_count > 0)
+        findings_warning(f, "%s: %zu frames are in none of train_filenames, val_filenames and "
+                         "test_filenames and were left out", name, c.unlisted_count);
+}

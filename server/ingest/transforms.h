@@ -1,0 +1,63 @@
+/* transforms.h -- reading transforms.json, as nerfstudio and instant-ngp write it.
+ *
+ * Taken from each frame, else from the top: fl_x fl_y cx cy w h, camera_angle_x / _y (radians),
+ * k1 to k6, p1, p2, camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV,
+ * FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye, exposure, exposure_time (s), iso, f_number. Per
+ * frame: file_path, transform_matrix, mask_path, split (train, test, val). At the top: `mesh` or
+ * ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val is test.
+ * Everything else is ignored. */
+#ifndef UNBAKE_INGEST_TRANSFORMS_H
+#define UNBAKE_INGEST_TRANSFORMS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/json.h"
+#include "server/ingest/findings.h"
+#include "server/scene/camera.h"
+
+#define TRANSFORMS_MAX_FRAMES 20000
+#define TRANSFORMS_MAX_BYTES ((size_t)256 << 20)
+
+struct lens {
+    enum camera_model model;
+    /* NAN where the file does not say. */
+    double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
+    double k[6], p[2];
+};
+
+/* Where a frame's exposure comes from; a bundle that mixes sources has mixed units. */
+enum exposure_source { EXPOSURE_UNKNOWN, EXPOSURE_FACTOR, EXPOSURE_CAMERA, EXPOSURE_EXIF, EXPOSURE_HDR };
+
+struct transforms_frame {
+    size_t number;          /* position in `frames`, from 0 */
+    char *file, *mask;      /* clean paths (path_clean); mask may be NULL; owned */
+    bool is_test;
+    struct lens lens;
+    struct rigid world_from_camera, camera_from_world;
+    enum exposure_source exposure_source;
+    double exposure;        /* 0 where unknown */
+};
+
+struct transforms {
+    char *mesh;             /* clean path or NULL; owned */
+    char *point_cloud;      /* ply_file_path, which may be a mesh or only points, or NULL; owned */
+    size_t frame_count;     /* usable frames: those with problems are left out */
+    struct transforms_frame *frame;
+};
+
+/* Reads from the parsed file; `name` is the file's name in problems. Every problem and warning
+ * goes to *f. The result is the caller's (transforms_release) in any case. */
+void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f);
+void transforms_release(struct transforms *t);
+
+/* The camera of a frame whose picture has width x height pixels. STATUS_INPUT when the file
+ * states another size or a lens that cannot be. */
+enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
+                              struct camera *camera, struct error *err);
+
+/* Pixel value per radiance from what a camera records: seconds x ISO / 100 / f-number^2, each
+ * missing (0) factor but the time taken as 1. */
+double transforms_exposure(double time_sec, double iso, double f_number);
+
+#endif
