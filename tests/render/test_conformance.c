@@ -1,0 +1,169 @@
+/* The path tracer and its derivatives against Mitsuba 3 on the conformance room: every picture by
+ * z-tests per pixel and on the mean, with both sides' standard errors. */
+#include "common/mem.h"
+#include "server/render/film.h"
+#include "server/render/path.h"
+#include "tests/render/room.h"
+
+#define WIDTH 48
+#define HEIGHT 36
+#define PIXELS (WIDTH * HEIGHT)
+#define GROUPS 24 /* independent estimates, from whose spread our error comes */
+#define GROUP_SPP 16
+
+enum { LEFT = 4, FLOOR = 0, TALL = 6, LAMP = 8, SHADE = 9, SEGMENTS = 10 };
+
+enum picture { PRIMAL, BASE_LEFT, BASE_TALL, ROUGH_FLOOR, ROUGH_TALL, SPEC_FLOOR, SPEC_TALL,
+               EMIT_LAMP, EMIT_SHADE, PICTURES };
+
+struct estimate {
+    const struct room *room;
+    const struct camera *camera;
+    struct path_settings settings;
+    bool derivatives;
+    double (*sum)[PICTURES][3];    /* [PIXELS] */
+    double (*square)[PICTURES][3]; /* [PIXELS] */
+};
+
+/* One group's derivatives of a pixel's channel by every parameter, out of its log. */
+static void read_log(const struct room *room, const struct gradient_log *log, int channel,
+                     double value[PICTURES][3]) {
+    double base[SEGMENTS] = {0};
+    for (size_t i = 0; i < log->entry_count; i++) {
+        const struct gradient_entry *e = &log->entry[i];
+        double d = (double)(channel == 0 ? e->d.r : channel == 1 ? e->d.g : e->d.b);
+        for (uint32_t k = 0; k < 4; k++)
+            if (e->weight[k] > 0.0f)
+                base[room_segment_of_texel(room, e->first + k % 2 + k / 2 * room->atlas.width)] +=
+                    (double)e->weight[k] * d;
+    }
+    value[BASE_LEFT][channel] = base[LEFT];
+    value[BASE_TALL][channel] = base[TALL];
+    value[ROUGH_FLOOR][channel] = log->segment[FLOOR].d_roughness;
+    value[ROUGH_TALL][channel] = log->segment[TALL].d_roughness;
+    value[SPEC_FLOOR][channel] = log->segment[FLOOR].d_specular;
+    value[SPEC_TALL][channel] = log->segment[TALL].d_specular;
+    value[EMIT_LAMP][channel] = log->segment[LAMP].d_emission[channel];
+    value[EMIT_SHADE][channel] = log->segment[SHADE].d_emission[channel];
+}
+
+static void estimate_pixel(void *user, size_t pixel, int thread) {
+    (void)thread;
+    struct estimate *e = user;
+    struct path_batch *batch = path_batch_new(GROUP_SPP, e->settings.max_depth);
+    struct gradient_log *log = gradient_log_new(e->room->segments.count);
+    struct ray ray[GROUP_SPP];
+    struct path_key key[GROUP_SPP];
+    rgb radiance[GROUP_SPP], adjoint[GROUP_SPP];
+    for (uint32_t group = 0; group < GROUPS; group++) {
+        for (uint32_t i = 0; i < GROUP_SPP; i++) {
+            key[i] = (struct path_key){(uint32_t)pixel, group, i};
+            uint64_t bits = rng_key(pixel, group, i);
+            float x = (float)(pixel % WIDTH) + rng_to_float((uint32_t)bits);
+            float y = (float)(pixel / WIDTH) + rng_to_float((uint32_t)(bits >> 32));
+            ray[i].origin = camera_origin(e->camera);
+            CHECK(camera_direction(e->camera, x, y, &ray[i].direction));
+        }
+        path_batch_trace(batch, &e->room->world, &e->settings, GROUP_SPP, ray, key, radiance);
+        double value[PICTURES][3] = {{0.0}};
+        for (int i = 0; i < GROUP_SPP; i++) {
+            value[PRIMAL][0] += (double)radiance[i].r;
+            value[PRIMAL][1] += (double)radiance[i].g;
+            value[PRIMAL][2] += (double)radiance[i].b;
+        }
+        for (int channel = 0; channel < 3 && e->derivatives; channel++) {
+            for (int i = 0; i < GROUP_SPP; i++)
+                adjoint[i] = (rgb){channel == 0, channel == 1, channel == 2};
+            gradient_log_clear(log);
+            path_batch_backward(batch, &e->room->world, adjoint, log);
+            read_log(e->room, log, channel, value);
+        }
+        for (int p = 0; p < PICTURES; p++) {
+            for (int c = 0; c < 3; c++) {
+                double v = value[p][c] / GROUP_SPP;
+                e->sum[pixel][p][c] += v;
+                e->square[pixel][p][c] += v * v;
+            }
+        }
+    }
+    gradient_log_free(log);
+    path_batch_free(batch);
+}
+
+static void compare(const struct estimate *e, enum picture p, const char *name) {
+    static double mean[PIXELS][3], error[PIXELS][3];
+    for (int i = 0; i < PIXELS; i++) {
+        for (int c = 0; c < 3; c++) {
+            mean[i][c] = e->sum[i][p][c] / GROUPS;
+            double variance = e->square[i][p][c] / GROUPS - mean[i][c] * mean[i][c];
+            error[i][c] = sqrt(fmax(0.0, variance) / (GROUPS - 1));
+        }
+    }
+    char path[128];
+    snprintf(path, sizeof path, "conformance/%s.exr", name);
+    struct image wanted;
+    room_read_image(path, &wanted);
+    CHECK(wanted.width == WIDTH && wanted.height == HEIGHT);
+    struct room_statistics s = room_compare(PIXELS, mean, error, &wanted);
+    image_release(&wanted);
+    printf("%-20s mean %.6g, wanted %.6g, z %+.2f; beyond 3 sigma %.4f\n", name, s.found_mean,
+           s.wanted_mean, s.mean_z, s.beyond);
+    CHECK_THAT(fabs(s.mean_z) < 3.3, "%s: mean %g, wanted %g, z %g", name, s.found_mean,
+               s.wanted_mean, s.mean_z);
+    CHECK_THAT(s.beyond < 0.012, "%s: %g of the values beyond 3 sigma", name, s.beyond);
+}
+
+static void run(struct estimate *e) {
+    e->sum = mem_calloc(PIXELS, sizeof *e->sum);
+    e->square = mem_calloc(PIXELS, sizeof *e->square);
+    parallel_for(e->room->pool, PIXELS, estimate_pixel, e);
+}
+
+static void finish(struct estimate *e) {
+    mem_free(e->sum);
+    mem_free(e->square);
+}
+
+int main(void) {
+    struct room room;
+    struct camera camera;
+    room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", NULL, 0, NULL, 0);
+    room_camera("conformance/room_transforms.json", "primal_all.exr", &camera);
+
+    struct estimate direct = {.room = &room, .camera = &camera, .settings = {2, 99, 11}};
+    run(&direct);
+    compare(&direct, PRIMAL, "primal_direct");
+    finish(&direct);
+
+    struct estimate all = {.room = &room, .camera = &camera, .settings = {17, 6, 12}};
+    run(&all);
+    compare(&all, PRIMAL, "primal_all");
+    finish(&all);
+
+    struct estimate d = {.room = &room, .camera = &camera, .settings = {9, 99, 13}, .derivatives = true};
+    run(&d);
+    compare(&d, BASE_LEFT, "d_base_color_left");
+    compare(&d, BASE_TALL, "d_base_color_tall");
+    compare(&d, ROUGH_FLOOR, "d_roughness_floor");
+    compare(&d, ROUGH_TALL, "d_roughness_tall");
+    compare(&d, EMIT_LAMP, "d_emission_lamp");
+    compare(&d, EMIT_SHADE, "d_emission_shade");
+    compare(&d, ROUGH_FLOOR, "fd_roughness_floor");
+    compare(&d, ROUGH_TALL, "fd_roughness_tall");
+    compare(&d, SPEC_FLOOR, "fd_specular_floor");
+    compare(&d, SPEC_TALL, "fd_specular_tall");
+    finish(&d);
+    room_release(&room);
+
+    struct image sky;
+    room_read_image("hdri/lythwood_room_1k.hdr", &sky);
+    room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", (int[]){1, 8}, 2,
+              &sky, 0);
+    struct estimate open = {.room = &room, .camera = &camera, .settings = {17, 6, 14}};
+    run(&open);
+    compare(&open, PRIMAL, "primal_env");
+    finish(&open);
+    room_release(&room);
+    image_release(&sky);
+    return check_result();
+}
