@@ -1,6 +1,7 @@
 /* The path tracer and its derivatives against Mitsuba 3 on the conformance room: every picture by
  * z-tests per pixel and on the mean, with both sides' standard errors. */
 #include "common/mem.h"
+#include "common/rng.h"
 #include "server/render/film.h"
 #include "server/render/path.h"
 #include "tests/render/room.h"
