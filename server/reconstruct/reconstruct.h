@@ -16,17 +16,11 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"
+#include "server/reconstruct/state.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
-
-/* A piece of state: plain memory that a checkpoint copies out and a resume copies in. */
-struct state_array {
-    const char *name;
-    void *data;
-    size_t bytes;
-};
 
 struct reconstruction; /* the present state, for previews and outputs */
 

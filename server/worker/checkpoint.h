@@ -1,0 +1,57 @@
+/* checkpoint.h -- checkpoint.db: all that a later attempt needs, in one SQLite transaction.
+ *
+ * 1. A save is committed whole or not at all; until then, and after any failure or crash, the
+ *    one before is what a load finds.
+ * 2. Arrays are cut into tiles of CHECKPOINT_TILE_BYTES. A tile whose hash has not changed since
+ *    it was last written is not written again. New versions of tiles are inserted and the old
+ *    rows then deleted, so that bytes go to free or appended pages, which the rollback journal
+ *    need not copy: every byte is written once (a write-ahead log would write it twice). The file
+ *    grows to about twice the state.
+ * 3. Each tile carries its hash, and a digest binds all of them, the iteration and the
+ *    fingerprint. Opening reads everything; damage is noted and the file removed: the attempt
+ *    then starts from the beginning, never from a state that is half wrong.
+ * 4. One connection, holding an exclusive lock while it is open: of a stale and a new worker only
+ *    one can ever write.
+ *
+ * Not thread-safe. */
+#ifndef UNBAKE_WORKER_CHECKPOINT_H
+#define UNBAKE_WORKER_CHECKPOINT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/reconstruct/state.h"
+
+#define CHECKPOINT_TILE_BYTES ((size_t)1 << 20)
+
+struct checkpoint; /* opaque */
+
+/* Opens or creates the file. `fingerprint` names what the state depends on (scene, settings): a
+ * checkpoint of another one is removed. note[0] is 0, or a sentence for the user on why an
+ * existing checkpoint is not used. STATUS_UNAVAILABLE when another process has it. */
+enum status checkpoint_open(struct checkpoint **checkpoint, const char *path,
+                            const char *fingerprint, char note[512], struct error *err);
+void checkpoint_close(struct checkpoint *checkpoint);
+
+struct checkpoint_cost {
+    size_t tile_count, written_tile_count;
+    uint64_t written_bytes; /* of tiles */
+    double seconds;
+};
+
+/* Commits the arrays (names unique) as the newest checkpoint. cost may be NULL. */
+enum status checkpoint_save(struct checkpoint *checkpoint, long iteration,
+                            const struct state_array *array, size_t count,
+                            struct checkpoint_cost *cost, struct error *err);
+
+/* Fills the arrays; *found is false, and nothing is touched, when there is no checkpoint.
+ * STATUS_CORRUPT, and nothing is touched, when it holds other arrays or sizes. */
+enum status checkpoint_load(struct checkpoint *checkpoint, struct state_array *array, size_t count,
+                            bool *found, long *iteration, struct error *err);
+
+/* Forgets what is stored: for a state that its reader cannot use. */
+enum status checkpoint_clear(struct checkpoint *checkpoint, struct error *err);
+
+#endif
