@@ -4,6 +4,7 @@
  * compares with and a load reads by. */
 #include "server/worker/checkpoint.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -161,9 +162,11 @@ static enum status read_tiles(struct checkpoint *c, struct error *err) {
 
 /* Reads and verifies the commit that is there. note[0] is set when it is of no use here. */
 static enum status read_commit(struct checkpoint *c, char note[512], struct error *err) {
-    int64_t version;
+    int64_t version, table_count;
     enum status status = sql_int(&c->sql, 0, &version, err, "PRAGMA user_version", "");
-    if (status == STATUS_OK && version == 0)
+    if (status == STATUS_OK)
+        status = sql_int(&c->sql, 0, &table_count, err, "SELECT count(*) FROM sqlite_schema", "");
+    if (status == STATUS_OK && version == 0 && table_count == 0)
         return create_tables(c, err);
     if (status == STATUS_OK && version != FORMAT_VERSION)
         snprintf(note, 512, "the checkpoint has format %lld, this program writes %d",
@@ -226,9 +229,10 @@ enum status checkpoint_open(struct checkpoint **out, const char *path, const cha
     enum status status = sql_open(&c->sql, path, SQL_ROLLBACK, PAGE_SIZE, &first);
     if (status == STATUS_OK)
         status = read_commit(c, note, &first);
-    if (status == STATUS_CORRUPT)
+    /* Damage in the schema's text makes our statements wrong: STATUS_INTERNAL. */
+    if (status == STATUS_CORRUPT || status == STATUS_INTERNAL)
         snprintf(note, 512, "the checkpoint cannot be used: %.400s", first.message);
-    if (status != STATUS_OK && status != STATUS_CORRUPT && err)
+    else if (status != STATUS_OK && err)
         *err = first;
     if (note[0]) {
         forget(c);

@@ -5,8 +5,9 @@
  * 2. Arrays are cut into tiles of CHECKPOINT_TILE_BYTES. A tile whose hash has not changed since
  *    it was last written is not written again. New versions of tiles are inserted and the old
  *    rows then deleted, so that bytes go to free or appended pages, which the rollback journal
- *    need not copy: every byte is written once (a write-ahead log would write it twice). The file
- *    grows to about twice the state.
+ *    need not copy: every byte is written once. (A write-ahead log writes it twice: for 671 MB,
+ *    all of it changed, 2.4 s against 1.8 s, where a plain stream and fsync took 0.4 to 2.3 s,
+ *    and the log's own 671 MB stay on the disk.) The file grows to about twice the state.
  * 3. Each tile carries its hash, and a digest binds all of them, the iteration and the
  *    fingerprint. Opening reads everything; damage is noted and the file removed: the attempt
  *    then starts from the beginning, never from a state that is half wrong.

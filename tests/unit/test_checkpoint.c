@@ -1,0 +1,311 @@
+/* test_checkpoint.c -- checkpoint.db: what is saved comes back, the unchanged is not written
+ * again, damage is found, a full disk or a kill leaves the one before. */
+#include "server/worker/checkpoint.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/worker/hash64.h"
+#include "tests/check.h"
+
+static struct error err;
+
+#define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
+#define IS(call, wanted) CHECK_THAT((call) == (wanted), "%s", err.message)
+
+#define TILE CHECKPOINT_TILE_BYTES
+#define ARRAYS 3
+
+/* Three arrays: five tiles and a bit, a few bytes, none. */
+static void state_init(struct state_array array[ARRAYS]) {
+    array[0] = (struct state_array){"texture", mem_calloc(5 * TILE + 12, 1), 5 * TILE + 12};
+    array[1] = (struct state_array){"counter", mem_calloc(8, 1), 8};
+    array[2] = (struct state_array){"empty", mem_calloc(1, 1), 0};
+}
+
+static void state_release(struct state_array array[ARRAYS]) {
+    for (int i = 0; i < ARRAYS; i++)
+        mem_free(array[i].data);
+}
+
+/* The state after iteration `k`: every byte follows from k. */
+static void state_set(struct state_array array[ARRAYS], long k) {
+    for (int i = 0; i < ARRAYS; i++)
+        for (size_t at = 0; at < array[i].bytes / 4; at++)
+            ((uint32_t *)array[i].data)[at] = (uint32_t)at * 2654435761u + (uint32_t)k * 40503u;
+}
+
+static bool state_is(struct state_array array[ARRAYS], long k) {
+    struct state_array wanted[ARRAYS];
+    state_init(wanted);
+    state_set(wanted, k);
+    bool same = true;
+    for (int i = 0; i < ARRAYS; i++)
+        same = same && memcmp(wanted[i].data, array[i].data, array[i].bytes) == 0;
+    state_release(wanted);
+    return same;
+}
+
+static char *fresh_dir(void) {
+    char *dir = mem_strdup("/tmp/unbake-test-checkpoint-XXXXXX");
+    if (!mkdtemp(dir))
+        exit(1);
+    return dir;
+}
+
+/* Opens and loads: the iteration found, or -1 with the note for none. The content must be that
+ * iteration's. */
+static long load_from(const char *path, char note[512]) {
+    struct checkpoint *c;
+    struct state_array array[ARRAYS];
+    bool found = false;
+    long iteration = -1;
+    state_init(array);
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    if (c) {
+        OK(checkpoint_load(c, array, ARRAYS, &found, &iteration, &err));
+        CHECK(!found || state_is(array, iteration));
+        checkpoint_close(c);
+    }
+    state_release(array);
+    return found ? iteration : -1;
+}
+
+static void test_hash(void) {
+    /* Published values of XXH64. */
+    CHECK(hash64("", 0, 0) == 0xEF46DB3751D8E999u);
+    CHECK(hash64("a", 1, 0) == 0xD24EC4F1A98C6E5Bu);
+    CHECK(hash64("abc", 3, 0) == 0x44BC2CF5AD770999u);
+    static const char text[] = "Nobody inspects the spammish repetition";
+    CHECK(hash64(text, strlen(text), 0) == 0xFBCEA83C8A378BF1u);
+}
+
+static void test_round_trip(const char *path) {
+    struct checkpoint *c, *second;
+    struct state_array array[ARRAYS];
+    struct checkpoint_cost cost;
+    char note[512];
+    bool found = true;
+    long iteration = -1;
+    state_init(array);
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    CHECK(note[0] == '\0');
+    OK(checkpoint_load(c, array, ARRAYS, &found, &iteration, &err));
+    CHECK(!found);
+    state_set(array, 1);
+    OK(checkpoint_save(c, 1, array, ARRAYS, &cost, &err));
+    CHECK(cost.tile_count == 7 && cost.written_tile_count == 7);
+    CHECK(cost.written_bytes == 5 * TILE + 12 + 8);
+
+    /* Nothing changed, then one byte. */
+    OK(checkpoint_save(c, 2, array, ARRAYS, &cost, &err));
+    CHECK(cost.written_tile_count == 0);
+    ((char *)array[0].data)[3 * TILE] ^= 1;
+    OK(checkpoint_save(c, 3, array, ARRAYS, &cost, &err));
+    CHECK(cost.written_tile_count == 1 && cost.written_bytes == TILE);
+
+    /* Another process (or connection) cannot have it. */
+    IS(checkpoint_open(&second, path, "scene+settings", note, &err), STATUS_UNAVAILABLE);
+    checkpoint_close(c);
+
+    /* Hashes survive the process: after a load nothing is written again. */
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    struct state_array loaded[ARRAYS];
+    state_init(loaded);
+    OK(checkpoint_load(c, loaded, ARRAYS, &found, &iteration, &err));
+    CHECK(found && iteration == 3);
+    CHECK(memcmp(loaded[0].data, array[0].data, array[0].bytes) == 0);
+    OK(checkpoint_save(c, 4, loaded, ARRAYS, &cost, &err));
+    CHECK(cost.written_tile_count == 0);
+
+    /* The file does not grow without end. */
+    struct stat info;
+    for (long k = 5; k < 12; k++) {
+        state_set(loaded, k);
+        OK(checkpoint_save(c, k, loaded, ARRAYS, &cost, &err));
+        CHECK(cost.written_tile_count == 7);
+    }
+    CHECK(stat(path, &info) == 0);
+    CHECK_THAT(info.st_size < (off_t)(14 * TILE), "%ld bytes", (long)info.st_size);
+
+    /* Other arrays: said, nothing touched; a save replaces them. */
+    loaded[1].bytes = 4;
+    memset(loaded[0].data, 0x5a, loaded[0].bytes);
+    IS(checkpoint_load(c, loaded, ARRAYS, &found, &iteration, &err), STATUS_CORRUPT);
+    CHECK(!found && ((char *)loaded[0].data)[0] == 0x5a);
+    OK(checkpoint_save(c, 20, loaded, 2, &cost, &err));
+    CHECK(cost.written_tile_count == 7);
+    OK(checkpoint_load(c, loaded, 2, &found, &iteration, &err));
+    CHECK(found && iteration == 20);
+    OK(checkpoint_clear(c, &err));
+    OK(checkpoint_load(c, loaded, 2, &found, &iteration, &err));
+    CHECK(!found);
+    loaded[1].bytes = 8;
+    state_set(loaded, 21);
+    OK(checkpoint_save(c, 21, loaded, ARRAYS, &cost, &err));
+    checkpoint_close(c);
+    CHECK(load_from(path, note) == 21);
+
+    /* Other settings: not used, and gone. */
+    OK(checkpoint_open(&c, path, "others", note, &err));
+    CHECK(strstr(note, "other settings") != NULL);
+    OK(checkpoint_load(c, loaded, ARRAYS, &found, &iteration, &err));
+    CHECK(!found);
+    checkpoint_close(c);
+    state_release(array);
+    state_release(loaded);
+}
+
+static void save_iteration(const char *path, long k) {
+    struct checkpoint *c;
+    struct state_array array[ARRAYS];
+    char note[512];
+    state_init(array);
+    state_set(array, k);
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    OK(checkpoint_save(c, k, array, ARRAYS, NULL, &err));
+    checkpoint_close(c);
+    state_release(array);
+}
+
+static void write_file(const char *path, const char *data, size_t length) {
+    int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    OK(file_write_all(fd, data, length, path, &err));
+    close(fd);
+}
+
+/* Flipped bits and lost ends: found, or they hit what nobody reads. */
+static void test_damage(const char *path) {
+    char note[512];
+    save_iteration(path, 7);
+    struct buf whole;
+    buf_init(&whole, 64 << 20);
+    OK(file_read(path, &whole, &err));
+    uint32_t random = 12345;
+    int found_count = 0, flips = 100;
+    for (int i = 0; i < flips; i++) {
+        random = random * 1664525u + 1013904223u;
+        size_t at = (size_t)random % whole.length;
+        if (i < 40)
+            at %= 4096; /* heads and the first page's table */
+        whole.data[at] ^= (char)(1 << (random >> 29));
+        write_file(path, whole.data, whole.length);
+        whole.data[at] ^= (char)(1 << (random >> 29));
+        long iteration = load_from(path, note);
+        CHECK_THAT(iteration == 7 || (iteration == -1 && note[0]), "flip at %zu: %ld", at, iteration);
+        found_count += iteration == -1;
+    }
+    CHECK_THAT(found_count > flips / 2, "%d of %d", found_count, flips);
+    for (size_t length = 0; length < whole.length; length += 65536 * 7 + 100) {
+        write_file(path, whole.data, length);
+        long iteration = load_from(path, note);
+        CHECK_THAT(iteration == -1 && (note[0] || length == 0), "cut at %zu: %ld", length, iteration);
+    }
+    write_file(path, whole.data, whole.length);
+    CHECK(load_from(path, note) == 7);
+    buf_release(&whole);
+}
+
+/* The limit on a file's size stands for a full disk. In a child: it is the process's. */
+static void test_full_disk(const char *path) {
+    char note[512];
+    save_iteration(path, 7);
+    struct stat info;
+    CHECK(stat(path, &info) == 0);
+    pid_t child = fork();
+    if (child == 0) {
+        signal(SIGXFSZ, SIG_IGN);
+        struct checkpoint *c;
+        struct state_array array[ARRAYS];
+        struct rlimit limit;
+        bool found;
+        long iteration;
+        int full_count = 0;
+        state_init(array);
+        OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+        getrlimit(RLIMIT_FSIZE, &limit);
+        for (rlim_t room = 0; room < 6 * TILE; room += TILE / 2 + 4096) {
+            limit.rlim_cur = (rlim_t)info.st_size + room;
+            setrlimit(RLIMIT_FSIZE, &limit);
+            state_set(array, 8);
+            enum status status = checkpoint_save(c, 8, array, ARRAYS, NULL, &err);
+            CHECK_THAT(status == STATUS_NO_SPACE || status == STATUS_OK, "%s", err.message);
+            full_count += status == STATUS_NO_SPACE;
+            OK(checkpoint_load(c, array, ARRAYS, &found, &iteration, &err));
+            CHECK(found && iteration == (status == STATUS_OK ? 8 : 7) && state_is(array, iteration));
+            if (status == STATUS_OK)
+                break;
+        }
+        CHECK(full_count > 5);
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_FSIZE, &limit); /* room again: goes on */
+        state_set(array, 9);
+        OK(checkpoint_save(c, 9, array, ARRAYS, NULL, &err));
+        checkpoint_close(c);
+        state_release(array);
+        _exit(check_result());
+    }
+    int status;
+    CHECK(waitpid(child, &status, 0) == child);
+    CHECK_THAT(status == 0, "wait status %x", (unsigned)status);
+    CHECK(load_from(path, note) == 9);
+}
+
+/* A process saves without pause and is killed: what it had acknowledged, or newer, is there. */
+static void test_kill(const char *path) {
+    char note[512];
+    uint32_t random = 99;
+    long last = 100;
+    save_iteration(path, last);
+    for (int round = 0; round < 15; round++) {
+        int ends[2];
+        CHECK(pipe(ends) == 0);
+        pid_t child = fork();
+        if (child == 0) {
+            struct checkpoint *c;
+            struct state_array array[ARRAYS];
+            state_init(array);
+            if (checkpoint_open(&c, path, "scene+settings", note, &err) != STATUS_OK)
+                _exit(1);
+            for (long k = last + 1;; k++) {
+                state_set(array, k);
+                if (checkpoint_save(c, k, array, ARRAYS, NULL, &err) != STATUS_OK)
+                    _exit(1);
+                if (write(ends[1], &k, sizeof k) != (ssize_t)sizeof k)
+                    _exit(1);
+            }
+        }
+        close(ends[1]);
+        long acknowledged = last, got;
+        random = random * 1664525u + 1013904223u;
+        usleep(1000 + (random >> 8) % 40000);
+        kill(child, SIGKILL);
+        int status;
+        CHECK(waitpid(child, &status, 0) == child && WIFSIGNALED(status));
+        while (read(ends[0], &got, sizeof got) == (ssize_t)sizeof got)
+            acknowledged = got;
+        close(ends[0]);
+        long found = load_from(path, note);
+        CHECK_THAT(found >= acknowledged && found <= acknowledged + 1 && !note[0],
+                   "round %d: acknowledged %ld, found %ld (%s)", round, acknowledged, found, note);
+        last = found;
+    }
+}
+
+int main(void) {
+    char *dir = fresh_dir(), *path = file_join(dir, "checkpoint.db");
+    test_hash();
+    test_round_trip(path);
+    test_damage(path);
+    test_full_disk(path);
+    test_kill(path);
+    OK(file_remove_tree(dir, &err));
+    mem_free(path);
+    mem_free(dir);
+    return check_result();
+}
