@@ -47,11 +47,18 @@ int image_channel(const struct image *image, const char *name);
 
 /* Reads EXR, PNG, JPEG or Radiance HDR by content (not by extension). Channels come in the
  * order R, G, B, A first where they exist, then the rest by name; grey PNG/JPEG and an EXR
- * with only Y become R = G = B. info may be NULL. */
+ * with Y in place of R, G, B become R = G = B. An EXR's picture is its display window, for
+ * which cameras are given: what its data window leaves out is 0, what it adds is dropped; of
+ * several parts the first with R, G, B is taken. info may be NULL. On error *image is empty
+ * (releasing it does no harm). */
 enum status image_read(const char *path, struct image *image, struct image_info *info,
                        struct error *err);
 
-/* The same without reading pixels: only width, height, channels and info. */
+/* The same from memory; `name` stands for the path in messages. */
+enum status image_read_memory(const char *name, const void *data, size_t size,
+                              struct image *image, struct image_info *info, struct error *err);
+
+/* The same without reading pixels: only width, height, channels and info; pixel is NULL. */
 enum status image_probe(const char *path, struct image *image, struct image_info *info,
                         struct error *err);
 

@@ -1,0 +1,538 @@
+/* exr.c -- OpenEXR pictures by the C library OpenEXRCore (openexr.com/en/latest/OpenEXRCoreAPI).
+ *
+ * Invariants:
+ *  1. A file's sizes are checked against image.h's limits and against the file's own length
+ *     before pixels are asked for: a chunk takes at least 8 bytes of table and compresses at
+ *     most MAX_RATIO : 1, so a small file cannot ask for a large picture.
+ *  2. Every chunk lies inside the data window (checked), so the library writes only into our
+ *     pixels.
+ *  3. Written bytes depend on the pixels alone: no time, no host, no thread order. */
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <openexr.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "common/image_codec.h"
+#include "common/mem.h"
+
+/* What the library may ask for at once; a chunk of the largest picture stays below. */
+#define MAX_ALLOCATION ((size_t)2 << 30)
+/* Deflate reaches 1032 : 1; DWA drops a block of 64 values to one symbol before that. */
+#define MAX_RATIO 2048
+#define MAX_RATIO_DWA (64 * 2048)
+
+/* What the library's callbacks reach through the context. */
+struct stream {
+    struct image_source *source; /* reading */
+    int fd;                      /* writing */
+    int io_error;                /* errno of the first refused write */
+    char message[256];           /* the library's first complaint */
+};
+
+static void *limited_alloc(size_t bytes) {
+    return bytes <= MAX_ALLOCATION ? malloc(bytes) : NULL;
+}
+
+static void note_error(exr_const_context_t context, exr_result_t code, const char *message) {
+    (void)code;
+    void *user = NULL;
+    exr_get_user_data(context, &user);
+    struct stream *stream = user;
+    if (stream && stream->message[0] == '\0' && message)
+        strncpy(stream->message, message, sizeof stream->message - 1);
+}
+
+static int64_t stream_read(exr_const_context_t context, void *user, void *buffer, uint64_t size,
+                           uint64_t offset, exr_stream_error_func_ptr_t report) {
+    (void)context;
+    (void)report;
+    struct stream *stream = user;
+    return (int64_t)image_source_read(stream->source, offset, buffer, (size_t)size);
+}
+
+static int64_t stream_size(exr_const_context_t context, void *user) {
+    (void)context;
+    struct stream *stream = user;
+    return (int64_t)stream->source->size;
+}
+
+static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer,
+                            uint64_t size, uint64_t offset, exr_stream_error_func_ptr_t report) {
+    struct stream *stream = user;
+    uint64_t done = 0;
+    while (done < size) {
+        ssize_t wrote = pwrite(stream->fd, (const char *)buffer + done, (size_t)(size - done),
+                               (off_t)(offset + done));
+        if (wrote < 0 && errno == EINTR)
+            continue;
+        if (wrote <= 0) {
+            stream->io_error = wrote < 0 ? errno : EIO;
+            report(context, EXR_ERR_WRITE_IO, "write failed");
+            return -1;
+        }
+        done += (uint64_t)wrote;
+    }
+    return (int64_t)done;
+}
+
+static exr_context_initializer_t initializer(struct stream *stream) {
+    exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    init.error_handler_fn = note_error;
+    init.alloc_fn = limited_alloc;
+    init.free_fn = free;
+    init.user_data = stream;
+    init.read_fn = stream_read;
+    init.size_fn = stream_size;
+    init.write_fn = stream_write;
+    init.max_image_width = init.max_image_height = IMAGE_MAX_SIDE;
+    init.max_tile_width = init.max_tile_height = IMAGE_MAX_SIDE;
+    init.zip_level = 4; /* a fifth of level 9's time for 2 % more bytes on noisy floats */
+    /* A table of chunks that was never written means a writer that died: refuse the file
+     * rather than guess. */
+    init.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
+    return init;
+}
+
+static enum status refuse(const struct stream *stream, exr_result_t code, struct error *err) {
+    return error_set(err, STATUS_INPUT, "%s: damaged EXR: %s", stream->source->name,
+                     stream->message[0] ? stream->message : exr_get_default_error_message(code));
+}
+
+/* ---------------------------------------------------------------------------- reading */
+
+/* One file being read. */
+struct reader {
+    exr_context_t context;
+    struct stream *stream;
+    int part;
+    exr_storage_t storage;
+    exr_compression_t compression;
+    const exr_attr_chlist_t *list;
+    exr_attr_box2i_t data, display;
+    int grey;                       /* index in `list` of the Y that becomes R, G and B; or -1 */
+    int target[IMAGE_MAX_CHANNELS]; /* channel of the picture for each of `list` */
+};
+
+static int find_channel(const exr_attr_chlist_t *list, const char *name) {
+    for (int i = 0; i < list->num_channels; i++)
+        if (strcmp(list->entries[i].name.str, name) == 0)
+            return i;
+    return -1;
+}
+
+/* Takes the first part with R, G and B; failing that, the first one that is not deep. */
+static enum status choose_part(struct reader *r, struct error *err) {
+    int part_count = 0;
+    exr_result_t code = exr_get_count(r->context, &part_count);
+    r->part = -1;
+    for (int i = 0; code == EXR_ERR_SUCCESS && i < part_count; i++) {
+        exr_storage_t storage;
+        const exr_attr_chlist_t *list;
+        code = exr_get_storage(r->context, i, &storage);
+        if (code != EXR_ERR_SUCCESS || storage > EXR_STORAGE_TILED)
+            continue;
+        code = exr_get_channels(r->context, i, &list);
+        if (code != EXR_ERR_SUCCESS)
+            break;
+        bool colour = find_channel(list, "R") >= 0 && find_channel(list, "G") >= 0 &&
+                      find_channel(list, "B") >= 0;
+        if (r->part < 0 || colour) {
+            r->part = i;
+            r->storage = storage;
+            r->list = list;
+        }
+        if (colour)
+            break;
+    }
+    if (code != EXR_ERR_SUCCESS)
+        return refuse(r->stream, code, err);
+    if (r->part < 0)
+        return error_set(err, STATUS_INPUT,
+                         "%s: the EXR holds only deep data; a flat picture was expected",
+                         r->stream->source->name);
+    return STATUS_OK;
+}
+
+/* Gives every channel of the file its place: R, G, B, A first, then the rest in the file's
+ * (alphabetical) order. Fills name[] and *count with the picture's channels. */
+static enum status order_channels(struct reader *r, const char **name, uint32_t *count,
+                                  struct error *err) {
+    const exr_attr_chlist_t *list = r->list;
+    const char *file = r->stream->source->name;
+    if (list->num_channels > IMAGE_MAX_CHANNELS - 2)
+        return error_set(err, STATUS_LIMIT, "%s: %d channels are more than the limit of %d", file,
+                         list->num_channels, IMAGE_MAX_CHANNELS - 2);
+    r->grey = -1;
+    *count = 0;
+    for (int i = 0; i < list->num_channels; i++) {
+        const exr_attr_chlist_entry_t *entry = &list->entries[i];
+        r->target[i] = -1;
+        if (entry->x_sampling != 1 || entry->y_sampling != 1)
+            return error_set(err, STATUS_INPUT,
+                             "%s: channel %s is subsampled %d x %d (luminance/chroma EXR); only "
+                             "full-resolution channels can be read", file, entry->name.str,
+                             entry->x_sampling, entry->y_sampling);
+        if (entry->name.length >= (int)sizeof(((struct image *)0)->channel[0]))
+            return error_set(err, STATUS_INPUT, "%s: the channel name %.40s... is too long", file,
+                             entry->name.str);
+        if (i > 0 && strcmp(list->entries[i - 1].name.str, entry->name.str) == 0)
+            return error_set(err, STATUS_INPUT, "%s: damaged EXR: two channels are named %s",
+                             file, entry->name.str);
+    }
+    if (find_channel(list, "R") < 0 && find_channel(list, "G") < 0 && find_channel(list, "B") < 0)
+        r->grey = find_channel(list, "Y");
+    if (r->grey >= 0) {
+        r->target[r->grey] = 0;
+        for (; *count < 3; ++*count)
+            name[*count] = image_rgba[*count];
+    }
+    for (int k = 0; k < 4; k++) {
+        int i = find_channel(list, image_rgba[k]);
+        if (i < 0)
+            continue;
+        r->target[i] = (int)*count;
+        name[(*count)++] = image_rgba[k];
+    }
+    for (int i = 0; i < list->num_channels; i++) {
+        if (r->target[i] >= 0)
+            continue;
+        r->target[i] = (int)*count;
+        name[(*count)++] = list->entries[i].name.str;
+    }
+    return STATUS_OK;
+}
+
+static int64_t side(int32_t min, int32_t max) {
+    return (int64_t)max - min + 1;
+}
+
+/* Invariant 1. */
+static enum status check_plausible(const struct reader *r, struct error *err) {
+    const struct image_source *source = r->stream->source;
+    int32_t chunk_count = 0;
+    exr_result_t code = exr_get_chunk_count(r->context, r->part, &chunk_count);
+    if (code != EXR_ERR_SUCCESS)
+        return refuse(r->stream, code, err);
+    uint64_t pixel_bytes = 0;
+    for (int i = 0; i < r->list->num_channels; i++)
+        pixel_bytes += r->list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
+    uint64_t bytes = pixel_bytes * (uint64_t)side(r->data.min.x, r->data.max.x) *
+                     (uint64_t)side(r->data.min.y, r->data.max.y);
+    uint64_t ratio = r->compression == EXR_COMPRESSION_NONE   ? 1
+                     : r->compression < EXR_COMPRESSION_DWAA ? MAX_RATIO
+                                                              : MAX_RATIO_DWA;
+    if (chunk_count < 1 || (uint64_t)chunk_count * 8 > source->size ||
+        bytes / ratio > source->size)
+        return error_set(err, STATUS_INPUT,
+                         "%s: damaged EXR: the file's %llu bytes cannot hold the picture that its "
+                         "header promises", source->name, (unsigned long long)source->size);
+    return STATUS_OK;
+}
+
+static enum status read_header(struct reader *r, struct image *image, struct image_info *info,
+                               struct error *err) {
+    enum status status = choose_part(r, err);
+    if (status != STATUS_OK)
+        return status;
+    exr_result_t code = exr_get_data_window(r->context, r->part, &r->data);
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_get_display_window(r->context, r->part, &r->display);
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_get_compression(r->context, r->part, &r->compression);
+    if (code != EXR_ERR_SUCCESS)
+        return refuse(r->stream, code, err);
+    const char *name[IMAGE_MAX_CHANNELS];
+    uint32_t channel_count;
+    status = order_channels(r, name, &channel_count, err);
+    if (status != STATUS_OK)
+        return status;
+    const exr_attr_box2i_t *windows[2] = {&r->data, &r->display};
+    for (int i = 0; i < 2; i++) { /* both have to pass; the display window is what stays */
+        image_release(image);
+        int64_t width = side(windows[i]->min.x, windows[i]->max.x);
+        int64_t height = side(windows[i]->min.y, windows[i]->max.y);
+        status = image_header(image, r->stream->source->name, width < 0 ? 0 : (uint64_t)width,
+                              height < 0 ? 0 : (uint64_t)height, channel_count, name, err);
+        if (status != STATUS_OK)
+            return status;
+    }
+    info->encoding = IMAGE_LINEAR;
+    info->bits = 16;
+    for (int i = 0; i < r->list->num_channels; i++)
+        if (r->list->entries[i].pixel_type != EXR_PIXEL_HALF)
+            info->bits = 32;
+    return check_plausible(r, err);
+}
+
+/* Where a chunk's values go; the pipeline's user data. */
+struct destination {
+    const int *target;                /* [channel_count] channel of the picture */
+    size_t pixel_stride, line_stride; /* floats */
+    float *corner;
+};
+
+static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t stride, float *to) {
+    if (type == EXR_PIXEL_HALF)
+        for (size_t x = 0; x < width; x++)
+            to[x * stride] = image_half_to_float((uint16_t)(from[2 * x] | from[2 * x + 1] << 8));
+    else
+        for (size_t x = 0; x < width; x++) {
+            uint32_t bits = (uint32_t)from[4 * x] | (uint32_t)from[4 * x + 1] << 8 |
+                            (uint32_t)from[4 * x + 2] << 16 | (uint32_t)from[4 * x + 3] << 24;
+            float value = (float)bits;
+            if (type == EXR_PIXEL_FLOAT)
+                memcpy(&value, &bits, sizeof value);
+            to[x * stride] = value;
+        }
+}
+
+/* In place of the library's own unpacking, which in 3.1.5 mixes up the channels of interleaved
+ * RGBA halves. A chunk holds line after line, in each the channels' rows one after the other. */
+static exr_result_t unpack(exr_decode_pipeline_t *pipeline) {
+    const struct destination *d = pipeline->decoding_user_data;
+    const uint8_t *from = pipeline->unpacked_buffer;
+    size_t width = (size_t)pipeline->chunk.width, line_bytes = 0;
+    for (int i = 0; i < pipeline->channel_count; i++)
+        line_bytes += width * (size_t)pipeline->channels[i].bytes_per_element;
+    if (!from || line_bytes * (size_t)pipeline->chunk.height != pipeline->chunk.unpacked_size)
+        return EXR_ERR_CORRUPT_CHUNK;
+    for (int y = 0; y < pipeline->chunk.height; y++)
+        for (int i = 0; i < pipeline->channel_count; i++) {
+            const exr_coding_channel_info_t *channel = &pipeline->channels[i];
+            unpack_row(from, channel->data_type, width, d->pixel_stride,
+                       d->corner + (size_t)y * d->line_stride + d->target[i]);
+            from += width * (size_t)channel->bytes_per_element;
+        }
+    return EXR_ERR_SUCCESS;
+}
+
+/* Decodes one chunk to its place in `image`, which covers the data window. The first call sets
+ * the pipeline up, the others reuse its buffers. */
+static exr_result_t decode_chunk(const struct reader *r, exr_decode_pipeline_t *pipeline,
+                                 const exr_chunk_info_t *chunk, uint32_t x, uint32_t y,
+                                 const struct image *image) {
+    if (chunk->width < 0 || chunk->height < 0 ||
+        (uint64_t)x + (uint64_t)chunk->width > image->width ||
+        (uint64_t)y + (uint64_t)chunk->height > image->height)
+        return EXR_ERR_BAD_CHUNK_LEADER;
+    exr_result_t code;
+    if (pipeline->channels) {
+        code = exr_decoding_update(r->context, r->part, chunk, pipeline);
+    } else {
+        code = exr_decoding_initialize(r->context, r->part, chunk, pipeline);
+        if (code == EXR_ERR_SUCCESS)
+            code = exr_decoding_choose_default_routines(r->context, r->part, pipeline);
+    }
+    if (code != EXR_ERR_SUCCESS)
+        return code;
+    size_t stride = image->channel_count, line_stride = stride * image->width;
+    struct destination destination = {.target = r->target,
+                                      .pixel_stride = stride,
+                                      .line_stride = line_stride,
+                                      .corner = image->pixel + y * line_stride + x * stride};
+    pipeline->decoding_user_data = &destination;
+    pipeline->unpack_and_convert_fn = unpack;
+    return exr_decoding_run(r->context, r->part, pipeline);
+}
+
+static exr_result_t decode_scanlines(const struct reader *r, exr_decode_pipeline_t *pipeline,
+                                     const struct image *image) {
+    int32_t lines = 0;
+    exr_result_t code = exr_get_scanlines_per_chunk(r->context, r->part, &lines);
+    if (code == EXR_ERR_SUCCESS && lines < 1)
+        code = EXR_ERR_UNKNOWN;
+    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < image->height; y += (uint32_t)lines) {
+        exr_chunk_info_t chunk;
+        code = exr_read_scanline_chunk_info(r->context, r->part, r->data.min.y + (int32_t)y,
+                                            &chunk);
+        if (code == EXR_ERR_SUCCESS)
+            code = decode_chunk(r, pipeline, &chunk, 0, y, image);
+    }
+    return code;
+}
+
+/* Level 0 only: the picture at full size. */
+static exr_result_t decode_tiles(const struct reader *r, exr_decode_pipeline_t *pipeline,
+                                 const struct image *image) {
+    int32_t width = 0, height = 0;
+    exr_result_t code = exr_get_tile_sizes(r->context, r->part, 0, 0, &width, &height);
+    if (code == EXR_ERR_SUCCESS && (width < 1 || height < 1))
+        code = EXR_ERR_UNKNOWN;
+    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < image->height; y += (uint32_t)height)
+        for (uint32_t x = 0; code == EXR_ERR_SUCCESS && x < image->width; x += (uint32_t)width) {
+            exr_chunk_info_t chunk;
+            code = exr_read_tile_chunk_info(r->context, r->part, (int)(x / (uint32_t)width),
+                                            (int)(y / (uint32_t)height), 0, 0, &chunk);
+            if (code == EXR_ERR_SUCCESS)
+                code = decode_chunk(r, pipeline, &chunk, x, y, image);
+        }
+    return code;
+}
+
+static void copy_grey(struct image *image) {
+    size_t pixel_count = (size_t)image->width * image->height;
+    float *pixel = image->pixel;
+    for (size_t i = 0; i < pixel_count; i++, pixel += image->channel_count)
+        pixel[1] = pixel[2] = pixel[0];
+}
+
+/* Copies the part of `from` (the data window) that lies in `to` (the display window). */
+static void copy_window(const struct reader *r, const struct image *from, struct image *to) {
+    int64_t dx = (int64_t)r->data.min.x - r->display.min.x;
+    int64_t dy = (int64_t)r->data.min.y - r->display.min.y;
+    int64_t x0 = dx > 0 ? dx : 0, x1 = dx + from->width < to->width ? dx + from->width : to->width;
+    size_t stride = to->channel_count;
+    for (int64_t y = 0; y < to->height && x0 < x1; y++) {
+        if (y < dy || y >= dy + from->height)
+            continue;
+        memcpy(to->pixel + ((size_t)y * to->width + (size_t)x0) * stride,
+               from->pixel + ((size_t)(y - dy) * from->width + (size_t)(x0 - dx)) * stride,
+               (size_t)(x1 - x0) * stride * sizeof(float));
+    }
+}
+
+static enum status decode(const struct reader *r, struct image *image, struct error *err) {
+    exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
+    exr_result_t code = r->storage == EXR_STORAGE_TILED ? decode_tiles(r, &pipeline, image)
+                                                        : decode_scanlines(r, &pipeline, image);
+    exr_decoding_destroy(r->context, &pipeline);
+    if (code == EXR_ERR_FEATURE_NOT_IMPLEMENTED)
+        return error_set(err, STATUS_INPUT,
+                         "%s: the EXR's compression (%s) is not supported by the installed OpenEXR "
+                         "library", r->stream->source->name,
+                         r->compression >= EXR_COMPRESSION_DWAA ? "DWAA or DWAB" : "unknown");
+    if (code != EXR_ERR_SUCCESS)
+        return refuse(r->stream, code, err);
+    if (r->grey >= 0)
+        copy_grey(image);
+    return STATUS_OK;
+}
+
+static enum status read_pixels(const struct reader *r, struct image *image, struct error *err) {
+    image_allocate(image);
+    if (memcmp(&r->data, &r->display, sizeof r->data) == 0)
+        return decode(r, image, err);
+    struct image inner = *image; /* the names are only borrowed */
+    inner.width = (uint32_t)side(r->data.min.x, r->data.max.x);
+    inner.height = (uint32_t)side(r->data.min.y, r->data.max.y);
+    image_allocate(&inner);
+    enum status status = decode(r, &inner, err);
+    if (status == STATUS_OK)
+        copy_window(r, &inner, image);
+    mem_free(inner.pixel);
+    return status;
+}
+
+enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
+                           struct image_info *info, struct error *err) {
+    struct stream stream = {.source = source, .fd = -1};
+    struct reader r = {.stream = &stream};
+    exr_context_initializer_t init = initializer(&stream);
+    exr_result_t code = exr_start_read(&r.context, source->name, &init);
+    if (code != EXR_ERR_SUCCESS)
+        return refuse(&stream, code, err);
+    enum status status = read_header(&r, image, info, err);
+    if (status == STATUS_OK && !probe)
+        status = read_pixels(&r, image, err);
+    exr_finish(&r.context);
+    return status;
+}
+
+/* ---------------------------------------------------------------------------- writing */
+
+enum { TILE_SIDE = 64 };
+
+static exr_result_t write_header(exr_context_t context, const struct image *image,
+                                 enum image_exr_type type, bool tiled) {
+    int part = 0;
+    exr_result_t code = exr_add_part(context, NULL,
+                                     tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_initialize_required_attr_simple(context, part, (int32_t)image->width,
+                                                   (int32_t)image->height, EXR_COMPRESSION_ZIP);
+    if (code == EXR_ERR_SUCCESS && tiled)
+        code = exr_set_tile_descriptor(context, part, TILE_SIDE, TILE_SIDE, EXR_TILE_ONE_LEVEL,
+                                       EXR_TILE_ROUND_DOWN);
+    for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
+        code = exr_add_channel(context, part, image->channel[c],
+                               type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
+                               EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
+    return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
+}
+
+static exr_result_t encode_chunk(exr_context_t context, exr_encode_pipeline_t *pipeline,
+                                 const exr_chunk_info_t *chunk, uint32_t x, uint32_t y,
+                                 const struct image *image) {
+    bool first = pipeline->channels == NULL;
+    exr_result_t code = first ? exr_encoding_initialize(context, 0, chunk, pipeline)
+                              : exr_encoding_update(context, 0, chunk, pipeline);
+    if (code != EXR_ERR_SUCCESS)
+        return code;
+    size_t stride = image->channel_count * sizeof(float);
+    const float *corner = image->pixel + ((size_t)y * image->width + x) * image->channel_count;
+    for (int i = 0; i < pipeline->channel_count; i++) {
+        exr_coding_channel_info_t *channel = &pipeline->channels[i];
+        int from = image_channel(image, channel->channel_name);
+        channel->encode_from_ptr = (const uint8_t *)(corner + from);
+        channel->user_bytes_per_element = sizeof(float);
+        channel->user_data_type = EXR_PIXEL_FLOAT;
+        channel->user_pixel_stride = (int32_t)stride;
+        channel->user_line_stride = (int32_t)(stride * image->width);
+    }
+    if (first)
+        code = exr_encoding_choose_default_routines(context, 0, pipeline);
+    return code == EXR_ERR_SUCCESS ? exr_encoding_run(context, 0, pipeline) : code;
+}
+
+static exr_result_t write_chunks(exr_context_t context, const struct image *image, bool tiled) {
+    exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
+    int32_t lines = TILE_SIDE;
+    exr_result_t code = EXR_ERR_SUCCESS;
+    if (!tiled)
+        code = exr_get_scanlines_per_chunk(context, 0, &lines);
+    uint32_t step_x = tiled ? TILE_SIDE : image->width, step_y = (uint32_t)lines;
+    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < image->height; y += step_y)
+        for (uint32_t x = 0; code == EXR_ERR_SUCCESS && x < image->width; x += step_x) {
+            exr_chunk_info_t chunk;
+            if (tiled)
+                code = exr_write_tile_chunk_info(context, 0, (int)(x / TILE_SIDE),
+                                                 (int)(y / TILE_SIDE), 0, 0, &chunk);
+            else
+                code = exr_write_scanline_chunk_info(context, 0, (int)y, &chunk);
+            if (code == EXR_ERR_SUCCESS)
+                code = encode_chunk(context, &pipeline, &chunk, x, y, image);
+        }
+    exr_encoding_destroy(context, &pipeline);
+    return code;
+}
+
+enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
+                            bool tiled, struct error *err) {
+    struct stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640)};
+    if (stream.fd < 0)
+        return error_set_errno(err, errno, "cannot create %s", path);
+    exr_context_initializer_t init = initializer(&stream);
+    exr_context_t context;
+    exr_result_t code = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &init);
+    if (code == EXR_ERR_SUCCESS) {
+        code = write_header(context, image, type, tiled);
+        if (code == EXR_ERR_SUCCESS)
+            code = write_chunks(context, image, tiled);
+        exr_result_t finish = exr_finish(&context); /* writes the table of chunks */
+        if (code == EXR_ERR_SUCCESS)
+            code = finish;
+    }
+    enum status status = STATUS_OK;
+    if (stream.io_error)
+        status = error_set_errno(err, stream.io_error, "cannot write %s", path);
+    else if (code != EXR_ERR_SUCCESS)
+        status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path,
+                           stream.message[0] ? stream.message
+                                             : exr_get_default_error_message(code));
+    if (close(stream.fd) != 0 && status == STATUS_OK)
+        status = error_set_errno(err, errno, "cannot close %s", path);
+    return status;
+}

@@ -1,0 +1,66 @@
+/* image_codec.h -- what image.c and its codecs (exr.c, hdr.c, jpeg.c, png.c) share; private
+ * to them.
+ *
+ * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
+ * whole, so probing a large file costs as little as reading its header. A codec fills *image
+ * only through image_header and image_allocate, which enforce the limits of image.h. */
+#ifndef UNBAKE_COMMON_IMAGE_CODEC_H
+#define UNBAKE_COMMON_IMAGE_CODEC_H
+
+#include <string.h>
+
+#include "common/image.h"
+
+struct image_source {
+    const char *name;      /* for messages */
+    const uint8_t *memory; /* NULL for a file */
+    int fd;
+    uint64_t size;         /* bytes */
+    int io_error;          /* errno of the first read that the system refused, else 0 */
+};
+
+/* Reads up to `length` bytes at `offset`; fewer only at the end or after an I/O error. */
+size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
+                         size_t length);
+
+/* Sets size and channel names of an empty image, without pixels; STATUS_LIMIT when the sizes
+ * pass the limits, STATUS_INPUT when one is 0. */
+enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
+                         uint32_t channel_count, const char *const *channel, struct error *err);
+
+/* Zero pixels for an image that has its header. */
+void image_allocate(struct image *image);
+
+/* image_float_from_half without a branch, for loops that the compiler vectorises. In integers
+ * but for one product of normal numbers, so that a thread which flushes subnormals to zero
+ * reads the same. */
+static inline float image_half_to_float(uint16_t half) {
+    uint32_t exponent = half & 0x7c00, mantissa = half & 0x3ff;
+    float small = (float)(int32_t)mantissa * 0x1p-24f, value;
+    uint32_t small_bits, bits = (uint32_t)(half & 0x7fff) << 13;
+    memcpy(&small_bits, &small, sizeof small_bits);
+    bits += exponent == 0x7c00 ? 224u << 23 : 112u << 23;
+    bits = (exponent == 0 ? small_bits : bits) | (uint32_t)(half & 0x8000) << 16;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* The names of a colour picture's channels, for image_header. */
+extern const char *const image_rgba[4];
+
+/* One reader per format. With `probe` they stop after the header. The source's first bytes
+ * were recognised by image.c. On error the caller releases *image. */
+enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
+                           struct image_info *info, struct error *err);
+enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
+                           struct image_info *info, struct error *err);
+enum status image_read_png(struct image_source *source, bool probe, struct image *image,
+                           struct image_info *info, struct error *err);
+enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
+                            struct image_info *info, struct error *err);
+
+/* exif.c: reads what image_info holds out of a TIFF-structured EXIF block ("II*\0..." or
+ * "MM\0*..."). Best effort: what is absent, damaged or out of range keeps its value. */
+void image_parse_exif(const uint8_t *data, size_t size, struct image_info *info);
+
+#endif

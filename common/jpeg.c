@@ -1,0 +1,187 @@
+/* jpeg.c -- JPEG pictures by libjpeg-turbo (its libjpeg.txt), with EXIF from the first APP1.
+ *
+ * The library tolerates damage: it fills what is missing with grey and counts a warning. Grey
+ * that no camera saw would be taken for light, so data that is corrupt or ends early is an
+ * error here. Errors arrive by longjmp; what must survive one is in struct reader. */
+#include <setjmp.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <jpeglib.h>
+
+#include <jerror.h>
+
+#include "common/image_codec.h"
+#include "common/mem.h"
+
+/* A block of 64 pixels takes at least one bit, and chroma may share it among four. */
+#define MAX_PIXELS_PER_BYTE 2048
+/* A progressive file may ask for any number of passes over the whole picture. */
+#define MAX_SCANS 500
+
+struct reader {
+    struct jpeg_decompress_struct jpeg; /* each finds its reader through client_data */
+    struct jpeg_error_mgr error;
+    struct jpeg_source_mgr input;
+    struct jpeg_progress_mgr progress;
+    jmp_buf jump;
+    struct image_source *source;
+    uint64_t offset;
+    struct image *image;
+    struct image_info *info;
+    struct error *err;
+    enum status status;
+    JSAMPLE *row;
+    JOCTET buffer[16384];
+};
+
+static void stop(struct reader *r, enum status status) {
+    r->status = status;
+    longjmp(r->jump, 1);
+}
+
+static void damaged(j_common_ptr common) {
+    struct reader *r = common->client_data;
+    char message[JMSG_LENGTH_MAX];
+    common->err->format_message(common, message);
+    stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: %s", r->source->name, message));
+}
+
+static void on_message(j_common_ptr common, int level) {
+    if (level >= 0)
+        return; /* a trace */
+    switch (common->err->msg_code) {
+    case JWRN_ADOBE_XFORM:     /* an unknown colour transform: the default is right */
+    case JWRN_BOGUS_ICC:       /* we take no profile */
+    case JWRN_EXTRANEOUS_DATA: /* padding between segments, as some cameras write it */
+    case JWRN_JFIF_MAJOR:
+        return;
+    default:
+        damaged(common);
+    }
+}
+
+static void init_source(j_decompress_ptr jpeg) {
+    (void)jpeg;
+}
+
+static boolean fill_buffer(j_decompress_ptr jpeg) {
+    struct reader *r = jpeg->client_data;
+    size_t got = image_source_read(r->source, r->offset, r->buffer, sizeof r->buffer);
+    if (got == 0)
+        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: the file is cut short",
+                          r->source->name));
+    r->offset += got;
+    r->input.next_input_byte = r->buffer;
+    r->input.bytes_in_buffer = got;
+    return TRUE;
+}
+
+static void skip_bytes(j_decompress_ptr jpeg, long count) {
+    struct reader *r = jpeg->client_data;
+    if (count <= 0)
+        return;
+    size_t skip = (size_t)count;
+    if (skip <= r->input.bytes_in_buffer) {
+        r->input.next_input_byte += skip;
+        r->input.bytes_in_buffer -= skip;
+    } else {
+        r->offset += skip - r->input.bytes_in_buffer;
+        r->input.bytes_in_buffer = 0;
+    }
+}
+
+static void end_source(j_decompress_ptr jpeg) {
+    (void)jpeg;
+}
+
+static void on_progress(j_common_ptr common) {
+    struct reader *r = common->client_data;
+    if (r->jpeg.input_scan_number > MAX_SCANS)
+        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: more than %d scans",
+                          r->source->name, MAX_SCANS));
+}
+
+static void start(struct reader *r) {
+    jpeg_create_decompress(&r->jpeg);
+    r->input = (struct jpeg_source_mgr){.init_source = init_source,
+                                        .fill_input_buffer = fill_buffer,
+                                        .skip_input_data = skip_bytes,
+                                        .resync_to_restart = jpeg_resync_to_restart,
+                                        .term_source = end_source};
+    r->jpeg.src = &r->input;
+    r->progress.progress_monitor = on_progress;
+    r->jpeg.progress = &r->progress;
+    jpeg_save_markers(&r->jpeg, JPEG_APP0 + 1, 0xffff);
+}
+
+static void read_exif(struct reader *r) {
+    static const char start_of_exif[6] = "Exif\0";
+    for (jpeg_saved_marker_ptr m = r->jpeg.marker_list; m; m = m->next)
+        if (m->data_length > sizeof start_of_exif &&
+            memcmp(m->data, start_of_exif, sizeof start_of_exif) == 0) {
+            image_parse_exif(m->data + sizeof start_of_exif,
+                             m->data_length - sizeof start_of_exif, r->info);
+            return;
+        }
+}
+
+static void read_header(struct reader *r) {
+    const char *name = r->source->name;
+    jpeg_read_header(&r->jpeg, TRUE);
+    if (r->jpeg.num_components != 1 && r->jpeg.num_components != 3)
+        stop(r, error_set(r->err, STATUS_INPUT,
+                          "%s: a JPEG of %d components (CMYK?) is not a photograph; expected grey, "
+                          "YCbCr or RGB", name, r->jpeg.num_components));
+    uint64_t width = r->jpeg.image_width, height = r->jpeg.image_height;
+    enum status status = image_header(r->image, name, width, height, 3, image_rgba, r->err);
+    if (status != STATUS_OK)
+        stop(r, status);
+    if (width * height / MAX_PIXELS_PER_BYTE > r->source->size)
+        stop(r, error_set(r->err, STATUS_INPUT,
+                          "%s: damaged JPEG: the file is too short for its picture's size", name));
+    r->info->encoding = IMAGE_SRGB;
+    r->info->bits = 8;
+    read_exif(r);
+}
+
+static void read_pixels(struct reader *r) {
+    r->jpeg.out_color_space = JCS_RGB; /* grey too */
+    jpeg_start_decompress(&r->jpeg);
+    struct image *image = r->image;
+    size_t row_floats = (size_t)image->width * 3;
+    r->row = mem_array(row_floats, sizeof *r->row);
+    image_allocate(image);
+    while (r->jpeg.output_scanline < image->height) {
+        float *to = image->pixel + r->jpeg.output_scanline * row_floats;
+        if (jpeg_read_scanlines(&r->jpeg, &r->row, 1) != 1)
+            continue;
+        for (size_t i = 0; i < row_floats; i++)
+            to[i] = (float)r->row[i] / 255.0f;
+    }
+    jpeg_finish_decompress(&r->jpeg);
+}
+
+enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
+                            struct image_info *info, struct error *err) {
+    struct reader *r = mem_calloc(1, sizeof *r);
+    r->source = source;
+    r->image = image;
+    r->info = info;
+    r->err = err;
+    r->jpeg.err = jpeg_std_error(&r->error);
+    r->error.error_exit = damaged;
+    r->error.emit_message = on_message;
+    r->jpeg.client_data = r;
+    if (setjmp(r->jump) == 0) {
+        start(r);
+        read_header(r);
+        if (!probe)
+            read_pixels(r);
+    }
+    jpeg_destroy_decompress(&r->jpeg);
+    mem_free(r->row);
+    enum status status = r->status;
+    mem_free(r);
+    return status;
+}

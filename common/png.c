@@ -1,0 +1,256 @@
+/* png.c -- PNG pictures by libpng (libpng.org/pub/png/libpng-manual.txt).
+ *
+ * libpng reports errors by longjmp, so each entry point keeps what must survive in one struct
+ * that outlives the jump and does its cleaning after setjmp has returned. A damaged file is
+ * refused as a whole, whatever part could be decoded: checksums are part of the check. */
+#include <errno.h>
+#include <math.h>
+#include <png.h>
+#include <setjmp.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/image_codec.h"
+#include "common/mem.h"
+
+/* Deflate's best ratio is 1032 : 1. */
+#define MAX_RATIO 1032
+/* What libpng may ask for at once, for text and profiles that we do not want. */
+#define MAX_CHUNK_BYTES ((png_alloc_size_t)64 << 20)
+
+/* ---------------------------------------------------------------------------- reading */
+
+struct reader {
+    struct image_source *source;
+    uint64_t offset;
+    struct image *image;
+    struct image_info *info;
+    bool probe;
+    struct error *err;
+    enum status status; /* what the jump reports */
+    png_structp png;
+    png_infop png_info;
+    uint8_t *row; /* [row_bytes] one row as stored */
+};
+
+static void read_failed(png_structp png, png_const_charp message) {
+    struct reader *r = png_get_error_ptr(png);
+    if (r->status == STATUS_OK)
+        r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s", r->source->name, message);
+    longjmp(png_jmpbuf(png), 1);
+}
+
+/* Warnings are about ancillary chunks (profiles, times, text) that do not touch the pixels. */
+static void ignore_warning(png_structp png, png_const_charp message) {
+    (void)png;
+    (void)message;
+}
+
+static void read_bytes(png_structp png, png_bytep out, size_t length) {
+    struct reader *r = png_get_io_ptr(png);
+    size_t got = image_source_read(r->source, r->offset, out, length);
+    r->offset += got;
+    if (got < length)
+        png_error(png, "the file is cut short");
+}
+
+static void stop(struct reader *r, enum status status) {
+    r->status = status;
+    longjmp(png_jmpbuf(r->png), 1);
+}
+
+/* Has libpng expand everything to grey-free 8 or 16-bit RGB or RGBA. */
+static void set_transforms(struct reader *r, int color) {
+    bool transparent = png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
+    if (color == PNG_COLOR_TYPE_PALETTE)
+        png_set_palette_to_rgb(r->png);
+    else
+        png_set_expand_gray_1_2_4_to_8(r->png);
+    if (transparent)
+        png_set_tRNS_to_alpha(r->png);
+    if (!(color & PNG_COLOR_MASK_COLOR))
+        png_set_gray_to_rgb(r->png);
+}
+
+static void read_header(struct reader *r) {
+    png_read_info(r->png, r->png_info);
+    png_uint_32 width, height;
+    int depth, color;
+    png_get_IHDR(r->png, r->png_info, &width, &height, &depth, &color, NULL, NULL, NULL);
+    bool alpha = (color & PNG_COLOR_MASK_ALPHA) ||
+                 png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
+    enum status status = image_header(r->image, r->source->name, width, height, alpha ? 4 : 3,
+                                      image_rgba, r->err);
+    if (status != STATUS_OK)
+        stop(r, status);
+    uint64_t bytes = (uint64_t)png_get_rowbytes(r->png, r->png_info) * height;
+    if (bytes / MAX_RATIO > r->source->size)
+        png_error(r->png, "the file is too short for its picture's size");
+    r->info->encoding = IMAGE_SRGB;
+    r->info->bits = depth == 16 ? 16 : 8;
+    png_uint_32 exif_size = 0;
+    png_bytep exif = NULL;
+    if (png_get_eXIf_1(r->png, r->png_info, &exif_size, &exif) != 0)
+        image_parse_exif(exif, exif_size, r->info);
+    set_transforms(r, color);
+}
+
+static void convert_row(const struct reader *r, const uint8_t *from, float *to) {
+    size_t count = (size_t)r->image->width * r->image->channel_count;
+    if (r->info->bits == 8)
+        for (size_t i = 0; i < count; i++)
+            to[i] = (float)from[i] / 255.0f;
+    else
+        for (size_t i = 0; i < count; i++)
+            to[i] = (float)(from[2 * i] << 8 | from[2 * i + 1]) / 65535.0f;
+}
+
+/* Rows of an interlaced picture gather over seven passes; they do so in the memory of their own
+ * float row, which has room for them, and are converted once the last pass has completed them. */
+static void read_pixels(struct reader *r) {
+    int pass_count = png_set_interlace_handling(r->png);
+    png_read_update_info(r->png, r->png_info);
+    struct image *image = r->image;
+    size_t row_bytes = png_get_rowbytes(r->png, r->png_info);
+    size_t row_floats = (size_t)image->width * image->channel_count;
+    if (row_bytes != row_floats * (r->info->bits == 16 ? 2 : 1))
+        png_error(r->png, "unexpected row size");
+    image_allocate(image);
+    r->row = mem_alloc(row_bytes);
+    for (int pass = 0; pass < pass_count; pass++)
+        for (uint32_t y = 0; y < image->height; y++) {
+            float *floats = image->pixel + y * row_floats;
+            uint8_t *gathered = pass_count == 1 ? r->row : (uint8_t *)floats;
+            png_read_row(r->png, gathered, NULL);
+            if (pass < pass_count - 1)
+                continue;
+            if (pass_count > 1)
+                memcpy(r->row, gathered, row_bytes);
+            convert_row(r, r->row, floats);
+        }
+    png_read_end(r->png, NULL);
+}
+
+enum status image_read_png(struct image_source *source, bool probe, struct image *image,
+                           struct image_info *info, struct error *err) {
+    struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
+    struct reader *volatile kept = &r;
+    r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, read_failed, ignore_warning);
+    r.png_info = r.png ? png_create_info_struct(r.png) : NULL;
+    if (!r.png_info) {
+        png_destroy_read_struct(&r.png, NULL, NULL);
+        return error_set(err, STATUS_INTERNAL, "libpng does not start");
+    }
+    if (setjmp(png_jmpbuf(r.png)) == 0) {
+        png_set_read_fn(r.png, &r, read_bytes);
+        png_set_user_limits(r.png, IMAGE_MAX_SIDE, IMAGE_MAX_SIDE);
+        png_set_chunk_malloc_max(r.png, MAX_CHUNK_BYTES);
+        png_set_crc_action(r.png, PNG_CRC_ERROR_QUIT, PNG_CRC_WARN_DISCARD);
+        read_header(&r);
+        if (!probe)
+            read_pixels(&r);
+    }
+    png_destroy_read_struct(&kept->png, &kept->png_info, NULL);
+    mem_free(kept->row);
+    return kept->status;
+}
+
+/* ---------------------------------------------------------------------------- writing */
+
+struct writer {
+    const char *path;
+    FILE *file;
+    struct error *err;
+    enum status status;
+    png_structp png;
+    png_infop png_info;
+    uint8_t *row;
+};
+
+static void write_failed(png_structp png, png_const_charp message) {
+    struct writer *w = png_get_error_ptr(png);
+    if (w->status == STATUS_OK)
+        w->status = error_set(w->err, STATUS_INTERNAL, "cannot write %s: %s", w->path, message);
+    longjmp(png_jmpbuf(png), 1);
+}
+
+static void write_bytes(png_structp png, png_bytep data, size_t length) {
+    struct writer *w = png_get_io_ptr(png);
+    if (fwrite(data, 1, length, w->file) == length)
+        return;
+    w->status = error_set_errno(w->err, errno, "cannot write %s", w->path);
+    longjmp(png_jmpbuf(png), 1);
+}
+
+static void flush_bytes(png_structp png) {
+    (void)png; /* fclose does */
+}
+
+static uint8_t to_byte(float linear) {
+    float value = linear > 0 ? fminf(linear, 1) : 0; /* not a number: 0 */
+    return (uint8_t)(image_linear_to_srgb(value) * 255.0f + 0.5f);
+}
+
+/* One row of `out_count` channels: 3, or 1 for a grey picture. */
+static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, float scale,
+                     uint8_t *row) {
+    const float *pixel = image->pixel + (size_t)y * image->width * image->channel_count;
+    uint32_t step = image->channel_count < 3 ? 0 : 1; /* grey: all from the first channel */
+    for (uint32_t x = 0; x < image->width; x++, pixel += image->channel_count, row += out_count) {
+        bool finite = true;
+        for (uint32_t c = 0; c < out_count; c++) {
+            float value = pixel[c * step] * scale;
+            finite = finite && isfinite(value);
+            row[c] = to_byte(value);
+        }
+        if (!finite)
+            memcpy(row, "\xff\x00\xff", out_count);
+    }
+}
+
+static bool has_non_finite(const struct image *image) {
+    size_t pixel_count = (size_t)image->width * image->height;
+    for (size_t i = 0; i < pixel_count; i++)
+        if (!isfinite(image->pixel[i * image->channel_count]))
+            return true;
+    return false;
+}
+
+static void write_picture(struct writer *w, const struct image *image, float scale) {
+    /* A grey picture with a non-finite value is written in colour, for the magenta to show. */
+    bool colour = image->channel_count >= 3 || has_non_finite(image);
+    png_set_IHDR(w->png, w->png_info, image->width, image->height, 8,
+                 colour ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_sRGB(w->png, w->png_info, PNG_sRGB_INTENT_PERCEPTUAL);
+    png_set_compression_level(w->png, 4);
+    png_write_info(w->png, w->png_info);
+    w->row = mem_array(image->width, 3);
+    for (uint32_t y = 0; y < image->height; y++) {
+        fill_row(image, y, colour ? 3 : 1, scale, w->row);
+        png_write_row(w->png, w->row);
+    }
+    png_write_end(w->png, NULL);
+}
+
+enum status image_write_png(const char *path, const struct image *image, float scale,
+                            struct error *err) {
+    struct writer w = {.path = path, .err = err};
+    struct writer *volatile kept = &w;
+    w.file = fopen(path, "wbe");
+    if (!w.file)
+        return error_set_errno(err, errno, "cannot create %s", path);
+    w.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning);
+    w.png_info = w.png ? png_create_info_struct(w.png) : NULL;
+    if (!w.png_info)
+        w.status = error_set(err, STATUS_INTERNAL, "libpng does not start");
+    else if (setjmp(png_jmpbuf(w.png)) == 0) {
+        png_set_write_fn(w.png, &w, write_bytes, flush_bytes);
+        write_picture(&w, image, scale);
+    }
+    png_destroy_write_struct(&kept->png, &kept->png_info);
+    mem_free(kept->row);
+    if (fclose(kept->file) != 0 && kept->status == STATUS_OK)
+        kept->status = error_set_errno(err, errno, "cannot write %s", path);
+    return kept->status;
+}
