@@ -1,0 +1,263 @@
+/* archive.c -- see archive.h.
+ *
+ * 1. Every name goes through path_clean before anything is done with it.
+ * 2. Folders are walked one name at a time from the descriptor of `dir` with O_NOFOLLOW, and
+ *    files are made with O_EXCL: nothing that lies there already is followed or replaced.
+ * 3. Bytes are counted as they are written, whatever the entry's header claims. */
+#include "server/ingest/archive.h"
+
+#include <archive.h>
+#include <archive_entry.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <locale.h>
+#include <stdbool.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/ingest/path.h"
+
+#define BLOCK_BYTES ((size_t)256 << 10)
+
+struct unpacking {
+    struct archive *archive;
+    const char *name; /* the archive's, for messages */
+    const struct archive_limits *limits;
+    uint64_t packed_bytes, written_bytes, entry_count, file_count;
+    int dir_fd;
+    char *block; /* [BLOCK_BYTES] */
+    struct error *err;
+};
+
+/* What libarchive says went wrong: a fault of the file, unless reading it failed. */
+static enum status library_error(struct unpacking *u, const char *entry) {
+    int number = archive_errno(u->archive);
+    const char *text = archive_error_string(u->archive);
+    enum status status = number == EIO || number == EACCES ? STATUS_IO : STATUS_INPUT;
+    if (entry)
+        return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry,
+                         text ? text : "unknown fault");
+    if (u->entry_count == 0)
+        return error_set(u->err, status, "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s",
+                         u->name, text ? text : "unknown fault");
+    return error_set(u->err, status, "%s is damaged or cut off: %s", u->name,
+                     text ? text : "unknown fault");
+}
+
+/* The formats and filters that are promised and no others: each is a parser of hostile bytes. */
+static enum status open_archive(struct unpacking *u, const char *path) {
+    struct archive *a = u->archive;
+    struct stat info;
+    if (stat(path, &info) != 0)
+        return error_set_errno(u->err, errno, "cannot open %s", u->name);
+    u->packed_bytes = (uint64_t)info.st_size;
+    if (archive_read_support_format_zip(a) != ARCHIVE_OK ||
+        archive_read_support_format_tar(a) != ARCHIVE_OK ||
+        archive_read_support_filter_gzip(a) != ARCHIVE_OK ||
+        archive_read_support_filter_zstd(a) != ARCHIVE_OK)
+        return error_set(u->err, STATUS_INTERNAL, "libarchive lacks zip, tar, gzip or zstd: %s",
+                         archive_error_string(a));
+    if (archive_read_open_filename(a, path, BLOCK_BYTES) != ARCHIVE_OK)
+        return library_error(u, NULL);
+    return STATUS_OK;
+}
+
+/* A word for an entry that is neither file nor folder; NULL for those two. */
+static const char *forbidden_kind(struct archive_entry *entry) {
+    if (archive_entry_hardlink(entry))
+        return "a hard link";
+    switch (archive_entry_filetype(entry)) {
+    case AE_IFREG:
+    case AE_IFDIR: return NULL;
+    case AE_IFLNK: return "a symbolic link";
+    case AE_IFCHR:
+    case AE_IFBLK: return "a device";
+    case AE_IFIFO: return "a pipe";
+    case AE_IFSOCK: return "a socket";
+    default: return "of an unknown kind";
+    }
+}
+
+static enum status check_entry(struct unpacking *u, struct archive_entry *entry, const char *path) {
+    const char *kind = forbidden_kind(entry);
+    if (kind)
+        return error_set(u->err, STATUS_INPUT, "%s: \"%s\" is %s; only files and folders are taken",
+                         u->name, path, kind);
+    if (archive_entry_is_encrypted(entry)) {
+        error_set(u->err, STATUS_INPUT, "%s: \"%s\" is encrypted", u->name, path);
+        return error_hint(u->err, "pack it again without a password");
+    }
+    if (archive_entry_size_is_set(entry) && archive_entry_size(entry) > 0 &&
+        (uint64_t)archive_entry_size(entry) > u->limits->total_bytes)
+        return error_set(u->err, STATUS_LIMIT,
+                         "%s: \"%s\" says it is %" PRId64 " bytes; a bundle may unpack to %" PRIu64,
+                         u->name, path, (int64_t)archive_entry_size(entry), u->limits->total_bytes);
+    return STATUS_OK;
+}
+
+/* Opens the folder `path` below the root, making what is missing; -1 with *err set. An empty
+ * path gives a copy of the root. */
+static int open_folder(struct unpacking *u, const char *path, size_t length, enum status *status) {
+    int at = fcntl(u->dir_fd, F_DUPFD_CLOEXEC, 0);
+    for (size_t start = 0; at >= 0 && start < length;) {
+        size_t n = strcspn(path + start, "/");
+        n = start + n > length ? length - start : n;
+        char *part = mem_strndup(path + start, n);
+        int next = -1;
+        if (mkdirat(at, part, 0750) == 0 || errno == EEXIST)
+            next = openat(at, part, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+        mem_free(part);
+        int number = errno;
+        close(at);
+        errno = number;
+        at = next;
+        start += n + 1;
+    }
+    if (at < 0 && (errno == ENOTDIR || errno == ELOOP))
+        *status = error_set(u->err, STATUS_INPUT, "%s: \"%.*s\" is both a file and a folder", u->name,
+                            (int)length, path);
+    else if (at < 0)
+        *status = error_set_errno(u->err, errno, "cannot make folder %.*s", (int)length, path);
+    return at;
+}
+
+static enum status count_bytes(struct unpacking *u, size_t bytes) {
+    u->written_bytes += bytes;
+    if (u->written_bytes > u->limits->total_bytes)
+        return error_set(u->err, STATUS_LIMIT, "%s unpacks to more than %" PRIu64 " bytes, the limit",
+                         u->name, u->limits->total_bytes);
+    if (u->written_bytes > ARCHIVE_RATIO_FREE_BYTES &&
+        (double)u->written_bytes > u->limits->ratio * (double)u->packed_bytes)
+        return error_set(u->err, STATUS_LIMIT,
+                         "%s unpacks to more than %.0f times its size of %" PRIu64 " bytes", u->name,
+                         u->limits->ratio, u->packed_bytes);
+    return STATUS_OK;
+}
+
+static enum status write_content(struct unpacking *u, int fd, const char *path) {
+    for (;;) {
+        la_ssize_t got = archive_read_data(u->archive, u->block, BLOCK_BYTES);
+        if (got == 0)
+            return STATUS_OK;
+        /* A warning here is a wrong checksum or size: no content to trust either. */
+        if (got < 0)
+            return library_error(u, path);
+        enum status status = count_bytes(u, (size_t)got);
+        if (status == STATUS_OK)
+            status = file_write_all(fd, u->block, (size_t)got, path, u->err);
+        if (status != STATUS_OK)
+            return status;
+    }
+}
+
+static enum status unpack_file(struct unpacking *u, const char *path) {
+    enum status status = STATUS_OK;
+    const char *base = path_base(path);
+    size_t folder_length = base > path ? (size_t)(base - path) - 1 : 0;
+    int folder = open_folder(u, path, folder_length, &status);
+    if (folder < 0)
+        return status;
+    int fd = openat(folder, base, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0640);
+    if (fd < 0 && errno == EEXIST)
+        status = error_set(u->err, STATUS_INPUT, "%s holds \"%s\" twice", u->name, path);
+    else if (fd < 0)
+        status = error_set_errno(u->err, errno, "cannot create %s", path);
+    close(folder);
+    if (fd < 0)
+        return status;
+    status = write_content(u, fd, path);
+    if (close(fd) != 0 && status == STATUS_OK)
+        status = error_set_errno(u->err, errno, "cannot write %s", path);
+    u->file_count++;
+    return status;
+}
+
+static enum status unpack_entry(struct unpacking *u, struct archive_entry *entry) {
+    const char *raw = archive_entry_pathname_utf8(entry);
+    if (!raw)
+        raw = archive_entry_pathname(entry);
+    if (!raw || raw[0] == '\0')
+        return error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " has no name in UTF-8", u->name,
+                         u->entry_count);
+    char *path;
+    enum status status = path_clean(raw, &path, u->err);
+    if (status != STATUS_OK)
+        return error_prefix(u->err, "%s", u->name);
+    if (path_is_litter(path))
+        goto out;
+    status = check_entry(u, entry, path);
+    if (status != STATUS_OK)
+        goto out;
+    if (archive_entry_filetype(entry) == AE_IFDIR) {
+        int folder = open_folder(u, path, strlen(path), &status);
+        if (folder >= 0)
+            close(folder);
+    } else if (path[0] == '\0') {
+        status = error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " is a file without a name",
+                           u->name, u->entry_count);
+    } else {
+        status = unpack_file(u, path);
+    }
+out:
+    mem_free(path);
+    return status;
+}
+
+static enum status unpack_all(struct unpacking *u) {
+    for (;;) {
+        struct archive_entry *entry;
+        int result = archive_read_next_header(u->archive, &entry);
+        if (result == ARCHIVE_EOF)
+            break;
+        /* Warnings are about attributes and names; names that matter are checked next. */
+        if (result != ARCHIVE_OK && result != ARCHIVE_WARN)
+            return library_error(u, NULL);
+        if (++u->entry_count > u->limits->file_count)
+            return error_set(u->err, STATUS_LIMIT, "%s holds more than %" PRIu64 " files, the limit",
+                             u->name, u->limits->file_count);
+        enum status status = unpack_entry(u, entry);
+        if (status != STATUS_OK)
+            return status;
+    }
+    if (u->file_count == 0)
+        return error_set(u->err, STATUS_INPUT, "%s holds no files", u->name);
+    return STATUS_OK;
+}
+
+enum status archive_unpack(const char *path, const char *name, const char *dir,
+                           const struct archive_limits *limits, struct error *err) {
+    if (mkdir(dir, 0750) != 0)
+        return error_set_errno(err, errno, "cannot create folder %s", dir);
+    struct unpacking u = {.archive = archive_read_new(), .name = name, .limits = limits, .err = err,
+                          .dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC),
+                          .block = mem_alloc(BLOCK_BYTES)};
+    /* libarchive turns names into the locale's characters and loses those it cannot; the "C"
+     * locale of a daemon has none but ASCII. For this thread, for this call. */
+    locale_t utf8 = newlocale(LC_CTYPE_MASK, "C.UTF-8", (locale_t)0), previous = (locale_t)0;
+    if (utf8)
+        previous = uselocale(utf8);
+    enum status status;
+    if (u.dir_fd < 0)
+        status = error_set_errno(err, errno, "cannot open folder %s", dir);
+    else if (!u.archive)
+        status = error_set(err, STATUS_INTERNAL, "libarchive cannot start");
+    else
+        status = open_archive(&u, path);
+    if (status == STATUS_OK)
+        status = unpack_all(&u);
+    archive_read_free(u.archive);
+    if (utf8) {
+        uselocale(previous);
+        freelocale(utf8);
+    }
+    mem_free(u.block);
+    if (u.dir_fd >= 0)
+        close(u.dir_fd);
+    if (status != STATUS_OK)
+        file_remove_tree(dir, NULL);
+    return status;
+}
