@@ -184,7 +184,7 @@ static void test_damage(void) {
             content.data[length / 2] ^= 0x55;
             content.data[length / 2 + 1] ^= 0x55;
             write_file(path, content.data, length);
-            refuse("bad", path, &generous, STATUS_INPUT, "damaged");
+            refuse("bad", path, &generous, STATUS_INPUT, p == TAR_ZST ? "corruption" : "damaged");
         }
         buf_release(&content);
         mem_free(whole);
