@@ -1,0 +1,150 @@
+/* about.c -- `settings` and `version`: what the server, or else this program, knows of itself. */
+#include <archive.h>
+#include <string.h>
+
+#include "client/commands.h"
+#include "client/nearest.h"
+#include "client/table.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "common/settings.h"
+
+/* "64 to 16384 texels", "auto|given", "true or false" */
+static void print_range(struct table *t, size_t column, const cJSON *setting) {
+    const char *type = member_text(setting, "type"), *unit = member_text(setting, "unit");
+    const cJSON *choices = member_items(setting, "choices"), *choice;
+    struct buf text;
+    buf_init(&text, 4096);
+    if (choices)
+        cJSON_ArrayForEach(choice, choices)
+            buf_printf(&text, "%s%s", text.length ? ", " : "",
+                       cJSON_IsString(choice) ? choice->valuestring : "");
+    else if (cJSON_HasObjectItem(setting, "minimum"))
+        buf_printf(&text, "%.15g to %.15g%s%s", member_number(setting, "minimum", 0.0),
+                   member_number(setting, "maximum", 0.0), *unit ? " " : "", unit);
+    else
+        buf_puts(&text, strcmp(type, "bool") == 0 ? "true, false" : type);
+    table_set(t, column, COLOUR_NONE, "%s", buf_text(&text));
+    buf_release(&text);
+}
+
+static void print_settings(struct client *c, const cJSON *items) {
+    static const char *const headings[] = {"setting", ">default", "values", "meaning"};
+    struct table t;
+    const cJSON *setting;
+    table_init(&t, 4, headings);
+    cJSON_ArrayForEach(setting, items) {
+        const cJSON *value = cJSON_GetObjectItemCaseSensitive(setting, "default");
+        char *text = cJSON_IsString(value) ? mem_strdup(value->valuestring) : json_text(value);
+        table_row(&t);
+        table_set(&t, 0, COLOUR_NONE, "%s", member_text(setting, "name"));
+        table_set(&t, 1, COLOUR_NONE, "%s", text);
+        print_range(&t, 2, setting);
+        table_set(&t, 3, COLOUR_NONE, "%s", member_text(setting, "help"));
+        mem_free(text);
+    }
+    table_print(&t, &c->out);
+    table_release(&t);
+}
+
+/* Leaves only the settings named in o. */
+static enum status pick(cJSON *items, const struct options *o, struct error *err) {
+    for (size_t w = 0; w < o->word_count; w++) {
+        struct nearest nearest;
+        const cJSON *setting;
+        bool found = false;
+        nearest_init(&nearest, o->word[w]);
+        cJSON_ArrayForEach(setting, items) {
+            found = found || strcmp(member_text(setting, "name"), o->word[w]) == 0;
+            nearest_offer(&nearest, member_text(setting, "name"));
+        }
+        if (found)
+            continue;
+        error_set(err, STATUS_INPUT, "there is no setting \"%.100s\"", o->word[w]);
+        return nearest.best ? error_hint(err, "did you mean %s?", nearest.best) : STATUS_INPUT;
+    }
+    for (int i = cJSON_GetArraySize(items); o->word_count && i-- > 0;) {
+        bool named = false;
+        for (size_t w = 0; w < o->word_count; w++)
+            named = named || strcmp(member_text(cJSON_GetArrayItem(items, i), "name"), o->word[w]) == 0;
+        if (!named)
+            cJSON_DeleteItemFromArray(items, i);
+    }
+    return STATUS_OK;
+}
+
+int settings_run(struct client *c, const struct options *o) {
+    struct reply reply;
+    struct error err;
+    int code = CLIENT_OK;
+    cJSON *items = NULL;
+    reply_init(&reply);
+    enum status status = request_get(c->request, "/v1/settings", &reply, &err);
+    if (status == STATUS_OK) {
+        items = cJSON_DetachItemFromObjectCaseSensitive(reply.json, "items");
+    } else if (status == STATUS_UNAVAILABLE) {
+        client_note(c, "%s; these are the settings that version " UNBAKE_VERSION " knows", err.message);
+        items = settings_describe();
+        status = STATUS_OK;
+        reply.code = 0;
+    }
+    if (status == STATUS_OK && items)
+        status = pick(items, o, &err);
+    if (status != STATUS_OK)
+        code = client_fail(c, status == STATUS_INPUT ? NULL : &reply, &err);
+    else if (c->json)
+        client_print_json(c, items);
+    else
+        print_settings(c, items);
+    cJSON_Delete(items);
+    reply_release(&reply);
+    return code;
+}
+
+static void print_server(struct client *c, const cJSON *server) {
+    struct buf line;
+    const cJSON *library;
+    buf_init(&line, 1 << 16);
+    buf_puts(&line, "unbaked ");
+    terminal_clean(&line, member_text(server, "version"));
+    buf_printf(&line, " at %s", request_server(c->request));
+    cJSON_ArrayForEach(library, cJSON_GetObjectItemCaseSensitive(server, "libraries")) {
+        buf_puts(&line, ", ");
+        terminal_clean(&line, library->string);
+        buf_puts(&line, " ");
+        terminal_clean(&line, cJSON_IsString(library) ? library->valuestring : "?");
+    }
+    printf("%s\n", buf_text(&line));
+    buf_release(&line);
+}
+
+/* A server that does not answer is part of the answer, not a failure. */
+int version_run(struct client *c, const struct options *o) {
+    (void)o;
+    struct reply reply;
+    struct error err;
+    reply_init(&reply);
+    struct request_call call = {.path = "/v1/version", .once = true};
+    enum status status = request_run(c->request, &call, &reply, &err);
+    int code = status == STATUS_OK || status == STATUS_UNAVAILABLE ? CLIENT_OK : client_fail(c, &reply, &err);
+    if (code == CLIENT_OK && c->json) {
+        cJSON *object = cJSON_CreateObject(), *client = cJSON_CreateObject(), *libraries = cJSON_CreateObject();
+        json_add_string(client, "version", UNBAKE_VERSION);
+        json_add_string(libraries, "libcurl", request_library_version());
+        json_add_string(libraries, "libarchive", archive_version_details());
+        json_add(client, "libraries", libraries);
+        json_add(object, "client", client);
+        json_add(object, "server", status == STATUS_OK ? cJSON_Duplicate(reply.json, true) : cJSON_CreateNull());
+        client_print_json(c, object);
+        cJSON_Delete(object);
+    } else if (code == CLIENT_OK) {
+        printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(),
+               archive_version_details());
+        if (status == STATUS_OK)
+            print_server(c, reply.json);
+        else
+            printf("%s\n", err.message);
+    }
+    reply_release(&reply);
+    return code;
+}

@@ -1,0 +1,80 @@
+/* client.h -- what every command gets, and how every command ends. */
+#ifndef UNBAKE_CLIENT_CLIENT_H
+#define UNBAKE_CLIENT_CLIENT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "client/options.h"
+#include "client/request.h"
+#include "client/terminal.h"
+#include "common/error.h"
+#include "common/json.h"
+
+/* Exit statuses: part of the interface, listed in the help and in README.md. */
+enum client_exit {
+    CLIENT_OK = 0,
+    CLIENT_JOB_FAILED = 1,   /* the job that was watched failed or was cancelled */
+    CLIENT_USAGE = 2,        /* the command line is at fault */
+    CLIENT_NOT_FOUND = 3,    /* no such job, scene or output */
+    CLIENT_REFUSED = 4,      /* the server refused and said why */
+    CLIENT_UNREACHABLE = 5,  /* no answer from the server, after several tries */
+    CLIENT_CONFLICT = 6,     /* the present state of the job or scene forbids it */
+    CLIENT_LOCAL = 7,        /* a file here cannot be read or written */
+    CLIENT_INTERRUPTED = 130 /* Ctrl-C; a submitted job goes on */
+};
+
+struct client {
+    struct request *request;
+    struct terminal out; /* stdout: results */
+    struct terminal err; /* stderr: progress of transfers, messages */
+    bool json, quiet;
+    double retry_sec;
+};
+
+struct command {
+    const char *name;
+    const char *arguments; /* "JOB [NAME...]"; "" if it takes none */
+    const char *summary;   /* one line */
+    const char *details;   /* for --help; "" if the summary says all */
+    const char *examples;  /* lines, each ending in a newline */
+    size_t words_min, words_max;
+    const struct option *options; /* ends with a NULL name */
+    int (*run)(struct client *c, const struct options *o);
+};
+
+/* In the order of the help; *count entries. */
+const struct command *command_table(size_t *count);
+/* The options that every command takes. */
+extern const struct option command_shared_options[];
+const struct command *command_find(const char *name);
+/* Writes the help of the program (command NULL) or of one command. */
+void command_help(const struct command *command, FILE *out);
+
+/* Tells what went wrong (one JSON object with --json), with hint and invalid parameters, on
+ * stderr, and returns the exit status for it. reply may be NULL. */
+int client_fail(struct client *c, const struct reply *reply, const struct error *err);
+/* Prints "unbake: " and a sentence to stderr unless --quiet or --json. */
+void client_note(struct client *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* A line of JSON to stdout. */
+void client_print_json(struct client *c, const cJSON *value);
+
+/* The job that a word names: its number, or `last` for the newest. */
+enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply,
+                          struct error *err);
+/* GET /v1/jobs/ID. */
+enum status client_job_get(struct client *c, int64_t id, struct reply *reply, struct error *err);
+/* Collects `items` over all pages of a list ("/v1/jobs?state=failed"), at most `limit` (0: all). */
+enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items,
+                        struct reply *reply, struct error *err);
+
+/* Members of a reply, with what stands for absent, null and another type: "", `fallback`. */
+const char *member_text(const cJSON *object, const char *key);
+double member_number(const cJSON *object, const char *key, double fallback);
+const cJSON *member_items(const cJSON *object, const char *key); /* an array or NULL */
+
+/* Unix time of an RFC 3339 time in UTC ("2024-05-06T07:08:09.123Z"); NaN for anything else. */
+double time_parse(const char *text);
+
+#endif

@@ -1,0 +1,133 @@
+/* commands.c -- the table of commands, and the help that is made from it.
+ *
+ * The table is not in main.c so that a test can read it. */
+#include "client/commands.h"
+
+#include <string.h>
+
+#include "common/protocol.h"
+
+#define ANY_NUMBER ((size_t)-1)
+
+static const struct option no_options[] = {{0}};
+
+const struct option command_shared_options[] = {
+    {"server", 0, OPTION_TEXT, "URL",
+     "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
+    {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
+    {"quiet", 'q', OPTION_FLAG, NULL, "print only what was asked for: no progress, no remarks"},
+    {"retry", 0, OPTION_SECONDS, "SEC",
+     "how long to try when the server does not answer (3; fetching 60, watching 600)"},
+    {"help", 'h', OPTION_FLAG, NULL, "print this help"},
+    {0},
+};
+
+static const struct command table[] = {
+    {"submit", "ROOM", "upload a room and queue a job on it",
+     "ROOM is a folder or an archive (.zip, .tar, .tar.gz, .tar.zst) with a mesh, photographs and\n"
+     "their cameras. A folder is packed on the fly; hidden files are left out. A room that the\n"
+     "server has already is not sent again. With --scene no ROOM is needed.\n",
+     "  unbake submit living-room/ --watch\n"
+     "  unbake submit room.zip --name kitchen --set texture_size=4096 --set seed=7\n"
+     "  unbake submit --scene 3f2a91c0 --set time_limit_sec=3600 --priority 5\n",
+     0, 1, submit_options, submit_run},
+    {"list", "", "list jobs, newest first", "",
+     "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0, list_options, list_run},
+    {"show", "JOB", "show one job: state, settings, outputs", "",
+     "  unbake show 17\n  unbake show last --json | jq .settings\n", 1, 1, no_options, show_run},
+    {"watch", "JOB", "follow a job until it ends",
+     "On a terminal one line shows stage, progress, figures and time left; on a pipe a line is\n"
+     "printed when something changes, and every 10 s. When the server restarts, watching goes\n"
+     "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n",
+     "  unbake watch last\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
+     1, 1, watch_options, watch_run},
+    {"logs", "JOB", "print what the job's workers wrote", "",
+     "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options, logs_run},
+    {"get", "JOB [NAME...]", "fetch a job's outputs, also while it runs",
+     "Fetches all outputs, or those named; a NAME may be a pattern such as 'preview/*'. Files that\n"
+     "are there already with the right SHA-256 are left alone, and a fetch that was broken off goes\n"
+     "on where it stopped (NAME.part). Each file gets its name only when its SHA-256 is right.\n",
+     "  unbake get 17 -o room-textures\n  unbake get last base_color.exr 'preview/*'\n", 1, ANY_NUMBER,
+     get_options, get_run},
+    {"cancel", "JOB...", "end jobs for good", "", "  unbake cancel 17\n", 1, ANY_NUMBER, no_options,
+     cancel_run},
+    {"pause", "JOB...", "stop jobs after a checkpoint, and let them wait", "", "  unbake pause 17\n", 1,
+     ANY_NUMBER, no_options, pause_run},
+    {"resume", "JOB...", "queue paused jobs again; they go on from their checkpoints", "",
+     "  unbake resume 17\n", 1, ANY_NUMBER, no_options, resume_run},
+    {"retry", "JOB...", "queue failed or cancelled jobs again, attempts counted anew", "",
+     "  unbake retry 17\n", 1, ANY_NUMBER, no_options, retry_run},
+    {"rm", "JOB...", "remove jobs that do not run, with their outputs", "", "  unbake rm 12 13\n", 1,
+     ANY_NUMBER, no_options, rm_run},
+    {"scenes", "[show|rm SCENE...]", "list uploaded rooms, show or remove them",
+     "A SCENE is an id or its beginning, 8 digits or more.\n",
+     "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes rm 3f2a91c0\n", 0, ANY_NUMBER,
+     scenes_options, scenes_run},
+    {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
+     "  unbake settings\n  unbake settings texture_size\n", 0, ANY_NUMBER, no_options, settings_run},
+    {"version", "", "print the versions of the client and of the server", "",
+     "  unbake version --json\n", 0, 0, no_options, version_run},
+};
+
+#define COMMAND_COUNT (sizeof table / sizeof *table)
+
+const struct command *command_table(size_t *count) {
+    *count = COMMAND_COUNT;
+    return table;
+}
+
+const struct command *command_find(const char *name) {
+    for (size_t i = 0; i < COMMAND_COUNT; i++)
+        if (strcmp(table[i].name, name) == 0)
+            return &table[i];
+    return NULL;
+}
+
+static void print_options(const struct option *option, FILE *out) {
+    for (; option->name; option++) {
+        char left[64], letter[5] = "    ";
+        if (option->letter)
+            snprintf(letter, sizeof letter, "-%c, ", option->letter);
+        snprintf(left, sizeof left, "%s--%s%s%s", letter, option->name, option->value ? " " : "",
+                 option->value ? option->value : "");
+        fprintf(out, "  %-22s %s\n", left, option->help);
+    }
+}
+
+static void print_exit_statuses(FILE *out) {
+    fputs("exit status:\n"
+          "  0    success\n"
+          "  1    the job failed or was cancelled\n"
+          "  2    the command line is wrong\n"
+          "  3    no such job, scene or output\n"
+          "  4    the server refused, and said why\n"
+          "  5    the server cannot be reached\n"
+          "  6    the present state forbids it\n"
+          "  7    a file here cannot be read or written\n"
+          "  130  interrupted; a submitted job goes on\n",
+          out);
+}
+
+void command_help(const struct command *command, FILE *out) {
+    if (command) {
+        fprintf(out, "usage: unbake %s%s%s [options]\n\n%s.\n", command->name,
+                *command->arguments ? " " : "", command->arguments, command->summary);
+        if (*command->details)
+            fprintf(out, "\n%s", command->details);
+        fprintf(out, "\nexamples:\n%s\noptions:\n", command->examples);
+        print_options(command->options, out);
+        print_options(command_shared_options, out);
+        return;
+    }
+    fputs("unbake takes the light out of a scanned room; `unbaked` does the work.\n\n"
+          "usage: unbake COMMAND [options]\n\ncommands:\n",
+          out);
+    for (size_t i = 0; i < COMMAND_COUNT; i++)
+        fprintf(out, "  %-9s %s\n", table[i].name, table[i].summary);
+    fputs("\nA JOB is a number, or `last` for the newest. `unbake COMMAND --help` has the options and\n"
+          "an example of each command. Every command takes:\n",
+          out);
+    print_options(command_shared_options, out);
+    fputs("\n", out);
+    print_exit_statuses(out);
+}

@@ -1,0 +1,44 @@
+/* commands.h -- what each command does; one file a group. The table is in commands.c. */
+#ifndef UNBAKE_CLIENT_COMMANDS_H
+#define UNBAKE_CLIENT_COMMANDS_H
+
+#include "client/client.h"
+
+/* submit.c */
+extern const struct option submit_options[];
+int submit_run(struct client *c, const struct options *o);
+
+/* watch.c */
+extern const struct option watch_options[], logs_options[];
+int watch_run(struct client *c, const struct options *o);
+int logs_run(struct client *c, const struct options *o);
+/* Follows a job to its end. `all`: from its first event on, not from now. */
+int watch_job(struct client *c, int64_t job, bool all);
+
+/* jobs.c */
+extern const struct option list_options[];
+int list_run(struct client *c, const struct options *o);
+int show_run(struct client *c, const struct options *o);
+int cancel_run(struct client *c, const struct options *o);
+int pause_run(struct client *c, const struct options *o);
+int resume_run(struct client *c, const struct options *o);
+int retry_run(struct client *c, const struct options *o);
+int rm_run(struct client *c, const struct options *o);
+
+/* get.c */
+extern const struct option get_options[];
+int get_run(struct client *c, const struct options *o);
+/* Whether a name from the server may become a file below the folder asked for. */
+bool get_name_is_safe(const char *name);
+
+/* scenes.c */
+extern const struct option scenes_options[];
+int scenes_run(struct client *c, const struct options *o);
+/* Prints a rejected scene's problems, each with its file. */
+void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
+
+/* about.c */
+int settings_run(struct client *c, const struct options *o);
+int version_run(struct client *c, const struct options *o);
+
+#endif

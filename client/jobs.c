@@ -1,0 +1,279 @@
+/* jobs.c -- `list`, `show`, and what is asked of jobs: cancel, pause, resume, retry, rm. */
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+#include "client/commands.h"
+#include "client/nearest.h"
+#include "client/table.h"
+#include "client/view.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+
+const struct option list_options[] = {
+    {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
+    {"limit", 'n', OPTION_WHOLE, "N", "at most so many (20); 0: all"},
+    {0},
+};
+
+static const char *const states[] = {JOB_STATE_QUEUED,    JOB_STATE_RUNNING, JOB_STATE_PAUSED,
+                                     JOB_STATE_SUCCEEDED, JOB_STATE_FAILED,  JOB_STATE_CANCELLED};
+
+static enum status check_state(const char *state, struct error *err) {
+    struct nearest nearest;
+    nearest_init(&nearest, state);
+    for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
+        if (strcmp(states[i], state) == 0)
+            return STATUS_OK;
+        nearest_offer(&nearest, states[i]);
+    }
+    error_set(err, STATUS_INPUT, "a job is never \"%.100s\"", state);
+    return nearest.best ? error_hint(err, "did you mean %s?", nearest.best)
+                        : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
+}
+
+static void print_age(struct table *t, size_t column, const char *at) {
+    char age[16];
+    double then = time_parse(at);
+    format_duration(age, fmax(difftime(time(NULL), 0) - then, 0.0));
+    if (isfinite(then))
+        table_set(t, column, COLOUR_NONE, "%s", age);
+}
+
+static void print_jobs(struct client *c, const cJSON *items) {
+    static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", "name"};
+    struct table t;
+    const cJSON *job;
+    table_init(&t, 7, headings);
+    cJSON_ArrayForEach(job, items) {
+        const char *state = member_text(job, "state");
+        bool running = strcmp(state, JOB_STATE_RUNNING) == 0;
+        double eta = member_number(job, "eta_sec", -1.0);
+        table_row(&t);
+        table_set(&t, 0, COLOUR_NONE, "%.0f", member_number(job, "id", 0.0));
+        table_set(&t, 1, state_colour(state), "%s", state);
+        table_set(&t, 2, COLOUR_NONE, "%.0f%%", floor(100.0 * member_number(job, "progress", 0.0)));
+        table_set(&t, 3, COLOUR_NONE, "%s", running ? member_text(job, "stage") : "");
+        if (running && eta >= 0.0) {
+            char left[16];
+            format_duration(left, eta);
+            table_set(&t, 4, COLOUR_NONE, "%s", left);
+        }
+        print_age(&t, 5, member_text(job, "created_at"));
+        table_set(&t, 6, COLOUR_NONE, "%s", member_text(job, "name"));
+    }
+    table_print(&t, &c->out);
+    table_release(&t);
+}
+
+int list_run(struct client *c, const struct options *o) {
+    const char *state = options_text(o, "state", NULL);
+    long limit = options_whole(o, "limit", 20);
+    struct reply reply;
+    struct error err;
+    cJSON *items = NULL;
+    char path[64];
+    int code = CLIENT_OK;
+    reply_init(&reply);
+    enum status status = STATUS_OK;
+    if (state)
+        status = check_state(state, &err);
+    if (limit < 0)
+        status = error_set(&err, STATUS_INPUT, "--limit takes 0 or more, not %ld", limit);
+    if (status == STATUS_OK) {
+        snprintf(path, sizeof path, "/v1/jobs%s%s", state ? "?state=" : "", state ? state : "");
+        status = client_list(c, path, (size_t)limit, &items, &reply, &err);
+    }
+    if (status != STATUS_OK)
+        code = client_fail(c, &reply, &err);
+    else if (c->json)
+        client_print_json(c, items);
+    else if (cJSON_GetArraySize(items) == 0)
+        client_note(c, "no jobs%s%s", state ? " are " : "", state ? state : "");
+    else if (c->quiet) {
+        const cJSON *job;
+        cJSON_ArrayForEach(job, items) printf("%.0f\n", member_number(job, "id", 0.0));
+    } else
+        print_jobs(c, items);
+    cJSON_Delete(items);
+    reply_release(&reply);
+    return code;
+}
+
+/* --- show ---------------------------------------------------------------------------------- */
+
+static void print_field(struct client *c, const char *name, const char *value) {
+    if (!*value)
+        return;
+    struct buf clean;
+    buf_init(&clean, 1 << 16);
+    terminal_clean(&clean, value);
+    fprintf(c->out.out, "%s%-10s%s %s\n", terminal_colour(&c->out, COLOUR_DIM), name,
+            terminal_colour(&c->out, COLOUR_NONE), buf_text(&clean));
+    buf_release(&clean);
+}
+
+/* "texture_size=512 seed=7" */
+static void print_members(struct client *c, const char *name, const cJSON *object) {
+    struct buf line;
+    const cJSON *member;
+    buf_init(&line, 1 << 16);
+    cJSON_ArrayForEach(member, object) {
+        char *text = cJSON_IsString(member) ? mem_strdup(member->valuestring) : json_text(member);
+        buf_printf(&line, "%s%s=%s", line.length ? " " : "", member->string, text);
+        mem_free(text);
+    }
+    print_field(c, name, buf_text(&line));
+    buf_release(&line);
+}
+
+static void print_outputs(struct client *c, const cJSON *outputs) {
+    static const char *const headings[] = {">size", "output", "sha256"};
+    struct table t;
+    const cJSON *output;
+    if (cJSON_GetArraySize(outputs) == 0)
+        return;
+    table_init(&t, 3, headings);
+    cJSON_ArrayForEach(output, outputs) {
+        char size[16];
+        format_bytes(size, member_number(output, "bytes", 0.0));
+        table_row(&t);
+        table_set(&t, 0, COLOUR_NONE, "%s", size);
+        table_set(&t, 1, COLOUR_NONE, "%s", member_text(output, "name"));
+        table_set(&t, 2, COLOUR_DIM, "%.12s", member_text(output, "sha256"));
+    }
+    fputs("\n", c->out.out);
+    table_print(&t, &c->out);
+    table_release(&t);
+}
+
+static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) {
+    char text[96], left[16];
+    const char *wanted = member_text(job, "wanted");
+    snprintf(text, sizeof text, "%.0f", member_number(job, "id", 0.0));
+    print_field(c, "job", text);
+    print_field(c, "name", member_text(job, "name"));
+    snprintf(text, sizeof text, "%s%s%s", member_text(job, "state"),
+             strcmp(wanted, "run") == 0 ? "" : ", to ", strcmp(wanted, "run") == 0 ? "" : wanted);
+    print_field(c, "state", text);
+    print_field(c, "reason", member_text(job, "reason"));
+    print_field(c, "hint", member_text(job, "hint"));
+    format_duration(left, member_number(job, "eta_sec", -1.0));
+    if (*member_text(job, "stage")) {
+        snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"),
+                 floor(100.0 * member_number(job, "progress", 0.0)), left);
+        print_field(c, "stage", text);
+    }
+    print_field(c, "scene", member_text(job, "scene"));
+    snprintf(text, sizeof text, "%.0f", member_number(job, "priority", 0.0));
+    print_field(c, "priority", text);
+    print_members(c, "labels", cJSON_GetObjectItemCaseSensitive(job, "labels"));
+    print_members(c, "settings", cJSON_GetObjectItemCaseSensitive(job, "settings"));
+    snprintf(text, sizeof text, "%.0f, %.0f left", member_number(job, "attempt", 0.0),
+             member_number(job, "attempts_left", 0.0));
+    print_field(c, "attempt", text);
+    print_field(c, "created", member_text(job, "created_at"));
+    print_field(c, "started", member_text(job, "started_at"));
+    print_field(c, "finished", member_text(job, "finished_at"));
+    print_outputs(c, outputs);
+}
+
+int show_run(struct client *c, const struct options *o) {
+    struct reply job, outputs;
+    struct error err;
+    int64_t id;
+    char path[64];
+    int code = CLIENT_OK;
+    reply_init(&job);
+    reply_init(&outputs);
+    struct reply *last = &job;
+    enum status status = client_job_id(c, o->word[0], &id, &job, &err);
+    if (status == STATUS_OK)
+        status = client_job_get(c, id, &job, &err);
+    if (status == STATUS_OK) {
+        snprintf(path, sizeof path, "/v1/jobs/%lld/outputs", (long long)id);
+        last = &outputs;
+        status = request_get(c->request, path, &outputs, &err);
+    }
+    const cJSON *items = member_items(outputs.json, "items");
+    if (status != STATUS_OK)
+        code = client_fail(c, last, &err);
+    else if (c->json) {
+        json_add(job.json, "outputs", items ? cJSON_Duplicate(items, true) : cJSON_CreateArray());
+        client_print_json(c, job.json);
+    } else
+        print_job(c, job.json, items);
+    reply_release(&job);
+    reply_release(&outputs);
+    return code;
+}
+
+/* --- actions ------------------------------------------------------------------------------- */
+
+/* POST /v1/jobs/ID/ACTION, or DELETE of the job where action is NULL. */
+static int act_on(struct client *c, const char *word, const char *action) {
+    struct reply reply;
+    struct error err;
+    int64_t id;
+    char path[80];
+    int code = CLIENT_OK;
+    reply_init(&reply);
+    enum status status = client_job_id(c, word, &id, &reply, &err);
+    if (status == STATUS_OK) {
+        snprintf(path, sizeof path, "/v1/jobs/%lld%s%s", (long long)id, action ? "/" : "",
+                 action ? action : "");
+        struct request_call call = {.path = path, .method = action ? "POST" : "DELETE"};
+        status = request_run(c->request, &call, &reply, &err);
+    }
+    const char *state = member_text(reply.json, "state"), *wanted = member_text(reply.json, "wanted");
+    if (status != STATUS_OK)
+        code = client_fail(c, &reply, &err);
+    else if (c->json) {
+        cJSON *removed = action ? NULL : cJSON_CreateObject();
+        if (removed) {
+            json_add_int(removed, "id", id);
+            json_add_bool(removed, "removed", true);
+        }
+        client_print_json(c, action ? reply.json : removed);
+        cJSON_Delete(removed);
+    } else if (!c->quiet && !action)
+        printf("job %lld removed\n", (long long)id);
+    else if (!c->quiet)
+        printf("job %lld is %s%s%s\n", (long long)id, state, strcmp(wanted, "run") ? ", to " : "",
+               strcmp(wanted, "run") ? wanted : "");
+    reply_release(&reply);
+    return code;
+}
+
+/* All of them, also after one failed; the first failure is the exit status. */
+static int act_on_all(struct client *c, const struct options *o, const char *action) {
+    int first = CLIENT_OK;
+    for (size_t i = 0; i < o->word_count; i++) {
+        int code = act_on(c, o->word[i], action);
+        if (first == CLIENT_OK)
+            first = code;
+        if (code == CLIENT_UNREACHABLE || code == CLIENT_INTERRUPTED)
+            break;
+    }
+    return first;
+}
+
+int cancel_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, "cancel");
+}
+
+int pause_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, "pause");
+}
+
+int resume_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, "resume");
+}
+
+int retry_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, "retry");
+}
+
+int rm_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, NULL);
+}

@@ -1,0 +1,109 @@
+/* main.c -- `unbake`, the command-line client: finds the command and gives it what it needs. */
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include "client/commands.h"
+#include "client/nearest.h"
+#include "common/protocol.h"
+
+#define RETRY_SEC 3.0
+
+/* SIGINT and SIGTERM are read from a descriptor, where request.c waits for them: no handler runs
+ * in the middle of anything. */
+static int block_signals(void) {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    sigprocmask(SIG_BLOCK, &set, NULL);
+    return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+static int unknown_command(struct client *c, const char *name) {
+    struct error err;
+    struct nearest nearest;
+    size_t count;
+    const struct command *table = command_table(&count);
+    nearest_init(&nearest, name);
+    for (size_t i = 0; i < count; i++)
+        nearest_offer(&nearest, table[i].name);
+    error_set(&err, STATUS_INPUT, "there is no command \"%.100s\"", name);
+    if (nearest.best)
+        error_hint(&err, "did you mean \"%s\"?", nearest.best);
+    else
+        error_hint(&err, "`unbake --help` lists the commands");
+    return client_fail(c, NULL, &err);
+}
+
+static int check_words(struct client *c, const struct command *command, size_t count) {
+    struct error err;
+    if (count >= command->words_min && count <= command->words_max)
+        return CLIENT_OK;
+    error_set(&err, STATUS_INPUT, "%s takes %s%s", command->name,
+              *command->arguments ? command->arguments : "no further words",
+              count < command->words_min ? ", which is missing" : "");
+    error_hint(&err, "`unbake %s --help` has an example", command->name);
+    return client_fail(c, NULL, &err);
+}
+
+static int run(struct client *c, const struct command *command, const struct options *o) {
+    const char *server = getenv("UNBAKE_SERVER");
+    server = options_text(o, "server", server && *server ? server : PROTOCOL_DEFAULT_SERVER);
+    int signal_fd = block_signals();
+    c->retry_sec = options_seconds(o, "retry", -1.0);
+    c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : RETRY_SEC, signal_fd);
+    int code = command->run(c, o);
+    request_free(c->request);
+    if (signal_fd >= 0)
+        close(signal_fd);
+    return code;
+}
+
+int main(int argc, char **argv) {
+    struct client c = {0};
+    struct options o;
+    struct error err;
+    terminal_init(&c.out, stdout);
+    terminal_init(&c.err, stderr);
+    const char *name = argc > 1 ? argv[1] : "";
+    bool help = strcmp(name, "help") == 0;
+    if (help && argc > 2) {
+        name = argv[2];
+    } else if (help || strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0) {
+        command_help(NULL, stdout);
+        return CLIENT_OK;
+    }
+    if (argc < 2) {
+        command_help(NULL, stderr);
+        return CLIENT_USAGE;
+    }
+    if (strcmp(name, "--version") == 0)
+        name = "version";
+    const struct command *command = command_find(name);
+    if (!command)
+        return unknown_command(&c, name);
+    if (help) {
+        command_help(command, stdout);
+        return CLIENT_OK;
+    }
+    int code = CLIENT_OK;
+    enum status status = options_parse(&o, argc - 2, argv + 2, command->options,
+                                       command_shared_options, &err);
+    c.json = options_flag(&o, "json");
+    c.quiet = options_flag(&o, "quiet");
+    if (options_flag(&o, "help"))
+        command_help(command, stdout);
+    else if (status != STATUS_OK)
+        code = client_fail(&c, NULL, &err);
+    else if ((code = check_words(&c, command, o.word_count)) == CLIENT_OK)
+        code = run(&c, command, &o);
+    options_release(&o);
+    /* A full disk or a closed pipe must not look like success. */
+    if (fflush(stdout) != 0 && code == CLIENT_OK)
+        code = CLIENT_LOCAL;
+    return code;
+}

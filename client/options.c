@@ -1,0 +1,147 @@
+/* options.c -- see options.h. */
+#include "client/options.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/nearest.h"
+#include "common/mem.h"
+
+static const struct option *find(const struct option *table, const char *name, size_t length) {
+    for (; table && table->name; table++)
+        if (strlen(table->name) == length && memcmp(table->name, name, length) == 0)
+            return table;
+    return NULL;
+}
+
+static const struct option *find_letter(const struct option *table, char letter) {
+    for (; table && table->name; table++)
+        if (table->letter == letter)
+            return table;
+    return NULL;
+}
+
+static void offer(struct nearest *nearest, const struct option *table) {
+    for (; table && table->name; table++)
+        nearest_offer(nearest, table->name);
+}
+
+static enum status unknown(const char *argument, const struct option *own,
+                           const struct option *shared, struct error *err) {
+    if (argument[1] != '-')
+        return error_set(err, STATUS_INPUT, "there is no option -%c", argument[1]);
+    char *name = mem_strndup(argument + 2, strcspn(argument + 2, "="));
+    struct nearest nearest;
+    nearest_init(&nearest, name);
+    offer(&nearest, own);
+    offer(&nearest, shared);
+    enum status status = error_set(err, STATUS_INPUT, "there is no option --%s", name);
+    if (nearest.best)
+        status = error_hint(err, "did you mean --%s?", nearest.best);
+    mem_free(name);
+    return status;
+}
+
+static enum status check_value(const struct option *option, const char *text, struct error *err) {
+    char *end;
+    if (option->kind == OPTION_WHOLE) {
+        long value = strtol(text, &end, 10);
+        if (end == text || *end || strlen(text) > 10 || value > 999999999 || value < -999999999)
+            return error_set(err, STATUS_INPUT, "--%s takes a whole number, not \"%s\"",
+                             option->name, text);
+    }
+    if (option->kind == OPTION_SECONDS) {
+        double value = strtod(text, &end);
+        if (end == text || *end || !isfinite(value) || value < 0.0 || value > 1e9)
+            return error_set(err, STATUS_INPUT, "--%s takes a number of seconds, not \"%s\"",
+                             option->name, text);
+    }
+    return STATUS_OK;
+}
+
+enum status options_parse(struct options *o, int count, char *const *argv,
+                          const struct option *own, const struct option *shared,
+                          struct error *err) {
+    size_t room = count > 0 ? (size_t)count : 1;
+    *o = (struct options){
+        .given = mem_calloc(room, sizeof *o->given),
+        .word = mem_calloc(room, sizeof *o->word),
+    };
+    bool options_ended = false;
+    for (int i = 0; i < count; i++) {
+        const char *argument = argv[i];
+        if (options_ended || argument[0] != '-' || argument[1] == '\0') {
+            o->word[o->word_count++] = argument;
+            continue;
+        }
+        if (strcmp(argument, "--") == 0) {
+            options_ended = true;
+            continue;
+        }
+        const struct option *option;
+        const char *text = NULL;
+        if (argument[1] == '-') {
+            size_t length = strcspn(argument + 2, "=");
+            option = find(own, argument + 2, length);
+            if (!option)
+                option = find(shared, argument + 2, length);
+            if (argument[2 + length] == '=')
+                text = argument + 3 + length;
+        } else {
+            option = find_letter(own, argument[1]);
+            if (!option)
+                option = find_letter(shared, argument[1]);
+            if (argument[2])
+                text = argument + 2;
+        }
+        if (!option)
+            return unknown(argument, own, shared, err);
+        if (option->kind == OPTION_FLAG && text)
+            return error_set(err, STATUS_INPUT, "--%s takes no value", option->name);
+        if (option->kind != OPTION_FLAG && !text) {
+            if (i + 1 >= count)
+                return error_set(err, STATUS_INPUT, "--%s needs a value: --%s %s", option->name,
+                                 option->name, option->value);
+            text = argv[++i];
+        }
+        enum status status = check_value(option, text, err);
+        if (status != STATUS_OK)
+            return status;
+        o->given[o->given_count++] = (struct options_given){.option = option, .text = text};
+    }
+    return STATUS_OK;
+}
+
+void options_release(struct options *o) {
+    mem_free(o->given);
+    mem_free(o->word);
+    *o = (struct options){0};
+}
+
+static const struct options_given *last(const struct options *o, const char *name) {
+    for (size_t i = o->given_count; i-- > 0;)
+        if (strcmp(o->given[i].option->name, name) == 0)
+            return &o->given[i];
+    return NULL;
+}
+
+bool options_flag(const struct options *o, const char *name) {
+    return last(o, name) != NULL;
+}
+
+const char *options_text(const struct options *o, const char *name, const char *fallback) {
+    const struct options_given *given = last(o, name);
+    return given ? given->text : fallback;
+}
+
+long options_whole(const struct options *o, const char *name, long fallback) {
+    const struct options_given *given = last(o, name);
+    return given ? strtol(given->text, NULL, 10) : fallback;
+}
+
+double options_seconds(const struct options *o, const char *name, double fallback) {
+    const struct options_given *given = last(o, name);
+    return given ? strtod(given->text, NULL) : fallback;
+}

@@ -1,0 +1,390 @@
+/* request.c -- see request.h. */
+#include "client/request.h"
+
+#include <curl/curl.h>
+#include <math.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include "client/meter.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+
+#define BODY_MAX ((size_t)64 << 20)
+#define CONNECT_SEC 10L
+#define SILENCE_SEC 300.0
+#define TICK_MS 200
+#define PAUSE_FIRST_SEC 0.1
+#define PAUSE_MAX_SEC 5.0
+
+struct request {
+    char *server; /* owned */
+    double retry_sec;
+    int signal_fd; /* borrowed; -1: none */
+    bool interrupted;
+    CURL *easy;
+    CURLM *multi;
+};
+
+/* One try of a call, as curl's callbacks see it. */
+struct attempt {
+    struct request *request;
+    const struct request_call *call;
+    struct reply *reply;
+    struct error *err;
+    enum status read_status; /* what ended the pulling of the body */
+    bool stopped;            /* the sink had enough */
+    bool too_long;
+};
+
+struct request *request_new(const char *server_url, double retry_sec, int signal_fd) {
+    struct request *r = mem_calloc(1, sizeof *r);
+    size_t length = strlen(server_url);
+    while (length > 0 && server_url[length - 1] == '/')
+        length--;
+    r->server = mem_strndup(server_url, length);
+    r->retry_sec = retry_sec;
+    r->signal_fd = signal_fd;
+    curl_global_init(CURL_GLOBAL_DEFAULT);
+    r->easy = curl_easy_init();
+    r->multi = curl_multi_init();
+    return r;
+}
+
+void request_free(struct request *r) {
+    if (!r)
+        return;
+    curl_easy_cleanup(r->easy);
+    curl_multi_cleanup(r->multi);
+    curl_global_cleanup();
+    mem_free(r->server);
+    mem_free(r);
+}
+
+const char *request_server(const struct request *r) {
+    return r->server;
+}
+
+const char *request_library_version(void) {
+    return curl_version_info(CURLVERSION_NOW)->version;
+}
+
+/* --- interruption and pauses --------------------------------------------------------------- */
+
+static bool wait_for_signal(struct request *r, int milliseconds) {
+    struct pollfd wait = {.fd = r->signal_fd, .events = POLLIN};
+    struct signalfd_siginfo info;
+    if (!r->interrupted && poll(&wait, 1, milliseconds) == 1 &&
+        read(r->signal_fd, &info, sizeof info) == (ssize_t)sizeof info)
+        r->interrupted = true;
+    return r->interrupted;
+}
+
+bool request_interrupted(struct request *r) {
+    return wait_for_signal(r, 0);
+}
+
+static double pause_length(int tries, double asked_sec) {
+    double pause = fmin(PAUSE_FIRST_SEC * pow(2.0, tries), PAUSE_MAX_SEC);
+    return asked_sec >= 0.0 ? fmin(fmax(asked_sec, PAUSE_FIRST_SEC), 60.0) : pause;
+}
+
+bool request_pause(struct request *r, int tries, double asked_sec) {
+    return !wait_for_signal(r, (int)lround(1000.0 * pause_length(tries, asked_sec)));
+}
+
+static enum status cancelled(struct error *err) {
+    return error_set(err, STATUS_CANCELLED, "interrupted");
+}
+
+/* --- the reply ----------------------------------------------------------------------------- */
+
+void reply_init(struct reply *reply) {
+    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1, .range_total = -1, .length = -1};
+    buf_init(&reply->body, BODY_MAX);
+}
+
+void reply_release(struct reply *reply) {
+    buf_release(&reply->body);
+    cJSON_Delete(reply->json);
+    reply->json = NULL;
+}
+
+/* The value where `line` is the header `name`; NULL otherwise. */
+static const char *header_value(const char *line, const char *name) {
+    size_t length = strlen(name);
+    if (strncasecmp(line, name, length) != 0 || line[length] != ':')
+        return NULL;
+    return line + length + 1 + strspn(line + length + 1, " \t");
+}
+
+static void copy_header(char *to, size_t size, const char *line, const char *name) {
+    const char *value = header_value(line, name);
+    if (value)
+        snprintf(to, size, "%s", value);
+}
+
+static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
+    struct reply *reply = ((struct attempt *)user)->reply;
+    size_t length = size * count;
+    char line[512];
+    snprintf(line, sizeof line, "%.*s", (int)(length < sizeof line ? length : sizeof line - 1), bytes);
+    line[strcspn(line, "\r\n")] = '\0';
+    if (strncmp(line, "HTTP/", 5) == 0) { /* also after a 100 Continue: what came before is void */
+        const char *code = strchr(line, ' ');
+        reply->code = code ? strtol(code, NULL, 10) : 0;
+        reply->etag[0] = reply->content_type[0] = '\0';
+        return length;
+    }
+    copy_header(reply->etag, sizeof reply->etag, line, "ETag");
+    copy_header(reply->content_type, sizeof reply->content_type, line, "Content-Type");
+    const char *value = header_value(line, "Retry-After");
+    if (value && *value >= '0' && *value <= '9')
+        reply->retry_after_sec = strtod(value, NULL);
+    value = header_value(line, "Content-Length");
+    if (value)
+        reply->length = strtoll(value, NULL, 10);
+    value = header_value(line, "Content-Range");
+    if (value && strncasecmp(value, "bytes ", 6) == 0) {
+        const char *slash = strchr(value, '/');
+        if (value[6] != '*')
+            reply->range_first = strtoll(value + 6, NULL, 10);
+        if (slash && slash[1] != '*')
+            reply->range_total = strtoll(slash + 1, NULL, 10);
+    }
+    return length;
+}
+
+static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
+    struct attempt *a = user;
+    size_t length = size * count;
+    if (a->call->sink && (a->reply->code == 200 || a->reply->code == 206)) {
+        a->stopped = !a->call->sink(a->call->user, a->reply, bytes, length);
+        return a->stopped ? 0 : length;
+    }
+    a->too_long = !buf_append(&a->reply->body, bytes, length);
+    return a->too_long ? 0 : length;
+}
+
+static size_t on_read(char *bytes, size_t size, size_t count, void *user) {
+    struct attempt *a = user;
+    size_t got = 0;
+    a->read_status = a->call->read(a->call->user, bytes, size * count, &got, a->err);
+    return a->read_status == STATUS_OK ? got : CURL_READFUNC_ABORT;
+}
+
+/* --- one try ------------------------------------------------------------------------------- */
+
+static bool is_loopback(const char *server) {
+    const char *host = strstr(server, "://");
+    host = host ? host + 3 : server;
+    return strncmp(host, "127.", 4) == 0 || strncasecmp(host, "localhost", 9) == 0 ||
+           strncmp(host, "[::1]", 5) == 0;
+}
+
+/* Sets up the handle; the returned list of headers and the texts must live until the end. */
+static struct curl_slist *set_up(struct attempt *a, const char *url, const char *body) {
+    const struct request_call *call = a->call;
+    CURL *easy = a->request->easy;
+    curl_easy_reset(easy);
+    curl_easy_setopt(easy, CURLOPT_URL, url);
+    curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
+    curl_easy_setopt(easy, CURLOPT_USERAGENT, "unbake/" UNBAKE_VERSION);
+    curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, CONNECT_SEC);
+    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
+    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME,
+                     lround(call->silence_sec > 0.0 ? call->silence_sec : SILENCE_SEC));
+    curl_easy_setopt(easy, CURLOPT_HEADERFUNCTION, on_header);
+    curl_easy_setopt(easy, CURLOPT_HEADERDATA, a);
+    curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, on_body);
+    curl_easy_setopt(easy, CURLOPT_WRITEDATA, a);
+    if (is_loopback(a->request->server))
+        curl_easy_setopt(easy, CURLOPT_PROXY, "");
+    struct curl_slist *headers = NULL;
+    for (size_t i = 0; i < sizeof call->header / sizeof *call->header && call->header[i]; i++)
+        headers = curl_slist_append(headers, call->header[i]);
+    if (call->read) {
+        curl_easy_setopt(easy, CURLOPT_POST, 1L);
+        curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)call->read_length);
+        curl_easy_setopt(easy, CURLOPT_READFUNCTION, on_read);
+        curl_easy_setopt(easy, CURLOPT_READDATA, a);
+        headers = curl_slist_append(headers, "Content-Type: application/octet-stream");
+        headers = curl_slist_append(headers, "Expect: 100-continue");
+    } else if (body || (call->method && strcmp(call->method, "POST") == 0)) {
+        curl_easy_setopt(easy, CURLOPT_POSTFIELDS, body ? body : "");
+        if (body)
+            headers = curl_slist_append(headers, "Content-Type: " MIME_JSON);
+        headers = curl_slist_append(headers, "Expect:");
+    }
+    if (call->method)
+        curl_easy_setopt(easy, CURLOPT_CUSTOMREQUEST, call->method);
+    curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers);
+    return headers;
+}
+
+/* Drives the transfer to its end; false when interrupted. */
+static bool drive(struct attempt *a, CURLcode *result) {
+    struct request *r = a->request;
+    int running = 1;
+    *result = CURLE_FAILED_INIT;
+    while (running) {
+        struct curl_waitfd also = {.fd = r->signal_fd, .events = CURL_WAIT_POLLIN};
+        if (curl_multi_perform(r->multi, &running) != CURLM_OK)
+            return true;
+        if (request_interrupted(r))
+            return false;
+        if (a->call->tick) {
+            curl_off_t sent = 0;
+            curl_easy_getinfo(r->easy, CURLINFO_SIZE_UPLOAD_T, &sent);
+            a->call->tick(a->call->user, (double)sent);
+        }
+        if (running)
+            curl_multi_poll(r->multi, &also, r->signal_fd >= 0 ? 1 : 0, TICK_MS, NULL);
+    }
+    int left;
+    CURLMsg *message = curl_multi_info_read(r->multi, &left);
+    if (message && message->msg == CURLMSG_DONE)
+        *result = message->data.result;
+    return true;
+}
+
+static enum status transport_failed(struct attempt *a, CURLcode code, const char *detail) {
+    struct error *err = a->err;
+    const char *why = *detail ? detail : curl_easy_strerror(code);
+    if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) {
+        error_set(err, STATUS_INPUT, "%s is no server's URL: %s", a->request->server, why);
+        return error_hint(err, "an example: --server " PROTOCOL_DEFAULT_SERVER);
+    }
+    error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);
+    return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
+}
+
+/* One try. *unsent: the server cannot have got the request. */
+static enum status transfer(struct attempt *a, const char *url, const char *body, bool *unsent) {
+    struct request *r = a->request;
+    char detail[CURL_ERROR_SIZE] = "";
+    struct curl_slist *headers = set_up(a, url, body);
+    curl_easy_setopt(r->easy, CURLOPT_ERRORBUFFER, detail);
+    curl_multi_add_handle(r->multi, r->easy);
+    CURLcode code;
+    bool whole = drive(a, &code);
+    curl_multi_remove_handle(r->multi, r->easy);
+    curl_easy_setopt(r->easy, CURLOPT_ERRORBUFFER, NULL);
+    curl_slist_free_all(headers);
+    if (!whole)
+        return cancelled(a->err);
+    if (a->read_status != STATUS_OK)
+        return a->read_status;
+    if (a->too_long)
+        return error_set(a->err, STATUS_LIMIT, "%s sent more than %zu bytes", url, BODY_MAX);
+    /* A server that refuses an upload early may close before all is sent: its reply counts. */
+    if (code == CURLE_OK || a->stopped || (code == CURLE_SEND_ERROR && a->reply->code >= 400))
+        return STATUS_OK;
+    *unsent = code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST;
+    return transport_failed(a, code, detail);
+}
+
+static enum status try_once(struct attempt *a, const char *url, const char *body, bool *unsent) {
+    enum status status = STATUS_OK;
+    *unsent = false;
+    if (a->call->rewind)
+        status = a->call->rewind(a->call->user, a->err);
+    if (status == STATUS_OK)
+        status = transfer(a, url, body, unsent);
+    if (status != STATUS_OK)
+        a->reply->code = 0; /* a 100 Continue is no reply, half a reply is none either */
+    return status;
+}
+
+/* --- status codes -------------------------------------------------------------------------- */
+
+static enum status status_of(long code) {
+    switch (code) {
+    case 404: return STATUS_NOT_FOUND;
+    case 409:
+    case 412: return STATUS_CONFLICT;
+    case 413:
+    case 429: return STATUS_LIMIT;
+    case 502:
+    case 503:
+    case 504: return STATUS_UNAVAILABLE;
+    case 507: return STATUS_NO_SPACE;
+    default: return code >= 500 ? STATUS_INTERNAL : STATUS_INPUT;
+    }
+}
+
+static enum status judge(struct attempt *a) {
+    struct reply *reply = a->reply;
+    if (strstr(reply->content_type, "json") && reply->body.length > 0) {
+        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the server's reply",
+                                        &reply->json, a->err);
+        if (status != STATUS_OK) {
+            error_set(a->err, STATUS_UNAVAILABLE, "%s does not answer in JSON", a->request->server);
+            return error_hint(a->err, "is that server unbaked?");
+        }
+    }
+    if (reply->code < 400)
+        return STATUS_OK;
+    const char *detail = NULL, *hint = NULL;
+    json_string(reply->json, "detail", "problem", NULL, &detail, NULL);
+    json_string(reply->json, "hint", "problem", NULL, &hint, NULL);
+    enum status status = status_of(reply->code);
+    if (detail)
+        error_set(a->err, status, "%s", detail);
+    else
+        error_set(a->err, status, "%s answered %ld", a->request->server, reply->code);
+    return hint ? error_hint(a->err, "%s", hint) : status;
+}
+
+enum status request_run(struct request *r, const struct request_call *call, struct reply *reply,
+                        struct error *err) {
+    char *url = mem_printf("%s%s", r->server, call->path);
+    char *body = call->body ? json_text(call->body) : NULL;
+    bool same_twice = call->same_twice || !call->method;
+    double give_up_at = meter_now() + r->retry_sec;
+    enum status status;
+    for (int tries = 0;; tries++) {
+        bool unsent;
+        reply_release(reply);
+        reply_init(reply);
+        struct attempt a = {.request = r, .call = call, .reply = reply, .err = err};
+        status = try_once(&a, url, body, &unsent);
+        if (status == STATUS_OK)
+            status = judge(&a);
+        bool again = status == STATUS_UNAVAILABLE && !call->once &&
+                     (same_twice || unsent || reply->code == 503);
+        if (!again || meter_now() + pause_length(tries, reply->retry_after_sec) > give_up_at)
+            break;
+        if (!request_pause(r, tries, reply->retry_after_sec)) {
+            status = cancelled(err);
+            break;
+        }
+    }
+    mem_free(url);
+    mem_free(body);
+    return status;
+}
+
+enum status request_get(struct request *r, const char *path, struct reply *reply, struct error *err) {
+    enum status status = request_run(r, &(struct request_call){.path = path}, reply, err);
+    if (status != STATUS_OK || reply->json)
+        return status;
+    error_set(err, STATUS_UNAVAILABLE, "%s%s answered %ld without JSON", r->server, path, reply->code);
+    return error_hint(err, "is that server unbaked?");
+}
+
+void request_escape(struct buf *out, const char *text, bool keep_slash) {
+    for (; *text; text++) {
+        unsigned char c = (unsigned char)*text;
+        bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                     strchr("-._~", c) != NULL || (keep_slash && c == '/');
+        if (plain)
+            buf_append(out, text, 1);
+        else
+            buf_printf(out, "%%%02X", c);
+    }
+}

@@ -1,0 +1,83 @@
+/* request.h -- requests to the daemon. request.c is the only include of <curl/curl.h>.
+ *
+ * 1. A request that cannot be sent, or that meets 502, 503 or 504, is tried again with growing
+ *    pauses for `retry_sec`. One whose effect is not the same twice is tried again only when the
+ *    server cannot have got it.
+ * 2. SIGINT and SIGTERM (blocked by main, read from signal_fd) end a request or a pause at once
+ *    with STATUS_CANCELLED.
+ * 3. Redirects are not followed; a loopback address is reached without a proxy.
+ * One request at a time; not thread-safe. */
+#ifndef UNBAKE_CLIENT_REQUEST_H
+#define UNBAKE_CLIENT_REQUEST_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/buf.h"
+#include "common/error.h"
+#include "common/json.h"
+
+struct request; /* a server and the connection to it; opaque */
+
+struct request *request_new(const char *server_url, double retry_sec, int signal_fd);
+void request_free(struct request *r);
+const char *request_server(const struct request *r); /* the URL, without a slash at its end */
+const char *request_library_version(void);           /* libcurl's */
+
+/* True once SIGINT or SIGTERM has come. */
+bool request_interrupted(struct request *r);
+/* Waits before a further try (0, 1, ...): 0.1 s, doubled each time, at most 5 s, or what the
+ * server asked for (`asked_sec`, negative: nothing). False when interrupted. */
+bool request_pause(struct request *r, int tries, double asked_sec);
+
+/* What came back. */
+struct reply {
+    long code;              /* HTTP status; 0: no reply at all */
+    struct buf body;        /* but for what went to a sink */
+    cJSON *json;            /* the body where it is JSON, also a problem; else NULL */
+    char content_type[128];
+    char etag[128];         /* as sent, quotes included; "" if none */
+    double retry_after_sec; /* negative: not said */
+    int64_t range_first, range_total; /* of Content-Range; -1: not said */
+    int64_t length;         /* Content-Length; -1: not said */
+};
+void reply_init(struct reply *reply);
+void reply_release(struct reply *reply);
+
+struct request_call {
+    const char *method; /* NULL: GET */
+    const char *path;   /* "/v1/jobs?limit=1", percent-encoded */
+    const char *header[4]; /* more headers, "Name: value"; unused ones NULL */
+
+    const cJSON *body;  /* sent as JSON; NULL: none */
+    /* Or a body that is pulled: `read` as pack_read, `rewind` before every try. */
+    enum status (*read)(void *user, void *bytes, size_t room, size_t *got, struct error *err);
+    enum status (*rewind)(void *user, struct error *err);
+    uint64_t read_length;
+
+    /* Gets the body of a 200 or 206 piece by piece; false ends the request, successfully. */
+    bool (*sink)(void *user, const struct reply *reply, const char *bytes, size_t length);
+    /* Called a few times a second while the request runs, with the bytes sent so far. */
+    void (*tick)(void *user, double sent);
+    void *user;
+
+    double silence_sec; /* nothing moves so long: the connection is dead; 0: 300 s */
+    bool once;          /* the caller sees to further tries */
+    bool same_twice;    /* a second try does no harm (GET always is so) */
+};
+
+/* Runs a request. Status codes of 400 and above become an error with the problem's detail and
+ * hint: 404 STATUS_NOT_FOUND, 409 and 412 STATUS_CONFLICT, 502 to 504 STATUS_UNAVAILABLE, 507
+ * STATUS_NO_SPACE, 413 and 429 STATUS_LIMIT, other 5xx STATUS_INTERNAL, else STATUS_INPUT.
+ * reply->code tells them from errors of our own (0). *reply is emptied first. */
+enum status request_run(struct request *r, const struct request_call *call, struct reply *reply,
+                        struct error *err);
+
+/* GET of a JSON document. */
+enum status request_get(struct request *r, const char *path, struct reply *reply, struct error *err);
+
+/* Appends `text` percent-encoded; slashes stay if `keep_slash`. */
+void request_escape(struct buf *out, const char *text, bool keep_slash);
+
+#endif

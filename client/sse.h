@@ -1,0 +1,37 @@
+/* sse.h -- a stream of Server-Sent Events, cut into events (WHATWG HTML, section 9.2.6).
+ *
+ * Bytes come in pieces of any size; lines end in LF, CR or CR LF. An event whose text passes
+ * SSE_EVENT_MAX is refused: the stream is then broken for good. */
+#ifndef UNBAKE_CLIENT_SSE_H
+#define UNBAKE_CLIENT_SSE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/buf.h"
+
+#define SSE_EVENT_MAX ((size_t)4 << 20)
+#define SSE_ID_MAX 128
+
+struct sse {
+    struct buf line, data;
+    char type[64];
+    char pending_id[SSE_ID_MAX];
+    char last_id[SSE_ID_MAX]; /* of the last event given out: what Last-Event-ID must say */
+    double retry_sec;         /* what the server asked to wait before it is asked again; < 0: nothing */
+    bool after_cr;            /* an LF that follows belongs to the line that ended */
+    bool begun;               /* a byte-order mark can no longer come */
+    /* Gets each event; type is "message" where the stream names none. False stops the stream. */
+    bool (*each)(void *user, const char *type, const char *data, const char *id);
+    void *user;
+};
+
+void sse_init(struct sse *s, bool (*each)(void *user, const char *type, const char *data, const char *id),
+              void *user);
+void sse_release(struct sse *s);
+/* Forgets a half-received event (the connection broke); last_id stays. */
+void sse_restart(struct sse *s);
+/* False when `each` said stop or an event was too large. */
+bool sse_feed(struct sse *s, const char *bytes, size_t length);
+
+#endif

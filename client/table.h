@@ -1,0 +1,30 @@
+/* table.h -- rows of text in aligned columns, for people. */
+#ifndef UNBAKE_CLIENT_TABLE_H
+#define UNBAKE_CLIENT_TABLE_H
+
+#include <stddef.h>
+
+#include "client/terminal.h"
+
+#define TABLE_COLUMNS 8
+
+struct table {
+    size_t columns;
+    bool right[TABLE_COLUMNS]; /* align to the right */
+    char **cell;               /* [rows][columns]; owned */
+    enum colour *colour;       /* [rows][columns] */
+    size_t rows, capacity;
+};
+
+/* `headings` are the first row; one that begins with '>' is a column aligned to the right. */
+void table_init(struct table *t, size_t columns, const char *const *headings);
+void table_release(struct table *t);
+/* Starts a row of empty cells. */
+void table_row(struct table *t);
+/* Fills a cell of the last row; control characters are made harmless. */
+void table_set(struct table *t, size_t column, enum colour colour, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+/* Prints it. On a screen the last column is cut at the screen's edge. */
+void table_print(const struct table *t, struct terminal *terminal);
+
+#endif

@@ -1,0 +1,46 @@
+/* view.h -- what a job's events add up to, and the line that shows it. */
+#ifndef UNBAKE_CLIENT_VIEW_H
+#define UNBAKE_CLIENT_VIEW_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "client/terminal.h"
+#include "common/json.h"
+
+#define VIEW_METRICS 3
+
+struct view_metric {
+    char series[32];
+    double value;
+    uint64_t order; /* of its last report; the oldest gives way to a new series */
+};
+
+struct view {
+    int64_t job;
+    char state[16], wanted[16];
+    char stage[48];
+    double done, total;  /* of the stage; total 0: unknown */
+    double eta_sec;      /* when it was reported; negative: unknown */
+    int attempt;
+    char reason[512];    /* "" if none */
+    struct view_metric metric[VIEW_METRICS];
+    size_t metric_count;
+    uint64_t reports;
+};
+
+void view_init(struct view *v, int64_t job);
+/* Takes an event in (common/protocol.h names the types; others are ignored). */
+void view_event(struct view *v, const char *type, const cJSON *data);
+bool view_is_over(const struct view *v);
+
+/* 0..1. */
+double view_fraction(const struct view *v);
+/* The line: state or stage, bar if `columns` leave room for one, figures, time left.
+ * `age_sec` is how long ago the last progress came. */
+void view_line(const struct view *v, const struct terminal *t, size_t columns, bool with_bar,
+               double age_sec, struct buf *out);
+
+enum colour state_colour(const char *state);
+
+#endif

@@ -1,0 +1,339 @@
+/* watch.c -- `watch` and `logs`: a job's events, as they come.
+ *
+ * The stream is asked for again, from the last event seen, whenever it breaks off: when the
+ * daemon restarts, when a proxy has enough, when nothing (not even the keep-alive) comes for
+ * SILENCE_SEC. The end of the job, not the end of a stream, ends the watching; what GET says
+ * about the job then is its outcome. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "client/commands.h"
+#include "client/meter.h"
+#include "client/sse.h"
+#include "client/view.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+
+#define SILENCE_SEC 45.0 /* three keep-alives */
+#define PATIENCE_SEC 600.0
+#define REDRAW_SEC 0.2
+#define PLAIN_SEC 10.0
+
+const struct option watch_options[] = {
+    {"all", 'a', OPTION_FLAG, NULL, "begin with what happened before, not with the present"},
+    {0},
+};
+const struct option logs_options[] = {
+    {"follow", 'f', OPTION_FLAG, NULL, "print the log's events until the job ends"},
+    {0},
+};
+
+struct watch {
+    struct client *client;
+    struct view view;
+    struct sse sse;
+    bool only_log;      /* `logs --follow` */
+    bool connected;     /* something came over the present connection */
+    double heard_at;    /* when the last event came */
+    double progress_at; /* when the last progress came */
+    double shown_at;
+    char shown_state[80]; /* state and stage of the last plain line */
+};
+
+/* --- showing ------------------------------------------------------------------------------- */
+
+static void show_line(struct watch *w) {
+    struct terminal *t = &w->client->out;
+    struct buf line;
+    buf_init(&line, 4096);
+    double age = w->progress_at > 0.0 ? meter_now() - w->progress_at : 0.0;
+    view_line(&w->view, t, t->live ? terminal_width(t) - 1 : 1000, t->live, age, &line);
+    if (t->live)
+        terminal_draw(t, buf_text(&line));
+    else {
+        fprintf(t->out, "%s\n", buf_text(&line));
+        fflush(t->out);
+    }
+    w->shown_at = meter_now();
+    buf_release(&line);
+}
+
+/* On a terminal: as often as eyes want. Else: what is new at once, figures now and then. */
+static void show(struct watch *w, bool urgent) {
+    struct client *c = w->client;
+    if (c->json || c->quiet || w->only_log || !w->view.state[0])
+        return;
+    double since = meter_now() - w->shown_at;
+    if (c->out.live) {
+        if (urgent || since >= REDRAW_SEC)
+            show_line(w);
+        return;
+    }
+    char state[sizeof w->shown_state];
+    snprintf(state, sizeof state, "%s %s %s", w->view.state, w->view.stage, w->view.wanted);
+    bool changed = strcmp(state, w->shown_state) != 0;
+    memcpy(w->shown_state, state, sizeof state);
+    if (changed || (since >= PLAIN_SEC && !urgent))
+        show_line(w);
+}
+
+static void print_log(struct watch *w, const cJSON *data) {
+    struct client *c = w->client;
+    const char *level = member_text(data, "level");
+    bool important = strcmp(level, "warning") == 0 || strcmp(level, "error") == 0;
+    if (!w->only_log && (c->quiet || !important))
+        return;
+    struct buf line;
+    buf_init(&line, 1 << 20);
+    if (w->only_log) {
+        terminal_clean(&line, member_text(data, "at"));
+        buf_puts(&line, " ");
+    }
+    enum colour colour = !important ? COLOUR_NONE : strcmp(level, "error") == 0 ? COLOUR_RED : COLOUR_YELLOW;
+    buf_puts(&line, terminal_colour(&c->out, colour));
+    terminal_clean(&line, level);
+    buf_puts(&line, terminal_colour(&c->out, COLOUR_NONE));
+    buf_puts(&line, ": ");
+    terminal_clean(&line, member_text(data, "message"));
+    terminal_clear(&c->out);
+    fprintf(c->out.out, "%s\n", buf_text(&line));
+    fflush(c->out.out);
+    buf_release(&line);
+}
+
+/* {"id": 12, "event": "metric", "data": {...}}, as the daemon's own NDJSON has it. */
+static void print_event(struct client *c, const char *type, const cJSON *data, const char *id) {
+    cJSON *event = cJSON_CreateObject();
+    json_add_int(event, "id", strtoll(id, NULL, 10));
+    json_add_string(event, "event", type);
+    json_add(event, "data", cJSON_Duplicate(data, true));
+    client_print_json(c, event);
+    cJSON_Delete(event);
+}
+
+static bool on_event(void *user, const char *type, const char *data, const char *id) {
+    struct watch *w = user;
+    cJSON *value;
+    w->connected = true;
+    w->heard_at = meter_now();
+    if (json_parse(data, strlen(data), "event", &value, NULL) != STATUS_OK)
+        return true; /* one broken event is no reason to stop watching */
+    view_event(&w->view, type, value);
+    if (strcmp(type, EVENT_PROGRESS) == 0)
+        w->progress_at = w->heard_at;
+    bool is_log = strcmp(type, EVENT_LOG) == 0;
+    if (w->client->json && (is_log || !w->only_log))
+        print_event(w->client, type, value, id);
+    else if (!w->client->json && is_log)
+        print_log(w, value);
+    show(w, strcmp(type, EVENT_STATE) == 0);
+    cJSON_Delete(value);
+    return true;
+}
+
+/* --- the stream ---------------------------------------------------------------------------- */
+
+static bool on_bytes(void *user, const struct reply *reply, const char *bytes, size_t length) {
+    (void)reply;
+    return sse_feed(&((struct watch *)user)->sse, bytes, length);
+}
+
+static void on_tick(void *user, double sent) {
+    (void)sent;
+    show(user, false);
+}
+
+static enum status follow_once(struct watch *w, struct reply *reply, struct error *err) {
+    char path[64], last[SSE_ID_MAX + 20] = "";
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events", (long long)w->view.job);
+    if (w->sse.last_id[0])
+        snprintf(last, sizeof last, "Last-Event-ID: %s", w->sse.last_id);
+    struct request_call call = {
+        .path = path,
+        .header = {"Accept: " MIME_SSE, last[0] ? last : NULL},
+        .sink = on_bytes,
+        .tick = on_tick,
+        .user = w,
+        .silence_sec = SILENCE_SEC,
+        .once = true,
+    };
+    sse_restart(&w->sse);
+    w->connected = false;
+    return request_run(w->client->request, &call, reply, err);
+}
+
+/* Follows the stream until the job is over. */
+static enum status follow(struct watch *w, struct reply *reply, struct error *err) {
+    struct client *c = w->client;
+    double first_patience = c->retry_sec >= 0.0 ? c->retry_sec : 3.0;
+    bool ever = false, told = false;
+    w->heard_at = meter_now();
+    for (int tries = 0;; tries++) {
+        enum status status = follow_once(w, reply, err);
+        if (status != STATUS_OK && status != STATUS_UNAVAILABLE)
+            return status;
+        if (reply->code == 204 || view_is_over(&w->view))
+            return STATUS_OK;
+        if (w->connected) {
+            ever = true;
+            told = false;
+            tries = 0;
+        }
+        double patience = ever ? (c->retry_sec >= 0.0 ? c->retry_sec : PATIENCE_SEC) : first_patience;
+        if (status == STATUS_OK)
+            error_set(err, STATUS_UNAVAILABLE, "%s ended the stream of events before the job ended",
+                      request_server(c->request));
+        if (meter_now() - w->heard_at > patience)
+            return STATUS_UNAVAILABLE;
+        if (ever && !told && status != STATUS_OK) {
+            client_note(c, "lost the server; watching goes on when it is back");
+            told = true;
+        }
+        if (!request_pause(c->request, tries, reply->retry_after_sec))
+            return error_set(err, STATUS_CANCELLED, "interrupted");
+    }
+}
+
+/* --- the end ------------------------------------------------------------------------------- */
+
+static void print_rejection(struct client *c, const cJSON *job) {
+    struct reply reply;
+    reply_init(&reply);
+    char *path = mem_printf("/v1/scenes/%s", member_text(job, "scene"));
+    if (request_get(c->request, path, &reply, NULL) == STATUS_OK)
+        scenes_print_problems(c, reply.json, c->out.out);
+    mem_free(path);
+    reply_release(&reply);
+}
+
+static void print_outcome(struct client *c, const cJSON *job) {
+    const char *state = member_text(job, "state");
+    double started = time_parse(member_text(job, "started_at"));
+    double finished = time_parse(member_text(job, "finished_at"));
+    long long id = (long long)member_number(job, "id", 0.0);
+    FILE *out = c->out.out;
+    terminal_clear(&c->out);
+    fprintf(out, "job %lld %s%s%s", id, terminal_colour(&c->out, state_colour(state)), state,
+            terminal_colour(&c->out, COLOUR_NONE));
+    if (isfinite(started) && isfinite(finished)) {
+        char took[16];
+        format_duration(took, finished - started);
+        fprintf(out, " after %s", took);
+    }
+    struct buf text;
+    buf_init(&text, 1 << 16);
+    if (*member_text(job, "reason")) {
+        buf_puts(&text, ": ");
+        terminal_clean(&text, member_text(job, "reason"));
+    }
+    if (*member_text(job, "hint")) {
+        buf_puts(&text, "\n  hint: ");
+        terminal_clean(&text, member_text(job, "hint"));
+    }
+    fprintf(out, "%s\n", buf_text(&text));
+    buf_release(&text);
+    if (strcmp(state, JOB_STATE_SUCCEEDED) == 0)
+        fprintf(out, "fetch its outputs with: unbake get %lld\n", id);
+    else if (strcmp(state, JOB_STATE_FAILED) == 0)
+        print_rejection(c, job);
+}
+
+static int interrupted(struct client *c, int64_t job) {
+    struct error err;
+    error_set(&err, STATUS_CANCELLED, "interrupted; job %lld goes on", (long long)job);
+    error_hint(&err, "`unbake watch %lld` looks again, `unbake cancel %lld` ends it", (long long)job,
+               (long long)job);
+    terminal_keep(&c->out);
+    return client_fail(c, NULL, &err);
+}
+
+static int watch_events(struct client *c, int64_t job, bool all, bool only_log) {
+    struct watch w = {.client = c, .only_log = only_log};
+    struct reply reply;
+    struct error err;
+    int code = CLIENT_OK;
+    view_init(&w.view, job);
+    sse_init(&w.sse, on_event, &w);
+    reply_init(&reply);
+    if (all)
+        snprintf(w.sse.last_id, sizeof w.sse.last_id, "0");
+    enum status status = follow(&w, &reply, &err);
+    if (status == STATUS_OK && !only_log) {
+        status = client_job_get(c, job, &reply, &err);
+        if (status == STATUS_OK && !c->json && !c->quiet)
+            print_outcome(c, reply.json);
+        if (status == STATUS_OK && strcmp(member_text(reply.json, "state"), JOB_STATE_SUCCEEDED) != 0)
+            code = CLIENT_JOB_FAILED;
+    }
+    if (status == STATUS_CANCELLED)
+        code = interrupted(c, job);
+    else if (status != STATUS_OK)
+        code = client_fail(c, &reply, &err);
+    sse_release(&w.sse);
+    reply_release(&reply);
+    return code;
+}
+
+int watch_job(struct client *c, int64_t job, bool all) {
+    return watch_events(c, job, all, false);
+}
+
+int watch_run(struct client *c, const struct options *o) {
+    struct reply reply;
+    struct error err;
+    int64_t job;
+    reply_init(&reply);
+    enum status status = client_job_id(c, o->word[0], &job, &reply, &err);
+    int code = status == STATUS_OK ? CLIENT_OK : client_fail(c, &reply, &err);
+    reply_release(&reply);
+    return code != CLIENT_OK ? code : watch_job(c, job, options_flag(o, "all"));
+}
+
+/* --- logs ---------------------------------------------------------------------------------- */
+
+static enum status print_whole_log(struct client *c, int64_t job, struct reply *reply, struct error *err) {
+    char path[80];
+    snprintf(path, sizeof path, "/v1/jobs/%lld/log?bytes=1048576", (long long)job);
+    enum status status = request_run(c->request, &(struct request_call){.path = path}, reply, err);
+    if (status != STATUS_OK)
+        return status;
+    if (c->json) {
+        cJSON *object = cJSON_CreateObject();
+        json_add_int(object, "job", job);
+        json_add_string(object, "log", buf_text(&reply->body));
+        client_print_json(c, object);
+        cJSON_Delete(object);
+        return STATUS_OK;
+    }
+    for (const char *at = buf_text(&reply->body); *at;) {
+        struct buf line;
+        size_t length = strcspn(at, "\n");
+        char *raw = mem_strndup(at, length);
+        buf_init(&line, 1 << 21);
+        terminal_clean(&line, raw);
+        fprintf(c->out.out, "%s\n", buf_text(&line));
+        buf_release(&line);
+        mem_free(raw);
+        at += length + (at[length] == '\n');
+    }
+    return STATUS_OK;
+}
+
+int logs_run(struct client *c, const struct options *o) {
+    struct reply reply;
+    struct error err;
+    int64_t job;
+    int code = CLIENT_OK;
+    reply_init(&reply);
+    enum status status = client_job_id(c, o->word[0], &job, &reply, &err);
+    bool follow_it = options_flag(o, "follow");
+    if (status == STATUS_OK && !follow_it)
+        status = print_whole_log(c, job, &reply, &err);
+    if (status != STATUS_OK)
+        code = client_fail(c, &reply, &err);
+    else if (follow_it)
+        code = watch_events(c, job, true, true);
+    reply_release(&reply);
+    return code;
+}
