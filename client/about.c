@@ -20,7 +20,7 @@ static void print_range(struct table *t, size_t column, const cJSON *setting) {
             buf_printf(&text, "%s%s", text.length ? ", " : "",
                        cJSON_IsString(choice) ? choice->valuestring : "");
     else if (cJSON_HasObjectItem(setting, "minimum"))
-        buf_printf(&text, "%.15g to %.15g%s%s", member_number(setting, "minimum", 0.0),
+        buf_printf(&text, "%.16g to %.16g%s%s", member_number(setting, "minimum", 0.0),
                    member_number(setting, "maximum", 0.0), *unit ? " " : "", unit);
     else
         buf_puts(&text, strcmp(type, "bool") == 0 ? "true, false" : type);
@@ -118,6 +118,19 @@ static void print_server(struct client *c, const cJSON *server) {
     buf_release(&line);
 }
 
+static void print_versions_json(struct client *c, const cJSON *server) {
+    cJSON *object = cJSON_CreateObject(), *client = cJSON_CreateObject();
+    cJSON *libraries = cJSON_CreateObject();
+    json_add_string(client, "version", UNBAKE_VERSION);
+    json_add_string(libraries, "libcurl", request_library_version());
+    json_add_string(libraries, "libarchive", archive_version_details());
+    json_add(client, "libraries", libraries);
+    json_add(object, "client", client);
+    json_add(object, "server", server ? cJSON_Duplicate(server, true) : cJSON_CreateNull());
+    client_print_json(c, object);
+    cJSON_Delete(object);
+}
+
 /* A server that does not answer is part of the answer, not a failure. */
 int version_run(struct client *c, const struct options *o) {
     (void)o;
@@ -126,18 +139,12 @@ int version_run(struct client *c, const struct options *o) {
     reply_init(&reply);
     struct request_call call = {.path = "/v1/version", .once = true};
     enum status status = request_run(c->request, &call, &reply, &err);
-    int code = status == STATUS_OK || status == STATUS_UNAVAILABLE ? CLIENT_OK : client_fail(c, &reply, &err);
-    if (code == CLIENT_OK && c->json) {
-        cJSON *object = cJSON_CreateObject(), *client = cJSON_CreateObject(), *libraries = cJSON_CreateObject();
-        json_add_string(client, "version", UNBAKE_VERSION);
-        json_add_string(libraries, "libcurl", request_library_version());
-        json_add_string(libraries, "libarchive", archive_version_details());
-        json_add(client, "libraries", libraries);
-        json_add(object, "client", client);
-        json_add(object, "server", status == STATUS_OK ? cJSON_Duplicate(reply.json, true) : cJSON_CreateNull());
-        client_print_json(c, object);
-        cJSON_Delete(object);
-    } else if (code == CLIENT_OK) {
+    int code = CLIENT_OK;
+    if (status != STATUS_OK && status != STATUS_UNAVAILABLE)
+        code = client_fail(c, &reply, &err);
+    else if (c->json)
+        print_versions_json(c, reply.json);
+    else {
         printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(),
                archive_version_details());
         if (status == STATUS_OK)

@@ -147,6 +147,11 @@ double time_parse(const char *text) {
     return strcmp(rest, "Z") == 0 ? (double)timegm(&time) + fraction : (double)NAN;
 }
 
+double time_since(const char *text) {
+    double age = difftime(time(NULL), 0) - time_parse(text);
+    return age < 0.0 ? 0.0 : age;
+}
+
 /* --- jobs and lists ------------------------------------------------------------------------ */
 
 enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply,

@@ -24,12 +24,14 @@ enum client_exit {
     CLIENT_INTERRUPTED = 130 /* Ctrl-C; a submitted job goes on */
 };
 
+#define CLIENT_RETRY_SEC 3.0
+
 struct client {
     struct request *request;
     struct terminal out; /* stdout: results */
     struct terminal err; /* stderr: progress of transfers, messages */
     bool json, quiet;
-    double retry_sec;
+    double retry_sec; /* --retry; negative: each command's own default */
 };
 
 struct command {
@@ -76,5 +78,7 @@ const cJSON *member_items(const cJSON *object, const char *key); /* an array or 
 
 /* Unix time of an RFC 3339 time in UTC ("2024-05-06T07:08:09.123Z"); NaN for anything else. */
 double time_parse(const char *text);
+/* Seconds from then to now; never negative; NaN where time_parse gives that. */
+double time_since(const char *text);
 
 #endif

@@ -113,9 +113,10 @@ static enum status check_words(struct fetch *f, const struct options *o) {
         }
         if (matched)
             continue;
-        error_set(f->err, STATUS_NOT_FOUND, "job %lld has no output %.200s", (long long)f->job, o->word[i]);
+        long long job = (long long)f->job;
+        error_set(f->err, STATUS_NOT_FOUND, "job %lld has no output %.200s", job, o->word[i]);
         return nearest.best ? error_hint(f->err, "did you mean %s?", nearest.best)
-                            : error_hint(f->err, "`unbake show %lld` lists what there is", (long long)f->job);
+                            : error_hint(f->err, "`unbake show %lld` lists what there is", job);
     }
     return STATUS_OK;
 }
@@ -264,8 +265,9 @@ static enum status fetch_verified(struct fetch *f) {
             return status;
         if (strcmp(listed, f->sha256) == 0 && !resumed) {
             f->reply.code = 0;
-            return error_set(f->err, STATUS_CORRUPT, "%s arrived with SHA-256 %.12s..., listed is %.12s...",
-                             f->name, found, listed);
+            return error_set(f->err, STATUS_CORRUPT,
+                             "%s arrived with SHA-256 %.12s..., listed is %.12s...", f->name, found,
+                             listed);
         }
     }
     f->reply.code = 0;
@@ -350,8 +352,8 @@ static enum status fetch_all(struct fetch *f, const struct options *o, cJSON *re
             continue;
         if (!get_name_is_safe(name)) {
             f->reply.code = 0;
-            status = error_set(f->err, STATUS_CORRUPT, "the server lists an output with an unsafe name: %.200s",
-                               name);
+            status = error_set(f->err, STATUS_CORRUPT,
+                               "the server lists an output with an unsafe name: %.200s", name);
             break;
         }
         f->name = mem_strdup(name);

@@ -1,7 +1,6 @@
 /* jobs.c -- `list`, `show`, and what is asked of jobs: cancel, pause, resume, retry, rm. */
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
 #include "client/commands.h"
 #include "client/nearest.h"
@@ -32,20 +31,13 @@ static enum status check_state(const char *state, struct error *err) {
                         : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
 }
 
-static void print_age(struct table *t, size_t column, const char *at) {
-    char age[16];
-    double then = time_parse(at);
-    format_duration(age, fmax(difftime(time(NULL), 0) - then, 0.0));
-    if (isfinite(then))
-        table_set(t, column, COLOUR_NONE, "%s", age);
-}
-
 static void print_jobs(struct client *c, const cJSON *items) {
     static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", "name"};
     struct table t;
     const cJSON *job;
     table_init(&t, 7, headings);
     cJSON_ArrayForEach(job, items) {
+        char age[16];
         const char *state = member_text(job, "state");
         bool running = strcmp(state, JOB_STATE_RUNNING) == 0;
         double eta = member_number(job, "eta_sec", -1.0);
@@ -59,7 +51,8 @@ static void print_jobs(struct client *c, const cJSON *items) {
             format_duration(left, eta);
             table_set(&t, 4, COLOUR_NONE, "%s", left);
         }
-        print_age(&t, 5, member_text(job, "created_at"));
+        format_duration(age, time_since(member_text(job, "created_at")));
+        table_set(&t, 5, COLOUR_NONE, "%s", age);
         table_set(&t, 6, COLOUR_NONE, "%s", member_text(job, "name"));
     }
     table_print(&t, &c->out);

@@ -10,8 +10,6 @@
 #include "client/nearest.h"
 #include "common/protocol.h"
 
-#define RETRY_SEC 3.0
-
 /* SIGINT and SIGTERM are read from a descriptor, where request.c waits for them: no handler runs
  * in the middle of anything. */
 static int block_signals(void) {
@@ -55,7 +53,7 @@ static int run(struct client *c, const struct command *command, const struct opt
     server = options_text(o, "server", server && *server ? server : PROTOCOL_DEFAULT_SERVER);
     int signal_fd = block_signals();
     c->retry_sec = options_seconds(o, "retry", -1.0);
-    c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : RETRY_SEC, signal_fd);
+    c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : CLIENT_RETRY_SEC, signal_fd);
     int code = command->run(c, o);
     request_free(c->request);
     if (signal_fd >= 0)

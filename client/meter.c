@@ -45,7 +45,8 @@ void meter_text(const struct meter *m, struct buf *out, size_t columns, bool uni
     struct buf tail;
     buf_init(&tail, 256);
     if (m->total > 0.0)
-        buf_printf(&tail, " %3.0f%%  %s of %s", floor(100.0 * fmin(m->done / m->total, 1.0)), done, total);
+        buf_printf(&tail, " %3.0f%%  %s of %s", floor(100.0 * fmin(m->done / m->total, 1.0)),
+                   done, total);
     else
         buf_printf(&tail, "  %s", done);
     if (m->rate > 0.0) {

@@ -104,7 +104,7 @@ static enum status cancelled(struct error *err) {
 /* --- the reply ----------------------------------------------------------------------------- */
 
 void reply_init(struct reply *reply) {
-    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1, .range_total = -1, .length = -1};
+    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1};
     buf_init(&reply->body, BODY_MAX);
 }
 
@@ -122,12 +122,6 @@ static const char *header_value(const char *line, const char *name) {
     return line + length + 1 + strspn(line + length + 1, " \t");
 }
 
-static void copy_header(char *to, size_t size, const char *line, const char *name) {
-    const char *value = header_value(line, name);
-    if (value)
-        snprintf(to, size, "%s", value);
-}
-
 static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
     struct reply *reply = ((struct attempt *)user)->reply;
     size_t length = size * count;
@@ -137,25 +131,18 @@ static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
     if (strncmp(line, "HTTP/", 5) == 0) { /* also after a 100 Continue: what came before is void */
         const char *code = strchr(line, ' ');
         reply->code = code ? strtol(code, NULL, 10) : 0;
-        reply->etag[0] = reply->content_type[0] = '\0';
+        reply->content_type[0] = '\0';
         return length;
     }
-    copy_header(reply->etag, sizeof reply->etag, line, "ETag");
-    copy_header(reply->content_type, sizeof reply->content_type, line, "Content-Type");
-    const char *value = header_value(line, "Retry-After");
+    const char *value = header_value(line, "Content-Type");
+    if (value)
+        snprintf(reply->content_type, sizeof reply->content_type, "%s", value);
+    value = header_value(line, "Retry-After");
     if (value && *value >= '0' && *value <= '9')
         reply->retry_after_sec = strtod(value, NULL);
-    value = header_value(line, "Content-Length");
-    if (value)
-        reply->length = strtoll(value, NULL, 10);
     value = header_value(line, "Content-Range");
-    if (value && strncasecmp(value, "bytes ", 6) == 0) {
-        const char *slash = strchr(value, '/');
-        if (value[6] != '*')
-            reply->range_first = strtoll(value + 6, NULL, 10);
-        if (slash && slash[1] != '*')
-            reply->range_total = strtoll(slash + 1, NULL, 10);
-    }
+    if (value && strncasecmp(value, "bytes ", 6) == 0 && value[6] >= '0' && value[6] <= '9')
+        reply->range_first = strtoll(value + 6, NULL, 10);
     return length;
 }
 
@@ -255,6 +242,10 @@ static bool drive(struct attempt *a, CURLcode *result) {
 static enum status transport_failed(struct attempt *a, CURLcode code, const char *detail) {
     struct error *err = a->err;
     const char *why = *detail ? detail : curl_easy_strerror(code);
+    long number = 0; /* of the operating system: "Connection refused" says more than curl does */
+    if (code == CURLE_COULDNT_CONNECT &&
+        curl_easy_getinfo(a->request->easy, CURLINFO_OS_ERRNO, &number) == CURLE_OK && number > 0)
+        why = strerror((int)number);
     if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) {
         error_set(err, STATUS_INPUT, "%s is no server's URL: %s", a->request->server, why);
         return error_hint(err, "an example: --server " PROTOCOL_DEFAULT_SERVER);
@@ -320,8 +311,8 @@ static enum status status_of(long code) {
 static enum status judge(struct attempt *a) {
     struct reply *reply = a->reply;
     if (strstr(reply->content_type, "json") && reply->body.length > 0) {
-        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the server's reply",
-                                        &reply->json, a->err);
+        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the reply",
+                                        &reply->json, NULL);
         if (status != STATUS_OK) {
             error_set(a->err, STATUS_UNAVAILABLE, "%s does not answer in JSON", a->request->server);
             return error_hint(a->err, "is that server unbaked?");

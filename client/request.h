@@ -37,10 +37,8 @@ struct reply {
     struct buf body;        /* but for what went to a sink */
     cJSON *json;            /* the body where it is JSON, also a problem; else NULL */
     char content_type[128];
-    char etag[128];         /* as sent, quotes included; "" if none */
     double retry_after_sec; /* negative: not said */
-    int64_t range_first, range_total; /* of Content-Range; -1: not said */
-    int64_t length;         /* Content-Length; -1: not said */
+    int64_t range_first;    /* of Content-Range; -1: not said */
 };
 void reply_init(struct reply *reply);
 void reply_release(struct reply *reply);

@@ -1,8 +1,5 @@
 /* scenes.c -- `scenes`: what was uploaded. */
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "client/commands.h"
 #include "client/nearest.h"
@@ -25,7 +22,7 @@ static void print_scenes(struct client *c, const cJSON *items) {
         char size[16], age[16];
         const char *state = member_text(scene, "state");
         format_bytes(size, member_number(scene, "bytes", 0.0));
-        format_duration(age, fmax(difftime(time(NULL), 0) - time_parse(member_text(scene, "created_at")), 0.0));
+        format_duration(age, time_since(member_text(scene, "created_at")));
         table_row(&t);
         table_set(&t, 0, COLOUR_NONE, "%.12s", member_text(scene, "id"));
         table_set(&t, 1, state_colour(state), "%s", state);
@@ -157,8 +154,8 @@ int scenes_run(struct client *c, const struct options *o) {
         if (show || remove)
             error_set(&err, STATUS_INPUT, "scenes %s takes SCENE..., which is missing", verb);
         else
-            error_set(&err, STATUS_INPUT, "scenes takes nothing, `show SCENE` or `rm SCENE`, not \"%.100s\"",
-                      verb);
+            error_set(&err, STATUS_INPUT,
+                      "scenes takes nothing, `show SCENE` or `rm SCENE`, not \"%.100s\"", verb);
         if (nearest.best && !show && !remove)
             error_hint(&err, "did you mean `unbake scenes %s`?", nearest.best);
         return client_fail(c, NULL, &err);

@@ -2,12 +2,10 @@
 #include "client/sse.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-void sse_init(struct sse *s, bool (*each)(void *user, const char *type, const char *data, const char *id),
-              void *user) {
-    *s = (struct sse){.each = each, .user = user, .retry_sec = -1.0};
+void sse_init(struct sse *s, sse_each *each, void *user) {
+    *s = (struct sse){.each = each, .user = user};
     buf_init(&s->line, SSE_EVENT_MAX);
     buf_init(&s->data, SSE_EVENT_MAX);
 }
@@ -46,9 +44,7 @@ static bool field(struct sse *s, const char *name, const char *value) {
         snprintf(s->type, sizeof s->type, "%s", value);
     else if (strcmp(name, "id") == 0 && strlen(value) < sizeof s->pending_id)
         snprintf(s->pending_id, sizeof s->pending_id, "%s", value);
-    else if (strcmp(name, "retry") == 0 && value[0] && strspn(value, "0123456789") == strlen(value))
-        s->retry_sec = strtod(value, NULL) / 1000.0;
-    return true; /* an unknown field is ignored, as the standard says */
+    return true; /* others are ignored, as the standard says; so is "retry": pauses grow by themselves */
 }
 
 static bool end_of_line(struct sse *s) {

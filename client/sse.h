@@ -13,21 +13,21 @@
 #define SSE_EVENT_MAX ((size_t)4 << 20)
 #define SSE_ID_MAX 128
 
+/* Gets each event; type is "message" where the stream names none. False stops the stream. */
+typedef bool sse_each(void *user, const char *type, const char *data, const char *id);
+
 struct sse {
     struct buf line, data;
     char type[64];
     char pending_id[SSE_ID_MAX];
     char last_id[SSE_ID_MAX]; /* of the last event given out: what Last-Event-ID must say */
-    double retry_sec;         /* what the server asked to wait before it is asked again; < 0: nothing */
     bool after_cr;            /* an LF that follows belongs to the line that ended */
     bool begun;               /* a byte-order mark can no longer come */
-    /* Gets each event; type is "message" where the stream names none. False stops the stream. */
-    bool (*each)(void *user, const char *type, const char *data, const char *id);
+    sse_each *each;
     void *user;
 };
 
-void sse_init(struct sse *s, bool (*each)(void *user, const char *type, const char *data, const char *id),
-              void *user);
+void sse_init(struct sse *s, sse_each *each, void *user);
 void sse_release(struct sse *s);
 /* Forgets a half-received event (the connection broke); last_id stays. */
 void sse_restart(struct sse *s);

@@ -194,7 +194,8 @@ static enum status check(struct submission *s, struct reply *reply, struct error
     struct request_call call = {
         .method = "POST", .path = "/v1/jobs?dry_run=1", .body = s->job, .same_twice = true};
     enum status status = request_run(s->client->request, &call, reply, err);
-    if (status != STATUS_OK && reply->code == 422 && s->pack && !s->present && only_scene_is_missing(reply))
+    bool to_be_sent = s->pack && !s->present;
+    if (status != STATUS_OK && reply->code == 422 && to_be_sent && only_scene_is_missing(reply))
         return STATUS_OK;
     return status;
 }
@@ -236,7 +237,8 @@ static void print_dry_run(struct submission *s, const struct reply *reply) {
     if (s->pack && !s->present)
         printf("scene %.12s is not on the server: %s would be sent\n", s->scene, size);
     else
-        printf("scene %.12s is on the server (%s)\n", s->scene, member_text(reply->json, "scene_state"));
+        printf("scene %.12s is on the server (%s)\n", s->scene,
+               member_text(reply->json, "scene_state"));
 }
 
 static void print_job(struct submission *s, const cJSON *job) {
@@ -249,8 +251,8 @@ static void print_job(struct submission *s, const cJSON *job) {
         struct buf name;
         buf_init(&name, 4096);
         terminal_clean(&name, member_text(job, "name"));
-        printf("job %.0f is queued: %s (scene %.12s)\n", member_number(job, "id", 0.0), buf_text(&name),
-               member_text(job, "scene"));
+        printf("job %.0f is queued: %s (scene %.12s)\n", member_number(job, "id", 0.0),
+               buf_text(&name), member_text(job, "scene"));
         buf_release(&name);
     }
     fflush(stdout);
@@ -260,7 +262,8 @@ static enum status submit(struct submission *s, const struct options *o, struct 
                           struct error *err) {
     const char *scene = options_text(o, "scene", NULL);
     if ((scene != NULL) == (o->word_count == 1)) {
-        error_set(err, STATUS_INPUT, scene ? "submit takes ROOM or --scene, not both" : "ROOM is missing");
+        error_set(err, STATUS_INPUT,
+                  scene ? "submit takes ROOM or --scene, not both" : "ROOM is missing");
         return error_hint(err, "an example: unbake submit living-room/ --watch");
     }
     s->scene = scene ? mem_strdup(scene) : NULL;

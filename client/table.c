@@ -57,7 +57,8 @@ static void put_spaces(FILE *out, size_t count) {
     fprintf(out, "%*s", (int)count, "");
 }
 
-static void print_row(const struct table *t, size_t row, const size_t *width, struct terminal *terminal) {
+static void print_row(const struct table *t, size_t row, const size_t *width,
+                      struct terminal *terminal) {
     size_t used = 0, edge = terminal->live ? terminal_width(terminal) : 0;
     for (size_t i = 0; i < t->columns; i++) {
         struct buf cell;
@@ -66,12 +67,14 @@ static void print_row(const struct table *t, size_t row, const size_t *width, st
         bool last = i + 1 == t->columns;
         if (last && edge > used + 8)
             text_cut(&cell, edge - used);
-        size_t columns = text_columns(buf_text(&cell)), pad = width[i] - (columns < width[i] ? columns : width[i]);
+        size_t columns = text_columns(buf_text(&cell));
+        size_t pad = columns < width[i] ? width[i] - columns : 0;
         enum colour colour = t->colour[row * t->columns + i];
         if (t->right[i])
             put_spaces(terminal->out, pad);
-        fprintf(terminal->out, "%s%s%s", colour ? terminal_colour(terminal, colour) : "", buf_text(&cell),
-                colour ? terminal_colour(terminal, COLOUR_NONE) : "");
+        const char *on = colour ? terminal_colour(terminal, colour) : "";
+        const char *off = colour ? terminal_colour(terminal, COLOUR_NONE) : "";
+        fprintf(terminal->out, "%s%s%s", on, buf_text(&cell), off);
         if (!t->right[i] && !last)
             put_spaces(terminal->out, pad);
         fputs(last ? "\n" : "  ", terminal->out);

@@ -135,7 +135,7 @@ void text_cut(struct buf *b, size_t columns) {
 }
 
 void format_bytes(char out[16], double bytes) {
-    static const char *const unit[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB"};
+    static const char *const unit[] = {"B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"};
     size_t i = 0;
     if (!(bytes > 0.0))
         bytes = 0.0;
@@ -165,8 +165,9 @@ void format_duration(char out[16], double seconds) {
 
 void format_bar(struct buf *out, size_t columns, double fraction, bool unicode) {
     /* Eighths of a block, U+258F (one) to U+2588 (eight). */
-    static const char *const part[] = {" ",            "\xE2\x96\x8F", "\xE2\x96\x8E", "\xE2\x96\x8D", "\xE2\x96\x8C",
-                                       "\xE2\x96\x8B", "\xE2\x96\x8A", "\xE2\x96\x89", "\xE2\x96\x88"};
+    static const char *const part[] = {
+        " ",            "\xE2\x96\x8F", "\xE2\x96\x8E", "\xE2\x96\x8D", "\xE2\x96\x8C",
+        "\xE2\x96\x8B", "\xE2\x96\x8A", "\xE2\x96\x89", "\xE2\x96\x88"};
     if (columns < 3)
         return;
     size_t cells = columns - 2, steps = unicode ? 8 : 1;

@@ -90,7 +90,9 @@ static void print_log(struct watch *w, const cJSON *data) {
         terminal_clean(&line, member_text(data, "at"));
         buf_puts(&line, " ");
     }
-    enum colour colour = !important ? COLOUR_NONE : strcmp(level, "error") == 0 ? COLOUR_RED : COLOUR_YELLOW;
+    enum colour colour = !important                      ? COLOUR_NONE
+                         : strcmp(level, "error") == 0 ? COLOUR_RED
+                                                       : COLOUR_YELLOW;
     buf_puts(&line, terminal_colour(&c->out, colour));
     terminal_clean(&line, level);
     buf_puts(&line, terminal_colour(&c->out, COLOUR_NONE));
@@ -166,7 +168,6 @@ static enum status follow_once(struct watch *w, struct reply *reply, struct erro
 /* Follows the stream until the job is over. */
 static enum status follow(struct watch *w, struct reply *reply, struct error *err) {
     struct client *c = w->client;
-    double first_patience = c->retry_sec >= 0.0 ? c->retry_sec : 3.0;
     bool ever = false, told = false;
     w->heard_at = meter_now();
     for (int tries = 0;; tries++) {
@@ -180,7 +181,9 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
             told = false;
             tries = 0;
         }
-        double patience = ever ? (c->retry_sec >= 0.0 ? c->retry_sec : PATIENCE_SEC) : first_patience;
+        double patience = c->retry_sec >= 0.0 ? c->retry_sec
+                          : ever              ? PATIENCE_SEC
+                                              : CLIENT_RETRY_SEC;
         if (status == STATUS_OK)
             error_set(err, STATUS_UNAVAILABLE, "%s ended the stream of events before the job ended",
                       request_server(c->request));
@@ -292,7 +295,8 @@ int watch_run(struct client *c, const struct options *o) {
 
 /* --- logs ---------------------------------------------------------------------------------- */
 
-static enum status print_whole_log(struct client *c, int64_t job, struct reply *reply, struct error *err) {
+static enum status print_whole_log(struct client *c, int64_t job, struct reply *reply,
+                                   struct error *err) {
     char path[80];
     snprintf(path, sizeof path, "/v1/jobs/%lld/log?bytes=1048576", (long long)job);
     enum status status = request_run(c->request, &(struct request_call){.path = path}, reply, err);
