@@ -48,8 +48,8 @@ struct export_input {
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
     const struct materials *materials;
-    const float *confidence_count;     /* [height][width] observations */
-    const float *confidence_spread;    /* [height][width] relative spread of their radiance */
+    const float *confidence_count;     /* [height][width] observations; NULL while not known: */
+    const float *confidence_spread;    /* [height][width] their spread;  then no preview of it */
     const bool *is_emitter;            /* [segment_count] */
     size_t comparison_count;
     const struct export_comparison *comparison;

@@ -1,0 +1,54 @@
+/* room.h -- the demo room: a closed, furnished room whose materials and lights are known.
+ *
+ * It is the controlled scene of Nimier-David et al. 2021, section 6, built by us: walls, floor
+ * and ceiling with texture, a table with legs, a door panel, shelves with things on them, a
+ * glossy vase, a patterned carpet, pictures, an emitter on a wall and one at the ceiling whose
+ * radiances are parameters. 5 x 2.8 x 4 m, y up, one object_id for each object. */
+#ifndef UNBAKE_DEMO_ROOM_H
+#define UNBAKE_DEMO_ROOM_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/parallel.h"
+#include "server/demo/shapes.h"
+#include "server/render/world.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
+#include "server/scene/segment.h"
+
+#define ROOM_WIDTH 5.0f  /* metres along x */
+#define ROOM_HEIGHT 2.8f /* along y */
+#define ROOM_DEPTH 4.0f  /* along z */
+
+enum room_object {
+    ROOM_FLOOR, ROOM_CEILING, ROOM_WALL_WEST, ROOM_WALL_EAST, ROOM_WALL_NORTH, ROOM_WALL_SOUTH,
+    ROOM_CARPET, ROOM_TABLE_TOP, ROOM_TABLE_LEGS, ROOM_DOOR, ROOM_DOOR_FRAME, ROOM_SHELVES,
+    ROOM_BOOKS, ROOM_GLOBE, ROOM_CHEST, ROOM_VASE, ROOM_PAINTING_LARGE, ROOM_PAINTING_SMALL,
+    ROOM_PICTURE_FRAMES, ROOM_SOFA, ROOM_LAMP_FRAMES, ROOM_WALL_EMITTER, ROOM_CEILING_EMITTER,
+    ROOM_OBJECT_COUNT
+};
+
+struct room {
+    struct mesh mesh;
+    struct segments segments; /* segment number = object_id */
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+};
+
+/* Static storage. */
+const char *room_object_name(enum room_object object);
+
+/* The furniture as boxes that a camera keeps clear of; [*count], static storage. */
+const vec3 (*room_obstacles(size_t *count))[2];
+
+/* Builds geometry, textures of texture_size texels a side, and the acceleration structure. */
+enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance,
+                      float ceiling_radiance, struct parallel *pool, struct error *err);
+void room_release(struct room *room);
+
+#endif

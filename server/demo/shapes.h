@@ -1,0 +1,48 @@
+/* shapes.h -- putting a mesh together from quads, boxes and turned bodies.
+ *
+ * Faces have vertices of their own with the face's normal, turned bodies share smooth ones. Every
+ * triangle is counter-clockwise as seen from outside. */
+#ifndef UNBAKE_DEMO_SHAPES_H
+#define UNBAKE_DEMO_SHAPES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/vec.h"
+#include "server/scene/mesh.h"
+
+struct shapes {
+    struct mesh mesh;
+    size_t vertex_capacity, triangle_capacity;
+};
+
+/* Faces of a box, to be left out where they lie on something. */
+enum {
+    SHAPE_LEFT = 1,    /* -x */
+    SHAPE_RIGHT = 2,   /* +x */
+    SHAPE_BOTTOM = 4,  /* -y */
+    SHAPE_TOP = 8,     /* +y */
+    SHAPE_BACK = 16,   /* -z */
+    SHAPE_FRONT = 32,  /* +z */
+    SHAPE_INWARD = 64  /* a room: its faces look inside */
+};
+
+void shapes_init(struct shapes *s);
+
+/* The parallelogram origin, origin + u, origin + u + v, origin + v; its front is where u x v
+ * points. */
+void shapes_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3 v);
+
+/* The faces of an axis-aligned box, but for those in `without`. */
+void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without);
+
+/* The profile (x = radius, y = height, from below to above), turned about the vertical axis
+ * through `base` in `sides` steps. A radius of 0 at an end closes the body. */
+void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count,
+                  int sides);
+
+/* Writes positions, normals and object_id as binary little-endian PLY. */
+enum status shapes_write_ply(const struct mesh *mesh, const char *path, struct error *err);
+
+#endif

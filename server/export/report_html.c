@@ -1,0 +1,426 @@
+/* report_html.c -- see report_html.h. Every text that came from outside goes through put_text. */
+#include "server/export/report_html.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+
+#define PICTURE_LIMIT ((size_t)1 << 26) /* bytes of one embedded PNG */
+#define CURVE_POINTS 480                /* more are thinned */
+#define SEGMENT_ROWS 60                 /* the rest is in report.json */
+
+static const char style[] =
+    ":root{color-scheme:light dark;--ink:#1d2229;--soft:#667080;--line:#d9dde3;--page:#f6f7f9;"
+    "--card:#fff;--accent:#b4581c}"
+    "@media(prefers-color-scheme:dark){:root{--ink:#e6e8eb;--soft:#98a1ad;--line:#353b44;"
+    "--page:#15181c;--card:#1d2126;--accent:#f0955a}}"
+    "*{box-sizing:border-box}body{margin:0 auto;padding:2.5rem 1.5rem 4rem;max-width:72rem;"
+    "background:var(--page);color:var(--ink);font:15px/1.5 system-ui,'DejaVu Sans',sans-serif}"
+    "h1{font-size:1.8rem;margin:0}h2{font-size:1.15rem;margin:2.5rem 0 .8rem}"
+    "p{margin:.3rem 0 .8rem}.soft,figcaption span,th{color:var(--soft)}"
+    ".grid{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(20rem,1fr))}"
+    ".card,figure{margin:0;background:var(--card);border:1px solid var(--line);"
+    "border-radius:8px;padding:.8rem;overflow-x:auto}"
+    "img{display:block;width:100%;height:auto;border-radius:4px;background:#16181b}"
+    "figcaption{margin-top:.5rem;font-size:.9rem}figcaption span{display:block;font-size:.82rem}"
+    ".wide figure{margin-bottom:1rem}.heads{display:grid;grid-template-columns:repeat(3,1fr);"
+    "text-align:center;font-size:.82rem;color:var(--soft);margin-bottom:.3rem}"
+    "table{border-collapse:collapse;width:100%;font-size:.87rem;font-variant-numeric:tabular-nums}"
+    "th,td{text-align:left;padding:.25rem .7rem .25rem 0;border-bottom:1px solid var(--line);"
+    "font-weight:400;vertical-align:top;overflow-wrap:anywhere}"
+    "tr:last-child>*{border-bottom:0}td.n,th.n{text-align:right}"
+    ".swatch{display:inline-block;width:2.2em;height:1em;border-radius:3px;vertical-align:-.12em;"
+    "border:1px solid var(--line);margin-right:.4em}"
+    ".bar{display:block;height:.6em;margin:.4em 0;border-radius:3px;background:var(--accent)}"
+    "svg{display:block;width:100%;height:auto}svg text{fill:var(--soft);font-size:11px}"
+    "svg path{fill:none;stroke:var(--accent);stroke-width:1.6;vector-effect:non-scaling-stroke}"
+    "svg line{stroke:var(--line)}"
+    "@media print{.card,figure{break-inside:avoid}}";
+
+/* --- text --------------------------------------------------------------------------------- */
+
+static void put_text(struct buf *out, const char *text) {
+    for (const char *c = text; *c; c++) {
+        switch (*c) {
+        case '<': buf_puts(out, "&lt;"); break;
+        case '>': buf_puts(out, "&gt;"); break;
+        case '&': buf_puts(out, "&amp;"); break;
+        case '"': buf_puts(out, "&quot;"); break;
+        default: buf_append(out, c, 1);
+        }
+    }
+}
+
+/* "mean_base_color" -> "mean base color" */
+static void put_key(struct buf *out, const char *key) {
+    char *words = mem_strdup(key);
+    for (char *c = words; *c; c++)
+        if (*c == '_')
+            *c = ' ';
+    put_text(out, words);
+    mem_free(words);
+}
+
+static void put_number(struct buf *out, double value) {
+    if (value == floor(value) && fabs(value) < 1e15)
+        buf_printf(out, "%.0f", value);
+    else
+        buf_printf(out, "%.4g", value);
+}
+
+/* Any value in a table's cell; objects and arrays of them as nested tables. */
+static void put_value(struct buf *out, const cJSON *value) {
+    if (cJSON_IsNumber(value)) {
+        put_number(out, value->valuedouble);
+    } else if (cJSON_IsString(value)) {
+        put_text(out, value->valuestring);
+    } else if (cJSON_IsBool(value)) {
+        buf_puts(out, cJSON_IsTrue(value) ? "yes" : "no");
+    } else if (cJSON_IsObject(value)) {
+        buf_puts(out, "<table>");
+        for (const cJSON *member = value->child; member; member = member->next) {
+            buf_puts(out, "<tr><th>");
+            put_key(out, member->string);
+            buf_puts(out, "</th><td>");
+            put_value(out, member);
+            buf_puts(out, "</td></tr>");
+        }
+        buf_puts(out, "</table>");
+    } else if (cJSON_IsArray(value)) {
+        for (const cJSON *item = value->child; item; item = item->next) {
+            put_value(out, item);
+            if (item->next)
+                buf_puts(out, cJSON_IsObject(item) ? "" : ", ");
+        }
+    } else {
+        buf_puts(out, "–");
+    }
+}
+
+static void put_base64(struct buf *out, const unsigned char *data, size_t length) {
+    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    for (size_t i = 0; i < length; i += 3) {
+        uint32_t word = (uint32_t)data[i] << 16;
+        if (i + 1 < length)
+            word |= (uint32_t)data[i + 1] << 8;
+        if (i + 2 < length)
+            word |= data[i + 2];
+        char four[4] = {digit[word >> 18], digit[word >> 12 & 63],
+                        i + 1 < length ? digit[word >> 6 & 63] : '=',
+                        i + 2 < length ? digit[word & 63] : '='};
+        buf_append(out, four, 4);
+    }
+}
+
+static enum status put_image(struct buf *out, const struct report_picture *picture,
+                             struct error *err) {
+    struct buf file;
+    buf_init(&file, PICTURE_LIMIT);
+    enum status status = file_read(picture->path, &file, err);
+    if (status == STATUS_OK) {
+        buf_puts(out, "<img alt=\"");
+        put_text(out, picture->title);
+        buf_puts(out, "\" src=\"data:image/png;base64,");
+        put_base64(out, (const unsigned char *)file.data, file.length);
+        buf_puts(out, "\">");
+    }
+    buf_release(&file);
+    return status;
+}
+
+/* --- curves ------------------------------------------------------------------------------- */
+
+struct point {
+    double step, value;
+};
+
+/* The finite points of [[step, value], ...]; the caller's. */
+static struct point *read_series(const cJSON *series, size_t *count) {
+    struct point *point = mem_array((size_t)cJSON_GetArraySize(series) + 1, sizeof *point);
+    *count = 0;
+    for (const cJSON *item = series->child; item; item = item->next) {
+        const cJSON *step = item->child, *value = step ? step->next : NULL;
+        if (!cJSON_IsNumber(step) || !cJSON_IsNumber(value) || !isfinite(value->valuedouble))
+            continue;
+        point[(*count)++] = (struct point){step->valuedouble, value->valuedouble};
+    }
+    return point;
+}
+
+/* Logarithmic in y where all values are positive and span a factor of 8. */
+static void put_curve(struct buf *out, const char *name, const cJSON *series) {
+    enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
+    size_t count;
+    struct point *point = read_series(series, &count);
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        low = fmin(low, point[i].value);
+        high = fmax(high, point[i].value);
+    }
+    bool logarithmic = count && low > 0.0 && high > 8.0 * low;
+    double from = logarithmic ? log(low) : low, to = logarithmic ? log(high) : high;
+    double range = to > from ? to - from : 1.0;
+    double steps = count ? point[count - 1].step - point[0].step : 0.0;
+    buf_puts(out, "<figure>");
+    if (count >= 2 && steps > 0.0) {
+        buf_printf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\">", WIDTH, HEIGHT);
+        for (int i = 0; i <= 4; i++) {
+            double y = TOP + (HEIGHT - TOP - BOTTOM) * i / 4.0;
+            double value = to - range * i / 4.0;
+            buf_printf(out, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
+                       "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>",
+                       LEFT, WIDTH - RIGHT, y, y, LEFT - 6, y + 4.0,
+                       logarithmic ? exp(value) : value);
+        }
+        buf_printf(out, "<text x=\"%d\" y=\"%d\">step %.0f</text>"
+                   "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.0f</text><path d=\"",
+                   LEFT, HEIGHT - 6, point[0].step, WIDTH - RIGHT, HEIGHT - 6,
+                   point[count - 1].step);
+        size_t stride = (count + CURVE_POINTS - 1) / CURVE_POINTS;
+        for (size_t i = 0; i < count; i += i + 1 < count && i + stride >= count ? count - 1 - i
+                                                                                : stride) {
+            double value = logarithmic ? log(point[i].value) : point[i].value;
+            buf_printf(out, "%c%.1f %.1f", i ? 'L' : 'M',
+                       LEFT + (WIDTH - LEFT - RIGHT) * (point[i].step - point[0].step) / steps,
+                       TOP + (HEIGHT - TOP - BOTTOM) * (to - value) / range);
+        }
+        buf_puts(out, "\"/></svg>");
+    }
+    buf_puts(out, "<figcaption>");
+    put_key(out, name);
+    buf_puts(out, "<span>");
+    if (count) {
+        buf_puts(out, "last: ");
+        put_number(out, point[count - 1].value);
+        buf_puts(out, logarithmic ? ", logarithmic scale" : "");
+    } else {
+        buf_puts(out, "no value was reported");
+    }
+    buf_puts(out, "</span></figcaption></figure>");
+    mem_free(point);
+}
+
+/* --- sections ----------------------------------------------------------------------------- */
+
+static enum status put_textures(struct buf *out, const struct report_page *page,
+                                struct error *err) {
+    enum status status = STATUS_OK;
+    buf_puts(out, "<h2>Textures</h2><div class=grid>");
+    for (size_t i = 0; i < page->texture_count && status == STATUS_OK; i++) {
+        buf_puts(out, "<figure>");
+        status = put_image(out, &page->texture[i], err);
+        buf_puts(out, "<figcaption>");
+        put_text(out, page->texture[i].title);
+        if (page->texture[i].caption) {
+            buf_puts(out, "<span>");
+            put_text(out, page->texture[i].caption);
+            buf_puts(out, "</span>");
+        }
+        buf_puts(out, "</figcaption></figure>");
+    }
+    buf_puts(out, "</div>");
+    return status;
+}
+
+static enum status put_comparisons(struct buf *out, const struct report_page *page,
+                                   struct error *err) {
+    if (page->comparison_count == 0)
+        return STATUS_OK;
+    const cJSON *view = cJSON_GetObjectItemCaseSensitive(page->report, "views");
+    view = view ? view->child : NULL;
+    enum status status = STATUS_OK;
+    buf_puts(out, "<h2>Held-out views</h2><p class=soft>Photographs that the reconstruction never "
+                  "saw, beside what its materials and lights give there. One exposure for both. "
+                  "Difference: red where the re-render is too bright, blue where it is too dark, "
+                  "white where they agree.</p><div class=wide>");
+    for (size_t i = 0; i < page->comparison_count && status == STATUS_OK; i++) {
+        buf_puts(out, "<figure><div class=heads><span>photograph</span><span>re-render</span>"
+                      "<span>difference</span></div>");
+        status = put_image(out, &page->comparison[i], err);
+        buf_puts(out, "<figcaption>");
+        put_text(out, page->comparison[i].title);
+        buf_puts(out, "<span>");
+        for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
+            if (!cJSON_IsNumber(m))
+                continue;
+            put_key(out, m->string);
+            buf_puts(out, " ");
+            put_number(out, m->valuedouble);
+            buf_puts(out, "&ensp;");
+        }
+        buf_puts(out, "</span></figcaption></figure>");
+        view = view ? view->next : NULL;
+    }
+    buf_puts(out, "</div>");
+    return status;
+}
+
+static void put_curves(struct buf *out, const cJSON *series) {
+    if (!cJSON_IsObject(series) || !series->child)
+        return;
+    buf_puts(out, "<h2>Curves</h2><div class=grid>");
+    for (const cJSON *one = series->child; one; one = one->next)
+        if (cJSON_IsArray(one))
+            put_curve(out, one->string, one);
+    buf_puts(out, "</div>");
+}
+
+static void put_stages(struct buf *out, const cJSON *stages) {
+    if (!cJSON_IsArray(stages) || !stages->child)
+        return;
+    double longest = 0.0, total = 0.0;
+    for (const cJSON *stage = stages->child; stage; stage = stage->next) {
+        double seconds = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(stage, "seconds"));
+        longest = fmax(longest, isfinite(seconds) ? seconds : 0.0);
+        total += isfinite(seconds) ? seconds : 0.0;
+    }
+    buf_printf(out, "<h2>Time by stage</h2><div class=card><p class=soft>%.1f s in all</p><table>",
+               total);
+    for (const cJSON *stage = stages->child; stage; stage = stage->next) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(stage, "name"));
+        double seconds = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(stage, "seconds"));
+        if (!name || !isfinite(seconds))
+            continue;
+        buf_puts(out, "<tr><th>");
+        put_key(out, name);
+        buf_printf(out, "</th><td class=n>%.2f s</td><td style=\"width:60%%\"><span class=bar "
+                   "style=\"width:%.1f%%\"></span></td></tr>",
+                   seconds, longest > 0.0 ? fmax(100.0 * seconds / longest, 0.3) : 0.0);
+    }
+    buf_puts(out, "</table></div>");
+}
+
+/* A swatch of a linear colour; emission is scaled to its brightest channel. */
+static void put_swatch(struct buf *out, const cJSON *color) {
+    double c[3] = {0.0, 0.0, 0.0}, high = 1.0;
+    int i = 0;
+    for (const cJSON *v = color ? color->child : NULL; v && i < 3; v = v->next, i++) {
+        c[i] = isfinite(v->valuedouble) ? v->valuedouble : 0.0;
+        high = fmax(high, c[i]);
+    }
+    buf_puts(out, "<span class=swatch style=\"background:rgb(");
+    for (i = 0; i < 3; i++) {
+        double linear = c[i] / high;
+        double s = linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1.0 / 2.4) - 0.055;
+        buf_printf(out, "%s%.0f", i ? "," : "", 255.0 * fmax(s, 0.0));
+    }
+    buf_puts(out, ")\"></span>");
+    buf_printf(out, "%.3g %.3g %.3g", c[0], c[1], c[2]);
+}
+
+static void put_segment(struct buf *out, const cJSON *segment) {
+    static const char *const plain[] = {"area_m2", "texels", "roughness", "specular"};
+    buf_puts(out, "<tr><td>");
+    put_value(out, cJSON_GetObjectItemCaseSensitive(segment, "id"));
+    buf_puts(out, "</td>");
+    for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
+        buf_puts(out, "<td class=n>");
+        put_value(out, cJSON_GetObjectItemCaseSensitive(segment, plain[i]));
+        buf_puts(out, "</td>");
+    }
+    buf_puts(out, "<td>");
+    put_swatch(out, cJSON_GetObjectItemCaseSensitive(segment, "mean_base_color"));
+    buf_puts(out, "</td><td>");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(segment, "emitter")))
+        put_swatch(out, cJSON_GetObjectItemCaseSensitive(segment, "emission"));
+    buf_puts(out, "</td></tr>");
+}
+
+/* Emitters first, then the others in their own order. */
+static void put_segments(struct buf *out, const cJSON *segments) {
+    if (!cJSON_IsArray(segments))
+        return;
+    int count = cJSON_GetArraySize(segments), emitters = 0, rows = 0;
+    for (const cJSON *s = segments->child; s; s = s->next)
+        emitters += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter"));
+    buf_printf(out, "<h2>Segments</h2><div class=card><p class=soft>%d segments, %d of them "
+               "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=n>texels"
+               "</th><th class=n>roughness</th><th class=n>specular</th><th>mean base colour</th>"
+               "<th>emission, radiance</th></tr>", count, emitters);
+    for (int pass = 1; pass >= 0; pass--) {
+        for (const cJSON *s = segments->child; s && rows < SEGMENT_ROWS; s = s->next) {
+            if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter")) != pass)
+                continue;
+            put_segment(out, s);
+            rows++;
+        }
+    }
+    buf_puts(out, "</table>");
+    if (rows < count)
+        buf_printf(out, "<p class=soft>%d more are in report.json.</p>", count - rows);
+    buf_puts(out, "</div>");
+}
+
+/* Plain members make the summary at the top, objects a section each. */
+static void put_others(struct buf *out, const cJSON *report, bool plain) {
+    static const char *const drawn[] = {"title", "series", "stages", "views", "segments", "files"};
+    for (const cJSON *member = report->child; member; member = member->next) {
+        bool skip = (!cJSON_IsObject(member) && !cJSON_IsArray(member)) != plain;
+        for (size_t i = 0; i < sizeof drawn / sizeof *drawn; i++)
+            skip = skip || strcmp(member->string, drawn[i]) == 0;
+        if (skip)
+            continue;
+        if (plain) {
+            buf_puts(out, "<tr><th>");
+            put_key(out, member->string);
+            buf_puts(out, "</th><td>");
+            put_value(out, member);
+            buf_puts(out, "</td></tr>");
+        } else {
+            buf_puts(out, "<div class=card><b>");
+            put_key(out, member->string);
+            buf_puts(out, "</b>");
+            put_value(out, member);
+            buf_puts(out, "</div>");
+        }
+    }
+}
+
+static void put_files(struct buf *out, const cJSON *files) {
+    if (!cJSON_IsArray(files))
+        return;
+    buf_puts(out, "<h2>Files</h2><div class=card><table>");
+    for (const cJSON *file = files->child; file; file = file->next) {
+        buf_puts(out, "<tr><th>");
+        put_value(out, cJSON_GetObjectItemCaseSensitive(file, "name"));
+        buf_puts(out, "</th><td>");
+        put_value(out, cJSON_GetObjectItemCaseSensitive(file, "about"));
+        buf_puts(out, "</td></tr>");
+    }
+    buf_puts(out, "</table></div>");
+}
+
+enum status report_html(const struct report_page *page, struct buf *out, struct error *err) {
+    const cJSON *report = page->report;
+    buf_puts(out, "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport "
+                  "content=\"width=device-width,initial-scale=1\"><title>");
+    put_text(out, page->title);
+    buf_puts(out, " – unbake</title><style>");
+    buf_puts(out, style);
+    buf_puts(out, "</style><h1>");
+    put_text(out, page->title);
+    buf_puts(out, "</h1><p class=soft>Materials and lights recovered by unbake. Colours are linear "
+                  "Rec. 709; radiance is in units in which a frame of exposure 1 maps radiance 1 "
+                  "to pixel value 1.</p><div class=card><table>");
+    put_others(out, report, true);
+    buf_puts(out, "</table></div>");
+    enum status status = put_textures(out, page, err);
+    if (status == STATUS_OK)
+        status = put_comparisons(out, page, err);
+    if (status != STATUS_OK)
+        return status;
+    put_curves(out, cJSON_GetObjectItemCaseSensitive(report, "series"));
+    put_segments(out, cJSON_GetObjectItemCaseSensitive(report, "segments"));
+    put_stages(out, cJSON_GetObjectItemCaseSensitive(report, "stages"));
+    buf_puts(out, "<h2>Figures and settings</h2><div class=grid>");
+    put_others(out, report, false);
+    buf_puts(out, "</div>");
+    put_files(out, cJSON_GetObjectItemCaseSensitive(report, "files"));
+    buf_puts(out, "</html>\n");
+    if (out->overflowed)
+        return error_set(err, STATUS_LIMIT, "report.html would be larger than %zu bytes", out->limit);
+    return STATUS_OK;
+}
