@@ -1,0 +1,55 @@
+/* attempt.h -- one worker's work, from its folder to the entry of its outcome in the store.
+ *
+ *      empty ──start──> alive ──(process ends)──> ended ──settle──> empty
+ *
+ * 1. A job's attempt is in the store before its process exists, and its outcome is entered after
+ *    the process is buried: of one job there is never more than one process.
+ * 2. What a worker says is not believed where it can be checked: it has read a stranger's files.
+ * 3. settle can fail (the disk of state.db is full): the attempt stays ended and is settled
+ *    again later; nothing of the outcome is lost. */
+#ifndef UNBAKE_JOB_ATTEMPT_H
+#define UNBAKE_JOB_ATTEMPT_H
+
+#include "common/json.h"
+#include "server/job/scheduler.h"
+#include "server/job/supervisor.h"
+
+enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
+
+struct attempt {
+    enum attempt_phase phase;
+    int64_t job_id;               /* 0: the check of a scene */
+    int number;                   /* fences what is entered for the job */
+    char scene_id[SCENE_ID_SIZE];
+    char *dir;
+    struct worker worker;
+    int wait_status;              /* when ended */
+    bool stopping;                /* it was asked to stop */
+    bool killed;                  /* by us */
+    int64_t kill_at_ms;           /* monotonic; 0: never */
+    long event_count;             /* what it has reported */
+    bool complained;              /* a report could not be entered, and the log says so */
+    /* What it said of itself. */
+    bool has_end;
+    enum status end_status;
+    char *end_message, *end_hint;
+    cJSON *problems, *facts;      /* of a scene */
+};
+
+/* Starts the job, which is queued in the store. STATUS_OK: it has left the queue, and the attempt
+ * is alive or (the input is at fault, the disk is full, the user was faster) still empty. Else
+ * the job is in the queue again and it is of no use to try at once. */
+enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
+                              struct store *store, int64_t job_id, int thread_count,
+                              struct error *err);
+/* Starts the check of a scene, which is in `checking` and stays there if this fails. */
+enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
+                                const char *scene_id, int thread_count, struct error *err);
+
+/* Reads what the worker says and notices its end. */
+void attempt_listen(struct attempt *a, struct store *store);
+
+/* Enters the outcome of an ended attempt and empties it. */
+enum status attempt_settle(struct attempt *a, struct store *store, struct error *err);
+
+#endif

@@ -1,0 +1,282 @@
+/* scheduler.c -- see scheduler.h.
+ *
+ * One loop: give free slots to what waits, tell workers what is wished of them, sleep in poll
+ * until a worker says something, ends, must be killed, or somebody calls. While nothing happens
+ * it does not wake up.
+ *
+ * Slots 0 .. max_running - 1 run jobs, the last one checks scenes: a check is short and must not
+ * wait behind hours of work. */
+#include "server/job/scheduler.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <sys/eventfd.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/job/attempt.h"
+
+#define RETRY_MS 5000        /* after the store or a start failed */
+#define NO_PIDFD_POLL_MS 200 /* where the kernel cannot tell us that a process has ended */
+
+struct scheduler {
+    struct scheduler_config config;
+    struct store *store;
+    int wake_fd; /* an eventfd: survives any number of calls before it is read */
+    atomic_bool stopping;
+    atomic_int running;
+    size_t slot_count;
+    struct attempt *slot; /* [slot_count] */
+    bool must_retry;      /* something failed that may work later */
+    struct pollfd *poll;  /* [1 + 2 * slot_count] */
+};
+
+static int64_t now_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config,
+                          struct store *store, struct error *err) {
+    *out = NULL;
+    int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot make an eventfd");
+    struct scheduler *s = mem_calloc(1, sizeof *s);
+    s->config = *config;
+    s->store = store;
+    s->wake_fd = fd;
+    if (s->config.thread_count <= 0) {
+        cpu_set_t set;
+        s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+    }
+    s->slot_count = (size_t)(config->max_running > 0 ? config->max_running : 1) + 1;
+    s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
+    s->poll = mem_calloc(1 + 2 * s->slot_count, sizeof *s->poll);
+    *out = s;
+    return STATUS_OK;
+}
+
+void scheduler_free(struct scheduler *s) {
+    if (!s)
+        return;
+    close(s->wake_fd);
+    mem_free(s->slot);
+    mem_free(s->poll);
+    mem_free(s);
+}
+
+void scheduler_wake(struct scheduler *s) {
+    uint64_t one = 1;
+    /* It fails only when the counter is full, and then the loop is awake already. */
+    if (write(s->wake_fd, &one, sizeof one) < 0)
+        return;
+}
+
+void scheduler_stop(struct scheduler *s) {
+    atomic_store(&s->stopping, true);
+    scheduler_wake(s);
+}
+
+int scheduler_running(const struct scheduler *s) {
+    return atomic_load(&s->running);
+}
+
+/* Something failed that is not the job's fault: say so once per round and try again. */
+static void retry_later(struct scheduler *s, const char *what, const struct error *err) {
+    if (!s->must_retry)
+        log_error("%s: %s", what, err->message);
+    s->must_retry = true;
+}
+
+/* Threads for one more job: an equal share among those that run or could run now. A worker keeps
+ * what it was started with, so the shares are fair, not exact. */
+static int thread_share(struct scheduler *s) {
+    struct store_counts counts;
+    int64_t limit = (int64_t)s->slot_count - 1, sharing = 1;
+    if (store_count(s->store, &counts, NULL) == STATUS_OK)
+        sharing = counts.jobs_by_state[JOB_QUEUED] + counts.jobs_by_state[JOB_RUNNING];
+    sharing = sharing < 1 ? 1 : sharing > limit ? limit : sharing;
+    int share = s->config.thread_count / (int)sharing;
+    return share > 0 ? share : 1;
+}
+
+static void start_jobs(struct scheduler *s) {
+    for (size_t i = 0; i + 1 < s->slot_count; i++) {
+        struct error err;
+        /* A job that came to nothing has left the queue: look at the next one. */
+        while (s->slot[i].phase == ATTEMPT_EMPTY) {
+            int64_t id;
+            enum status status = store_job_next(s->store, &id, &err);
+            if (status == STATUS_NOT_FOUND)
+                return;
+            if (status == STATUS_OK)
+                status = attempt_start_job(&s->slot[i], &s->config, s->store, id, thread_share(s),
+                                           &err);
+            if (status != STATUS_OK) {
+                retry_later(s, "cannot start a job", &err);
+                return;
+            }
+        }
+    }
+}
+
+static void start_check(struct scheduler *s) {
+    struct attempt *slot = &s->slot[s->slot_count - 1];
+    char id[SCENE_ID_SIZE];
+    struct error err;
+    if (slot->phase != ATTEMPT_EMPTY)
+        return;
+    enum status status = store_scene_next_unchecked(s->store, id, &err);
+    if (status == STATUS_NOT_FOUND)
+        return;
+    if (status == STATUS_OK)
+        status = attempt_start_check(slot, &s->config, id, s->config.thread_count, &err);
+    if (status != STATUS_OK)
+        retry_later(s, "cannot check a scene", &err);
+}
+
+/* SIGTERM, and SIGKILL when the grace is over. */
+static void ask_to_stop(struct scheduler *s, struct attempt *a) {
+    if (a->phase != ATTEMPT_ALIVE || a->stopping)
+        return;
+    a->stopping = true;
+    a->kill_at_ms = now_ms() + (int64_t)(s->config.stop_grace_sec * 1000.0);
+    supervisor_signal(&a->worker, SIGTERM);
+}
+
+static void kill_now(struct attempt *a) {
+    a->killed = true;
+    a->kill_at_ms = 0;
+    supervisor_signal(&a->worker, SIGKILL);
+}
+
+static void follow_wish(struct scheduler *s, struct attempt *a, enum job_wanted wanted) {
+    if (wanted == JOB_WANT_PAUSE) {
+        ask_to_stop(s, a);
+    } else if (wanted == JOB_WANT_CANCEL && !a->killed) {
+        a->stopping = true;
+        kill_now(a); /* nothing of its state is wanted any more */
+    }
+}
+
+/* A job that claims to run and has no attempt: the entry of its false start had failed. */
+static void requeue_orphan(struct scheduler *s, int64_t id) {
+    struct job job;
+    struct error err;
+    enum status status = store_job_get(s->store, id, &job, &err);
+    if (status == STATUS_OK)
+        status = store_job_stop(s->store, id, job.attempt, "its start failed", &err);
+    if (status != STATUS_OK)
+        retry_later(s, "cannot queue a job again", &err);
+    job_release(&job);
+}
+
+static void follow_wishes(struct scheduler *s) {
+    size_t limit = s->slot_count + 16, count; /* of orphans the rest comes with the next round */
+    int64_t *ids = mem_array(limit, sizeof *ids);
+    enum job_wanted *wanted = mem_array(limit, sizeof *wanted);
+    struct error err;
+    if (store_job_running(s->store, limit, ids, wanted, &count, &err) != STATUS_OK) {
+        retry_later(s, "cannot read the users' wishes", &err);
+        count = 0;
+    }
+    for (size_t i = 0; i < count; i++) {
+        struct attempt *a = NULL;
+        for (size_t k = 0; k + 1 < s->slot_count && !a; k++)
+            if (s->slot[k].phase != ATTEMPT_EMPTY && s->slot[k].job_id == ids[i])
+                a = &s->slot[k];
+        if (!a)
+            requeue_orphan(s, ids[i]);
+        else if (a->phase == ATTEMPT_ALIVE)
+            follow_wish(s, a, wanted[i]);
+    }
+    mem_free(wanted);
+    mem_free(ids);
+}
+
+/* Kills whose time is up; returns how long poll may sleep. */
+static int keep_deadlines(struct scheduler *s) {
+    int64_t now = now_ms(), sleep = s->must_retry ? RETRY_MS : INT32_MAX;
+    for (size_t i = 0; i < s->slot_count; i++) {
+        struct attempt *a = &s->slot[i];
+        if (a->phase != ATTEMPT_ALIVE)
+            continue;
+        if (a->kill_at_ms && a->kill_at_ms <= now)
+            kill_now(a);
+        if (a->kill_at_ms && a->kill_at_ms - now < sleep)
+            sleep = a->kill_at_ms - now;
+        if (a->worker.pid_fd < 0 && sleep > NO_PIDFD_POLL_MS)
+            sleep = NO_PIDFD_POLL_MS;
+    }
+    return sleep == INT32_MAX ? -1 : (int)sleep;
+}
+
+static void wait_for_something(struct scheduler *s, int timeout_ms) {
+    nfds_t count = 0;
+    s->poll[count++] = (struct pollfd){.fd = s->wake_fd, .events = POLLIN};
+    for (size_t i = 0; i < s->slot_count; i++) {
+        const struct attempt *a = &s->slot[i];
+        if (a->phase != ATTEMPT_ALIVE)
+            continue;
+        s->poll[count++] = (struct pollfd){.fd = a->worker.pid_fd, .events = POLLIN};
+        s->poll[count++] = (struct pollfd){.fd = a->worker.pipe_fd, .events = POLLIN};
+    }
+    poll(s->poll, count, timeout_ms); /* a signal ends it early, which does no harm */
+    uint64_t calls;
+    if (s->poll[0].revents && read(s->wake_fd, &calls, sizeof calls) < 0)
+        return;
+}
+
+static void listen_and_settle(struct scheduler *s) {
+    int running = 0;
+    for (size_t i = 0; i < s->slot_count; i++) {
+        struct attempt *a = &s->slot[i];
+        struct error err;
+        attempt_listen(a, s->store);
+        if (a->phase == ATTEMPT_ENDED && attempt_settle(a, s->store, &err) != STATUS_OK)
+            retry_later(s, "cannot record how an attempt ended", &err);
+        running += a->phase == ATTEMPT_ALIVE;
+    }
+    atomic_store(&s->running, running);
+}
+
+static bool any_alive(const struct scheduler *s) {
+    for (size_t i = 0; i < s->slot_count; i++)
+        if (s->slot[i].phase == ATTEMPT_ALIVE)
+            return true;
+    return false;
+}
+
+enum status scheduler_run(struct scheduler *s, struct error *err) {
+    size_t requeued;
+    enum status status = store_reconcile(s->store, &requeued, err);
+    if (status != STATUS_OK)
+        return status;
+    if (requeued)
+        log_info("%zu jobs that ran when the daemon ended are queued again", requeued);
+    for (;;) {
+        bool stopping = atomic_load(&s->stopping);
+        s->must_retry = false;
+        listen_and_settle(s);
+        if (stopping) {
+            for (size_t i = 0; i < s->slot_count; i++)
+                ask_to_stop(s, &s->slot[i]);
+            if (!any_alive(s))
+                break;
+        } else {
+            start_check(s);
+            start_jobs(s);
+        }
+        follow_wishes(s);
+        wait_for_something(s, keep_deadlines(s));
+    }
+    /* What could not be entered is "running" in the store: the next start queues it again. */
+    return STATUS_OK;
+}
