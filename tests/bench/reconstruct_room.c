@@ -1,0 +1,180 @@
+/* reconstruct_room ROOM OUT [name=value ...] -- one reconstruction without the daemon, for
+ * benches and experiments: reads the unpacked bundle ROOM, writes the outputs to OUT, prints the
+ * curve and the figures. No checkpoints. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/export/outputs.h"
+#include "server/ingest/bundle.h"
+#include "server/reconstruct/reconstruct.h"
+
+static double now_sec(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static bool never(void *user) {
+    (void)user;
+    return false;
+}
+
+static void print_stage(void *user, const char *stage) {
+    (void)user;
+    printf("stage %s\n", stage);
+    fflush(stdout);
+}
+
+static void print_progress(void *user, const char *stage, double done, double total, double eta) {
+    (void)user;
+    (void)stage;
+    (void)done;
+    (void)total;
+    (void)eta;
+}
+
+static void print_metric(void *user, const char *series, long step, double value) {
+    double *last = user;
+    if (now_sec() - *last < 10.0)
+        return;
+    *last = now_sec();
+    printf("%s %ld %.5f\n", series, step, value);
+    fflush(stdout);
+}
+
+static void print_log(void *user, const char *message) {
+    (void)user;
+    printf("%s\n", message);
+}
+
+static enum status keep_nothing(void *user, long iteration, const struct state_array *array,
+                                size_t count, struct error *err) {
+    (void)user;
+    (void)iteration;
+    (void)array;
+    (void)count;
+    (void)err;
+    return STATUS_OK;
+}
+
+static enum status find_nothing(void *user, struct state_array *array, size_t count, bool *found,
+                                struct error *err) {
+    (void)user;
+    (void)array;
+    (void)count;
+    (void)err;
+    *found = false;
+    return STATUS_OK;
+}
+
+static enum status no_preview(void *user, const struct reconstruction *r, struct error *err) {
+    (void)user;
+    (void)r;
+    (void)err;
+    return STATUS_OK;
+}
+
+static enum status ignore_file(void *user, const char *type, const char *name, const char *content_type,
+                               struct error *err) {
+    (void)user;
+    (void)type;
+    (void)name;
+    (void)content_type;
+    (void)err;
+    return STATUS_OK;
+}
+
+static enum status write_outputs(const char *dir, const struct reconstruction *r, struct error *err) {
+    struct export_comparison *pair = mem_calloc(r->held_out_count + 1, sizeof *pair);
+    for (size_t i = 0; i < r->held_out_count; i++)
+        pair[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
+                                             &r->held_out[i].render};
+    struct export_input input = {
+        .title = "room",
+        .mesh = &r->scene->mesh,
+        .segments = &r->segments,
+        .atlas = &r->atlas,
+        .inverse = &r->inverse,
+        .materials = &r->materials,
+        .confidence_count = r->confidence_count,
+        .confidence_spread = r->confidence_spread,
+        .is_emitter = r->is_emitter,
+        .comparison_count = r->held_out_count,
+        .comparison = pair,
+        .report = r->report,
+    };
+    enum status status = file_make_dirs(dir, err);
+    if (status == STATUS_OK)
+        status = export_outputs(dir, &input, ignore_file, NULL, err);
+    mem_free(pair);
+    return status;
+}
+
+static enum status run(int argc, char **argv, struct error *err) {
+    double last = now_sec(), begin = last;
+    struct reconstruct_hooks hooks = {
+        .user = &last,
+        .stop_requested = never,
+        .stage = print_stage,
+        .progress = print_progress,
+        .metric = print_metric,
+        .log = print_log,
+        .checkpoint_due = never,
+        .preview_due = never,
+        .checkpoint_save = keep_nothing,
+        .checkpoint_load = find_nothing,
+        .preview = no_preview,
+    };
+    struct settings settings;
+    settings_init(&settings);
+    cJSON *object = cJSON_CreateObject();
+    enum status status = STATUS_OK;
+    for (int i = 3; i < argc && status == STATUS_OK; i++)
+        status = settings_parse_assignment(argv[i], object, err);
+    if (status == STATUS_OK)
+        status = settings_apply(&settings, object, NULL, err);
+    struct parallel *pool = parallel_new(0);
+    struct scene scene = {0};
+    struct reconstruction r = {0};
+    struct bundle_limits limits = bundle_default_limits();
+    if (status == STATUS_OK)
+        status = bundle_load(argv[1], settings_text(&settings, "transforms"), &limits, pool, &scene,
+                             NULL, err);
+    printf("loaded in %.1f s\n", now_sec() - begin);
+    if (status == STATUS_OK)
+        status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
+    if (status == STATUS_OK)
+        status = write_outputs(argv[2], &r, err);
+    if (status == STATUS_OK) {
+        char *text = cJSON_Print(cJSON_GetObjectItem(r.report, "metrics"));
+        struct rusage usage;
+        getrusage(RUSAGE_SELF, &usage);
+        printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0,
+               now_sec() - begin);
+        cJSON_free(text);
+    }
+    reconstruct_release(&r);
+    scene_release(&scene);
+    parallel_free(pool);
+    cJSON_Delete(object);
+    settings_release(&settings);
+    return status;
+}
+
+int main(int argc, char **argv) {
+    if (argc < 3) {
+        fprintf(stderr, "usage: reconstruct_room ROOM OUT [name=value ...]\n");
+        return 2;
+    }
+    struct error err = {0};
+    if (run(argc, argv, &err) == STATUS_OK)
+        return 0;
+    fprintf(stderr, "reconstruct_room: %s\n", err.message);
+    return 1;
+}
