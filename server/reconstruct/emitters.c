@@ -15,7 +15,7 @@ struct observe_job {
     const struct views *views;
     const uint32_t *first; /* [segment_count + 1] into texel */
     const uint32_t *texel; /* valid texels by segment */
-    float *radiance;
+    rgb *radiance;
 };
 
 static int compare_floats(const void *a, const void *b) {
@@ -27,7 +27,7 @@ static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct observe_job *job = user;
     const struct reconstruction *r = job->r;
-    float value[TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
+    float value[3][TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
     size_t count = 0, texels = job->first[segment + 1] - job->first[segment];
     size_t wanted = texels < TEXELS_PER_SEGMENT ? texels : TEXELS_PER_SEGMENT;
     for (size_t i = 0; i < wanted; i++) {
@@ -44,15 +44,22 @@ static void observe_segment(void *user, size_t segment, int thread) {
             struct photograph_sample sample;
             const struct photograph *photo =
                 &r->scene->photograph[job->views->train[view[k].train]];
-            if (photograph_sample(photo, view[k].x, view[k].y, &sample))
-                value[count++] = rgb_mean(sample.radiance);
+            if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
+                continue;
+            value[0][count] = sample.radiance.r;
+            value[1][count] = sample.radiance.g;
+            value[2][count++] = sample.radiance.b;
         }
     }
-    qsort(value, count, sizeof *value, compare_floats);
-    job->radiance[segment] = count ? value[count / 2] : 0.0f;
+    job->radiance[segment] = rgb_gray(0.0f);
+    if (count == 0)
+        return;
+    for (int c = 0; c < 3; c++)
+        qsort(value[c], count, sizeof value[c][0], compare_floats);
+    job->radiance[segment] = rgb_make(value[0][count / 2], value[1][count / 2], value[2][count / 2]);
 }
 
-void emitters_observe(const struct reconstruction *r, const struct views *views, float *radiance) {
+void emitters_observe(const struct reconstruction *r, const struct views *views, rgb *radiance) {
     size_t segments = r->segments.count, valid = r->inverse.valid_count;
     uint32_t *first = mem_calloc(segments + 2, sizeof *first);
     uint32_t *texel = mem_array(valid + 1, sizeof *texel);
@@ -71,11 +78,12 @@ void emitters_observe(const struct reconstruction *r, const struct views *views,
     mem_free(first);
 }
 
-void emitters_decide(const struct materials *materials, const float *observed, bool *is_emitter,
+void emitters_decide(const struct materials *materials, const rgb *observed, bool *is_emitter,
                      float *share) {
     for (size_t s = 0; s < materials->segment_count; s++) {
         float emission = rgb_mean(materials->emission[s]);
-        share[s] = observed[s] > 0.0f ? emission / observed[s] : 0.0f;
+        float seen = rgb_mean(observed[s]);
+        share[s] = seen > 0.0f ? emission / seen : 0.0f;
         is_emitter[s] = share[s] >= EMITTER_SHARE;
     }
 }

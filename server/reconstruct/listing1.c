@@ -24,9 +24,9 @@
 #define COARSE_PART 0.4
 #define DECISION_AT 0.12
 
-/* Where everything starts. Emission starts at this share of the photographs' median radiance. */
-#define NEUTRAL_BASE_COLOR 0.5f
-#define NEUTRAL_EMISSION 0.05f
+/* The neutral start of emission: this share of what the photographs show of a segment is its own
+ * light, the rest is reflected. A segment that no photograph shows does not emit. */
+#define NEUTRAL_EMISSION_SHARE 0.5f
 /* Downward push on emission before the decision, in Adam steps (whose size is at most about 1). */
 #define EMISSION_DECAY 0.25f
 /* Step sizes fall to this share of the first at the end of the run. */
@@ -52,6 +52,7 @@ struct refine {
     struct params params;
     struct chooser chooser;
     struct counters counters;
+    rgb *observed;         /* [segment_count] radiance that the photographs show of it */
     float *emission_share; /* [segment_count] evidence of the decision */
     struct path_settings path;
     struct gradient *gradient;
@@ -216,10 +217,7 @@ static struct params_rates rates_at(const struct refine *f, double fraction) {
 
 static void decide_emitters(struct refine *f) {
     struct reconstruction *r = f->r;
-    float *observed = mem_calloc(r->segments.count, sizeof *observed);
-    emitters_observe(r, f->views, observed);
-    emitters_decide(&r->materials, observed, r->is_emitter, f->emission_share);
-    mem_free(observed);
+    emitters_decide(&r->materials, f->observed, r->is_emitter, f->emission_share);
     params_fix_emitters(&f->params, r->is_emitter);
     f->counters.decided = 1;
 }
@@ -399,8 +397,11 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
         .seed = (uint64_t)settings_number(set, "seed"),
     };
     f->counters.level = f->coarse_levels;
-    params_init(&f->params, &r->materials, f->coarse_levels,
-                NEUTRAL_EMISSION * views->median_radiance);
+    f->observed = mem_calloc(r->segments.count, sizeof *f->observed);
+    emitters_observe(r, views, f->observed);
+    for (size_t s = 0; s < r->segments.count; s++)
+        r->materials.emission[s] = rgb_scale(f->observed[s], NEUTRAL_EMISSION_SHARE);
+    params_init(&f->params, &r->materials, f->coarse_levels);
     f->emission_share = mem_calloc(r->segments.count, sizeof *f->emission_share);
     chooser_init(&f->chooser, r->inverse.valid_count,
                  (size_t)settings_number(set, "texels_per_iteration"), f->path.seed);
@@ -431,6 +432,7 @@ static void refine_release(struct refine *f) {
     mem_free(f->log);
     gradient_free(f->gradient);
     mem_free(f->emission_share);
+    mem_free(f->observed);
     params_release(&f->params);
 }
 

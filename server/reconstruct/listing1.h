@@ -5,8 +5,8 @@
  * look up the photograph there; trace with derivatives; compare two independent half-estimates
  * with the photograph; walk the paths backwards; move every parameter that was touched by Adam.
  *
- * From a neutral start: grey base colour, every segment a faint emitter. Base colour is solved
- * coarse to fine: at level L all texels of a block of 2^L x 2^L move together. After a first part
+ * From a neutral start: grey base colour, of all light that is seen of a segment half its own, half
+ * reflected. Base colour is solved coarse to fine: at level L all texels of a block of 2^L x 2^L move together. After a first part
  * of the run each segment is declared an emitter or not (emitters.h); from then on the emission
  * of all others is exactly 0. */
 #ifndef UNBAKE_RECONSTRUCT_LISTING1_H

@@ -27,7 +27,11 @@ static size_t block_count(const struct params *p, int level) {
     return blocks_across(t->width, level) * blocks_across(t->height, level);
 }
 
-void params_init(struct params *p, struct materials *materials, int level, float emission) {
+static float log_emission(float radiance) {
+    return radiance > 0.0f ? fmaxf(logf(radiance), LOG_EMISSION_MIN) : LOG_EMISSION_MIN;
+}
+
+void params_init(struct params *p, struct materials *materials, int level) {
     size_t segments = materials->segment_count;
     *p = (struct params){.materials = materials, .level = level};
     adam_init(&p->base_color, block_count(p, 0), 3, BASE_BETA1, BASE_BETA2);
@@ -36,9 +40,9 @@ void params_init(struct params *p, struct materials *materials, int level, float
     adam_init(&p->emission, segments, 3, SEGMENT_BETA1, SEGMENT_BETA2);
     p->log_emission = mem_array(segments, sizeof *p->log_emission);
     for (size_t s = 0; s < segments; s++) {
-        for (int c = 0; c < 3; c++)
-            p->log_emission[s][c] = logf(emission);
-        materials->emission[s] = rgb_gray(emission);
+        p->log_emission[s][0] = log_emission(materials->emission[s].r);
+        p->log_emission[s][1] = log_emission(materials->emission[s].g);
+        p->log_emission[s][2] = log_emission(materials->emission[s].b);
     }
     if (level > 0) {
         p->block_sum = mem_calloc_large(block_count(p, 1), sizeof *p->block_sum);

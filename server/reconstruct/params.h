@@ -39,8 +39,8 @@ struct params {
     size_t block_capacity;
 };
 
-/* Starts from the materials as they are, emission at `emission` everywhere. */
-void params_init(struct params *p, struct materials *materials, int level, float emission);
+/* Starts from the materials as they are; a segment whose emission is 0 never emits. */
+void params_init(struct params *p, struct materials *materials, int level);
 void params_release(struct params *p);
 
 /* Goes to a finer level: the moments of base colour start anew. */

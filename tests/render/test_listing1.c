@@ -253,21 +253,24 @@ static void test_recovers(struct scene *scene) {
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(run(scene, &s, 0, &shell, &r) == STATUS_OK);
-    double error[OBJECTS] = {0}, count[OBJECTS] = {0};
+    double error[OBJECTS] = {0}, bias[OBJECTS] = {0}, count[OBJECTS] = {0};
     for (size_t i = 0; i < r.inverse.valid_count; i++) {
         uint32_t texel = r.inverse.valid[i];
+        if (r.confidence_count[texel] < 2.0f)
+            continue;
         uint32_t segment = r.segments.of_triangle[r.inverse.triangle[texel]];
         const float *t = r.materials.base_color.texel[texel];
         const rgb *c = &wall_color[segment];
         error[segment] += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) +
                           pow((double)(t[2] - c->b), 2);
+        bias[segment] += (double)(t[0] - c->r + t[1] - c->g + t[2] - c->b);
         count[segment] += 3.0;
     }
     for (int o = 0; o < OBJECTS; o++) {
         double rms = sqrt(error[o] / count[o]);
         const rgb *e = &r.materials.emission[o];
-        printf("object %d: base colour off by %.4f, roughness %.3f, specular %.3f, emission %.4g %.4g %.4g\n",
-               o, rms, (double)r.materials.roughness[o], (double)r.materials.specular[o], (double)e->r,
+        printf("object %d: base colour off by %.4f, mean %+.4f, roughness %.3f, specular %.3f, emission %.4g %.4g %.4g\n",
+               o, rms, bias[o] / count[o], (double)r.materials.roughness[o], (double)r.materials.specular[o], (double)e->r,
                (double)e->g, (double)e->b);
         if (o == LAMP) {
             CHECK_NEAR(e->r, lamp_radiance.r, 0.05f * lamp_radiance.r);
