@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 #include "common/mem.h"
@@ -19,6 +20,9 @@
 #define CHUNK_TEXELS 32
 #define CURVE_POINTS 256
 
+/* Weight of a photograph's pixel that mixes surfaces: it speaks only where nothing else does. */
+#define UNCLEAN_TRUST 0.02f
+
 /* Parts of the run, as fractions of it: the coarse levels share the first, all get equal time;
  * the decision about emitters falls into the second coarse level. */
 #define COARSE_PART 0.4
@@ -29,6 +33,8 @@
 #define NEUTRAL_EMISSION_SHARE 0.5f
 /* Downward push on emission before the decision, in Adam steps (whose size is at most about 1). */
 #define EMISSION_DECAY 0.25f
+/* Emission moves at this share of its rate once it starts from what is seen. */
+#define DECIDED_EMISSION_RATE 0.2f
 /* Step sizes fall to this share of the first at the end of the run. */
 #define FINAL_RATE 0.02
 /* A segment whose emission explained this share at the decision is listed in the report. */
@@ -60,7 +66,8 @@ struct refine {
     struct gradient_log **log; /* [chunk_count] */
     double *chunk_loss;        /* [chunk_count] sum of loss estimates */
     size_t *chunk_pairs;       /* [chunk_count] texel-photograph pairs */
-    size_t *chunk_paths;       /* [chunk_count] */
+    struct seen_emission *seen; /* [chunk_count][pairs a chunk] of each pair, in order */
+    size_t chunk_pair_capacity;
     int cameras, samples;      /* a texel's photographs; paths for each */
     size_t batch_capacity;
     struct scratch *scratch;   /* [threads] */
@@ -73,6 +80,17 @@ struct refine {
 struct pair {
     size_t first;
     uint32_t photograph;
+    uint32_t segment; /* that the texel belongs to */
+    float trust;      /* 1, or UNCLEAN_TRUST where the photograph's pixel mixes surfaces */
+};
+
+/* Derivative of a pair's loss by the emission of the segment that it looks at. Only what is seen
+ * of a segment moves its emission. What it sheds on other surfaces is left out: there emission and
+ * base colour can stand in for each other (the bias that this accepts: none at the optimum, where
+ * both derivatives are 0), and while base colours are still too dark it would drive the lamps up. */
+struct seen_emission {
+    uint32_t segment;
+    rgb d_emission;
 };
 
 struct scratch {
@@ -105,25 +123,29 @@ static void scratch_release(struct scratch *s) {
     mem_free(s->pair);
 }
 
-/* Adds the paths of one texel seen by one photograph; false when a sample cannot be used. */
+/* Adds the paths of one texel seen by one photograph; false when a sample cannot be used: out of
+ * the picture, masked, or in a pixel that mixes surfaces while the texel's centre is not. */
 static bool add_pair(const struct refine *f, struct scratch *s, size_t first, uint32_t texel,
-                     uint32_t photograph, uint32_t sample_number) {
+                     const struct view *view, uint32_t sample_number) {
     const struct reconstruction *r = f->r;
-    const struct photograph *photo = &r->scene->photograph[photograph];
+    const struct photograph *photo = &r->scene->photograph[f->views->train[view->train]];
+    bool clean = views_clean(f->views, view);
     uint32_t x = texel % r->atlas.width, y = texel / r->atlas.width;
     for (int i = 0; i < f->samples; i++) {
         struct path_key key = {texel, (uint32_t)f->counters.iteration, sample_number + (uint32_t)i};
         /* Where in the texel: the photograph saw all of it, not its centre. */
         uint64_t bits = rng_key(f->path.seed ^ key.iteration, key.index, key.sample);
         uint32_t triangle;
-        float b1, b2, px, py, depth_m;
+        float b1, b2, depth_m;
+        struct view place = *view;
         if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)x + rng_to_float((uint32_t)bits),
                                (float)y + rng_to_float((uint32_t)(bits >> 32)), &triangle, &b1, &b2))
             return false;
         vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
         size_t at = first + (size_t)i;
-        if (!camera_project(&photo->camera, point, &px, &py, &depth_m) ||
-            !photograph_sample(photo, px, py, &s->reference[at]))
+        if (!camera_project(&photo->camera, point, &place.x, &place.y, &depth_m) ||
+            (clean && !views_clean(f->views, &place)) ||
+            !photograph_sample(photo, place.x, place.y, &s->reference[at]))
             return false;
         vec3 origin = camera_origin(&photo->camera);
         s->ray[at] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
@@ -148,8 +170,10 @@ static size_t add_texel(const struct refine *f, struct scratch *s, uint32_t texe
     for (size_t k = 0; k < seen; k++) {
         size_t first = pair_count * (size_t)f->samples;
         uint32_t photograph = f->views->train[view[k].train];
-        if (add_pair(f, s, first, texel, photograph, (uint32_t)(k * (size_t)f->samples)))
-            s->pair[pair_count++] = (struct pair){first, photograph};
+        if (add_pair(f, s, first, texel, &view[k], (uint32_t)(k * (size_t)f->samples)))
+            s->pair[pair_count++] =
+                (struct pair){first, photograph, r->segments.of_triangle[triangle],
+                              views_clean(f->views, &view[k]) ? 1.0f : UNCLEAN_TRUST};
     }
     return pair_count;
 }
@@ -166,11 +190,10 @@ static void run_chunk(void *user, size_t chunk, int thread) {
         if (item != CHOOSE_NONE)
             pairs = add_texel(f, s, f->r->inverse.valid[item], pairs);
     }
-    size_t paths = pairs * (size_t)f->samples;
     f->chunk_pairs[chunk] = pairs;
-    f->chunk_paths[chunk] = paths;
-    if (paths == 0)
+    if (pairs == 0)
         return;
+    size_t paths = pairs * (size_t)f->samples;
     path_batch_trace(s->batch, &f->r->world, &f->path, paths, s->ray, s->key, s->radiance);
     double loss = 0.0;
     for (size_t i = 0; i < pairs; i++) {
@@ -178,6 +201,13 @@ static void run_chunk(void *user, size_t chunk, int thread) {
         loss += (double)loss_pair(&f->r->scene->photograph[s->pair[i].photograph],
                                   s->reference + first, s->radiance + first, f->samples,
                                   f->views->median_radiance, s->d_radiance + first);
+        struct seen_emission *seen = &f->seen[chunk * f->chunk_pair_capacity + i];
+        *seen = (struct seen_emission){s->pair[i].segment, {0, 0, 0}};
+        for (int k = 0; k < f->samples; k++) {
+            rgb *d = &s->d_radiance[first + (size_t)k];
+            *d = rgb_scale(*d, s->pair[i].trust);
+            seen->d_emission = rgb_add(seen->d_emission, *d);
+        }
     }
     f->chunk_loss[chunk] = loss;
     path_batch_backward(s->batch, &f->r->world, s->d_radiance, log);
@@ -210,7 +240,8 @@ static struct params_rates rates_at(const struct refine *f, double fraction) {
         .base_color = fall * (float)settings_number(set, "base_color_rate"),
         .roughness = fall * (float)settings_number(set, "roughness_rate"),
         .specular = fall * (float)settings_number(set, "specular_rate"),
-        .emission = fall * (float)settings_number(set, "emission_rate"),
+        .emission = fall * (f->counters.decided ? DECIDED_EMISSION_RATE : 1.0f) *
+                    (float)settings_number(set, "emission_rate"),
         .emission_decay = f->counters.decided ? 0.0f : EMISSION_DECAY,
     };
 }
@@ -219,7 +250,28 @@ static void decide_emitters(struct refine *f) {
     struct reconstruction *r = f->r;
     emitters_decide(&r->materials, f->observed, r->is_emitter, f->emission_share);
     params_fix_emitters(&f->params, r->is_emitter);
+    /* By now emission also made up for walls that were too dark; what is seen of the emitter
+     * itself is the better place to go on from. */
+    for (size_t s = 0; s < r->segments.count; s++) {
+        if (r->is_emitter[s])
+            params_set_emission(&f->params, s, f->observed[s]);
+    }
     f->counters.decided = 1;
+}
+
+/* Replaces the derivative by emission with that of what is seen; see struct seen_emission. */
+static void reduce_seen_emission(struct refine *f) {
+    struct gradient *g = f->gradient;
+    memset(g->d_emission, 0, g->segment_count * sizeof *g->d_emission);
+    for (size_t c = 0; c < f->chunk_count; c++) {
+        const struct seen_emission *seen = &f->seen[c * f->chunk_pair_capacity];
+        for (size_t i = 0; i < f->chunk_pairs[c]; i++) {
+            double *d = g->d_emission[seen[i].segment];
+            d[0] += (double)seen[i].d_emission.r;
+            d[1] += (double)seen[i].d_emission.g;
+            d[2] += (double)seen[i].d_emission.b;
+        }
+    }
 }
 
 /* One pass of Listing 1; returns the mean loss of its texel-photograph pairs. */
@@ -233,6 +285,7 @@ static double iterate(struct refine *f, double fraction) {
     world_update_lights(&f->r->world);
     parallel_for(f->r->pool, f->chunk_count, run_chunk, f);
     gradient_reduce(f->gradient, f->log, f->chunk_count, f->r->pool);
+    reduce_seen_emission(f);
     struct params_rates rates = rates_at(f, fraction);
     params_step(&f->params, f->gradient, &rates, f->r->pool);
     double loss = 0.0;
@@ -240,8 +293,8 @@ static double iterate(struct refine *f, double fraction) {
     for (size_t c = 0; c < f->chunk_count; c++) {
         loss += f->chunk_loss[c];
         pairs += f->chunk_pairs[c];
-        f->counters.path_count += f->chunk_paths[c];
     }
+    f->counters.path_count += pairs * (size_t)f->samples;
     double mean = pairs ? loss / (double)pairs : 0.0;
     size_t bin = (size_t)(fraction * (CURVE_POINTS - 1));
     f->counters.curve_sum[bin] += mean;
@@ -291,8 +344,11 @@ static enum status load(struct refine *f, struct error *err) {
     size_t count = state_arrays(f, array);
     bool found;
     enum status status = f->hooks->checkpoint_load(f->hooks->user, array, count, &found, err);
-    if (status == STATUS_OK && found)
+    if (status == STATUS_OK && found) {
         params_set_level(&f->params, f->counters.level);
+        if (f->counters.decided)
+            params_fix_emitters(&f->params, f->r->is_emitter);
+    }
     return status;
 }
 
@@ -401,7 +457,7 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
     emitters_observe(r, views, f->observed);
     for (size_t s = 0; s < r->segments.count; s++)
         r->materials.emission[s] = rgb_scale(f->observed[s], NEUTRAL_EMISSION_SHARE);
-    params_init(&f->params, &r->materials, f->coarse_levels);
+    params_init(&f->params, &r->materials, &r->inverse, &r->segments, f->coarse_levels);
     f->emission_share = mem_calloc(r->segments.count, sizeof *f->emission_share);
     chooser_init(&f->chooser, r->inverse.valid_count,
                  (size_t)settings_number(set, "texels_per_iteration"), f->path.seed);
@@ -412,8 +468,8 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
         f->log[c] = gradient_log_new(r->segments.count);
     f->chunk_loss = mem_calloc(f->chunk_count, sizeof *f->chunk_loss);
     f->chunk_pairs = mem_calloc(f->chunk_count, sizeof *f->chunk_pairs);
-    f->chunk_paths = mem_calloc(f->chunk_count, sizeof *f->chunk_paths);
-    size_t pairs = (size_t)CHUNK_TEXELS * (size_t)f->cameras;
+    size_t pairs = f->chunk_pair_capacity = (size_t)CHUNK_TEXELS * (size_t)f->cameras;
+    f->seen = mem_calloc(f->chunk_count * pairs, sizeof *f->seen);
     int threads = parallel_thread_count(r->pool);
     f->scratch = mem_calloc((size_t)threads, sizeof *f->scratch);
     for (int t = 0; t < threads; t++)
@@ -424,7 +480,7 @@ static void refine_release(struct refine *f) {
     for (int t = 0; t < parallel_thread_count(f->r->pool); t++)
         scratch_release(&f->scratch[t]);
     mem_free(f->scratch);
-    mem_free(f->chunk_paths);
+    mem_free(f->seen);
     mem_free(f->chunk_pairs);
     mem_free(f->chunk_loss);
     for (size_t c = 0; c < f->chunk_count; c++)

@@ -8,13 +8,16 @@
 
 /* Touches are few (tens a texel in a whole run), so the moments must be quick to fill. */
 #define BASE_BETA1 0.9f
-#define BASE_BETA2 0.99f
+#define BASE_BETA2 0.999f
 #define SEGMENT_BETA1 0.9f
 #define SEGMENT_BETA2 0.99f
 
 /* Radiance below which a recovered emission is taken for none; also keeps the logarithm finite. */
 #define LOG_EMISSION_MIN (-20.0f)
 #define LOG_EMISSION_MAX 20.0f
+
+/* Base colour of an emitter moves at this share of the rate. */
+#define EMITTER_SLOWDOWN 0.05f
 
 #define CHUNK 1024 /* touched texels a work item */
 
@@ -31,19 +34,18 @@ static float log_emission(float radiance) {
     return radiance > 0.0f ? fmaxf(logf(radiance), LOG_EMISSION_MIN) : LOG_EMISSION_MIN;
 }
 
-void params_init(struct params *p, struct materials *materials, int level) {
-    size_t segments = materials->segment_count;
-    *p = (struct params){.materials = materials, .level = level};
+void params_init(struct params *p, struct materials *materials, const struct inverse_uv *inverse,
+                 const struct segments *segments, int level) {
+    size_t count = materials->segment_count;
+    *p = (struct params){
+        .materials = materials, .inverse = inverse, .segments = segments, .level = level};
     adam_init(&p->base_color, block_count(p, 0), 3, BASE_BETA1, BASE_BETA2);
-    adam_init(&p->roughness, segments, 1, SEGMENT_BETA1, SEGMENT_BETA2);
-    adam_init(&p->specular, segments, 1, SEGMENT_BETA1, SEGMENT_BETA2);
-    adam_init(&p->emission, segments, 3, SEGMENT_BETA1, SEGMENT_BETA2);
-    p->log_emission = mem_array(segments, sizeof *p->log_emission);
-    for (size_t s = 0; s < segments; s++) {
-        p->log_emission[s][0] = log_emission(materials->emission[s].r);
-        p->log_emission[s][1] = log_emission(materials->emission[s].g);
-        p->log_emission[s][2] = log_emission(materials->emission[s].b);
-    }
+    adam_init(&p->roughness, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
+    adam_init(&p->specular, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
+    adam_init(&p->emission, count, 3, SEGMENT_BETA1, SEGMENT_BETA2);
+    p->log_emission = mem_array(count, sizeof *p->log_emission);
+    for (size_t s = 0; s < count; s++)
+        params_set_emission(p, s, materials->emission[s]);
     if (level > 0) {
         p->block_sum = mem_calloc_large(block_count(p, 1), sizeof *p->block_sum);
         p->block_stamp = mem_calloc_large(block_count(p, 1), sizeof *p->block_stamp);
@@ -77,7 +79,10 @@ void params_refine(struct params *p, int level) {
     params_set_level(p, level);
 }
 
-static void move_texel(float *texel, const float *step, float rate) {
+static void move_texel(struct params *p, size_t number, const float *step, float rate) {
+    float *texel = p->materials->base_color.texel[number];
+    if (p->is_emitter && p->is_emitter[p->segments->of_triangle[p->inverse->triangle[number]]])
+        rate *= EMITTER_SLOWDOWN;
     for (int c = 0; c < 3; c++)
         texel[c] = clampf(texel[c] + rate * step[c], 0.0f, 1.0f);
 }
@@ -92,14 +97,13 @@ struct step_job {
 static void step_texels(void *user, size_t chunk, int thread) {
     (void)thread;
     struct step_job *job = user;
-    struct texture *texture = &job->p->materials->base_color;
     size_t end = (chunk + 1) * CHUNK < job->count ? (chunk + 1) * CHUNK : job->count;
     for (size_t i = chunk * CHUNK; i < end; i++) {
         uint32_t texel = job->gradient->texel[i];
         const rgb *d = &job->gradient->d_base_color[i];
         float gradient[3] = {d->r, d->g, d->b}, step[3];
         adam_touch(&job->p->base_color, texel, gradient, step);
-        move_texel(texture->texel[texel], step, job->rate);
+        move_texel(job->p, texel, step, job->rate);
     }
 }
 
@@ -119,9 +123,9 @@ static void step_blocks(void *user, size_t chunk, int thread) {
         size_t x0 = block % across << p->level, y0 = block / across << p->level;
         for (size_t y = y0; y < y0 + side && y < texture->height; y++) {
             for (size_t x = x0; x < x0 + side && x < texture->width; x++) {
-                float *texel = texture->texel[y * texture->width + x];
-                if (texel[3] != 0.0f)
-                    move_texel(texel, step, job->rate);
+                size_t texel = y * texture->width + x;
+                if (texture->texel[texel][3] != 0.0f)
+                    move_texel(p, texel, step, job->rate);
             }
         }
     }
@@ -196,8 +200,19 @@ void params_step(struct params *p, const struct gradient *gradient, const struct
 }
 
 void params_fix_emitters(struct params *p, const bool *is_emitter) {
+    p->is_emitter = is_emitter;
     for (size_t s = 0; s < p->materials->segment_count; s++) {
         if (!is_emitter[s])
             p->materials->emission[s] = rgb_gray(0.0f);
     }
+}
+
+void params_set_emission(struct params *p, size_t segment, rgb emission) {
+    p->materials->emission[segment] = emission;
+    p->log_emission[segment][0] = log_emission(emission.r);
+    p->log_emission[segment][1] = log_emission(emission.g);
+    p->log_emission[segment][2] = log_emission(emission.b);
+    memset(p->emission.mean + 3 * segment, 0, 3 * sizeof *p->emission.mean);
+    memset(p->emission.square + 3 * segment, 0, 3 * sizeof *p->emission.square);
+    p->emission.touch_count[segment] = 0;
 }

@@ -12,7 +12,9 @@
 #include "common/parallel.h"
 #include "server/reconstruct/adam.h"
 #include "server/render/gradient.h"
+#include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
+#include "server/scene/segment.h"
 
 #define PARAMS_ROUGHNESS_MIN 0.05f
 
@@ -27,6 +29,9 @@ struct params_rates {
 
 struct params {
     struct materials *materials; /* borrowed; what is moved */
+    const struct inverse_uv *inverse;    /* borrowed */
+    const struct segments *segments;     /* borrowed */
+    const bool *is_emitter;      /* [segment_count] borrowed; NULL until the emitters are known */
     struct adam base_color;      /* an entry a texel, or a block at coarse levels */
     struct adam roughness, specular, emission; /* an entry a segment */
     float (*log_emission)[3];    /* [segment_count]; owned */
@@ -40,7 +45,8 @@ struct params {
 };
 
 /* Starts from the materials as they are; a segment whose emission is 0 never emits. */
-void params_init(struct params *p, struct materials *materials, int level);
+void params_init(struct params *p, struct materials *materials, const struct inverse_uv *inverse,
+                 const struct segments *segments, int level);
 void params_release(struct params *p);
 
 /* Goes to a finer level: the moments of base colour start anew. */
@@ -52,7 +58,11 @@ void params_set_level(struct params *p, int level);
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool);
 
-/* Sets the emission of all segments that are not emitters to exactly 0, for good. */
+/* Tells the emitters from now on (borrowed): all other segments emit exactly 0, for good, and the
+ * reflectance of an emitter, which its own light hides, moves slowly. */
 void params_fix_emitters(struct params *p, const bool *is_emitter);
+
+/* Sets a segment's emission, with moments that start anew. */
+void params_set_emission(struct params *p, size_t segment, rgb emission);
 
 #endif
