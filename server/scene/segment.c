@@ -6,7 +6,8 @@
  * what either has inside, plus a bonus for small regions. So a noisy surface tolerates in itself
  * what would be a border on a clean one. Three things are ours: sizes are areas, as triangles
  * of a modelled room differ by a factor of millions; normals are smoothed first, by a filter
- * that stops at creases; and a region that stays small joins its most similar neighbour. */
+ * that stops at creases; and a region that stays small joins its most similar neighbour, or, in a
+ * scan, where small pieces that hang in the air are debris of fusing, the nearest region. */
 #include "server/scene/segment.h"
 
 #include <math.h>
@@ -15,15 +16,20 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/rng.h"
 #include "server/scene/adjacency.h"
 
-#define SMOOTH_ROUNDS 4
-#define CREASE 0.5f           /* 1 - cosine from which on smoothing stops: 60 degrees */
+#define SMOOTH_ROUNDS 8
+#define CREASE 0.7f           /* 1 - cosine from which on smoothing stops: 73 degrees */
 #define CONVEX_FACTOR 0.3f    /* of an outward fold's weight: objects bulge, borders between two
                                * objects are mostly hollows */
-#define BONUS 0.05            /* weight by which a region of 1 / BONUS_PARTS of the mesh may differ */
+#define BONUS 0.5             /* weight by which a region of 1 / BONUS_PARTS of the mesh may differ */
 #define BONUS_PARTS 100000.0
-#define SMALL_PARTS 20000.0   /* a region of less than 1 / SMALL_PARTS of the mesh is small */
+#define SMALL_PARTS 5000.0    /* a region of less than 1 / SMALL_PARTS of the mesh is small */
+#define SCAN_EVENNESS 16.0    /* mean square of the triangles' areas over their squared mean: 1 to 3
+                               * where depth was fused, hundreds where a room was modelled */
+
+#define NONE UINT32_MAX
 
 static int ascending(const void *left, const void *right) {
     int64_t a = *(const int64_t *)left, b = *(const int64_t *)right;
@@ -140,15 +146,109 @@ static struct link *make_links(const struct mesh *mesh, const struct adjacency *
     return link;
 }
 
+static bool is_scan(const struct mesh *mesh, double total) {
+    double squares = 0.0;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        double area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        squares += area * area;
+    }
+    return squares * (double)mesh->triangle_count < SCAN_EVENNESS * total * total;
+}
+
+/* Triangles of large regions, in a hash table of cubes. */
+struct cubes {
+    const struct mesh *mesh;
+    float side_m;
+    size_t mask;
+    uint32_t *head; /* [mask + 1] first triangle or NONE */
+    uint32_t *next; /* [triangle_count] */
+};
+
+static void cube_of(const struct cubes *cubes, vec3 p, int64_t cube[3]) {
+    cube[0] = (int64_t)floorf(p.x / cubes->side_m);
+    cube[1] = (int64_t)floorf(p.y / cubes->side_m);
+    cube[2] = (int64_t)floorf(p.z / cubes->side_m);
+}
+
+static size_t slot_of(const struct cubes *cubes, const int64_t cube[3]) {
+    return rng_key((uint64_t)cube[0], (uint64_t)cube[1], (uint64_t)cube[2]) & cubes->mask;
+}
+
+/* The entered triangle with its centre nearest p, if nearer than *nearest_m (which it lowers) and
+ * no more than a cube's side away; else `otherwise`. */
+static uint32_t nearest_triangle(const struct cubes *cubes, vec3 p, float *nearest_m,
+                                 uint32_t otherwise) {
+    int64_t middle[3];
+    cube_of(cubes, p, middle);
+    for (int i = 0; i < 27; i++) {
+        int64_t cube[3] = {middle[0] + i % 3 - 1, middle[1] + i / 3 % 3 - 1, middle[2] + i / 9 - 1};
+        for (uint32_t t = cubes->head[slot_of(cubes, cube)]; t != NONE; t = cubes->next[t]) {
+            float distance_m = vec3_length(vec3_sub(centre_of(cubes->mesh, t), p));
+            if (distance_m < *nearest_m || (distance_m == *nearest_m && t < otherwise)) {
+                *nearest_m = distance_m;
+                otherwise = t;
+            }
+        }
+    }
+    return otherwise;
+}
+
+/* Joins each region smaller than small_area to the large region nearest to it, or, where there is
+ * none within the side of a small region, all those together. */
+static void adopt_debris(struct regions *r, const struct mesh *mesh, double small_area) {
+    size_t n = mesh->triangle_count;
+    struct cubes cubes = {.mesh = mesh, .side_m = (float)sqrt(small_area), .mask = 1};
+    while (cubes.mask < n)
+        cubes.mask = 2 * cubes.mask + 1;
+    cubes.head = mem_array(cubes.mask + 1, sizeof *cubes.head);
+    cubes.next = mem_array(n, sizeof *cubes.next);
+    memset(cubes.head, 0xff, (cubes.mask + 1) * sizeof *cubes.head);
+    uint32_t *target = mem_array(n, sizeof *target); /* of a small root: a triangle, or NONE */
+    float *distance_m = mem_array(n, sizeof *distance_m);
+    for (uint32_t t = 0; t < n; t++) {
+        target[t] = NONE;
+        distance_m[t] = cubes.side_m;
+        if (r->area[root_of(r, t)] < small_area)
+            continue;
+        int64_t cube[3];
+        cube_of(&cubes, centre_of(mesh, t), cube);
+        uint32_t *head = &cubes.head[slot_of(&cubes, cube)];
+        cubes.next[t] = *head;
+        *head = t;
+    }
+    for (uint32_t t = 0; t < n; t++) {
+        uint32_t root = root_of(r, t);
+        if (r->area[root] < small_area)
+            target[root] = nearest_triangle(&cubes, centre_of(mesh, t), &distance_m[root],
+                                            target[root]);
+    }
+    uint32_t strays = NONE;
+    for (uint32_t t = 0; t < n; t++) {
+        if (root_of(r, t) != t || r->area[t] >= small_area)
+            continue;
+        if (target[t] != NONE)
+            join(r, root_of(r, target[t]), t, 0.0f);
+        else if (strays == NONE)
+            strays = t;
+        else
+            join(r, root_of(r, strays), t, 0.0f);
+    }
+    mem_free(distance_m);
+    mem_free(target);
+    mem_free(cubes.next);
+    mem_free(cubes.head);
+}
+
 /* Numbers the regions in order of their first triangle. */
 static void number_regions(struct segments *s, struct regions *r, size_t triangle_count) {
     uint32_t *number = mem_array(triangle_count, sizeof *number);
-    memset(number, 0xff, triangle_count * sizeof *number);
+    for (size_t t = 0; t < triangle_count; t++)
+        number[t] = NONE;
     s->count = 0;
     s->of_triangle = mem_array(triangle_count, sizeof *s->of_triangle);
     for (uint32_t t = 0; t < triangle_count; t++) {
         uint32_t root = root_of(r, t);
-        if (number[root] == UINT32_MAX)
+        if (number[root] == NONE)
             number[root] = (uint32_t)s->count++;
         s->of_triangle[t] = number[root];
     }
@@ -185,6 +285,8 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
         if (a != b && fmin(r.area[a], r.area[b]) < total / SMALL_PARTS)
             join(&r, a, b, link[i].weight);
     }
+    if (is_scan(mesh, total))
+        adopt_debris(&r, mesh, total / SMALL_PARTS);
     number_regions(s, &r, n);
     mem_free(r.parent);
     mem_free(r.area);
