@@ -6,6 +6,9 @@
 
 #include "common/mem.h"
 
+#define SMOOTH_ROUNDS 8
+#define CREASE 0.7f /* 1 - cosine of the angle from which on smoothing stops: 73 degrees */
+
 struct half_edge {
     uint32_t upper;  /* the end with the greater welded number */
     uint32_t number; /* 3 t + e */
@@ -69,4 +72,33 @@ void adjacency_release(struct adjacency *adjacency) {
     mem_free(adjacency->weld);
     mem_free(adjacency->next);
     *adjacency = (struct adjacency){0};
+}
+
+vec3 *adjacency_smooth_normals(const struct adjacency *adjacency, const struct mesh *mesh) {
+    size_t n = mesh->triangle_count;
+    vec3 *normal = mem_array(n, sizeof *normal), *next = mem_array(n, sizeof *next);
+    float *area = mem_array(n, sizeof *area);
+    for (size_t t = 0; t < n; t++) {
+        vec3 cross = mesh_cross(mesh, t);
+        area[t] = vec3_length(cross);
+        normal[t] = vec3_normalize(cross);
+    }
+    for (int round = 0; round < SMOOTH_ROUNDS; round++) {
+        for (size_t t = 0; t < n; t++) {
+            vec3 sum = vec3_scale(normal[t], area[t]);
+            for (uint32_t half = (uint32_t)(3 * t); half < 3 * t + 3; half++)
+                for (uint32_t h = adjacency->next[half]; h != half; h = adjacency->next[h]) {
+                    float bend = 1.0f - vec3_dot(normal[t], normal[h / 3]);
+                    float like = fmaxf(0.0f, 1.0f - bend / CREASE);
+                    sum = vec3_mad(sum, like * like * area[h / 3], normal[h / 3]);
+                }
+            next[t] = vec3_normalize(sum);
+        }
+        vec3 *swap = normal;
+        normal = next;
+        next = swap;
+    }
+    mem_free(next);
+    mem_free(area);
+    return normal;
 }

@@ -20,4 +20,9 @@ struct adjacency {
 void adjacency_make(struct adjacency *adjacency, const struct mesh *mesh);
 void adjacency_release(struct adjacency *adjacency);
 
+/* Unit normals of the triangles, averaged over a few rings of neighbours but not across creases:
+ * the noise of a scan goes, the shape of a model stays. [triangle_count], the caller's
+ * (mem_free). */
+vec3 *adjacency_smooth_normals(const struct adjacency *adjacency, const struct mesh *mesh);
+
 #endif

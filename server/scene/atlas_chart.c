@@ -31,6 +31,7 @@ struct builder {
     const struct segments *segments;
     struct adjacency adjacency;
     vec3 *normal;         /* [triangle_count] unit */
+    vec3 *smooth;         /* [triangle_count] unit, without the noise of a scan */
     double *area;         /* [triangle_count] m^2 */
     uint32_t *by_area;    /* [triangle_count] largest first */
     uint32_t *chart_of;   /* [triangle_count] or NONE */
@@ -45,6 +46,7 @@ struct builder {
     struct flat_triangle *flat; /* [triangle_count] scratch, as is the next */
     bool *dropped;
     double overlap_m;
+    float max_lean_cos;   /* cosine of CHART_MAX_LEAN_DEG, for the normals as they are */
 };
 
 static void heap_push(struct builder *b, uint64_t key) {
@@ -84,8 +86,8 @@ static void offer_neighbours(struct builder *b, uint32_t t, vec3 normal, float m
             if (b->seen[n] == b->flood || b->chart_of[n] != NONE ||
                 b->segments->of_triangle[n] != b->segments->of_triangle[t])
                 continue;
-            float cosine = vec3_dot(b->normal[n], normal);
-            if (cosine < min_cos)
+            float cosine = vec3_dot(b->smooth[n], normal);
+            if (cosine < min_cos || vec3_dot(b->normal[n], normal) < b->max_lean_cos)
                 continue;
             b->seen[n] = b->flood;
             float lean = clampf((1.0f - cosine) / (1.0f - min_cos), 0.0f, 1.0f);
@@ -181,13 +183,14 @@ static void grow_all(struct builder *b, float min_cos) {
             if (b->chart_of[seed] != NONE)
                 continue;
             found = true;
-            vec3 normal = b->normal[seed];
+            vec3 normal = vec3_dot(b->smooth[seed], b->normal[seed]) < b->max_lean_cos
+                              ? b->normal[seed] : b->smooth[seed];
             for (int round = 0; round <= REFINE_ROUNDS; round++) {
                 b->region[0] = seed;
                 b->region_count = 1;
                 grow(b, normal, min_cos);
                 vec3 mean = region_normal(b);
-                if (round == REFINE_ROUNDS || vec3_dot(mean, b->normal[seed]) < min_cos ||
+                if (round == REFINE_ROUNDS || vec3_dot(mean, b->normal[seed]) < b->max_lean_cos ||
                     vec3_dot(mean, normal) > 0.9999f)
                     break;
                 normal = mean;
@@ -347,11 +350,17 @@ static int largest_first(const void *left, const void *right) {
     return a->triangle < b->triangle ? -1 : 1;
 }
 
+static float cos_of_deg(double degrees) {
+    return (float)cos(degrees * (3.14159265358979323846 / 180.0));
+}
+
 static void builder_init(struct builder *b, const struct mesh *mesh,
                          const struct segments *segments, double texel_m) {
     size_t n = mesh->triangle_count;
     *b = (struct builder){.mesh = mesh, .segments = segments, .overlap_m = OVERLAP_TEXELS * texel_m};
     adjacency_make(&b->adjacency, mesh);
+    b->smooth = adjacency_smooth_normals(&b->adjacency, mesh);
+    b->max_lean_cos = cos_of_deg(CHART_MAX_LEAN_DEG);
     b->normal = mem_array(n, sizeof *b->normal);
     b->area = mem_array(n, sizeof *b->area);
     b->by_area = mem_array(n, sizeof *b->by_area);
@@ -378,6 +387,7 @@ static void builder_init(struct builder *b, const struct mesh *mesh,
 static void builder_release(struct builder *b) {
     adjacency_release(&b->adjacency);
     mem_free(b->normal);
+    mem_free(b->smooth);
     mem_free(b->area);
     mem_free(b->by_area);
     mem_free(b->chart_of);
@@ -389,10 +399,6 @@ static void builder_release(struct builder *b) {
     mem_free(b->dropped);
 }
 
-static float cos_of_deg(double degrees) {
-    return (float)cos(degrees * (3.14159265358979323846 / 180.0));
-}
-
 void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments,
                  float texel_m) {
     size_t n = mesh->triangle_count;
@@ -400,8 +406,8 @@ void charts_make(struct charts *charts, const struct mesh *mesh, const struct se
     builder_init(&b, mesh, segments, (double)texel_m);
     grow_all(&b, cos_of_deg(LITTLE_LEAN_DEG));
     dissolve_small(&b, SMALL_TEXELS * (double)texel_m * (double)texel_m,
-                   cos_of_deg(CHART_MAX_LEAN_DEG));
-    grow_all(&b, cos_of_deg(CHART_MAX_LEAN_DEG));
+                   b.max_lean_cos);
+    grow_all(&b, b.max_lean_cos);
 
     *charts = (struct charts){.count = b.chart_count};
     charts->start = mem_array(b.chart_count + 1, sizeof *charts->start);

@@ -19,8 +19,6 @@
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
 
-#define SMOOTH_ROUNDS 8
-#define CREASE 0.7f           /* 1 - cosine from which on smoothing stops: 73 degrees */
 #define CONVEX_FACTOR 0.3f    /* of an outward fold's weight: objects bulge, borders between two
                                * objects are mostly hollows */
 #define BONUS 0.5             /* weight by which a region of 1 / BONUS_PARTS of the mesh may differ */
@@ -84,36 +82,6 @@ static void join(struct regions *r, uint32_t a, uint32_t b, float weight) {
     r->inside[a] = fmaxf(weight, fmaxf(r->inside[a], r->inside[b]));
 }
 
-/* Unit normals, each averaged with its neighbours' as far as there is no crease between. */
-static vec3 *smooth_normals(const struct mesh *mesh, const struct adjacency *adjacency) {
-    size_t n = mesh->triangle_count;
-    vec3 *normal = mem_array(n, sizeof *normal), *next = mem_array(n, sizeof *next);
-    float *area = mem_array(n, sizeof *area);
-    for (size_t t = 0; t < n; t++) {
-        vec3 cross = mesh_cross(mesh, t);
-        area[t] = vec3_length(cross);
-        normal[t] = vec3_normalize(cross);
-    }
-    for (int round = 0; round < SMOOTH_ROUNDS; round++) {
-        for (size_t t = 0; t < n; t++) {
-            vec3 sum = vec3_scale(normal[t], area[t]);
-            for (uint32_t half = (uint32_t)(3 * t); half < 3 * t + 3; half++)
-                for (uint32_t h = adjacency->next[half]; h != half; h = adjacency->next[h]) {
-                    float bend = 1.0f - vec3_dot(normal[t], normal[h / 3]);
-                    float like = fmaxf(0.0f, 1.0f - bend / CREASE);
-                    sum = vec3_mad(sum, like * like * area[h / 3], normal[h / 3]);
-                }
-            next[t] = vec3_normalize(sum);
-        }
-        vec3 *swap = normal;
-        normal = next;
-        next = swap;
-    }
-    mem_free(next);
-    mem_free(area);
-    return normal;
-}
-
 static vec3 centre_of(const struct mesh *mesh, uint32_t t) {
     return mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f);
 }
@@ -128,7 +96,7 @@ static int lightest_first(const void *left, const void *right) {
 /* All pairs of triangles that meet at an edge, the most alike first. */
 static struct link *make_links(const struct mesh *mesh, const struct adjacency *adjacency,
                                size_t *count) {
-    vec3 *normal = smooth_normals(mesh, adjacency);
+    vec3 *normal = adjacency_smooth_normals(adjacency, mesh);
     struct link *link = mem_array(3 * mesh->triangle_count, sizeof *link);
     *count = 0;
     for (uint32_t h = 0; h < 3 * mesh->triangle_count; h++) {
