@@ -16,10 +16,12 @@
 
 #define MAX_GRID 2048     /* cells a side */
 #define INSET 2           /* units between a chart and its box: more than coverage's margin */
-#define FIRST_FILL 0.72   /* share of the texels that charts take in the first try */
-#define SEARCH_STEP 1.04  /* of the density, until one fits and one does not */
-#define SEARCH_END 1.004  /* ratio of those two at which the search ends */
-#define MIN_FILL 1e-6     /* a density that fills less is not worth having */
+#define TEXEL_FILL 0.75   /* share of the texels that the mesh's area takes, to size a texel by */
+#define FIRST_FILL 0.96   /* share of the cells that shapes and padding take in the first try */
+#define GUESS_ROUNDS 4    /* drawings to find the density of that */
+#define SEARCH_STEP 1.015 /* of the density, until one fits and one does not */
+#define SEARCH_END 1.003  /* ratio of those two at which the search ends */
+#define MIN_DENSITY 1e-3  /* of the one at which the mesh's area takes all texels: not worth less */
 
 /* The charts drawn at one density. */
 struct drawing {
@@ -114,21 +116,62 @@ static struct grid grid_of(uint32_t size) {
     return grid;
 }
 
-static bool try_density(struct drawing *drawing, const struct charts *charts, double density,
-                        const struct grid *grid) {
-    int32_t cell = (int32_t)grid->cell * COVERAGE_UNITS;
-    return draw(drawing, charts, density, cell, grid->cells) &&
-           pack(drawing->item, charts->count, grid->cells, grid->padding);
+/* Cells that the shape takes with its padding: the sum with a square of padding + 1 cells, which
+ * for two shapes are disjoint exactly where their distance is kept. */
+static size_t padded_cells(const struct pack_item *item, uint32_t padding) {
+    size_t words = pack_words(item->width), count = 0;
+    for (uint32_t y = 0; y < item->height + padding; y++) {
+        uint64_t carry[2] = {0, 0}; /* the word before, whose last bits reach into this one */
+        uint32_t first = y > padding ? y - padding : 0;
+        uint32_t last = y < item->height ? y : item->height - 1;
+        for (size_t i = 0; i <= words; i++) {
+            carry[1] = 0;
+            for (uint32_t r = first; r <= last && i < words; r++)
+                carry[1] |= item->row[r * words + i];
+            uint64_t wide = carry[1];
+            for (uint32_t shift = 1; shift <= padding; shift++)
+                wide |= carry[1] << shift | carry[0] >> (64 - shift);
+            count += (size_t)__builtin_popcountll(wide);
+            carry[0] = carry[1];
+        }
+    }
+    return count;
+}
+
+/* Share of the grid that the drawn shapes take with their padding; infinite when one is larger
+ * than the grid. Over 1 they cannot fit. */
+static double fill_at(struct drawing *drawing, const struct charts *charts, double density,
+                      const struct grid *grid) {
+    if (!draw(drawing, charts, density, (int32_t)grid->cell * COVERAGE_UNITS, grid->cells))
+        return INFINITY;
+    size_t cells = 0;
+    for (size_t c = 0; c < charts->count; c++)
+        cells += padded_cells(&drawing->item[c], grid->padding);
+    double side = (double)(grid->cells + grid->padding); /* padding may stick out */
+    return (double)cells / (side * side);
+}
+
+/* A density at which the shapes about fill the grid to FIRST_FILL. */
+static double guess_density(struct drawing *drawing, const struct charts *charts,
+                            const struct grid *grid, double full) {
+    double density = full;
+    for (int round = 0; round < GUESS_ROUNDS; round++) {
+        double fill = fill_at(drawing, charts, density, grid);
+        density *= isfinite(fill) ? sqrt(FIRST_FILL / fill) : 0.8;
+    }
+    return density;
 }
 
 /* Finds about the greatest density that fits and leaves its packing in `best`; 0 when none. */
 static double search_density(struct drawing *best, const struct charts *charts,
                              const struct grid *grid) {
-    double full = (double)grid->size / sqrt(charts->flat_area); /* charts take all texels */
-    double density = full * sqrt(FIRST_FILL), fits = 0.0, fails = full, step = SEARCH_STEP;
     struct drawing trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
-    while (density > full * sqrt(MIN_FILL) && (fits == 0.0 || fails / fits > SEARCH_END)) {
-        if (try_density(&trial, charts, density, grid)) {
+    double full = (double)grid->size / sqrt(charts->flat_area); /* charts take all texels */
+    double density = guess_density(&trial, charts, grid, full);
+    double fits = 0.0, fails = INFINITY, step = SEARCH_STEP;
+    while (density > full * MIN_DENSITY && (fits == 0.0 || fails / fits > SEARCH_END)) {
+        if (fill_at(&trial, charts, density, grid) <= 1.0 &&
+            pack(trial.item, charts->count, grid->cells, grid->padding)) {
             struct drawing old = *best;
             *best = trial;
             trial = old;
@@ -136,13 +179,11 @@ static double search_density(struct drawing *best, const struct charts *charts,
         } else {
             fails = density;
         }
-        if (fits == 0.0) {
-            density /= step;
-            step *= step; /* a mesh in many pieces may be far from the first guess */
-        } else if (fails == full) {
-            density = fmin(fits * SEARCH_STEP, sqrt(fits * full));
-        } else {
+        if (fits > 0.0 && isfinite(fails)) {
             density = sqrt(fits * fails);
+        } else {
+            density = fits > 0.0 ? density * step : density / step;
+            step *= SEARCH_STEP; /* the first guess may be far off */
         }
     }
     drawing_release(&trial);
@@ -203,7 +244,7 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
                                 struct error *err) {
     struct charts charts;
     struct grid grid = grid_of(size);
-    float texel_m = (float)sqrt(mesh_area(mesh) / FIRST_FILL) / (float)size;
+    float texel_m = (float)sqrt(mesh_area(mesh) / TEXEL_FILL) / (float)size;
     charts_make(&charts, mesh, segments, texel_m);
     struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
     double density = search_density(&drawing, &charts, &grid);
@@ -241,7 +282,8 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
             break;
         }
         struct grid grid = grid_of(size);
-        fits = least <= size && try_density(&drawing, &charts, density, &grid);
+        fits = fill_at(&drawing, &charts, density, &grid) <= 1.0 &&
+               pack(drawing.item, charts.count, grid.cells, grid.padding);
         if (fits)
             finish(atlas, &charts, &drawing, &grid, density, mesh->triangle_count);
     }

@@ -13,7 +13,7 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
-#define CHART_MAX_LEAN_DEG 70.0
+#define CHART_MAX_LEAN_DEG 75.0
 
 struct charts {
     size_t count;

@@ -7,7 +7,8 @@
  * cells from x on is taken; so "a run of cells from x + a to x + a + n - 1 hits something" is,
  * for all x at once, the union of two shifted rows of level[floor(log2 n)]. A shape is a list of
  * runs; the union over them has a 0 where it fits. Mostly a few runs fill it with ones, so they
- * are tried longest first. */
+ * are tried longest first. What fits nowhere in a row is not tried there again in nearly the same
+ * shape: the search begins at the row where the last box with such sides was placed. */
 #include "server/scene/atlas_pack.h"
 
 #include <stdlib.h>
@@ -16,7 +17,7 @@
 #include "common/mem.h"
 
 #define LEVELS 15   /* runs up to 2^14 cells and over */
-#define SMALL 32    /* boxes up to this many cells a side share a place to start from */
+#define CLASSES 96  /* of box sides, see class_of */
 
 struct run {
     uint32_t y, x, length;
@@ -35,7 +36,7 @@ struct packer {
     int level_count;
     uint64_t *hits;           /* [words] scratch */
     struct shape shape[4];    /* of the present item, by orientation */
-    uint32_t start[SMALL + 1][SMALL + 1]; /* row below which a small box found no place */
+    uint32_t start[CLASSES][CLASSES]; /* row where the last box of these sides found a place */
 };
 
 static bool get(const struct pack_item *item, uint32_t x, uint32_t y) {
@@ -176,6 +177,15 @@ static void occupy(struct packer *p, const struct shape *shape, uint32_t x, uint
         }
 }
 
+/* Sides of nearly one length share a class: each to 16, then eight classes an octave. */
+static uint32_t class_of(uint32_t side) {
+    if (side < 16)
+        return side;
+    uint32_t octave = 31 - (uint32_t)__builtin_clz(side); /* 4 or more */
+    uint32_t class = 16 + (octave - 4) * 8 + ((side >> (octave - 3)) & 7);
+    return class < CLASSES ? class : CLASSES - 1;
+}
+
 static bool place(struct packer *p, struct pack_item *item) {
     if (item->width > p->size || item->height > p->size)
         return false;
@@ -183,9 +193,8 @@ static bool place(struct packer *p, struct pack_item *item) {
     for (int quarter = 0; quarter < 4; quarter++) {
         struct shape *shape = &p->shape[quarter];
         shape_make(shape, item, quarter);
-        bool is_small = shape->width <= SMALL && shape->height <= SMALL;
-        uint32_t *start = is_small ? &p->start[shape->width][shape->height] : NULL;
-        for (uint32_t y = start ? *start : 0; y + shape->height <= p->size; y++) {
+        uint32_t *start = &p->start[class_of(shape->width)][class_of(shape->height)];
+        for (uint32_t y = *start; y + shape->height <= p->size; y++) {
             if (y + shape->height >= lowest_top)
                 break;
             int64_t x = fit_row(p, shape, y);
@@ -195,8 +204,7 @@ static bool place(struct packer *p, struct pack_item *item) {
             item->x = (uint32_t)x;
             item->y = y;
             item->quarter = quarter;
-            if (start)
-                *start = y;
+            *start = y;
             break;
         }
         if (shape->run_count == shape->height && shape->width == shape->height &&
