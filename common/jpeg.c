@@ -14,8 +14,8 @@
 #include "common/image_codec.h"
 #include "common/mem.h"
 
-/* A block of 64 pixels takes at least one bit, and chroma may share it among four. */
-#define MAX_PIXELS_PER_BYTE 2048
+/* A block of 64 pixels takes at least one bit. */
+#define MAX_PIXELS_PER_BYTE 512
 /* A progressive file may ask for any number of passes over the whole picture. */
 #define MAX_SCANS 500
 

@@ -30,20 +30,22 @@ struct reader {
     enum status status; /* what the jump reports */
     png_structp png;
     png_infop png_info;
-    uint8_t *row; /* [row_bytes] one row as stored */
+    uint8_t *row;      /* [row_bytes] one row as stored */
+    char warning[128]; /* the last one: it often says what the error that follows means */
 };
 
 static void read_failed(png_structp png, png_const_charp message) {
     struct reader *r = png_get_error_ptr(png);
     if (r->status == STATUS_OK)
-        r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s", r->source->name, message);
+        r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s%s%s", r->source->name,
+                              message, r->warning[0] ? "; " : "", r->warning);
     longjmp(png_jmpbuf(png), 1);
 }
 
-/* Warnings are about ancillary chunks (profiles, times, text) that do not touch the pixels. */
-static void ignore_warning(png_structp png, png_const_charp message) {
-    (void)png;
-    (void)message;
+/* Alone, warnings are about chunks that do not touch the pixels (profiles, times, text). */
+static void note_warning(png_structp png, png_const_charp message) {
+    struct reader *r = png_get_error_ptr(png);
+    snprintf(r->warning, sizeof r->warning, "%s", message);
 }
 
 static void read_bytes(png_structp png, png_bytep out, size_t length) {
@@ -135,7 +137,7 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
                            struct image_info *info, struct error *err) {
     struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
     struct reader *volatile kept = &r;
-    r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, read_failed, ignore_warning);
+    r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning);
     r.png_info = r.png ? png_create_info_struct(r.png) : NULL;
     if (!r.png_info) {
         png_destroy_read_struct(&r.png, NULL, NULL);
@@ -172,6 +174,11 @@ static void write_failed(png_structp png, png_const_charp message) {
     if (w->status == STATUS_OK)
         w->status = error_set(w->err, STATUS_INTERNAL, "cannot write %s: %s", w->path, message);
     longjmp(png_jmpbuf(png), 1);
+}
+
+static void ignore_warning(png_structp png, png_const_charp message) {
+    (void)png;
+    (void)message;
 }
 
 static void write_bytes(png_structp png, png_bytep data, size_t length) {
