@@ -1,0 +1,132 @@
+/* api.c -- see api.h. */
+#include "server/http/api.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/http/digests.h"
+#include "server/http/events.h"
+#include "server/http/field.h"
+#include "server/http/problem.h"
+
+static bool has_row(struct store *store, const char *folder, const char *name) {
+    enum status status;
+    int64_t id;
+    if (strcmp(folder, "jobs") == 0) {
+        struct job job;
+        if (!field_number(name, 1, INT64_MAX, &id))
+            return false;
+        status = store_job_get(store, id, &job, NULL);
+        if (status == STATUS_OK)
+            job_release(&job);
+    } else {
+        struct scene_row row;
+        status = store_scene_get(store, name, &row, NULL);
+        if (status == STATUS_OK)
+            scene_row_release(&row);
+    }
+    return status != STATUS_NOT_FOUND; /* in doubt, keep the files */
+}
+
+/* Removes what is in DATA/folder: all of it, or what the store has no row for. */
+static enum status sweep(const struct api *api, const char *folder, bool keep_known, struct error *err) {
+    char *path = file_join(api->config.data_dir, folder);
+    enum status status = file_make_dirs(path, err);
+    DIR *dir = status == STATUS_OK ? opendir(path) : NULL;
+    if (status == STATUS_OK && !dir)
+        status = error_set_errno(err, errno, "cannot list folder %s", path);
+    struct dirent *entry;
+    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 ||
+            (keep_known && has_row(api->store, folder, entry->d_name)))
+            continue;
+        char *inner = file_join(path, entry->d_name);
+        log_info("removing %s, left over from an earlier run", inner);
+        status = file_remove_tree(inner, err);
+        mem_free(inner);
+    }
+    if (dir)
+        closedir(dir);
+    mem_free(path);
+    return status;
+}
+
+enum status api_new(struct api **out, const struct api_config *config, struct store *store,
+                    struct scheduler *scheduler, struct error *err) {
+    struct api *api = mem_calloc(1, sizeof *api);
+    api->config = *config;
+    api->store = store;
+    api->scheduler = scheduler;
+    pthread_mutex_init(&api->scene_mutex, NULL);
+    api->hub = hub_new(config->keepalive_sec);
+    api->digests = digests_new();
+    *out = api;
+    enum status status = sweep(api, "uploads", false, err);
+    if (status == STATUS_OK)
+        status = sweep(api, "trash", false, err);
+    if (status == STATUS_OK)
+        status = sweep(api, "scenes", true, err);
+    if (status == STATUS_OK)
+        status = sweep(api, "jobs", true, err);
+    if (status == STATUS_OK) {
+        store_on_change(store, hub_changed, api->hub);
+        return STATUS_OK;
+    }
+    api_free(api);
+    *out = NULL;
+    return status;
+}
+
+void api_free(struct api *api) {
+    if (!api)
+        return;
+    store_on_change(api->store, NULL, NULL);
+    hub_free(api->hub);
+    digests_free(api->digests);
+    pthread_mutex_destroy(&api->scene_mutex);
+    mem_free(api);
+}
+
+enum status api_discard(struct api *api, const char *path, struct error *err) {
+    char *from = file_join(api->config.data_dir, path);
+    char *to = file_join(api->config.data_dir, "trash/XXXXXX");
+    enum status status = STATUS_OK;
+    /* Into a folder of its own, so that two discards of one name do not meet. */
+    if (!mkdtemp(to)) {
+        status = error_set_errno(err, errno, "cannot make a folder in %s/trash", api->config.data_dir);
+        goto out;
+    }
+    char *inside = file_join(to, "it");
+    if (rename(from, inside) != 0 && errno != ENOENT)
+        status = error_set_errno(err, errno, "cannot move %s away", from);
+    mem_free(inside);
+    enum status removed = file_remove_tree(to, status == STATUS_OK ? err : NULL);
+    if (status == STATUS_OK)
+        status = removed;
+out:
+    mem_free(from);
+    mem_free(to);
+    return status;
+}
+
+struct response *api_check_room(struct api *api, const struct request *r, uint64_t bytes) {
+    struct error err;
+    uint64_t room;
+    if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    uint64_t keep = api->config.min_free_bytes;
+    if (room >= keep && room - keep >= bytes)
+        return NULL;
+    char detail[256];
+    snprintf(detail, sizeof detail,
+             "%llu MiB are wanted, and of the %llu MiB that are free, %llu MiB must stay so",
+             (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20),
+             (unsigned long long)(keep >> 20));
+    return problem_full(r, 507, detail, "delete jobs or scenes that nobody needs", NULL);
+}

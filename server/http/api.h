@@ -1,0 +1,57 @@
+/* api.h -- what every handler works with: the daemon's parts and limits, and figures. */
+#ifndef UNBAKE_HTTP_API_H
+#define UNBAKE_HTTP_API_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+#include "server/http/message.h"
+#include "server/job/scheduler.h"
+#include "server/store/store.h"
+
+struct api_library {
+    const char *name, *version;
+};
+
+struct api_config {
+    const char *data_dir;
+    int max_attempts;
+    size_t queue_limit;        /* queued jobs */
+    uint64_t max_upload_bytes;
+    uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */
+    size_t max_streams;        /* event streams at once */
+    double keepalive_sec;
+    const char *server_names;  /* besides loopback; separated by spaces or commas */
+    const struct api_library *libraries;
+    size_t library_count;
+};
+
+struct hub;      /* events.h */
+struct digests;  /* digests.h */
+struct listener; /* listener.h */
+
+struct api {
+    struct api_config config; /* pointers in it are borrowed */
+    struct store *store;      /* borrowed */
+    struct scheduler *scheduler; /* borrowed */
+    struct hub *hub;
+    struct digests *digests;
+    struct listener *listener; /* NULL before it listens; for figures */
+    /* Held while a scene's row and its file appear or disappear together. */
+    pthread_mutex_t scene_mutex;
+    atomic_ullong uploaded_bytes, request_count[6]; /* by first digit of the status */
+};
+
+/* Makes the data folder's parts, removes what an earlier life left half done (uploads, trash,
+ * files without a row), and listens to the store's changes. Before any other thread. */
+enum status api_new(struct api **api, const struct api_config *config, struct store *store,
+                    struct scheduler *scheduler, struct error *err);
+void api_free(struct api *api);
+
+/* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
+enum status api_discard(struct api *api, const char *path, struct error *err);
+
+/* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
+struct response *api_check_room(struct api *api, const struct request *r, uint64_t bytes);
+
+#endif

@@ -1,0 +1,191 @@
+/* field.c -- see field.h. */
+#include "server/http/field.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static bool is_digit(char c) {
+    return c >= '0' && c <= '9';
+}
+
+bool field_is_token(const char *text) {
+    if (*text == '\0')
+        return false;
+    for (; *text; text++)
+        if (!is_digit(*text) && !(*text >= 'a' && *text <= 'z') && !(*text >= 'A' && *text <= 'Z') &&
+            !strchr("!#$%&'*+-.^_`|~", *text))
+            return false;
+    return true;
+}
+
+bool field_etag_listed(const char *list, const char *etag, bool weak) {
+    list += strspn(list, " \t");
+    if (list[0] == '*' && list[1 + strspn(list + 1, " \t")] == '\0')
+        return true;
+    size_t wanted = strlen(etag);
+    for (const char *at = list; *at;) {
+        at += strspn(at, " \t,");
+        bool is_weak = strncmp(at, "W/", 2) == 0;
+        at += is_weak ? 2 : 0;
+        const char *end = *at == '"' ? strchr(at + 1, '"') : NULL;
+        if (!end)
+            return false;
+        size_t length = (size_t)(end + 1 - at);
+        if ((weak || !is_weak) && length == wanted && memcmp(at, etag, wanted) == 0)
+            return true;
+        at = end + 1;
+    }
+    return false;
+}
+
+bool field_accepts(const char *accept, const char *type) {
+    while (*accept) {
+        accept += strspn(accept, " \t,");
+        size_t length = strcspn(accept, ",");
+        size_t name = strcspn(accept, ",; \t");
+        if (name == strlen(type) && strncasecmp(accept, type, name) == 0)
+            return true;
+        accept += length;
+    }
+    return false;
+}
+
+bool field_is_type(const char *content_type, const char *type) {
+    size_t name = strcspn(content_type, "; \t");
+    return name == strlen(type) && strncasecmp(content_type, type, name) == 0;
+}
+
+/* Digits from *at on; false when there are none or too many. */
+static bool read_digits(const char **at, uint64_t *value) {
+    const char *start = *at;
+    *value = 0;
+    for (; is_digit(**at); (*at)++) {
+        if (*at - start >= 18)
+            return false;
+        *value = *value * 10 + (uint64_t)(**at - '0');
+    }
+    return *at > start;
+}
+
+enum field_range field_range(const char *range, uint64_t size, uint64_t *first, uint64_t *count) {
+    if (strncasecmp(range, "bytes=", 6) != 0)
+        return FIELD_RANGE_WHOLE;
+    const char *at = range + 6;
+    at += strspn(at, " \t");
+    uint64_t from = 0, last = 0;
+    bool has_from = is_digit(*at), has_last = false;
+    if (has_from && !read_digits(&at, &from))
+        return FIELD_RANGE_WHOLE;
+    if (*at++ != '-')
+        return FIELD_RANGE_WHOLE;
+    if (is_digit(*at)) {
+        has_last = true;
+        if (!read_digits(&at, &last))
+            return FIELD_RANGE_WHOLE;
+    }
+    if (at[strspn(at, " \t")] != '\0' || (!has_from && !has_last) || (has_from && has_last && last < from))
+        return FIELD_RANGE_WHOLE;
+    if (!has_from) { /* the last so many bytes */
+        if (last == 0 || size == 0)
+            return FIELD_RANGE_OUTSIDE;
+        *count = last < size ? last : size;
+        *first = size - *count;
+        return FIELD_RANGE_PART;
+    }
+    if (from >= size)
+        return FIELD_RANGE_OUTSIDE;
+    *first = from;
+    *count = has_last && last < size ? last - from + 1 : size - from;
+    return FIELD_RANGE_PART;
+}
+
+static const char base64_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+bool field_digest(const char *repr_digest, char hex[65]) {
+    const char *at = strstr(repr_digest, "sha-256=:");
+    if (!at || (at > repr_digest && !strchr(" ,\t", at[-1])))
+        return false;
+    at += 9;
+    uint32_t bits = 0;
+    unsigned held = 0;
+    size_t used = 0;
+    size_t length = strcspn(at, ":");
+    if (length != 44 || at[43] != '=' || at[44] != ':')
+        return false;
+    for (size_t i = 0; i < 43; i++) {
+        const char *digit = strchr(base64_digits, at[i]);
+        if (!digit)
+            return false;
+        bits = bits << 6 | (uint32_t)(digit - base64_digits);
+        held += 6;
+        if (held >= 8 && used < 64) {
+            held -= 8;
+            snprintf(hex + used, 3, "%02x", (unsigned)(bits >> held & 0xff));
+            used += 2;
+        }
+    }
+    return used == 64;
+}
+
+void field_digest_format(const char *hex, char text[64]) {
+    char *out = text + sprintf(text, "sha-256=:");
+    uint32_t bits = 0;
+    unsigned held = 0;
+    for (size_t i = 0; i < 64; i++) {
+        char c = hex[i];
+        bits = bits << 4 | (uint32_t)(is_digit(c) ? c - '0' : c - 'a' + 10);
+        held += 4;
+        if (held >= 6) {
+            held -= 6;
+            *out++ = base64_digits[bits >> held & 63];
+        }
+    }
+    *out++ = base64_digits[bits << (6 - held) & 63];
+    memcpy(out, "=:", 3);
+}
+
+bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *value) {
+    bool negative = *text == '-';
+    uint64_t magnitude;
+    text += negative ? 1 : 0;
+    if (!read_digits(&text, &magnitude) || *text != '\0')
+        return false;
+    *value = negative ? -(int64_t)magnitude : (int64_t)magnitude;
+    return *value >= minimum && *value <= maximum;
+}
+
+bool field_is_sha256(const char *text) {
+    return strspn(text, "0123456789abcdef") == 64 && text[64] == '\0';
+}
+
+bool field_host(const char *host, size_t *length) {
+    const char *at = host;
+    if (*at == '[') {
+        at += 1 + strspn(at + 1, "0123456789abcdefABCDEF:.");
+        if (*at++ != ']')
+            return false;
+    } else {
+        at += strspn(at, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._");
+        if (at == host)
+            return false;
+    }
+    *length = (size_t)(at - host);
+    if (*at == ':')
+        at += 1 + strspn(at + 1, "0123456789");
+    return *at == '\0';
+}
+
+bool field_is_loopback_host(const char *host, size_t length) {
+    static const char suffix[] = ".localhost";
+    size_t suffix_length = sizeof suffix - 1;
+    if (length == 9 && strncasecmp(host, "localhost", 9) == 0)
+        return true;
+    if (length > suffix_length && strncasecmp(host + length - suffix_length, suffix, suffix_length) == 0)
+        return true;
+    if (length == 5 && memcmp(host, "[::1]", 5) == 0)
+        return true;
+    /* A dotted quad that begins with 127: only digits and dots, so no name can pretend to be one. */
+    return length > 4 && memcmp(host, "127.", 4) == 0 && strspn(host, "0123456789.") >= length;
+}

@@ -1,0 +1,181 @@
+/* guard.c -- see guard.h. */
+#include "server/http/guard.h"
+
+#include <pthread.h>
+#include <stdbool.h>
+#include <sys/socket.h>
+#include <time.h>
+
+#include "common/mem.h"
+
+struct guarded {
+    int fd;
+    enum guard_phase phase;
+    double since_sec;       /* start of the phase, or of the window in GUARD_BODY */
+    uint64_t window_bytes;  /* arrived in the window */
+    bool is_shut;
+    struct guarded *next, *previous;
+};
+
+struct guard {
+    struct guard_limits limits;
+    void (*tick)(void *user);
+    void *user;
+    pthread_mutex_t mutex; /* guards everything below */
+    pthread_cond_t changed;
+    bool stopping;
+    struct guarded *first;
+    size_t count;
+    uint64_t shut_count;
+    pthread_t thread;
+};
+
+double guard_now(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bool is_late(const struct guard *g, struct guarded *c, double now_sec) {
+    double age = now_sec - c->since_sec;
+    switch (c->phase) {
+    case GUARD_HEAD: return age > g->limits.head_sec;
+    case GUARD_IDLE: return age > g->limits.idle_sec + g->limits.head_sec;
+    case GUARD_REPLY: return false;
+    case GUARD_BODY: break;
+    }
+    if (age < g->limits.window_sec)
+        return false;
+    bool late = (double)c->window_bytes < g->limits.body_bytes_per_sec * age;
+    c->since_sec = now_sec;
+    c->window_bytes = 0;
+    return late;
+}
+
+void guard_look(struct guard *g, double now_sec) {
+    pthread_mutex_lock(&g->mutex);
+    for (struct guarded *c = g->first; c; c = c->next) {
+        if (c->is_shut || !is_late(g, c, now_sec))
+            continue;
+        c->is_shut = true;
+        g->shut_count++;
+        shutdown(c->fd, SHUT_RDWR);
+    }
+    pthread_mutex_unlock(&g->mutex);
+}
+
+static void *run(void *user) {
+    struct guard *g = user;
+    pthread_mutex_lock(&g->mutex);
+    while (!g->stopping) {
+        if (g->count == 0) {
+            pthread_cond_wait(&g->changed, &g->mutex);
+            continue;
+        }
+        struct timespec until;
+        clock_gettime(CLOCK_MONOTONIC, &until);
+        until.tv_sec++;
+        while (!g->stopping && pthread_cond_timedwait(&g->changed, &g->mutex, &until) == 0)
+            ; /* another connection came or went: the second still runs */
+        pthread_mutex_unlock(&g->mutex);
+        guard_look(g, guard_now());
+        if (g->tick)
+            g->tick(g->user);
+        pthread_mutex_lock(&g->mutex);
+    }
+    pthread_mutex_unlock(&g->mutex);
+    return NULL;
+}
+
+enum status guard_new(struct guard **out, const struct guard_limits *limits,
+                      void (*tick)(void *user), void *user, struct error *err) {
+    struct guard *g = mem_calloc(1, sizeof *g);
+    g->limits = *limits;
+    g->tick = tick;
+    g->user = user;
+    pthread_mutex_init(&g->mutex, NULL);
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&g->changed, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+    *out = g;
+    int failed = pthread_create(&g->thread, NULL, run, g);
+    if (failed == 0)
+        return STATUS_OK;
+    pthread_cond_destroy(&g->changed);
+    pthread_mutex_destroy(&g->mutex);
+    mem_free(g);
+    *out = NULL;
+    return error_set_errno(err, failed, "cannot start the thread that watches connections");
+}
+
+void guard_free(struct guard *g) {
+    if (!g)
+        return;
+    pthread_mutex_lock(&g->mutex);
+    g->stopping = true;
+    pthread_cond_signal(&g->changed);
+    pthread_mutex_unlock(&g->mutex);
+    pthread_join(g->thread, NULL);
+    pthread_cond_destroy(&g->changed);
+    pthread_mutex_destroy(&g->mutex);
+    mem_free(g);
+}
+
+struct guarded *guard_add(struct guard *g, int fd) {
+    struct guarded *c = mem_calloc(1, sizeof *c);
+    c->fd = fd;
+    c->phase = GUARD_HEAD;
+    c->since_sec = guard_now();
+    pthread_mutex_lock(&g->mutex);
+    c->next = g->first;
+    if (g->first)
+        g->first->previous = c;
+    g->first = c;
+    if (g->count++ == 0)
+        pthread_cond_signal(&g->changed);
+    pthread_mutex_unlock(&g->mutex);
+    return c;
+}
+
+void guard_remove(struct guard *g, struct guarded *c) {
+    pthread_mutex_lock(&g->mutex);
+    if (c->next)
+        c->next->previous = c->previous;
+    if (c->previous)
+        c->previous->next = c->next;
+    else
+        g->first = c->next;
+    g->count--;
+    pthread_mutex_unlock(&g->mutex);
+    mem_free(c);
+}
+
+void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase) {
+    pthread_mutex_lock(&g->mutex);
+    c->phase = phase;
+    c->since_sec = guard_now();
+    c->window_bytes = 0;
+    pthread_mutex_unlock(&g->mutex);
+}
+
+void guard_body(struct guard *g, struct guarded *c, size_t bytes) {
+    pthread_mutex_lock(&g->mutex);
+    c->window_bytes += bytes;
+    pthread_mutex_unlock(&g->mutex);
+}
+
+size_t guard_count(struct guard *g) {
+    pthread_mutex_lock(&g->mutex);
+    size_t count = g->count;
+    pthread_mutex_unlock(&g->mutex);
+    return count;
+}
+
+uint64_t guard_shut_count(struct guard *g) {
+    pthread_mutex_lock(&g->mutex);
+    uint64_t count = g->shut_count;
+    pthread_mutex_unlock(&g->mutex);
+    return count;
+}

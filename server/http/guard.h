@@ -1,0 +1,48 @@
+/* guard.h -- deadlines on connections: the library's own timeout is for silence only, which a
+ * client that sends one byte every two seconds never trips.
+ *
+ *   connection ──> HEAD ──> BODY ──> REPLY ──> IDLE ──> HEAD ...   (HEAD after the first byte
+ *                    └────────────────^          could not be seen: IDLE covers both)
+ *
+ * 1. HEAD: the whole head within head_sec. IDLE: within idle_sec + head_sec of the last reply.
+ *    BODY: at least body_bytes_per_sec, over each window of window_sec. REPLY: no deadline here.
+ * 2. A late connection's socket is shut down under the mutex that guard_remove takes too, so
+ *    never one that was closed and given to somebody else. */
+#ifndef UNBAKE_HTTP_GUARD_H
+#define UNBAKE_HTTP_GUARD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+
+struct guard_limits {
+    double head_sec, idle_sec, window_sec;
+    double body_bytes_per_sec;
+};
+
+enum guard_phase { GUARD_HEAD, GUARD_BODY, GUARD_REPLY, GUARD_IDLE };
+
+struct guard;   /* opaque; thread-safe */
+struct guarded; /* one connection; opaque */
+
+/* Starts a thread that looks once a second while there are connections, and then calls
+ * tick(user) too; it sleeps while there are none. */
+enum status guard_new(struct guard **g, const struct guard_limits *limits,
+                      void (*tick)(void *user), void *user, struct error *err);
+/* Stops the thread. All connections must be gone. */
+void guard_free(struct guard *g);
+
+struct guarded *guard_add(struct guard *g, int fd);
+void guard_remove(struct guard *g, struct guarded *c);
+void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase);
+void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* arrived just now */
+
+size_t guard_count(struct guard *g);         /* connections */
+uint64_t guard_shut_count(struct guard *g);  /* shut down for being late, ever */
+
+/* One look at all connections as of `now_sec` (CLOCK_MONOTONIC); the thread's step, for tests. */
+void guard_look(struct guard *g, double now_sec);
+double guard_now(void);
+
+#endif

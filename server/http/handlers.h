@@ -1,0 +1,42 @@
+/* handlers.h -- the functions of the route table. Each gives a reply, never NULL. */
+#ifndef UNBAKE_HTTP_HANDLERS_H
+#define UNBAKE_HTTP_HANDLERS_H
+
+#include "server/http/api.h"
+#include "server/http/message.h"
+
+/* system.c */
+struct response *system_root(struct api *api, struct request *r);
+struct response *system_healthz(struct api *api, struct request *r);
+struct response *system_readyz(struct api *api, struct request *r);
+struct response *system_metrics(struct api *api, struct request *r);
+struct response *system_openapi(struct api *api, struct request *r);
+struct response *system_version(struct api *api, struct request *r);
+struct response *system_settings(struct api *api, struct request *r);
+
+/* scenes.c */
+struct response *scenes_list(struct api *api, struct request *r);
+struct response *scenes_add(struct api *api, struct request *r);
+struct response *scenes_get(struct api *api, struct request *r);
+struct response *scenes_delete(struct api *api, struct request *r);
+
+/* jobs.c */
+struct response *jobs_list(struct api *api, struct request *r);
+struct response *jobs_add(struct api *api, struct request *r);
+struct response *jobs_get(struct api *api, struct request *r);
+struct response *jobs_patch(struct api *api, struct request *r);
+struct response *jobs_delete(struct api *api, struct request *r);
+struct response *jobs_cancel(struct api *api, struct request *r);
+struct response *jobs_pause(struct api *api, struct request *r);
+struct response *jobs_resume(struct api *api, struct request *r);
+struct response *jobs_retry(struct api *api, struct request *r);
+
+/* outputs.c */
+struct response *outputs_list(struct api *api, struct request *r);
+struct response *outputs_get(struct api *api, struct request *r);
+struct response *jobs_log(struct api *api, struct request *r);
+
+/* events.c */
+struct response *events_get(struct api *api, struct request *r);
+
+#endif

@@ -1,0 +1,399 @@
+/* jobs.c -- /v1/jobs: submit, look, change, act. */
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/settings.h"
+#include "common/sha256.h"
+#include "server/http/field.h"
+#include "server/http/handlers.h"
+#include "server/http/problem.h"
+#include "server/http/views.h"
+
+#define NAME_MAX_BYTES 200
+#define PRIORITY_MAX 100
+#define LABELS_MAX 32
+#define LABEL_MAX_BYTES 100
+
+/* The job's number in the path; or *refusal. */
+static int64_t job_id(const struct request *r, struct response **refusal) {
+    int64_t id = 0;
+    if (!field_number(r->target.segments[2], 1, INT64_MAX, &id))
+        *refusal = problem(r, 404, "\"%.80s\" is no job's number", r->target.segments[2]);
+    return id;
+}
+
+/* The reply that shows a job as it is now. */
+static struct response *show(struct api *api, const struct request *r, int64_t id, int status) {
+    struct job job;
+    struct error err;
+    if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    char etag[48];
+    snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job.revision);
+    struct response *reply;
+    if (status == 200 && r->method == METHOD_GET) {
+        reply = view_tagged(r, view_job(&job), etag);
+    } else {
+        reply = response_json(status, view_job(&job));
+        response_field(reply, "ETag", "%s", etag);
+    }
+    job_release(&job);
+    return reply;
+}
+
+struct response *jobs_get(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    int64_t id = job_id(r, &refusal);
+    return refusal ? refusal : show(api, r, id, 200);
+}
+
+struct response *jobs_list(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    const char *state_name = target_query(&r->target, "state");
+    const char *cursor = target_query(&r->target, "cursor");
+    enum job_state state = JOB_QUEUED;
+    int64_t before = 0;
+    if (state_name && !job_state_parse(state_name, &state))
+        return problem_full(r, 400, "there is no such job state",
+                            "queued, running, paused, succeeded, failed, cancelled", NULL);
+    if (cursor && !field_number(cursor, 1, INT64_MAX, &before))
+        return problem(r, 400, "the cursor is not one of ours");
+    size_t limit = view_limit(r, &refusal), count = 0;
+    if (refusal)
+        return refusal;
+    struct job *jobs = mem_calloc(limit + 1, sizeof *jobs);
+    struct error err;
+    /* One more than asked for tells whether there is another page. */
+    if (store_job_list(api->store, state_name ? (int)state : -1, before, limit + 1, jobs, &count, &err) !=
+        STATUS_OK) {
+        mem_free(jobs);
+        return problem_from(r, &err);
+    }
+    cJSON *items = cJSON_CreateArray();
+    char next[32] = "";
+    for (size_t i = 0; i < count; i++) {
+        if (i < limit)
+            cJSON_AddItemToArray(items, view_job(&jobs[i]));
+        if (i == limit)
+            snprintf(next, sizeof next, "%lld", (long long)jobs[limit - 1].id);
+    }
+    for (size_t i = 0; i < count; i++)
+        job_release(&jobs[i]);
+    mem_free(jobs);
+    return view_page(r, items, next);
+}
+
+/* --- bodies ------------------------------------------------------------------------------ */
+
+/* What a POST or PATCH asks for, checked. Pointers lie in `body`. */
+struct wish {
+    cJSON *body;
+    const char *scene, *name;
+    const cJSON *settings;
+    char *labels; /* JSON text; owned; NULL: not given */
+    int priority; /* INT_MIN: not given */
+};
+
+static void wish_release(struct wish *w) {
+    cJSON_Delete(w->body);
+    mem_free(w->labels);
+}
+
+static bool check_string(const cJSON *member, size_t max, cJSON *params) {
+    if (cJSON_IsString(member) && *member->valuestring && strlen(member->valuestring) <= max)
+        return true;
+    problem_param(params, member->string, NULL, "must be text of 1 to %zu bytes", max);
+    return false;
+}
+
+static void read_labels(struct wish *w, const cJSON *member, cJSON *params) {
+    size_t count = 0;
+    bool good = cJSON_IsObject(member);
+    for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
+        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES &&
+               *label->string && strlen(label->string) <= LABEL_MAX_BYTES;
+    if (good && count <= LABELS_MAX)
+        w->labels = json_text(member);
+    else
+        problem_param(params, "labels", NULL, "must be an object of at most %d texts, each name and "
+                      "text of at most %d bytes", LABELS_MAX, LABEL_MAX_BYTES);
+}
+
+static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
+    double value = cJSON_IsNumber(member) ? member->valuedouble : NAN;
+    if (fabs(value) <= PRIORITY_MAX && value == floor(value))
+        w->priority = (int)value;
+    else
+        problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX,
+                      PRIORITY_MAX);
+}
+
+/* Checks the settings alone; the caller's problems get "settings." before their names. */
+static void check_settings(const cJSON *member, struct settings *settings, cJSON *params) {
+    cJSON *problems = cJSON_CreateArray();
+    if (settings_apply(settings, member, problems, NULL) != STATUS_OK) {
+        const cJSON *problem;
+        cJSON_ArrayForEach(problem, problems) {
+            const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
+            const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
+            const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
+            char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
+            problem_param(params, full, hint, "%s", reason);
+            mem_free(full);
+        }
+    }
+    cJSON_Delete(problems);
+}
+
+/* Reads the request's body; all faults go into `params`. NULL, or a reply where the body is no
+ * JSON object at all. *w needs wish_release in any case. */
+static struct response *read_wish(const struct request *r, struct wish *w, bool is_new, cJSON *params) {
+    memset(w, 0, sizeof *w);
+    w->priority = INT_MIN;
+    struct error err;
+    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &w->body, &err) != STATUS_OK)
+        return problem(r, 400, "%s", err.message);
+    if (!cJSON_IsObject(w->body))
+        return problem(r, 400, "the request body is not a JSON object");
+    for (const cJSON *member = w->body->child; member; member = member->next) {
+        const char *name = member->string;
+        if (strcmp(name, "name") == 0)
+            w->name = check_string(member, NAME_MAX_BYTES, params) ? member->valuestring : NULL;
+        else if (strcmp(name, "labels") == 0)
+            read_labels(w, member, params);
+        else if (strcmp(name, "priority") == 0)
+            read_priority(w, member, params);
+        else if (is_new && strcmp(name, "scene") == 0)
+            w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
+        else if (is_new && strcmp(name, "settings") == 0)
+            w->settings = member;
+        else
+            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels"
+                                               : "there are name, priority, labels", "is not known here");
+    }
+    if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
+        problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
+    return NULL;
+}
+
+/* --- submitting -------------------------------------------------------------------------- */
+
+/* The scene that the wish names, if a job may use it; else an entry in params. */
+static bool find_scene(struct api *api, const char *id, struct scene_row *row, cJSON *params) {
+    size_t digits = strspn(id, "0123456789abcdef");
+    struct error err;
+    if (digits < 8 || digits > 64 || id[digits] != '\0') {
+        problem_param(params, "scene", NULL, "is no scene's id: 8 to 64 lower-case hex digits");
+        return false;
+    }
+    enum status status = digits == 64 ? store_scene_get(api->store, id, row, &err)
+                                      : store_scene_find(api->store, id, row, &err);
+    if (status != STATUS_OK) {
+        problem_param(params, "scene", NULL, "%s", err.message);
+        return false;
+    }
+    if (row->state != SCENE_REJECTED)
+        return true;
+    problem_param(params, "scene", "GET /v1/scenes/{id} lists what is wrong with it", "was rejected");
+    scene_row_release(row);
+    return false;
+}
+
+static struct response *dry_run_reply(const struct scene_row *scene, const struct settings *settings) {
+    cJSON *value = cJSON_CreateObject();
+    json_add_bool(value, "dry_run", true);
+    json_add_string(value, "scene", scene->id);
+    json_add_string(value, "scene_state", scene_state_name(scene->state));
+    json_add(value, "settings", settings_to_json(settings));
+    return response_json(200, value);
+}
+
+static struct response *add_job(struct api *api, const struct request *r, const struct wish *w,
+                                const struct scene_row *scene) {
+    struct error err;
+    char *settings = w->settings ? json_text(w->settings) : mem_strdup("{}");
+    char digest[SHA256_HEX_SIZE];
+    sha256_of(buf_text(&r->body), r->body.length, digest);
+    struct job_new job = {
+        .scene_id = scene->id,
+        .name = w->name ? w->name : scene->name,
+        .labels = w->labels ? w->labels : "{}",
+        .settings = settings,
+        .priority = w->priority == INT_MIN ? 0 : w->priority,
+        .max_attempts = api->config.max_attempts,
+        .idempotency_key = request_field(r, "Idempotency-Key"),
+        .request_sha256 = digest,
+    };
+    int64_t id = 0;
+    bool replayed = false;
+    enum status status = store_job_add(api->store, &job, api->config.queue_limit, &id, &replayed, &err);
+    mem_free(settings);
+    if (status == STATUS_CONFLICT && job.idempotency_key)
+        return problem_full(r, 422, err.message, "a new request needs a new Idempotency-Key", NULL);
+    if (status != STATUS_OK)
+        return problem_from(r, &err);
+    if (!replayed)
+        scheduler_wake(api->scheduler);
+    struct response *reply = show(api, r, id, replayed ? 200 : 201);
+    response_field(reply, "Location", "/v1/jobs/%lld", (long long)id);
+    if (replayed)
+        response_field(reply, "Idempotency-Replayed", "true");
+    return reply;
+}
+
+static struct response *check_submission(const struct request *r, bool *dry_run) {
+    const char *text = target_query(&r->target, "dry_run");
+    const char *key = request_field(r, "Idempotency-Key");
+    *dry_run = text && strcmp(text, "1") == 0;
+    if (text && !*dry_run && strcmp(text, "0") != 0)
+        return problem(r, 400, "dry_run must be 0 or 1");
+    size_t length = key ? strlen(key) : 1;
+    bool visible = true;
+    for (size_t i = 0; key && i < length; i++)
+        visible = visible && key[i] > 0x20 && key[i] < 0x7f;
+    if (length < 1 || length > 200 || !visible)
+        return problem(r, 400, "Idempotency-Key must be 1 to 200 visible ASCII characters");
+    return NULL;
+}
+
+struct response *jobs_add(struct api *api, struct request *r) {
+    bool dry_run;
+    struct response *reply = check_submission(r, &dry_run);
+    if (reply)
+        return reply;
+    cJSON *params = cJSON_CreateArray();
+    struct wish w;
+    struct scene_row scene;
+    struct settings settings;
+    bool has_scene = false;
+    settings_init(&settings);
+    reply = read_wish(r, &w, true, params);
+    if (!reply && w.settings)
+        check_settings(w.settings, &settings, params);
+    if (!reply && w.scene)
+        has_scene = find_scene(api, w.scene, &scene, params);
+    if (!reply && cJSON_GetArraySize(params) > 0) {
+        reply = problem_invalid(r, "the job cannot be taken as it is", params);
+        params = NULL;
+    }
+    if (!reply && !dry_run)
+        reply = api_check_room(api, r, 0);
+    if (!reply)
+        reply = dry_run ? dry_run_reply(&scene, &settings) : add_job(api, r, &w, &scene);
+    if (has_scene)
+        scene_row_release(&scene);
+    settings_release(&settings);
+    cJSON_Delete(params);
+    wish_release(&w);
+    return reply;
+}
+
+/* --- changing ---------------------------------------------------------------------------- */
+
+/* The revision that If-Match asks for, -1 for any; or *refusal. */
+static int64_t expected_revision(const struct request *r, struct response **refusal) {
+    const char *match = request_field(r, "If-Match");
+    int64_t revision = -1;
+    char digits[24];
+    int end = 0;
+    if (!match)
+        *refusal = problem_full(r, 428, "a change must say what it changes, by If-Match",
+                                "send the job's ETag, or * to change whatever is there", NULL);
+    else if (strcmp(match, "*") != 0 &&
+             (sscanf(match, "\"rev-%20[0-9]\"%n", digits, &end) != 1 || end == 0 || match[end] != '\0' ||
+              !field_number(digits, 0, INT64_MAX, &revision)))
+        *refusal = problem(r, 412, "If-Match names none of this job's revisions");
+    return revision;
+}
+
+struct response *jobs_patch(struct api *api, struct request *r) {
+    struct response *reply = NULL;
+    int64_t id = job_id(r, &reply);
+    int64_t revision = reply ? -1 : expected_revision(r, &reply);
+    if (reply)
+        return reply;
+    cJSON *params = cJSON_CreateArray();
+    struct wish w;
+    struct error err;
+    reply = read_wish(r, &w, false, params);
+    if (!reply && cJSON_GetArraySize(params) > 0) {
+        reply = problem_invalid(r, "the change cannot be made", params);
+        params = NULL;
+    }
+    if (!reply) {
+        enum status status = store_job_patch(api->store, id, revision, w.name, w.labels, w.priority, &err);
+        if (status == STATUS_CONFLICT)
+            reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
+        else if (status != STATUS_OK)
+            reply = problem_from(r, &err);
+        else
+            reply = show(api, r, id, 200);
+    }
+    scheduler_wake(api->scheduler);
+    cJSON_Delete(params);
+    wish_release(&w);
+    return reply;
+}
+
+struct response *jobs_delete(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    int64_t id = job_id(r, &refusal);
+    if (refusal)
+        return refusal;
+    struct error err;
+    enum status status = store_job_delete(api->store, id, &err);
+    if (status == STATUS_OK) {
+        char path[40];
+        snprintf(path, sizeof path, "jobs/%lld", (long long)id);
+        status = api_discard(api, path, &err);
+    }
+    return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
+}
+
+static struct response *act(struct api *api, const struct request *r,
+                            enum status (*action)(struct api *api, int64_t id, struct error *err)) {
+    struct response *refusal = NULL;
+    int64_t id = job_id(r, &refusal);
+    if (refusal)
+        return refusal;
+    struct error err;
+    if (action(api, id, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    scheduler_wake(api->scheduler);
+    return show(api, r, id, 202);
+}
+
+static enum status do_cancel(struct api *api, int64_t id, struct error *err) {
+    return store_job_cancel(api->store, id, err);
+}
+
+static enum status do_pause(struct api *api, int64_t id, struct error *err) {
+    return store_job_pause(api->store, id, err);
+}
+
+static enum status do_resume(struct api *api, int64_t id, struct error *err) {
+    return store_job_resume(api->store, id, err);
+}
+
+static enum status do_retry(struct api *api, int64_t id, struct error *err) {
+    return store_job_retry(api->store, id, api->config.max_attempts, err);
+}
+
+struct response *jobs_cancel(struct api *api, struct request *r) {
+    return act(api, r, do_cancel);
+}
+
+struct response *jobs_pause(struct api *api, struct request *r) {
+    return act(api, r, do_pause);
+}
+
+struct response *jobs_resume(struct api *api, struct request *r) {
+    return act(api, r, do_resume);
+}
+
+struct response *jobs_retry(struct api *api, struct request *r) {
+    return act(api, r, do_retry);
+}

@@ -1,0 +1,38 @@
+/* listener.h -- the daemon's HTTP side: sockets, threads and libmicrohttpd, of which nothing shows.
+ *
+ *   head ──> head_check, routes_begin ──> body: routes_data ... ──> routes_finish ──> reply
+ *                    │ refused                     │ refused
+ *                    └──> reply                    └──> reply written past the library, then drain
+ *
+ * 1. A handler that may wait for a disk runs on a clerk thread while its connection is suspended;
+ *    libmicrohttpd's own few threads never wait.
+ * 2. A stream with nothing to say is suspended, never asked again until it is woken.
+ * 3. Stopping: accept nothing more, end the streams, resume all, then stop the library, which
+ *    aborts the process when it finds a suspended connection. */
+#ifndef UNBAKE_HTTP_LISTENER_H
+#define UNBAKE_HTTP_LISTENER_H
+
+#include <stdint.h>
+
+#include "server/http/api.h"
+#include "server/http/guard.h"
+
+struct listener_config {
+    const char *address; /* numeric: "127.0.0.1", "::1" */
+    uint16_t port;       /* 0: any free one */
+    unsigned connection_max;
+    struct guard_limits limits;
+};
+
+enum status listener_start(struct listener **l, const struct listener_config *config, struct api *api,
+                           struct error *err);
+uint16_t listener_port(const struct listener *l);
+/* Accepts no further connection; those that exist are served. Any thread, once. */
+void listener_quiesce(struct listener *l);
+void listener_stop(struct listener *l); /* NULL is fine */
+
+size_t listener_connections(struct listener *l);
+uint64_t listener_late(struct listener *l); /* connections shut for being too slow */
+const char *listener_library_version(void);
+
+#endif

@@ -1,0 +1,154 @@
+/* routes.c -- see routes.h. */
+#include "server/http/routes.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "common/protocol.h"
+#include "server/http/events.h"
+#include "server/http/field.h"
+#include "server/http/handlers.h"
+#include "server/http/problem.h"
+#include "server/http/upload.h"
+
+static const struct route table[] = {
+    {METHOD_GET, "/", system_root, 0, false, ""},
+    {METHOD_GET, "/healthz", system_healthz, 0, false, ""},
+    {METHOD_GET, "/readyz", system_readyz, 0, true, ""},
+    {METHOD_GET, "/metrics", system_metrics, 0, false, ""},
+    {METHOD_GET, "/openapi.json", system_openapi, 0, false, ""},
+    {METHOD_GET, "/v1/version", system_version, 0, false, ""},
+    {METHOD_GET, "/v1/settings", system_settings, 0, false, ""},
+    {METHOD_GET, "/v1/scenes", scenes_list, 0, false, "limit cursor"},
+    {METHOD_POST, "/v1/scenes", scenes_add, ROUTE_BODY_UPLOAD, true, "name"},
+    {METHOD_GET, "/v1/scenes/{scene}", scenes_get, 0, false, ""},
+    {METHOD_DELETE, "/v1/scenes/{scene}", scenes_delete, 0, true, ""},
+    {METHOD_GET, "/v1/jobs", jobs_list, 0, false, "state limit cursor"},
+    {METHOD_POST, "/v1/jobs", jobs_add, ROUTE_BODY_JSON, true, "dry_run"},
+    {METHOD_GET, "/v1/jobs/{job}", jobs_get, 0, false, ""},
+    {METHOD_PATCH, "/v1/jobs/{job}", jobs_patch, ROUTE_BODY_JSON, true, ""},
+    {METHOD_DELETE, "/v1/jobs/{job}", jobs_delete, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/cancel", jobs_cancel, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/pause", jobs_pause, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/resume", jobs_resume, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/retry", jobs_retry, 0, true, ""},
+    {METHOD_GET, "/v1/jobs/{job}/events", events_get, 0, false, "after"},
+    {METHOD_GET, "/v1/jobs/{job}/log", jobs_log, 0, false, "bytes"},
+    {METHOD_GET, "/v1/jobs/{job}/outputs", outputs_list, 0, false, ""},
+    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", outputs_get, 0, true, ""},
+};
+
+const struct route *routes_table(size_t *count) {
+    *count = sizeof table / sizeof *table;
+    return table;
+}
+
+static bool matches(const char *pattern, const struct target *t) {
+    size_t i = 0;
+    for (const char *at = pattern + 1; *at; i++) {
+        size_t length = strcspn(at, "/");
+        if (i == t->segment_count)
+            return false;
+        bool is_rest = length > 4 && memcmp(at + length - 4, "...}", 4) == 0;
+        if (is_rest)
+            return true;
+        if (*at != '{' && (strlen(t->segments[i]) != length || memcmp(at, t->segments[i], length) != 0))
+            return false;
+        at += length;
+        if (*at == '/')
+            at++;
+    }
+    return i == t->segment_count;
+}
+
+/* 404, or 405 where another method would do. */
+static struct response *no_route(const struct request *r) {
+    static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE"};
+    char allow[64] = "";
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        if (!matches(table[i].pattern, &r->target))
+            continue;
+        size_t used = strlen(allow);
+        snprintf(allow + used, sizeof allow - used, "%s%s", used ? ", " : "", names[table[i].method]);
+    }
+    if (!*allow)
+        return problem_full(r, 404, "there is nothing at this path",
+                            "GET / and GET /openapi.json say what there is", NULL);
+    struct response *reply = problem(r, 405, "here only %s can be done", allow);
+    response_field(reply, "Allow", "%s", allow);
+    return reply;
+}
+
+static struct response *check_query(const struct request *r) {
+    for (size_t i = 0; i < r->target.query_count; i++) {
+        const char *name = r->target.names[i];
+        size_t length = strlen(name);
+        const char *at = length ? r->route->query : "";
+        while (*at && !(strncmp(at, name, length) == 0 && (at[length] == ' ' || !at[length]))) {
+            at += strcspn(at, " ");
+            at += strspn(at, " ");
+        }
+        if (!*at)
+            return problem(r, 400, "\"%.100s\" is no query parameter here%s%s", name,
+                           *r->route->query ? "; there are: " : "", r->route->query);
+    }
+    return NULL;
+}
+
+static struct response *check_media_type(const struct request *r) {
+    const char *type = request_field(r, "Content-Type");
+    const char *coding = request_field(r, "Content-Encoding");
+    const char *accepted = r->route->body == ROUTE_BODY_UPLOAD ? "application/octet-stream" : MIME_JSON;
+    const char *detail = NULL;
+    if (coding && r->has_body)
+        detail = "a body with a Content-Encoding is not taken";
+    else if (r->route->body == ROUTE_BODY_UPLOAD && type && field_is_type(type, "multipart/form-data"))
+        detail = "a form is not taken: send the archive itself as the body, as curl -T does";
+    else if (r->route->body == ROUTE_BODY_JSON && !(type && (field_is_type(type, MIME_JSON) ||
+             (r->method == METHOD_PATCH && field_is_type(type, "application/merge-patch+json")))))
+        detail = "the body must be JSON and Content-Type say so";
+    if (!detail)
+        return NULL;
+    struct response *reply = problem(r, 415, "%s", detail);
+    response_field(reply, "Accept", "%s", accepted);
+    return reply;
+}
+
+static struct response *too_large(const struct request *r, uint64_t limit) {
+    cJSON *members = cJSON_CreateObject();
+    json_add_int(members, "limit_bytes", (int64_t)limit);
+    char detail[128];
+    snprintf(detail, sizeof detail, "the body is larger than %llu bytes", (unsigned long long)limit);
+    return problem_full(r, 413, detail, "", members);
+}
+
+struct response *routes_begin(struct api *api, struct request *r) {
+    for (size_t i = 0; i < sizeof table / sizeof *table && !r->route; i++)
+        if ((int)table[i].method == r->method && matches(table[i].pattern, &r->target))
+            r->route = &table[i];
+    if (!r->route)
+        return no_route(r);
+    struct response *refusal = check_query(r);
+    if (!refusal)
+        refusal = check_media_type(r);
+    if (refusal)
+        return refusal;
+    uint64_t limit = r->route->body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+    if (r->content_length > 0 && (uint64_t)r->content_length > limit)
+        return too_large(r, limit);
+    buf_init(&r->body, ROUTES_BODY_MAX);
+    return r->route->body == ROUTE_BODY_UPLOAD ? upload_begin(api, r) : NULL;
+}
+
+struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length) {
+    if (r->route->body == ROUTE_BODY_UPLOAD) {
+        if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
+            return too_large(r, api->config.max_upload_bytes);
+        return upload_data(api, r, data, length);
+    }
+    return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
+}
+
+struct response *routes_finish(struct api *api, struct request *r) {
+    return r->route->handle(api, r);
+}

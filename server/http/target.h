@@ -1,0 +1,39 @@
+/* target.h -- the request target (RFC 9112, 3.2), taken apart by us: libmicrohttpd decodes %2F and
+ * %00 before anybody can tell them from what they stand for.
+ *
+ * 1. A segment is decoded after the path was split, so an encoded slash never splits a path.
+ * 2. No decoded text holds a control byte or a NUL; no path holds an empty, "." or ".." part,
+ *    whether written with slashes or with %2F. */
+#ifndef UNBAKE_HTTP_TARGET_H
+#define UNBAKE_HTTP_TARGET_H
+
+#include <stddef.h>
+
+#include "common/error.h"
+
+#define TARGET_SEGMENTS_MAX 16
+#define TARGET_QUERY_MAX 16
+
+struct target {
+    char *path; /* as sent, without the query; owned */
+    char *segments[TARGET_SEGMENTS_MAX]; /* decoded; owned; none for "/" */
+    size_t segment_count;
+    char *names[TARGET_QUERY_MAX], *values[TARGET_QUERY_MAX]; /* decoded query; owned */
+    size_t query_count;
+};
+
+/* Fills *t, which needs target_release also after an error (STATUS_INPUT). */
+enum status target_parse(struct target *t, const char *raw, struct error *err);
+void target_release(struct target *t);
+
+/* The value of a query parameter, NULL where it is absent; borrowed. */
+const char *target_query(const struct target *t, const char *name);
+
+/* The segments from `first` on, joined by slashes; the caller's (mem_free). */
+char *target_rest(const struct target *t, size_t first);
+
+/* `text` with all but unreserved characters percent-encoded; slashes stay where `keep_slash`.
+ * The caller's (mem_free). */
+char *target_encode(const char *text, int keep_slash);
+
+#endif

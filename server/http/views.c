@@ -1,0 +1,152 @@
+/* views.c -- see views.h. */
+#include "server/http/views.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "common/mem.h"
+#include "server/http/field.h"
+#include "server/http/problem.h"
+
+#define LIMIT_DEFAULT 50
+#define LIMIT_MAX 200
+
+void view_time(int64_t unix_ms, char text[VIEW_TIME_SIZE]) {
+    time_t seconds = (time_t)(unix_ms / 1000);
+    struct tm utc;
+    gmtime_r(&seconds, &utc);
+    size_t used = strftime(text, VIEW_TIME_SIZE, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(text + used, VIEW_TIME_SIZE - used, ".%03dZ", (int)(unix_ms % 1000));
+}
+
+static void add_time(cJSON *object, const char *key, int64_t unix_ms) {
+    char text[VIEW_TIME_SIZE];
+    view_time(unix_ms, text);
+    json_add_string(object, key, unix_ms > 0 ? text : NULL);
+}
+
+/* JSON text that the store keeps; it checked it when it took it. */
+static void add_text(cJSON *object, const char *key, const char *text) {
+    cJSON *value = cJSON_Parse(text);
+    json_add(object, key, value ? value : cJSON_CreateNull());
+}
+
+static const char *or_null(const char *text) {
+    return text && *text ? text : NULL;
+}
+
+cJSON *view_job(const struct job *job) {
+    cJSON *v = cJSON_CreateObject();
+    json_add_int(v, "id", job->id);
+    json_add_int(v, "revision", job->revision);
+    json_add_string(v, "name", job->name);
+    json_add_string(v, "scene", job->scene_id);
+    json_add_string(v, "state", job_state_name(job->state));
+    json_add_string(v, "wanted", job_wanted_name(job->wanted));
+    json_add_int(v, "priority", job->priority);
+    add_text(v, "labels", job->labels);
+    add_text(v, "settings", job->settings);
+    json_add_int(v, "attempt", job->attempt);
+    json_add_int(v, "attempts_left", job->attempts_left);
+    add_time(v, "created_at", job->created_ms);
+    add_time(v, "started_at", job->started_ms);
+    add_time(v, "finished_at", job->finished_ms);
+    json_add_string(v, "stage", or_null(job->stage));
+    json_add_number(v, "progress", job->progress);
+    if (job->eta_sec >= 0)
+        json_add_number(v, "eta_sec", job->eta_sec);
+    else
+        json_add(v, "eta_sec", cJSON_CreateNull());
+    json_add_string(v, "reason", or_null(job->reason));
+    json_add_string(v, "hint", or_null(job->hint));
+    static const char *const parts[] = {"events", "outputs", "log"};
+    cJSON *links = cJSON_AddObjectToObject(v, "links");
+    char path[128];
+    snprintf(path, sizeof path, "/v1/jobs/%lld", (long long)job->id);
+    json_add_string(links, "self", path);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        snprintf(path, sizeof path, "/v1/jobs/%lld/%s", (long long)job->id, parts[i]);
+        json_add_string(links, parts[i], path);
+    }
+    snprintf(path, sizeof path, "/v1/scenes/%s", job->scene_id);
+    json_add_string(links, "scene", path);
+    return v;
+}
+
+cJSON *view_scene(const struct scene_row *row) {
+    cJSON *v = cJSON_CreateObject();
+    json_add_string(v, "id", row->id);
+    json_add_string(v, "name", row->name);
+    json_add_string(v, "state", scene_state_name(row->state));
+    json_add_int(v, "bytes", (int64_t)row->bytes);
+    add_time(v, "created_at", row->created_ms);
+    add_text(v, "problems", row->problems);
+    add_text(v, "facts", row->facts);
+    char path[128];
+    snprintf(path, sizeof path, "/v1/scenes/%s", row->id);
+    json_add_string(cJSON_AddObjectToObject(v, "links"), "self", path);
+    return v;
+}
+
+cJSON *view_output(int64_t job_id, const struct output_row *row) {
+    cJSON *v = cJSON_CreateObject();
+    json_add_string(v, "name", row->name);
+    json_add_int(v, "bytes", (int64_t)row->bytes);
+    json_add_string(v, "sha256", row->sha256);
+    json_add_string(v, "content_type", row->content_type);
+    add_time(v, "updated_at", row->updated_ms);
+    json_add_int(v, "attempt", row->attempt);
+    char *name = target_encode(row->name, true);
+    char *href = mem_printf("/v1/jobs/%lld/outputs/%s", (long long)job_id, name);
+    json_add_string(v, "href", href);
+    mem_free(href);
+    mem_free(name);
+    return v;
+}
+
+size_t view_limit(const struct request *r, struct response **refusal) {
+    const char *text = target_query(&r->target, "limit");
+    int64_t limit = LIMIT_DEFAULT;
+    if (text && !field_number(text, 1, LIMIT_MAX, &limit))
+        *refusal = problem(r, 400, "limit must be a number from 1 to %d", LIMIT_MAX);
+    return (size_t)limit;
+}
+
+struct response *view_page(const struct request *r, cJSON *items, const char *next) {
+    cJSON *page = cJSON_CreateObject();
+    json_add(page, "items", items);
+    json_add_string(page, "next", or_null(next));
+    struct response *reply = response_json(200, page);
+    if (!*next)
+        return reply;
+    struct buf link;
+    buf_init(&link, 900);
+    buf_printf(&link, "<%s?", r->target.path);
+    for (size_t i = 0; i < r->target.query_count; i++) {
+        if (strcmp(r->target.names[i], "cursor") == 0)
+            continue;
+        char *value = target_encode(r->target.values[i], false);
+        buf_printf(&link, "%s=%s&", r->target.names[i], value);
+        mem_free(value);
+    }
+    char *cursor = target_encode(next, false);
+    buf_printf(&link, "cursor=%s>; rel=\"next\"", cursor);
+    mem_free(cursor);
+    response_field(reply, "Link", "%s", buf_text(&link));
+    buf_release(&link);
+    return reply;
+}
+
+struct response *view_tagged(const struct request *r, cJSON *value, const char *etag) {
+    const char *known = request_field(r, "If-None-Match");
+    struct response *reply;
+    if (known && field_etag_listed(known, etag, true)) {
+        cJSON_Delete(value);
+        reply = response_new(304);
+    } else {
+        reply = response_json(200, value);
+    }
+    response_field(reply, "ETag", "%s", etag);
+    return reply;
+}

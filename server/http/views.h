@@ -1,0 +1,25 @@
+/* views.h -- rows of the store as the JSON that openapi.json describes. */
+#ifndef UNBAKE_HTTP_VIEWS_H
+#define UNBAKE_HTTP_VIEWS_H
+
+#include "common/json.h"
+#include "server/http/message.h"
+#include "server/store/store.h"
+
+cJSON *view_job(const struct job *job);
+cJSON *view_scene(const struct scene_row *row);
+cJSON *view_output(int64_t job_id, const struct output_row *row);
+
+#define VIEW_TIME_SIZE 32
+/* Unix milliseconds as 2026-11-21T12:00:00.123Z. */
+void view_time(int64_t unix_ms, char text[VIEW_TIME_SIZE]);
+
+/* `limit` of a list's query, or *refusal. */
+size_t view_limit(const struct request *r, struct response **refusal);
+/* {"items", "next"} and Link: `next` is the cursor, "" on the last page. Takes items. */
+struct response *view_page(const struct request *r, cJSON *items, const char *next);
+
+/* The reply to GET of a thing whose ETag is that text: 304 where the caller has it. Takes value. */
+struct response *view_tagged(const struct request *r, cJSON *value, const char *etag);
+
+#endif
