@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/word.h"
 
 #define NAME_MAX_LENGTH 64
 #define TEXT_MAX_LENGTH 255
@@ -76,41 +77,17 @@ const struct setting *settings_find(const char *name) {
     return i < 0 ? NULL : &table[i];
 }
 
-/* Levenshtein distance of two short words. */
-static size_t edit_distance(const char *a, const char *b) {
-    size_t row[NAME_MAX_LENGTH + 1];
-    size_t n = strlen(b);
-    for (size_t j = 0; j <= n; j++)
-        row[j] = j;
-    for (size_t i = 1; a[i - 1]; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= n; j++) {
-            size_t best = diagonal + (a[i - 1] != b[j - 1]);
-            if (row[j] + 1 < best)
-                best = row[j] + 1;
-            if (row[j - 1] + 1 < best)
-                best = row[j - 1] + 1;
-            diagonal = row[j];
-            row[j] = best;
-        }
-    }
-    return row[n];
-}
-
 const char *settings_nearest(const char *name) {
     const char *nearest = NULL;
     size_t best = SIZE_MAX;
-    if (strlen(name) > NAME_MAX_LENGTH)
-        return NULL;
     for (size_t i = 0; i < TABLE_COUNT; i++) {
-        size_t distance = edit_distance(name, table[i].name);
+        size_t distance = word_distance(name, table[i].name);
         if (distance < best) {
             best = distance;
             nearest = table[i].name;
         }
     }
-    return best <= 2 + strlen(name) / 4 ? nearest : NULL;
+    return word_is_near(name, best) ? nearest : NULL;
 }
 
 /* Index of a word in "a|b|c"; -1 when it is not one of them. */

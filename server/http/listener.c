@@ -468,9 +468,11 @@ enum status listener_start(struct listener **out, const struct listener_config *
 }
 
 void listener_quiesce(struct listener *l) {
-    /* The library gives the socket back but still watches it: it must stay open until the end. */
-    if (l->daemon)
-        MHD_quiesce_daemon(l->daemon);
+    /* The library gives the socket back, but its threads may still be about to look at it: it
+     * stays open until the end, and clients are refused rather than left waiting. */
+    MHD_socket fd = MHD_quiesce_daemon(l->daemon);
+    if (fd >= 0)
+        shutdown(fd, SHUT_RDWR);
 }
 
 /* Ends the streams and the clerks' work, and waits for both: nothing is suspended after. */

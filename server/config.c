@@ -1,0 +1,233 @@
+/* config.c -- see config.h. */
+#include "server/config.h"
+
+#include <arpa/inet.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "common/word.h"
+
+#define FILE_MAX_BYTES ((size_t)1 << 20)
+
+#define TEXT(name, value, help) {#name, OPTION_TEXT, "", 0, 0, value, help, offsetof(struct config, name)}
+#define INT(name, unit, low, high, value, help) \
+    {#name, OPTION_INT, unit, low, high, value, help, offsetof(struct config, name)}
+#define REAL(name, unit, low, high, value, help) \
+    {#name, OPTION_REAL, unit, low, high, value, help, offsetof(struct config, name)}
+#define BOOL(name, value, help) {#name, OPTION_BOOL, "", 0, 1, value, help, offsetof(struct config, name)}
+
+static const struct option table[] = {
+    TEXT(data_dir, "/var/lib/unbaked",
+         "Folder of everything that the daemon keeps. One daemon a folder; a local disk."),
+    TEXT(listen, "127.0.0.1:7117",
+         "Address and port for HTTP, loopback only. Port 0 takes a free one."),
+    TEXT(server_names, "",
+         "Host names besides localhost that the daemon answers for, as a proxy passes them on."),
+    TEXT(log_level, "info", "error, warning, info or debug; the log goes to stderr."),
+    INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time."),
+    INT(threads, "threads", 0, 1024, "0", "Threads shared by the running jobs. 0: one a processor."),
+    INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
+    INT(queue_limit, "jobs", 1, 1000000, "1000", "Jobs that may wait; more are refused with 429."),
+    INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
+    REAL(checkpoint_interval_sec, "s", 1, 86400, "60", "Work that a crash may cost at most."),
+    REAL(stop_grace_sec, "s", 1, 3600, "30",
+         "Time that a job has to write its checkpoint when it is stopped."),
+    BOOL(sandbox, "yes", "Keep jobs from the network and from files that are not theirs."),
+    INT(max_upload_mib, "MiB", 1, 16777216, "65536", "Largest upload; a larger one is refused with 413."),
+    INT(min_free_mib, "MiB", 0, 16777216, "1024",
+         "Space of the disk that uploads leave free; below it they are refused with 507."),
+    INT(max_connections, "connections", 8, 100000, "1000", "Open HTTP connections; more have to wait."),
+    INT(max_streams, "streams", 1, 100000, "500", "Open event streams; more are refused with 503."),
+    REAL(head_timeout_sec, "s", 1, 600, "10", "Time for the whole head of a request to arrive."),
+    REAL(idle_timeout_sec, "s", 1, 3600, "30", "Silence after which a connection is closed."),
+    INT(body_min_bytes_per_sec, "bytes/s", 0, 1073741824, "1024",
+        "A body that arrives more slowly over idle_timeout_sec is cut off. 0: any speed will do."),
+    REAL(keepalive_sec, "s", 1, 300, "15", "Longest silence in an event stream."),
+};
+#define TABLE_COUNT (sizeof table / sizeof *table)
+
+const struct option *config_table(size_t *count) {
+    *count = TABLE_COUNT;
+    return table;
+}
+
+static void *member(struct config *c, const struct option *option) {
+    return (char *)c + option->offset;
+}
+
+static const struct option *find(const char *name) {
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        if (strcmp(table[i].name, name) == 0)
+            return &table[i];
+    return NULL;
+}
+
+/* The number that is all of `text`, or NAN. */
+static double read_number(const char *text) {
+    char *end;
+    double value = strtod(text, &end);
+    return *text && *end == '\0' && isfinite(value) ? value : NAN;
+}
+
+static void set_number(struct config *c, const struct option *option, const char *value,
+                       const char *where, struct buf *problems) {
+    double number = read_number(value);
+    bool is_whole = option->type == OPTION_INT;
+    if (!(number >= option->minimum && number <= option->maximum) || (is_whole && number != floor(number)))
+        buf_printf(problems, "%s: %s must be a %snumber from %.0f to %.0f%s%s, not \"%s\"\n", where,
+                   option->name, is_whole ? "whole " : "", option->minimum, option->maximum,
+                   *option->unit ? " " : "", option->unit, value);
+    else if (is_whole)
+        *(int64_t *)member(c, option) = (int64_t)number;
+    else
+        *(double *)member(c, option) = number;
+}
+
+static void set_bool(struct config *c, const struct option *option, const char *value, const char *where,
+                     struct buf *problems) {
+    if (strcmp(value, "yes") == 0 || strcmp(value, "no") == 0)
+        *(bool *)member(c, option) = value[0] == 'y';
+    else
+        buf_printf(problems, "%s: %s must be yes or no, not \"%s\"\n", where, option->name, value);
+}
+
+void config_set(struct config *c, const char *name, const char *value, const char *where,
+                struct buf *problems) {
+    const struct option *option = find(name);
+    if (!option) {
+        size_t best = SIZE_MAX, nearest = 0;
+        for (size_t i = 0; i < TABLE_COUNT; i++) {
+            size_t distance = word_distance(name, table[i].name);
+            nearest = distance < best ? i : nearest;
+            best = distance < best ? distance : best;
+        }
+        bool is_near = word_is_near(name, best);
+        buf_printf(problems, "%s: there is no option \"%s\"%s%s%s\n", where, name,
+                   is_near ? "; did you mean " : "", is_near ? table[nearest].name : "", is_near ? "?" : "");
+        return;
+    }
+    if (option->type == OPTION_BOOL) {
+        set_bool(c, option, value, where, problems);
+    } else if (option->type != OPTION_TEXT) {
+        set_number(c, option, value, where, problems);
+    } else {
+        char **text = member(c, option);
+        mem_free(*text);
+        *text = mem_strdup(value);
+    }
+}
+
+void config_init(struct config *c) {
+    struct buf none;
+    memset(c, 0, sizeof *c);
+    buf_init(&none, 4096);
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        config_set(c, table[i].name, table[i].default_text, "default", &none);
+    buf_release(&none); /* a test holds the defaults against their ranges */
+}
+
+void config_release(struct config *c) {
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        if (table[i].type == OPTION_TEXT)
+            mem_free(*(char **)member(c, &table[i]));
+}
+
+/* `text` without white space at its ends; changes it. */
+static char *trim(char *text) {
+    text += strspn(text, " \t\r");
+    size_t length = strlen(text);
+    while (length > 0 && strchr(" \t\r", text[length - 1]))
+        length--;
+    text[length] = '\0';
+    return text;
+}
+
+static void read_line(struct config *c, char *line, const char *where, bool *seen, struct buf *problems) {
+    line[strcspn(line, "#")] = '\0';
+    line = trim(line);
+    if (*line == '\0')
+        return;
+    char *equals = strchr(line, '=');
+    if (!equals) {
+        buf_printf(problems, "%s: \"%s\" is not of the form name = value\n", where, line);
+        return;
+    }
+    *equals = '\0';
+    char *name = trim(line), *value = trim(equals + 1);
+    const struct option *option = find(name);
+    if (option && seen[option - table])
+        buf_printf(problems, "%s: %s is given twice\n", where, name);
+    else
+        config_set(c, name, value, where, problems);
+    if (option)
+        seen[option - table] = true;
+}
+
+enum status config_read(struct config *c, const char *path, struct buf *problems, struct error *err) {
+    struct buf text;
+    bool seen[TABLE_COUNT] = {false};
+    buf_init(&text, FILE_MAX_BYTES);
+    enum status status = file_read(path, &text, err);
+    if (status == STATUS_OK && text.length > 0 && memchr(text.data, '\0', text.length))
+        status = error_set(err, STATUS_INPUT, "%s is not a text file", path);
+    char *rest = status == STATUS_OK && text.length > 0 ? text.data : NULL;
+    for (size_t number = 1; rest; number++) {
+        char *line = strsep(&rest, "\n");
+        char *where = mem_printf("%s:%zu", path, number);
+        read_line(c, line, where, seen, problems);
+        mem_free(where);
+    }
+    buf_release(&text);
+    return status;
+}
+
+enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
+                           struct error *err) {
+    const char *colon = strrchr(listen, ':');
+    size_t length = colon ? (size_t)(colon - listen) : 0;
+    const char *host = listen;
+    bool is_v6 = length > 2 && host[0] == '[' && host[length - 1] == ']';
+    if (is_v6) {
+        host++;
+        length -= 2;
+    }
+    double number = colon ? read_number(colon + 1) : NAN;
+    if (length == 0 || length >= CONFIG_ADDRESS_SIZE || !(number >= 0 && number <= 65535) ||
+        number != floor(number))
+        return error_set(err, STATUS_INPUT,
+                         "listen must be like 127.0.0.1:7117 or [::1]:7117, not \"%s\"", listen);
+    *port = (uint16_t)number;
+    snprintf(address, CONFIG_ADDRESS_SIZE, "%.*s", (int)length, host);
+    if (strcmp(address, "localhost") == 0)
+        snprintf(address, CONFIG_ADDRESS_SIZE, "127.0.0.1");
+    struct in_addr v4;
+    struct in6_addr v6;
+    bool is_loopback = is_v6 ? inet_pton(AF_INET6, address, &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6)
+                             : inet_pton(AF_INET, address, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
+    if (is_loopback)
+        return STATUS_OK;
+    error_set(err, STATUS_INPUT, "listen is \"%s\", which is not a loopback address: anybody who "
+              "reaches the daemon may use it, so it listens on loopback only", listen);
+    return error_hint(err, "put a proxy that asks for passwords in front (deploy/nginx.conf)");
+}
+
+void config_check(const struct config *c, struct buf *problems) {
+    char address[CONFIG_ADDRESS_SIZE];
+    uint16_t port;
+    struct error err;
+    enum log_level level;
+    if (config_address(c->listen, address, &port, &err) != STATUS_OK)
+        buf_printf(problems, "%s%s%s\n", err.message, *err.hint ? "; " : "", err.hint);
+    if (!log_level_parse(c->log_level, &level))
+        buf_printf(problems, "log_level must be error, warning, info or debug, not \"%s\"\n", c->log_level);
+    if (*c->data_dir == '\0')
+        buf_puts(problems, "data_dir must name a folder\n");
+    if (c->max_streams >= c->max_connections)
+        buf_printf(problems, "max_streams (%lld) must be less than max_connections (%lld)\n",
+                   (long long)c->max_streams, (long long)c->max_connections);
+}

@@ -1,0 +1,57 @@
+/* config.h -- the daemon's configuration: one table of options, from which files and command
+ * lines are read, --help is printed and config/unbaked.conf is checked by a test.
+ *
+ * A file holds lines "name = value"; # begins a comment. All problems are found at once. */
+#ifndef UNBAKE_SERVER_CONFIG_H
+#define UNBAKE_SERVER_CONFIG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/buf.h"
+#include "common/error.h"
+
+enum option_type { OPTION_TEXT, OPTION_INT, OPTION_REAL, OPTION_BOOL };
+
+struct option {
+    const char *name;
+    enum option_type type;
+    const char *unit;         /* "s", "MiB", ...; "" where there is none */
+    double minimum, maximum;  /* inclusive, for numbers */
+    const char *default_text;
+    const char *help;         /* one sentence or two */
+    size_t offset;            /* of the member in struct config */
+};
+
+struct config {
+    char *listen, *server_names, *data_dir, *log_level; /* owned */
+    int64_t max_running, threads, max_attempts, queue_limit, worker_memory_mib;
+    int64_t max_upload_mib, min_free_mib;
+    int64_t max_connections, max_streams, body_min_bytes_per_sec;
+    double checkpoint_interval_sec, stop_grace_sec;
+    double head_timeout_sec, idle_timeout_sec, keepalive_sec;
+    bool sandbox;
+};
+
+const struct option *config_table(size_t *count); /* in the order of config/unbaked.conf */
+
+void config_init(struct config *c); /* all defaults */
+void config_release(struct config *c);
+
+/* Sets one option from text. `where` begins a message about it ("unbaked.conf:12"). A fault
+ * appends one line to *problems and leaves the option as it was. */
+void config_set(struct config *c, const char *name, const char *value, const char *where,
+                struct buf *problems);
+/* Reads a file; faults append a line each. The status is about the file itself. */
+enum status config_read(struct config *c, const char *path, struct buf *problems, struct error *err);
+/* What concerns several options, or needs more than a range. Appends a line a fault. */
+void config_check(const struct config *c, struct buf *problems);
+
+#define CONFIG_ADDRESS_SIZE 64
+/* Takes `listen` apart: "127.0.0.1:7117", "[::1]:0", "localhost:7117". STATUS_INPUT when it is
+ * none of these, or not a loopback address: without tokens, nothing else is safe. */
+enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
+                           struct error *err);
+
+#endif

@@ -1,0 +1,168 @@
+/* Options: the table, the documented file, faults all at once, addresses. */
+#include "server/config.h"
+
+#include "common/mem.h"
+#include "tests/check.h"
+
+static char *write_file(const char *text) {
+    char *path = mem_strdup("/tmp/test_config.XXXXXX");
+    int fd = mkstemp(path);
+    if (fd < 0 || write(fd, text, strlen(text)) != (ssize_t)strlen(text))
+        CHECK_SKIP("cannot write to /tmp");
+    close(fd);
+    return path;
+}
+
+/* Reads `text` as a file; the problems, without the file's name, are the caller's. */
+static char *problems_of(struct config *c, const char *text) {
+    struct buf problems;
+    struct error err;
+    buf_init(&problems, 65536);
+    char *path = write_file(text);
+    CHECK(config_read(c, path, &problems, &err) == STATUS_OK);
+    unlink(path);
+    struct buf plain;
+    buf_init(&plain, 65536);
+    for (const char *at = buf_text(&problems); *at;) {
+        if (strncmp(at, path, strlen(path)) == 0)
+            at += strlen(path);
+        buf_append(&plain, at++, 1);
+    }
+    mem_free(path);
+    buf_release(&problems);
+    char *result = mem_strdup(buf_text(&plain));
+    buf_release(&plain);
+    return result;
+}
+
+/* Defaults lie in their ranges: setting each again gives no problem. */
+static void check_defaults(void) {
+    size_t count;
+    const struct option *table = config_table(&count);
+    struct config c;
+    struct buf problems;
+    buf_init(&problems, 65536);
+    config_init(&c);
+    for (size_t i = 0; i < count; i++)
+        config_set(&c, table[i].name, table[i].default_text, "default", &problems);
+    config_check(&c, &problems);
+    CHECK_STRING(buf_text(&problems), "");
+    CHECK(c.max_attempts == 3 && c.sandbox && c.keepalive_sec == 15);
+    config_release(&c);
+    buf_release(&problems);
+}
+
+/* config/unbaked.conf has each option of the table once, in its order, with its default, and the
+ * comment above it gives unit and range. */
+static void check_documented(void) {
+    size_t count;
+    const struct option *table = config_table(&count);
+    FILE *file = fopen("config/unbaked.conf", "r");
+    char line[256], comment[4096] = "", wanted[256], value[128];
+    size_t next = 0;
+    CHECK(file != NULL);
+    while (file && fgets(line, sizeof line, file)) {
+        line[strcspn(line, "\n")] = '\0';
+        if (line[0] == '#') {
+            snprintf(comment + strlen(comment), sizeof comment - strlen(comment), "%s ", line + 1);
+            continue;
+        }
+        if (line[0] != '\0') {
+            const struct option *o = &table[next < count ? next : 0];
+            snprintf(wanted, sizeof wanted, "%s =%s%s", o->name, *o->default_text ? " " : "", o->default_text);
+            CHECK_STRING(line, wanted);
+            if (o->type == OPTION_INT || o->type == OPTION_REAL) {
+                snprintf(value, sizeof value, "(%s, %.0f to %.0f", o->unit, o->minimum, o->maximum);
+                /* The comment may break the range over two lines. */
+                char *high = strrchr(value, ' ');
+                CHECK_THAT(strstr(comment, high + 1), "%s: its comment has no \"%s\"", o->name, high + 1);
+                *high = '\0';
+                CHECK_THAT(strstr(comment, value), "%s: its comment has no \"%s\"", o->name, value);
+            } else if (o->type == OPTION_BOOL) {
+                CHECK_THAT(strstr(comment, "yes or no"), "%s: its comment has no \"yes or no\"", o->name);
+            }
+            next++;
+        }
+        comment[0] = '\0';
+    }
+    CHECK_THAT(next == count, "%zu of %zu options are documented", next, count);
+    if (file)
+        fclose(file);
+    struct config c;
+    struct buf problems;
+    struct error err;
+    config_init(&c);
+    buf_init(&problems, 4096);
+    CHECK(config_read(&c, "config/unbaked.conf", &problems, &err) == STATUS_OK);
+    CHECK_STRING(buf_text(&problems), "");
+    buf_release(&problems);
+    config_release(&c);
+}
+
+static void check_faults(void) {
+    struct config c;
+    config_init(&c);
+    char *found = problems_of(&c, "max_runing = 2\n# fine\nthreads=x\n  max_attempts = 0 # low\n\n"
+                                  "sandbox = maybe\nkeepalive_sec\nqueue_limit = 2.5\nqueue_limit = 7\n"
+                                  "entirely_else = 1\r\nhead_timeout_sec = nan\nmax_running = 3\n");
+    CHECK_STRING(found,
+        ":1: there is no option \"max_runing\"; did you mean max_running?\n"
+        ":3: threads must be a whole number from 0 to 1024 threads, not \"x\"\n"
+        ":4: max_attempts must be a whole number from 1 to 100 attempts, not \"0\"\n"
+        ":6: sandbox must be yes or no, not \"maybe\"\n"
+        ":7: \"keepalive_sec\" is not of the form name = value\n"
+        ":8: queue_limit must be a whole number from 1 to 1000000 jobs, not \"2.5\"\n"
+        ":9: queue_limit is given twice\n"
+        ":10: there is no option \"entirely_else\"\n"
+        ":11: head_timeout_sec must be a number from 1 to 600 s, not \"nan\"\n");
+    CHECK(c.max_running == 3 && c.queue_limit == 1000);
+    mem_free(found);
+    struct buf problems;
+    struct error err;
+    buf_init(&problems, 4096);
+    CHECK(config_read(&c, "/nonexistent/unbaked.conf", &problems, &err) == STATUS_NOT_FOUND);
+    config_set(&c, "max_streams", "1000", "flag", &problems);
+    config_set(&c, "log_level", "loud", "flag", &problems);
+    config_set(&c, "listen", "0.0.0.0:80", "flag", &problems);
+    config_check(&c, &problems);
+    CHECK(strstr(buf_text(&problems), "max_streams (1000) must be less than max_connections (1000)"));
+    CHECK(strstr(buf_text(&problems), "log_level must be"));
+    CHECK(strstr(buf_text(&problems), "not a loopback address"));
+    buf_release(&problems);
+    config_release(&c);
+}
+
+static void check_addresses(void) {
+    static const struct {
+        const char *text, *address;
+        int port; /* -1: refused */
+    } cases[] = {
+        {"127.0.0.1:7117", "127.0.0.1", 7117}, {"127.8.9.1:0", "127.8.9.1", 0},
+        {"localhost:80", "127.0.0.1", 80},     {"[::1]:65535", "::1", 65535},
+        {"0.0.0.0:80", "", -1},  {"[::]:80", "", -1},        {"192.168.1.1:80", "", -1},
+        {"::1:80", "", -1},      {"127.0.0.1", "", -1},      {"127.0.0.1:65536", "", -1},
+        {"127.0.0.1:-1", "", -1}, {":80", "", -1},           {"127.1:80", "", -1},
+        {"127.0.0.1.evil.org:80", "", -1}, {"[127.0.0.1]:80", "", -1}, {"", "", -1},
+        {"[::ffff:127.0.0.1]:80", "", -1}, {"127.0.0.1:8 ", "", -1},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char address[CONFIG_ADDRESS_SIZE];
+        uint16_t port = 1;
+        struct error err;
+        enum status status = config_address(cases[i].text, address, &port, &err);
+        if (cases[i].port < 0) {
+            CHECK_THAT(status == STATUS_INPUT, "%s", cases[i].text);
+        } else {
+            CHECK_THAT(status == STATUS_OK && port == cases[i].port, "%s", cases[i].text);
+            CHECK_STRING(address, cases[i].address);
+        }
+    }
+}
+
+int main(void) {
+    check_defaults();
+    check_documented();
+    check_faults();
+    check_addresses();
+    return check_result();
+}
