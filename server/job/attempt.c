@@ -386,7 +386,8 @@ static void judge(const struct attempt *a, struct verdict *v) {
         judge_exit(a, v);
     else
         judge_signal(a, v);
-    if (v->outcome == OUTCOME_CRASH && a->killed && a->stopping)
+    /* We wanted it to end: how it did is of no interest. */
+    if (v->outcome == OUTCOME_CRASH && a->stopping)
         say(v, OUTCOME_STOPPED, "", "");
     if (v->outcome != OUTCOME_CRASH)
         return;

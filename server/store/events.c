@@ -97,7 +97,8 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err) {
     store_lock(store);
     enum status status = sql_int(&store->sql, 0, id, err,
-                                 "SELECT max(id) FROM events WHERE job_id = ?", "i", job_id);
+                                 "SELECT ifnull(max(id), 0) FROM events WHERE job_id = ?", "i",
+                                 job_id);
     store_unlock(store);
     return status;
 }

@@ -102,12 +102,14 @@ void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, dou
     send_line(p, object);
 }
 
-void progress_problem(struct progress *p, const char *file, const char *reason) {
+void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint) {
     cJSON *object = line("problem");
     char *name = cut(file, 1000);
     json_add_string(object, "file", name);
     mem_free(name);
     add_cut(object, "reason", reason);
+    if (hint && hint[0])
+        add_cut(object, "hint", hint);
     send_line(p, object);
 }
 

@@ -7,7 +7,7 @@
  *   {"type":"output","name":"base_color.exr","bytes":123,"sha256":"…","content_type":"image/x-exr"}
  *   {"type":"log","level":"info","message":"…"}
  *   {"type":"checkpoint","iteration":120,"bytes":…,"seconds":…}
- *   {"type":"problem","file":"images/003.png","reason":"…"}   (scene checks)
+ *   {"type":"problem","file":"images/003.png","reason":"…","hint":"…"}   (scene checks)
  *   {"type":"scene","facts":{"triangle_count":…,"frame_count":…,…}}  (scene checks, last)
  *   {"type":"end","status":"ok|input|no-space|…","message":"…","hint":"…"}
  *
@@ -44,7 +44,8 @@ void progress_file(struct progress *p, const char *type, const char *name, uint6
                    const char *sha256, const char *content_type);
 void progress_log(struct progress *p, const char *level, const char *message);
 void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
-void progress_problem(struct progress *p, const char *file, const char *reason);
+/* hint may be NULL. */
+void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);
 void progress_scene(struct progress *p, cJSON *facts); /* takes facts */
 void progress_end(struct progress *p, enum status status, const char *message, const char *hint);
 

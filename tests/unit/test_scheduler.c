@@ -150,8 +150,8 @@ static int play_check(const char *role) {
     if (strcmp(role, "crash") == 0)
         abort();
     if (strcmp(role, "bad") == 0) {
-        progress_problem(&p, "mesh.ply", "face 3 has no area");
-        progress_problem(&p, "images/1.png", "is truncated");
+        progress_problem(&p, "mesh.ply", "face 3 has no area", NULL);
+        progress_problem(&p, "images/1.png", "is truncated", "copy it again");
         progress_end(&p, STATUS_INPUT, "2 problems", "");
         return PROGRESS_EXIT_INPUT;
     }
@@ -329,7 +329,7 @@ static void test_outcomes(struct daemon *d) {
     scene_row_release(&row);
     OK(store_scene_get(d->store, SCENE_B, &row, &err));
     CHECK_STRING(row.problems, "[{\"file\":\"mesh.ply\",\"reason\":\"face 3 has no area\"},"
-                               "{\"file\":\"images/1.png\",\"reason\":\"is truncated\"}]");
+                               "{\"file\":\"images/1.png\",\"reason\":\"is truncated\",\"hint\":\"copy it again\"}]");
     scene_row_release(&row);
     OK(store_scene_get(d->store, SCENE_C, &row, &err));
     CHECK_THAT(strstr(row.problems, "crashed (Aborted") != NULL, "%s", row.problems);
@@ -486,9 +486,12 @@ static void test_daemon_killed(struct daemon *d) {
     CHECK_THAT(worker_pid(job_dir) == 0, "worker %d outlived its daemon", (int)pid);
 
     daemon_start(d, 1, "/proc/self/exe");
-    CHECK(wait_for(d, id, JOB_RUNNING, "refine"));
-    struct job job;
-    OK(store_job_get(d->store, id, &job, &err));
+    struct job job = {0};
+    for (int i = 0; i < 10000 && job.attempt < 2; i++) {
+        usleep(1000);
+        job_release(&job);
+        OK(store_job_get(d->store, id, &job, &err));
+    }
     CHECK(job.attempt == 2 && job.attempts_left == 2);
     job_release(&job);
     OK(store_job_cancel(d->store, id, &err));

@@ -457,6 +457,11 @@ static void test_events(void) {
         OK(store_event_list(store, id, pieces.last, 7, replay_one, &pieces, &err));
     } while (pieces.count > before);
     CHECK(pieces.count == whole.count && pieces.last == whole.last);
+    int64_t last = -1;
+    OK(store_event_last(store, id, &last, &err));
+    CHECK(last == whole.last);
+    OK(store_event_last(store, 12345, &last, &err));
+    CHECK(last == 0);
     CHECK(events_of(store, other) == 1);
 
     /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
