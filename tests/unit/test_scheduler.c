@@ -231,13 +231,17 @@ static void add_scene(struct daemon *d, const char *id, const char *role) {
     mem_free(dir);
 }
 
+/* 0 when the store refuses because the scene has been rejected by now. */
 static int64_t submit(struct daemon *d, const char *scene, const char *role) {
     char *settings = mem_printf("{\"role\":\"%s\"}", role);
     struct job_new new = {.scene_id = scene, .name = role, .labels = "{}", .settings = settings,
                           .max_attempts = 2};
     int64_t id = 0;
     bool replayed;
-    OK(store_job_add(d->store, &new, 1000, &id, &replayed, &err));
+    enum status status = store_job_add(d->store, &new, 1000, &id, &replayed, &err);
+    CHECK_THAT(status == STATUS_OK ||
+                   (status == STATUS_CONFLICT && strstr(err.message, "was rejected") != NULL),
+               "%s", err.message);
     scheduler_wake(d->scheduler);
     mem_free(settings);
     return id;

@@ -1,0 +1,62 @@
+/* order.c -- see order.h. */
+#include "server/worker/order.h"
+
+#include <string.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+
+#define WHAT "job.json"
+
+static enum status read_reconstruct(struct order *o, struct error *err) {
+    double job_id, attempt;
+    enum status status = json_string(o->json, "scene", WHAT, "", &o->scene, err);
+    if (status == STATUS_OK)
+        status = json_number(o->json, "job_id", WHAT, 0.0, &job_id, err);
+    if (status == STATUS_OK)
+        status = json_number(o->json, "attempt", WHAT, 0.0, &attempt, err);
+    if (status == STATUS_OK)
+        status = json_number(o->json, "checkpoint_interval_sec", WHAT, 60.0,
+                             &o->checkpoint_interval_sec, err);
+    if (status != STATUS_OK)
+        return status;
+    o->job_id = (int64_t)job_id;
+    o->attempt = (int)attempt;
+    o->settings = cJSON_GetObjectItemCaseSensitive(o->json, "settings");
+    if (!o->scene[0] || !cJSON_IsObject(o->settings))
+        return error_set(err, STATUS_INTERNAL, WHAT ": no scene or no settings");
+    return STATUS_OK;
+}
+
+enum status order_read(struct order *o, const char *dir, struct error *err) {
+    *o = (struct order){.dir = dir};
+    double thread_count, memory_bytes;
+    char *path = file_join(dir, "job.json");
+    enum status status = json_read(path, (size_t)1 << 20, &o->json, err);
+    mem_free(path);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "kind", WHAT, "", &o->kind, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "scene_id", WHAT, "", &o->scene_id, err);
+    if (status == STATUS_OK)
+        status = json_number(o->json, "thread_count", WHAT, 1.0, &thread_count, err);
+    if (status == STATUS_OK)
+        status = json_number(o->json, "memory_bytes", WHAT, 0.0, &memory_bytes, err);
+    if (status == STATUS_OK)
+        status = json_bool(o->json, "sandbox", WHAT, true, &o->sandbox, err);
+    if (status == STATUS_OK) {
+        o->thread_count = (int)thread_count;
+        o->memory_bytes = (uint64_t)memory_bytes;
+    }
+    if (status == STATUS_OK && strcmp(o->kind, "reconstruct") == 0)
+        status = read_reconstruct(o, err);
+    /* The daemon wrote the file: what is wrong with it is our defect, not the user's. */
+    if (status == STATUS_INPUT && err)
+        status = err->status = STATUS_INTERNAL;
+    return status;
+}
+
+void order_release(struct order *o) {
+    cJSON_Delete(o->json);
+    *o = (struct order){0};
+}

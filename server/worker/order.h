@@ -1,0 +1,36 @@
+/* order.h -- job.json: what the daemon tells a worker to do; written by server/job/attempt.c.
+ *
+ *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","settings":{…},
+ *    "job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
+ *    "checkpoint_interval_sec":60}
+ *   {"kind":"check","scene_id":"…","thread_count":4,"memory_bytes":0,"sandbox":true}
+ *
+ * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. */
+#ifndef UNBAKE_WORKER_ORDER_H
+#define UNBAKE_WORKER_ORDER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/json.h"
+
+struct order {
+    cJSON *json; /* the file; owns the strings */
+    const char *dir;
+    const char *kind, *scene_id;
+    int thread_count;
+    uint64_t memory_bytes; /* 0: no limit */
+    bool sandbox;
+    /* kind "reconstruct" */
+    const char *scene;      /* folder of the unpacked bundle */
+    const cJSON *settings;  /* object */
+    int64_t job_id;
+    int attempt;
+    double checkpoint_interval_sec;
+};
+
+enum status order_read(struct order *order, const char *dir, struct error *err);
+void order_release(struct order *order);
+
+#endif

@@ -1,0 +1,90 @@
+/* worker.c -- the child's entry: read the order, take the folder, give up rights, work, say how
+ * it ended; see worker.h. */
+#include "server/worker/worker.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "common/log.h"
+#include "server/worker/order.h"
+#include "server/worker/progress.h"
+#include "server/worker/sandbox.h"
+
+#define LOCK_TRIES 100 /* of 0.1 s: a worker that was just killed may still be dying */
+
+/* The folder's lock is held until the process ends: its descriptor is never closed. */
+static enum status take_folder(const char *dir, struct error *err) {
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot open folder %s", dir);
+    for (int i = 0; flock(fd, LOCK_EX | LOCK_NB) != 0; i++) {
+        if (errno != EWOULDBLOCK) {
+            enum status status = error_set_errno(err, errno, "cannot lock folder %s", dir);
+            close(fd);
+            return status;
+        }
+        if (i == LOCK_TRIES) {
+            close(fd);
+            return error_set(err, STATUS_UNAVAILABLE, "another worker is in folder %s", dir);
+        }
+        usleep(100000);
+    }
+    return STATUS_OK;
+}
+
+static void confine(const struct order *order, struct progress *progress) {
+    struct sandbox_result result;
+    struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene,
+                              .memory_bytes = order->memory_bytes};
+    if (!order->sandbox) {
+        progress_log(progress, "warning", "sandbox: switched off by the daemon's configuration");
+        return;
+    }
+    sandbox_enter(&sandbox, &result);
+    progress_log(progress,
+                 result.files && result.system_calls && result.memory ? "info" : "warning",
+                 result.text);
+}
+
+static enum status work(const struct order *order, struct error *err) {
+    return error_set(err, STATUS_INTERNAL, "job.json: unknown kind \"%.40s\"", order->kind);
+}
+
+static int exit_status(enum status status) {
+    switch (status) {
+    case STATUS_OK: return PROGRESS_EXIT_OK;
+    case STATUS_INPUT:
+    case STATUS_LIMIT: return PROGRESS_EXIT_INPUT;
+    case STATUS_NO_SPACE: return PROGRESS_EXIT_NO_SPACE;
+    case STATUS_CANCELLED: return PROGRESS_EXIT_STOPPED;
+    default: return PROGRESS_EXIT_FAILED;
+    }
+}
+
+int worker_main(int argc, char **argv) {
+    if (argc != 2) {
+        fprintf(stderr, "usage: unbaked worker DIR\nThe daemon runs this; see job.json in DIR.\n");
+        return PROGRESS_EXIT_FAILED;
+    }
+    struct progress progress = {.fd = fcntl(PROGRESS_FD, F_GETFD) >= 0 ? PROGRESS_FD : -1};
+    struct order order;
+    struct error err = {0};
+    signal(SIGPIPE, SIG_IGN); /* a daemon that is gone is noticed elsewhere */
+    enum status status = order_read(&order, argv[1], &err);
+    if (status == STATUS_OK)
+        status = take_folder(argv[1], &err);
+    if (status == STATUS_OK) {
+        confine(&order, &progress);
+        status = work(&order, &err);
+    }
+    if (status != STATUS_OK)
+        log_error("%s", err.message);
+    progress_end(&progress, status, err.message, err.hint);
+    order_release(&order);
+    return exit_status(status);
+}
