@@ -8,6 +8,7 @@
 #define UNBAKE_INGEST_PLY_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/error.h"
 #include "server/scene/mesh.h"
@@ -26,5 +27,8 @@ enum status ply_read(const char *path, const char *name, size_t triangle_limit, 
 /* The same from memory. */
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
                       struct mesh *mesh, struct ply_report *report, struct error *err);
+
+/* How many faces the header promises; 0 for a point cloud. */
+enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);
 
 #endif
