@@ -1,4 +1,8 @@
-/* bundle.h -- from what a user uploads to a scene. Runs in workers only, never in the daemon. */
+/* bundle.h -- from what a user uploads to a scene. Runs in workers only, never in the daemon.
+ *
+ * A bundle is a folder with transforms.json (see transforms.h), the photographs it names and a
+ * mesh in PLY: the one that its key `mesh` names; failing that the one of ply_file_path, if it
+ * has faces; failing that the only PLY with faces beside transforms.json. */
 #ifndef UNBAKE_INGEST_BUNDLE_H
 #define UNBAKE_INGEST_BUNDLE_H
 
@@ -8,6 +12,8 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "server/scene/scene.h"
+
+#define BUNDLE_TRANSFORMS "transforms.json"
 
 struct bundle_limits {
     uint64_t file_count;     /* entries of an archive */
@@ -26,11 +32,15 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
                           struct error *err);
 
 /* Reads the unpacked bundle: transforms.json, the mesh, every photograph. All problems that can
- * be found are: each is an object {"file", "reason"} appended to the array `problems`;
- * STATUS_INPUT if any. `transforms` names the file to read instead of transforms.json (NULL:
- * that one). On success the scene is the caller's. */
+ * be found are: each is an object {"file", "reason"} (and "hint") appended to the array
+ * `problems`; STATUS_INPUT if any, *err summing them up. Another status is a failure of the
+ * machine. `transforms` names the file to read instead of transforms.json (NULL: that one). On
+ * success the scene is the caller's (scene_release); otherwise it is empty. */
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems,
                         struct error *err);
+
+/* What a scene holds, for its `facts`: counts, bounds, exposures, warnings; the caller's. */
+cJSON *bundle_facts(const struct scene *scene);
 
 #endif

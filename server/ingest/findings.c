@@ -40,7 +40,7 @@ void findings_error(struct findings *f, const char *file, const struct error *er
 void findings_warning(struct findings *f, const char *format, ...) {
     if (f->warning_count++ >= FINDINGS_MAX)
         return;
-    char sentence[1024];
+    char sentence[600];
     va_list args;
     va_start(args, format);
     vsnprintf(sentence, sizeof sentence, format, args);

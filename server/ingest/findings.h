@@ -7,7 +7,7 @@
 
 #include "common/json.h"
 
-#define FINDINGS_MAX 100 /* of each kind that are kept; the rest are counted */
+#define FINDINGS_MAX 50 /* of each kind that are kept; the rest are counted */
 
 struct findings {
     cJSON *problems; /* array of {"file", "reason"} or with "hint" too; borrowed */

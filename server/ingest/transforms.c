@@ -383,10 +383,9 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
         return;
     const cJSON *frames = cJSON_GetObjectItemCaseSensitive(root, "frames"), *object;
     t->frame = mem_calloc((size_t)cJSON_GetArraySize(frames), sizeof *t->frame);
-    size_t number_of = 0;
     cJSON_ArrayForEach(object, frames) {
         struct transforms_frame *frame = &t->frame[t->frame_count];
-        frame->number = number_of++;
+        frame->number = t->named_count++;
         if (read_frame(&c, object, frame))
             t->frame_count++;
         else

@@ -42,6 +42,7 @@ struct transforms_frame {
 struct transforms {
     char *mesh;             /* clean path or NULL; owned */
     char *point_cloud;      /* ply_file_path, which may be a mesh or only points, or NULL; owned */
+    size_t named_count;     /* frames in the file */
     size_t frame_count;     /* usable frames: those with problems are left out */
     struct transforms_frame *frame;
 };

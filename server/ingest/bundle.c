@@ -1,0 +1,389 @@
+/* bundle.c -- see bundle.h. */
+#include "server/ingest/bundle.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/ingest/archive.h"
+#include "server/ingest/path.h"
+#include "server/ingest/photos.h"
+#include "server/ingest/ply.h"
+#include "server/ingest/transforms.h"
+
+struct bundle_limits bundle_default_limits(void) {
+    return (struct bundle_limits){
+        .file_count = 100000,
+        .total_bytes = (uint64_t)256 << 30,
+        .ratio = 200.0, /* deflate ends at 1032; a room's pictures stay below 20 */
+        .photograph_pixels = (uint64_t)1 << 28,
+        .triangles = (uint64_t)1 << 26,
+    };
+}
+
+enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
+                          struct error *err) {
+    struct archive_limits own = {limits->file_count, limits->total_bytes, limits->ratio};
+    return archive_unpack(archive, "the archive", dir, &own, err);
+}
+
+/* --- the folder -------------------------------------------------------------------------- */
+
+static int by_name(const void *a, const void *b) {
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+static void free_names(char **names, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        mem_free(names[i]);
+    mem_free(names);
+}
+
+/* Names in a folder, sorted, litter and hidden files left out; the caller's (free_names). */
+static enum status list_folder(const char *dir, char ***names, size_t *count, struct error *err) {
+    *names = NULL;
+    *count = 0;
+    DIR *folder = opendir(dir);
+    if (!folder)
+        return error_set_errno(err, errno, "cannot list folder %s", dir);
+    size_t capacity = 0;
+    struct dirent *entry;
+    while ((entry = readdir(folder)) != NULL) {
+        if (entry->d_name[0] == '.' || path_is_litter(entry->d_name))
+            continue;
+        if (*count == capacity) {
+            capacity = capacity ? 2 * capacity : 64;
+            *names = mem_realloc_array(*names, capacity, sizeof **names);
+        }
+        (*names)[(*count)++] = mem_strdup(entry->d_name);
+    }
+    closedir(folder);
+    if (*count > 1)
+        qsort(*names, *count, sizeof **names, by_name);
+    return STATUS_OK;
+}
+
+static bool is_folder(const char *path) {
+    struct stat info;
+    return lstat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+/* The bundle's own folder: `dir`, or the single folder in it; the caller's. */
+static enum status find_root(const char *dir, char **root, struct error *err) {
+    char **names;
+    size_t count;
+    enum status status = list_folder(dir, &names, &count, err);
+    *root = NULL;
+    if (status != STATUS_OK)
+        return status;
+    if (count == 1) {
+        *root = file_join(dir, names[0]);
+        if (!is_folder(*root)) {
+            mem_free(*root);
+            *root = NULL;
+        }
+    }
+    if (!*root)
+        *root = mem_strdup(dir);
+    free_names(names, count);
+    return STATUS_OK;
+}
+
+/* --- transforms -------------------------------------------------------------------------- */
+
+static enum status load_transforms(const char *root, const char *name, struct transforms *t,
+                                   struct findings *f, struct error *err) {
+    struct buf text;
+    buf_init(&text, TRANSFORMS_MAX_BYTES);
+    char *path = file_join(root, name);
+    cJSON *tree = NULL;
+    struct error own;
+    *t = (struct transforms){0};
+    enum status status = file_read(path, &text, &own);
+    if (status == STATUS_NOT_FOUND) {
+        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top", name);
+        error_hint(&own, "nerfstudio and instant-ngp write one; poses are camera-to-world");
+    } else if (status == STATUS_LIMIT) {
+        error_set(&own, STATUS_INPUT, "%s is larger than %zu bytes", name, TRANSFORMS_MAX_BYTES);
+    } else if (status == STATUS_OK) {
+        status = json_parse(buf_text(&text), text.length, name, &tree, &own);
+    }
+    if (status == STATUS_OK)
+        transforms_read(tree, name, t, f);
+    else if (status == STATUS_NOT_FOUND || status == STATUS_LIMIT || status == STATUS_INPUT)
+        findings_error(f, name, &own);
+    else if (err)
+        *err = own;
+    bool failed = status != STATUS_OK && own.status != STATUS_INPUT;
+    cJSON_Delete(tree);
+    mem_free(path);
+    buf_release(&text);
+    return failed ? status : STATUS_OK;
+}
+
+/* --- mesh -------------------------------------------------------------------------------- */
+
+static bool has_faces(const char *root, const char *name) {
+    char *path = file_join(root, name);
+    uint64_t count = 0;
+    enum status status = ply_count_faces(path, name, &count, NULL);
+    mem_free(path);
+    /* A damaged file is taken, so that reading it says what is wrong. */
+    return status == STATUS_INPUT || count > 0;
+}
+
+/* The only PLY with faces at the top; NULL with a problem when there is none or more. */
+static char *search_mesh(const char *root, struct findings *f) {
+    static const char *const other_kinds[] = {"obj", "gltf", "glb", "stl", "fbx", "off", "usd", "usdz"};
+    char **names, *found = NULL, *second = NULL;
+    const char *other = NULL;
+    size_t count, points = 0;
+    struct error err;
+    if (list_folder(root, &names, &count, &err) != STATUS_OK) {
+        findings_error(f, "mesh", &err);
+        return NULL;
+    }
+    for (size_t i = 0; i < count; i++) {
+        const char *extension = path_extension(names[i]);
+        for (size_t k = 0; k < sizeof other_kinds / sizeof *other_kinds; k++)
+            if (strcasecmp(extension, other_kinds[k]) == 0)
+                other = names[i];
+        if (strcasecmp(extension, "ply") != 0)
+            continue;
+        if (!has_faces(root, names[i]))
+            points++;
+        else if (!found)
+            found = mem_strdup(names[i]);
+        else if (!second)
+            second = names[i];
+    }
+    if (second) {
+        error_set(&err, STATUS_INPUT, "two meshes: %s and %s", found, second);
+        error_hint(&err, "leave one, or name it in transforms.json as \"mesh\"");
+        findings_error(f, second, &err);
+        mem_free(found);
+        found = NULL;
+    } else if (!found && other) {
+        findings_problem(f, other, "no mesh: %s is not in a format that is read; a mesh must be PLY", other);
+    } else if (!found) {
+        findings_problem(f, "mesh.ply", points > 0
+                             ? "no mesh: the PLY files at the bundle's top are point clouds, without faces"
+                             : "no mesh: the bundle has no PLY file at its top");
+    }
+    free_names(names, count);
+    return found;
+}
+
+static char *find_mesh(const char *root, const char *transforms_name, const struct transforms *t,
+                       struct findings *f) {
+    if (t->mesh || t->point_cloud) {
+        const char *name = t->mesh ? t->mesh : t->point_cloud;
+        char *path = file_join(root, name);
+        bool there = access(path, F_OK) == 0;
+        mem_free(path);
+        if (there && (t->mesh || has_faces(root, name)))
+            return mem_strdup(name);
+        if (t->mesh) {
+            findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
+            return NULL;
+        }
+    }
+    return search_mesh(root, f);
+}
+
+static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit, struct scene *scene,
+                             struct findings *f, struct error *err) {
+    struct ply_report report;
+    struct error own;
+    char *path = file_join(root, name);
+    size_t limit = triangle_limit < MESH_MAX_TRIANGLES ? (size_t)triangle_limit : MESH_MAX_TRIANGLES;
+    enum status status = ply_read(path, name, limit, &scene->mesh, &report, &own);
+    mem_free(path);
+    if (status == STATUS_OK)
+        status = mesh_check(&scene->mesh, name, &scene->mesh_report, &own);
+    if (status == STATUS_INPUT || status == STATUS_LIMIT) {
+        findings_error(f, name, &own);
+        return STATUS_OK;
+    }
+    if (status != STATUS_OK) {
+        if (err)
+            *err = own;
+        return status;
+    }
+    if (report.small_count > 0)
+        findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name,
+                         report.small_count);
+    if (scene->mesh_report.degenerate_count > 0)
+        findings_warning(f, "%s: %zu triangles have no area and were left out", name,
+                         scene->mesh_report.degenerate_count);
+    if (scene->mesh_report.duplicate_count > 0)
+        findings_warning(f, "%s: %zu triangles repeat an earlier one and were left out", name,
+                         scene->mesh_report.duplicate_count);
+    return STATUS_OK;
+}
+
+/* Poses in other units or axes than the mesh's make a run fail late and puzzlingly: say it. */
+static void check_frames_meet_mesh(const struct scene *scene, struct findings *f) {
+    vec3 lower, upper;
+    mesh_bounds(&scene->mesh, &lower, &upper);
+    vec3 centre = vec3_scale(vec3_add(lower, upper), 0.5f);
+    float reach = 2.0f * vec3_length(vec3_sub(upper, lower));
+    size_t far_count = 0;
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        vec3 origin = camera_origin(&scene->photograph[i].camera);
+        far_count += vec3_length(vec3_sub(origin, centre)) > reach;
+    }
+    if (far_count > 0)
+        findings_warning(f, "%zu of %zu cameras stand farther from the mesh's centre than twice its diagonal: are "
+                         "poses and mesh in the same units and axes?", far_count, scene->photograph_count);
+}
+
+/* --- all of it --------------------------------------------------------------------------- */
+
+static void take_warnings(struct findings *f, struct scene *scene) {
+    if (f->warning_count > FINDINGS_MAX) {
+        char *last = f->warning[FINDINGS_MAX - 1];
+        f->warning[FINDINGS_MAX - 1] = mem_printf("... and %zu warnings more", f->warning_count - FINDINGS_MAX + 1);
+        mem_free(last);
+        f->warning_count = FINDINGS_MAX;
+    }
+    scene->warning = f->warning;
+    scene->warning_count = f->warning_count;
+    f->warning = NULL;
+    f->warning_count = 0;
+}
+
+static enum status sum_up(const struct findings *f, struct error *err) {
+    const cJSON *first = cJSON_GetArrayItem(f->problems, 0);
+    const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(first, "reason"));
+    if (f->problem_count > FINDINGS_MAX) {
+        cJSON *more = cJSON_CreateObject();
+        json_add_string(more, "file", "");
+        char *text = mem_printf("... and %zu problems more", f->problem_count - FINDINGS_MAX);
+        json_add_string(more, "reason", text);
+        cJSON_AddItemToArray(f->problems, more);
+        mem_free(text);
+    }
+    if (f->problem_count == 1)
+        return error_set(err, STATUS_INPUT, "%s", reason ? reason : "");
+    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s", f->problem_count, reason ? reason : "");
+}
+
+enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
+                        struct parallel *pool, struct scene *scene, cJSON *problems,
+                        struct error *err) {
+    struct findings f = {.problems = problems};
+    struct transforms t;
+    char *root = NULL, *mesh = NULL, *name = NULL;
+    *scene = (struct scene){0};
+    enum status status = path_clean(transforms ? transforms : BUNDLE_TRANSFORMS, &name, err);
+    if (status != STATUS_OK)
+        return status;
+    status = find_root(dir, &root, err);
+    if (status != STATUS_OK) {
+        mem_free(name);
+        return status;
+    }
+    status = load_transforms(root, name, &t, &f, err);
+    bool has_frames = f.problem_count == 0 || t.frame_count > 0;
+    if (status != STATUS_OK)
+        goto out;
+    mesh = find_mesh(root, name, &t, &f);
+    if (mesh)
+        status = load_mesh(root, mesh, limits->triangles, scene, &f, err);
+    if (status == STATUS_OK && has_frames)
+        status = photos_load(root, name, &t, limits->photograph_pixels, pool, scene, &f, err);
+    if (status == STATUS_OK && f.problem_count > 0)
+        status = sum_up(&f, err);
+    if (status == STATUS_OK) {
+        check_frames_meet_mesh(scene, &f);
+        take_warnings(&f, scene);
+    }
+out:
+    if (status != STATUS_OK)
+        scene_release(scene);
+    findings_release(&f);
+    transforms_release(&t);
+    mem_free(mesh);
+    mem_free(root);
+    mem_free(name);
+    return status;
+}
+
+/* --- facts ------------------------------------------------------------------------------- */
+
+static cJSON *vec3_facts(vec3 v) {
+    cJSON *array = cJSON_CreateArray();
+    cJSON_AddItemToArray(array, cJSON_CreateNumber((double)v.x));
+    cJSON_AddItemToArray(array, cJSON_CreateNumber((double)v.y));
+    cJSON_AddItemToArray(array, cJSON_CreateNumber((double)v.z));
+    return array;
+}
+
+static void add_mesh_facts(cJSON *facts, const struct scene *scene) {
+    const struct mesh *mesh = &scene->mesh;
+    vec3 lower, upper;
+    mesh_bounds(mesh, &lower, &upper);
+    json_add_int(facts, "vertex_count", (int64_t)mesh->vertex_count);
+    json_add_int(facts, "triangle_count", (int64_t)mesh->triangle_count);
+    json_add_int(facts, "face_count", (int64_t)mesh->face_count);
+    json_add_bool(facts, "has_normals", mesh->normal != NULL);
+    json_add_bool(facts, "has_object_id", mesh->object_id != NULL);
+    json_add_int(facts, "degenerate_count", (int64_t)scene->mesh_report.degenerate_count);
+    json_add_int(facts, "duplicate_count", (int64_t)scene->mesh_report.duplicate_count);
+    json_add_number(facts, "area_m2", mesh_area(mesh));
+    json_add(facts, "lower_m", vec3_facts(lower));
+    json_add(facts, "upper_m", vec3_facts(upper));
+}
+
+static cJSON *exposure_facts(const struct scene *scene) {
+    cJSON *facts = cJSON_CreateObject();
+    size_t known_count = 0;
+    double least = INFINITY, largest = 0.0;
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        const struct photograph *p = &scene->photograph[i];
+        if (!p->exposure_known)
+            continue;
+        known_count++;
+        least = fmin(least, (double)p->exposure);
+        largest = fmax(largest, (double)p->exposure);
+    }
+    json_add_int(facts, "known_count", (int64_t)known_count);
+    json_add_int(facts, "unknown_count", (int64_t)(scene->photograph_count - known_count));
+    if (known_count > 0) {
+        json_add_number(facts, "least", least);
+        json_add_number(facts, "largest", largest);
+    }
+    return facts;
+}
+
+cJSON *bundle_facts(const struct scene *scene) {
+    cJSON *facts = cJSON_CreateObject(), *warnings = cJSON_CreateArray();
+    size_t test_count = 0, hdr_count = 0, mask_count = 0;
+    uint64_t pixel_count = 0;
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        const struct photograph *p = &scene->photograph[i];
+        test_count += p->is_test;
+        hdr_count += p->is_hdr;
+        mask_count += p->mask != NULL;
+        pixel_count += (uint64_t)p->camera.width * p->camera.height;
+    }
+    add_mesh_facts(facts, scene);
+    json_add_int(facts, "frame_count", (int64_t)scene->photograph_count);
+    json_add_int(facts, "train_count", (int64_t)(scene->photograph_count - test_count));
+    json_add_int(facts, "test_count", (int64_t)test_count);
+    json_add_int(facts, "hdr_count", (int64_t)hdr_count);
+    json_add_int(facts, "mask_count", (int64_t)mask_count);
+    json_add_int(facts, "pixel_count", (int64_t)pixel_count);
+    json_add(facts, "exposure", exposure_facts(scene));
+    for (size_t i = 0; i < scene->warning_count; i++)
+        cJSON_AddItemToArray(warnings, cJSON_CreateString(scene->warning[i]));
+    json_add(facts, "warnings", warnings);
+    return facts;
+}

@@ -1,0 +1,340 @@
+/* photos.c -- see photos.h. */
+#include "server/ingest/photos.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/ingest/path.h"
+
+#define HALF_LARGEST 65504.0f
+
+/* The code value (of 255) from which a channel of an ordinary photograph counts as clipped. A
+ * clipped surface is 255 in the camera, but JPEG's quantisation and the resizing that poses are
+ * often computed after leave it a few levels lower; 250 takes those in, and what it takes too
+ * many is above 95 % of the clip in linear light, where the bound says nearly what the value
+ * would. */
+#define CLIP_CODE 250.0f
+
+/* What one frame's loading found; only its own body writes it. */
+struct outcome {
+    enum status status;
+    struct error err;
+    bool mask_failed;       /* err is about the mask */
+    int orientation;
+    enum exposure_source source;
+    size_t not_finite_count, clamped_count; /* pixels */
+};
+
+struct loading {
+    const char *dir;
+    const struct transforms *transforms;
+    uint64_t pixel_limit;
+    char **path;            /* [frame_count] of the picture, below dir; NULL where absent */
+    struct photograph *photograph; /* [frame_count] */
+    struct outcome *outcome;       /* [frame_count] */
+    uint16_t *half_of_srgb; /* [65536] linear half of a code value in 65535ths */
+    float clip;
+};
+
+/* --- finding files ----------------------------------------------------------------------- */
+
+static bool exists(const char *dir, const char *name) {
+    char *path = file_join(dir, name);
+    bool found = access(path, F_OK) == 0;
+    mem_free(path);
+    return found;
+}
+
+/* The file of a frame: as named or, as instant-ngp takes names without one, with an extension
+ * added. NULL when there is none. */
+static char *find_picture(const char *dir, const char *name) {
+    static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "PNG", "JPG", "JPEG", "EXR"};
+    if (exists(dir, name))
+        return mem_strdup(name);
+    for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
+        char *longer = mem_printf("%s.%s", name, extensions[i]);
+        if (exists(dir, longer))
+            return longer;
+        mem_free(longer);
+    }
+    return NULL;
+}
+
+/* --- pixels ------------------------------------------------------------------------------ */
+
+static uint16_t *make_srgb_table(void) {
+    uint16_t *table = mem_array(65536, sizeof *table);
+    for (size_t i = 0; i < 65536; i++)
+        table[i] = image_half_from_float(image_srgb_to_linear((float)i / 65535.0f));
+    return table;
+}
+
+static void convert_srgb(const struct loading *l, const struct image *image, struct photograph *photo) {
+    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++) {
+            float code = clampf(image->pixel[i * stride + c], 0.0f, 1.0f);
+            photo->pixel[i][c] = l->half_of_srgb[(size_t)(code * 65535.0f + 0.5f)];
+        }
+}
+
+/* Values beyond what a half holds become lower bounds, as clipped ones are; negative ones, left
+ * by reconstruction filters, become 0. */
+static void convert_linear(const struct image *image, struct photograph *photo, struct outcome *outcome) {
+    size_t count = (size_t)image->width * image->height, stride = image->channel_count;
+    for (size_t i = 0; i < count; i++) {
+        const float *in = image->pixel + i * stride;
+        bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
+        outcome->not_finite_count += !finite;
+        outcome->clamped_count += finite && fmaxf(in[0], fmaxf(in[1], in[2])) > HALF_LARGEST;
+        for (size_t c = 0; c < 3; c++)
+            photo->pixel[i][c] = image_half_from_float(finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN);
+    }
+    if (outcome->clamped_count > 0)
+        photo->clip = HALF_LARGEST;
+}
+
+/* Transparent pixels of a PNG show nothing. An EXR's alpha only says whether a renderer's ray
+ * met a surface: the light behind it is real. */
+static void mask_by_alpha(const struct image *image, struct photograph *photo) {
+    size_t count = (size_t)image->width * image->height;
+    int alpha = image_channel(image, "A");
+    if (alpha < 0)
+        return;
+    photo->mask = mem_alloc(count);
+    for (size_t i = 0; i < count; i++)
+        photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
+}
+
+/* A mask's black pixels are not used, all others are (nerfstudio's rule). */
+static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo,
+                             struct error *err) {
+    struct image image;
+    char *path = file_join(l->dir, name);
+    enum status status = image_probe(path, &image, NULL, err);
+    if (status != STATUS_OK)
+        goto out;
+    if (image.width != photo->camera.width || image.height != photo->camera.height)
+        status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u",
+                           image.width, image.height, photo->camera.width, photo->camera.height);
+    image_release(&image);
+    if (status == STATUS_OK)
+        status = image_read(path, &image, NULL, err);
+    if (status != STATUS_OK)
+        goto out;
+    size_t count = (size_t)image.width * image.height;
+    if (!photo->mask) {
+        photo->mask = mem_alloc(count);
+        memset(photo->mask, 255, count);
+    }
+    for (size_t i = 0; i < count; i++)
+        if (!(image.pixel[i * image.channel_count] > 0.0f))
+            photo->mask[i] = 0;
+    image_release(&image);
+out:
+    mem_free(path);
+    return status;
+}
+
+/* --- one photograph ---------------------------------------------------------------------- */
+
+static void set_exposure(const struct transforms_frame *frame, const struct image_info *info,
+                         struct photograph *photo, struct outcome *outcome) {
+    double exposure = frame->exposure;
+    outcome->source = frame->exposure_source;
+    if (exposure <= 0.0 && photo->is_hdr) {
+        exposure = 1.0;
+        outcome->source = EXPOSURE_HDR;
+    } else if (exposure <= 0.0) {
+        exposure = transforms_exposure(info->exposure_time_sec, info->iso, info->f_number);
+        outcome->source = exposure > 0.0 ? EXPOSURE_EXIF : EXPOSURE_UNKNOWN;
+    }
+    float single = (float)exposure;
+    photo->exposure_known = single > 0.0f && isfinite(single) && isfinite(1.0f / single);
+    photo->exposure = photo->exposure_known ? single : 1.0f;
+}
+
+static enum status check_size(const struct loading *l, const struct transforms_frame *frame, const char *path,
+                              struct camera *camera, struct error *err) {
+    struct image image;
+    enum status status = image_probe(path, &image, NULL, err);
+    if (status != STATUS_OK)
+        return status;
+    uint64_t pixels = (uint64_t)image.width * image.height;
+    if (pixels > l->pixel_limit)
+        status = error_set(err, STATUS_LIMIT, "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
+                           pixels, l->pixel_limit);
+    else
+        status = transforms_camera(frame, image.width, image.height, camera, err);
+    image_release(&image);
+    return status;
+}
+
+static enum status load_photograph(const struct loading *l, size_t index) {
+    const struct transforms_frame *frame = &l->transforms->frame[index];
+    struct photograph *photo = &l->photograph[index];
+    struct outcome *outcome = &l->outcome[index];
+    char *path = file_join(l->dir, l->path[index]);
+    struct image image;
+    struct image_info info;
+    enum status status = check_size(l, frame, path, &photo->camera, &outcome->err);
+    if (status == STATUS_OK)
+        status = image_read(path, &image, &info, &outcome->err);
+    mem_free(path);
+    if (status != STATUS_OK)
+        return status;
+    photo->name = mem_strdup(frame->file);
+    photo->is_test = frame->is_test;
+    photo->is_hdr = info.encoding == IMAGE_LINEAR;
+    photo->gain = rgb_gray(1.0f);
+    photo->clip = photo->is_hdr ? INFINITY : l->clip;
+    outcome->orientation = info.orientation;
+    set_exposure(frame, &info, photo, outcome);
+    if (image.channel_count < 3) {
+        status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
+    } else {
+        photo->pixel = mem_array((size_t)image.width * image.height, sizeof *photo->pixel);
+        if (photo->is_hdr) {
+            convert_linear(&image, photo, outcome);
+        } else {
+            convert_srgb(l, &image, photo);
+            mask_by_alpha(&image, photo);
+        }
+    }
+    image_release(&image);
+    if (status == STATUS_OK && frame->mask) {
+        status = load_mask(l, frame->mask, photo, &outcome->err);
+        outcome->mask_failed = status != STATUS_OK;
+    }
+    return status;
+}
+
+static void load_body(void *user, size_t index, int thread) {
+    struct loading *l = user;
+    (void)thread;
+    if (l->path[index])
+        l->outcome[index].status = load_photograph(l, index);
+}
+
+/* --- all of them ------------------------------------------------------------------------- */
+
+/* Messages of the picture readers begin with the path they were given; the user knows the part
+ * below the bundle's folder. */
+static void make_relative(struct error *err, const char *dir) {
+    char *prefix = file_join(dir, ""), *at;
+    size_t length = strlen(prefix);
+    while (length > 1 && (at = strstr(err->message, prefix)) != NULL)
+        memmove(at, at + length, strlen(at + length) + 1);
+    mem_free(prefix);
+}
+
+static void warn_about_pixels(const struct loading *l, struct findings *f) {
+    size_t rotated = 0, sources[EXPOSURE_HDR + 1] = {0};
+    for (size_t i = 0; i < l->transforms->frame_count; i++) {
+        const struct outcome *o = &l->outcome[i];
+        const char *name = l->transforms->frame[i].file;
+        if (!l->path[i])
+            continue;
+        sources[o->source]++;
+        rotated += o->orientation > 1;
+        if (o->not_finite_count > 0)
+            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->not_finite_count);
+        if (o->clamped_count > 0)
+            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name,
+                             o->clamped_count);
+    }
+    if (rotated > 0)
+        findings_warning(f, "the EXIF orientation of %zu photographs was ignored: poses are taken to be for the "
+                         "pixels as stored", rotated);
+    size_t given = sources[EXPOSURE_FACTOR] + sources[EXPOSURE_CAMERA] + sources[EXPOSURE_EXIF] +
+                   sources[EXPOSURE_HDR];
+    for (int s = EXPOSURE_FACTOR; s <= EXPOSURE_HDR; s++) {
+        if (sources[s] > 0 && sources[s] < given) {
+            findings_warning(f, "exposures come from different sources (%zu from \"exposure\", %zu from "
+                             "\"exposure_time\", %zu from EXIF, %zu HDR taken as 1): they may not agree in units",
+                             sources[EXPOSURE_FACTOR], sources[EXPOSURE_CAMERA], sources[EXPOSURE_EXIF],
+                             sources[EXPOSURE_HDR]);
+            break;
+        }
+    }
+}
+
+/* Turns each frame's outcome into problems, in the frames' order. */
+static enum status collect(struct loading *l, const char *name, struct findings *f, struct error *err) {
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < l->transforms->frame_count; i++) {
+        const struct transforms_frame *frame = &l->transforms->frame[i];
+        struct outcome *o = &l->outcome[i];
+        if (!l->path[i])
+            findings_warning(f, "%s: frames[%zu] names %s, which is not in the bundle; it was left out", name,
+                             frame->number, frame->file);
+        if (o->status == STATUS_OK)
+            continue;
+        make_relative(&o->err, l->dir);
+        if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT || o->status == STATUS_NOT_FOUND) {
+            findings_error(f, o->mask_failed ? frame->mask : l->path[i], &o->err);
+        } else if (status == STATUS_OK) {
+            status = o->status;
+            if (err)
+                *err = o->err;
+        }
+    }
+    return status;
+}
+
+/* Keeps what was loaded, in order. */
+static void keep_loaded(struct loading *l, struct scene *scene) {
+    size_t kept = 0;
+    for (size_t i = 0; i < l->transforms->frame_count; i++) {
+        if (l->path[i] && l->outcome[i].status == STATUS_OK)
+            l->photograph[kept++] = l->photograph[i];
+        else
+            photograph_release(&l->photograph[i]);
+    }
+    scene->photograph = l->photograph;
+    scene->photograph_count = kept;
+}
+
+static void check_count(const struct scene *scene, const char *name, size_t named_count, struct findings *f) {
+    size_t train_count = 0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        train_count += !scene->photograph[i].is_test;
+    if (scene->photograph_count < PHOTOS_MIN_COUNT)
+        findings_problem(f, name, "only %zu of its %zu frames can be used; at least %d are needed",
+                         scene->photograph_count, named_count, PHOTOS_MIN_COUNT);
+    else if (train_count == 0)
+        findings_problem(f, name, "every frame is held out as test: none is left to reconstruct from");
+}
+
+enum status photos_load(const char *dir, const char *name, const struct transforms *t,
+                        uint64_t pixel_limit, struct parallel *pool, struct scene *scene,
+                        struct findings *f, struct error *err) {
+    struct loading l = {
+        .dir = dir, .transforms = t, .pixel_limit = pixel_limit,
+        .path = mem_calloc(t->frame_count, sizeof *l.path),
+        .photograph = mem_calloc(t->frame_count, sizeof *l.photograph),
+        .outcome = mem_calloc(t->frame_count, sizeof *l.outcome),
+        .half_of_srgb = make_srgb_table(),
+    };
+    /* Through the table, so that a pixel of just this code value is not rounded below it. */
+    l.clip = image_float_from_half(l.half_of_srgb[(size_t)(CLIP_CODE / 255.0f * 65535.0f + 0.5f)]);
+    for (size_t i = 0; i < t->frame_count; i++)
+        l.path[i] = find_picture(dir, t->frame[i].file);
+    parallel_for(pool, t->frame_count, load_body, &l);
+    enum status status = collect(&l, name, f, err);
+    keep_loaded(&l, scene);
+    check_count(scene, name, t->named_count, f);
+    warn_about_pixels(&l, f);
+    for (size_t i = 0; i < t->frame_count; i++)
+        mem_free(l.path[i]);
+    mem_free(l.path);
+    mem_free(l.outcome);
+    mem_free(l.half_of_srgb);
+    return status;
+}
