@@ -1,0 +1,79 @@
+/* test_ply.c -- the PLY reader, and the mesh checks behind it, on damaged files. An answer of "ok"
+ * must come with a mesh whose every index and vertex can be read. */
+#include "server/ingest/ply.h"
+
+#include "tests/fuzz/mutate.h"
+
+static volatile float sink;
+
+static void target(const uint8_t *data, size_t size) {
+    struct mesh mesh;
+    struct mesh_report report;
+    struct error err = {.message = ""};
+    enum status status = ply_parse(data, size, "case", 100000, &mesh, NULL, &err);
+    if (status == STATUS_OK) {
+        for (size_t i = 0; i < mesh.triangle_count; i++) {
+            CHECK(mesh.face[i] < mesh.face_count && (i == 0 || mesh.face[i] >= mesh.face[i - 1]));
+            for (int k = 0; k < 3; k++) {
+                CHECK(mesh.index[i][k] < mesh.vertex_count);
+                sink = mesh.position[mesh.index[i][k]].x;
+            }
+        }
+        status = mesh_check(&mesh, "case", &report, &err);
+    }
+    if (status == STATUS_OK)
+        sink = (float)mesh_area(&mesh);
+    else
+        CHECK((status == STATUS_INPUT || status == STATUS_LIMIT) && err.message[0] != '\0');
+    mesh_release(&mesh);
+}
+
+/* A binary file of either byte order, with what the shared vectors lack. */
+static void add_binary(struct mutate *m, bool big) {
+    uint8_t file[1024];
+    size_t used = (size_t)snprintf((char *)file, 512,
+        "ply\nformat binary_%s_endian 1.0\nelement vertex 5\nproperty float x\nproperty double y\n"
+        "property short z\nproperty list uchar int l\nelement face 3\nproperty ushort object_id\n"
+        "property list uchar uint vertex_indices\nelement other 1\nproperty int a\nend_header\n",
+        big ? "big" : "little");
+    for (int i = 0; i < 5; i++) {
+        memset(file + used, i, 14);
+        file[used + 14] = (uint8_t)(i & 1); /* the list: none or one int */
+        used += 15;
+        if (i & 1)
+            used += 4;
+    }
+    static const uint8_t corners[3] = {3, 4, 5};
+    for (int f = 0; f < 3; f++) {
+        file[used++] = 0;
+        file[used++] = (uint8_t)f;
+        file[used++] = corners[f];
+        for (uint8_t k = 0; k < corners[f]; k++) {
+            memset(file + used, 0, 4);
+            file[used + (big ? 3 : 0)] = k;
+            used += 4;
+        }
+    }
+    memset(file + used, 7, 4);
+    mutate_add_bytes(m, file, used + 4);
+}
+
+int main(int argc, char **argv) {
+    static const char text[] =
+        "ply\r\nformat ascii 1.0\r\ncomment x\r\nelement face 2\r\nproperty int object_id\r\n"
+        "property list uchar int vertex_index\r\nelement vertex 6\r\nproperty float nx\r\nproperty float x\r\n"
+        "property float y\r\nproperty float z\r\nproperty float ny\r\nproperty float nz\r\nend_header\r\n"
+        "-1 3 0 1 2\r\n7 6 0 1 2 3 4 5\r\n0 0 0 0 0 1\r\n0 4 0 0 0 1\r\n0 4 4 0 0 1\r\n0 2 1 0 0 1\r\n"
+        "0 1 3 0 0 1\r\n0 0 4 0 0 1\r\n";
+    struct mutate *m = malloc(sizeof *m);
+    mutate_init(m);
+    mutate_add(m, "vectors/ply-happly", ".ply");
+    mutate_add(m, "vectors/assimp/PLY", "");
+    mutate_add(m, "conformance/room.ply", "");
+    mutate_add_bytes(m, text, sizeof text - 1);
+    add_binary(m, false);
+    add_binary(m, true);
+    int result = mutate_run(m, argc, argv, 20000, target);
+    free(m);
+    return result;
+}
