@@ -117,15 +117,17 @@ static enum status parse_format(struct parser *p, char *const *word, size_t word
     return header_error(p, "unknown format", words >= 2 ? word[1] : "");
 }
 
-/* Splits at blanks into at most 6 NUL-terminated words within `copy`; false when there are more
- * or one is too long for a name. */
+/* Splits at blanks into NUL-terminated words within `copy`: the first 6, though all are counted.
+ * False when one of these is too long for a name. */
 static bool split_words(char *copy, char **word, size_t *words) {
     *words = 0;
     char *rest = copy;
     for (char *w; (w = strtok_r(rest, " \t", &rest)) != NULL;) {
-        if (*words == 6 || strlen(w) >= PLY_MAX_NAME)
+        if (*words < 6 && strlen(w) >= PLY_MAX_NAME)
             return false;
-        word[(*words)++] = w;
+        if (*words < 6)
+            word[*words] = w;
+        (*words)++;
     }
     return true;
 }

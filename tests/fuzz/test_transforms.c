@@ -16,7 +16,8 @@ static void target(const uint8_t *data, size_t size) {
     transforms_read(tree, "case", &t, &f);
     for (size_t i = 0; i < t.frame_count; i++) {
         struct camera camera;
-        CHECK(t.frame[i].file != NULL && t.frame[i].file[0] != '/' && !strstr(t.frame[i].file, ".."));
+        const char *file = t.frame[i].file;
+        CHECK(file[0] != '\0' && file[0] != '/' && strncmp(file, "../", 3) != 0 && !strstr(file, "/../"));
         if (transforms_camera(&t.frame[i], 64, 48, &camera, &err) != STATUS_OK) {
             CHECK(err.message[0] != '\0');
             continue;

@@ -166,7 +166,8 @@ static void test_damage(void) {
     char *path = file_join(work, "bad");
     write_file(path, "", 0);
     refuse("bad", path, &generous, STATUS_INPUT, "bad");
-    write_file(path, "\x89PNG\r\n\x1a\n and so on, no archive at all", 40);
+    static const char picture[] = "\x89PNG\r\n\x1a\n and so on, no archive at all";
+    write_file(path, picture, sizeof picture);
     refuse("bad", path, &generous, STATUS_INPUT, "cannot be read as a zip, tar");
     static char big[300000];
     for (size_t i = 0; i + 1 < sizeof big; i++)

@@ -192,11 +192,54 @@ static void test_polygons(void) {
     polygon_triangulate(line, 5, t); /* without area: must end */
 }
 
+/* Other projects' files. */
+static void test_vectors(void) {
+    static const struct {
+        const char *file;
+        size_t vertices, triangles; /* 0: refused, with the sentence */
+        const char *sentence;
+    } table[] = {
+        {"ply-happly/test/sampledata/platonic_shelf.ply", 50, 80, NULL},
+        {"ply-happly/test/sampledata/platonic_shelf_ascii.ply", 50, 80, NULL},
+        {"ply-happly/test/sampledata/platonic_shelf_big_endian.ply", 50, 80, NULL},
+        {"assimp/PLY/Wuson.ply", 0, 0, "line 3: unknown keyword \"Created\""},
+        {"assimp/PLY/cube.ply", 8, 12, NULL},
+        {"assimp/PLY/cube_binary.ply", 8, 12, NULL},
+        {"assimp/PLY/cube_binary_header_with_RN_newline.ply", 8, 12, NULL},
+        {"assimp/PLY/cube_binary_starts_with_nl.ply", 8, 12, NULL},
+        {"assimp/PLY/cube_uv.ply", 24, 12, NULL},
+        {"assimp/PLY/float-color.ply", 3, 1, NULL},
+        {"assimp/PLY/issue623.ply", 0, 0, "line 14: vertex 0 has fewer"},
+        {"assimp/PLY/points.ply", 0, 0, "no faces"},
+        {"assimp/PLY/pond.0.ply", 0, 0, "no faces"},
+        {"assimp/PLY/payload_JVN42386607", 0, 0, "payload_JVN42386607"},
+    };
+    const char *root = getenv("UNBAKE_TEST_DATA");
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        char path[1024];
+        snprintf(path, sizeof path, "%s/vectors/%s", root ? root : "../shared/data", table[i].file);
+        if (access(path, R_OK) != 0) {
+            printf("no vectors here\n");
+            return;
+        }
+        struct mesh mesh;
+        struct error err = {.message = ""};
+        enum status status = ply_read(path, table[i].file, 1000000, &mesh, NULL, &err);
+        CHECK_THAT(status == (table[i].sentence ? STATUS_INPUT : STATUS_OK), "%s: %s", table[i].file, err.message);
+        CHECK_THAT(mesh.vertex_count == table[i].vertices && mesh.triangle_count == table[i].triangles,
+                   "%s: %zu vertices, %zu triangles", table[i].file, mesh.vertex_count, mesh.triangle_count);
+        if (table[i].sentence)
+            CHECK_THAT(strstr(err.message, table[i].sentence), "%s", err.message);
+        mesh_release(&mesh);
+    }
+}
+
 int main(void) {
     test_ascii();
     test_order();
     test_binary();
     test_refusals();
     test_polygons();
+    test_vectors();
     return check_result();
 }
