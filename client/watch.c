@@ -62,8 +62,8 @@ static void show_line(struct watch *w) {
 /* On a terminal: as often as eyes want. Else: what is new at once, figures now and then. */
 static void show(struct watch *w, bool urgent) {
     struct client *c = w->client;
-    if (c->json || c->quiet || w->only_log || !w->view.state[0])
-        return;
+    if (c->json || c->quiet || w->only_log || !w->view.state[0] || view_is_over(&w->view))
+        return; /* the outcome gets lines of its own */
     double since = meter_now() - w->shown_at;
     if (c->out.live) {
         if (urgent || since >= REDRAW_SEC)

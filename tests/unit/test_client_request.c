@@ -442,7 +442,7 @@ static void test_watch(void) {
               "GET /v1/jobs/7 ", NULL, NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "watch 7"), 0);
-    CHECK_STRING(out_text, "job 7  running    0%\njob 7  refine   25%\nwarning: dim\njob 7  succeeded\n"
+    CHECK_STRING(out_text, "job 7  running    0%\njob 7  refine   25%\nwarning: dim\n"
                            "job 7 succeeded after 3m05s\nfetch its outputs with: unbake get 7\n");
     script_end(&s, "watch, cut");
 
