@@ -31,6 +31,12 @@ static enum status check_state(const char *state, struct error *err) {
                         : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
 }
 
+/* The last progress that was reported falls short of the end. */
+static double percent_done(const cJSON *job) {
+    bool succeeded = strcmp(member_text(job, "state"), JOB_STATE_SUCCEEDED) == 0;
+    return succeeded ? 100.0 : floor(100.0 * member_number(job, "progress", 0.0));
+}
+
 static void print_jobs(struct client *c, const cJSON *items) {
     static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", "name"};
     struct table t;
@@ -44,7 +50,7 @@ static void print_jobs(struct client *c, const cJSON *items) {
         table_row(&t);
         table_set(&t, 0, COLOUR_NONE, "%.0f", member_number(job, "id", 0.0));
         table_set(&t, 1, state_colour(state), "%s", state);
-        table_set(&t, 2, COLOUR_NONE, "%.0f%%", floor(100.0 * member_number(job, "progress", 0.0)));
+        table_set(&t, 2, COLOUR_NONE, "%.0f%%", percent_done(job));
         table_set(&t, 3, COLOUR_NONE, "%s", running ? member_text(job, "stage") : "");
         if (running && eta >= 0.0) {
             char left[16];
@@ -151,10 +157,10 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     print_field(c, "state", text);
     print_field(c, "reason", member_text(job, "reason"));
     print_field(c, "hint", member_text(job, "hint"));
-    format_duration(left, member_number(job, "eta_sec", -1.0));
-    if (*member_text(job, "stage")) {
-        snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"),
-                 floor(100.0 * member_number(job, "progress", 0.0)), left);
+    if (strcmp(member_text(job, "state"), JOB_STATE_RUNNING) == 0) {
+        format_duration(left, member_number(job, "eta_sec", -1.0));
+        snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job),
+                 left);
         print_field(c, "stage", text);
     }
     print_field(c, "scene", member_text(job, "scene"));

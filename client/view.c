@@ -17,6 +17,8 @@ static void copy(char *to, size_t size, const cJSON *data, const char *key) {
 }
 
 static void take_state(struct view *v, const cJSON *data) {
+    /* An event of a change leaves out a reason and a wish that there is not. */
+    v->wanted[0] = v->reason[0] = '\0';
     copy(v->state, sizeof v->state, data, "state");
     copy(v->wanted, sizeof v->wanted, data, "wanted");
     copy(v->stage, sizeof v->stage, data, "stage");

@@ -82,8 +82,7 @@ static enum status forbidden(const struct present *now, const char *action, stru
 static enum status append_state(struct store *store, const struct present *now, const char *reason,
                                 const char *hint, struct error *err) {
     cJSON *data = cJSON_CreateObject();
-    json_add_string(data, "state", job_state_name(now->state));
-    json_add_int(data, "attempt", now->attempt);
+    json_add_string(data, "state", job_state_name(now->state)); /* the event's row has the attempt */
     if (now->wanted != JOB_WANT_RUN)
         json_add_string(data, "wanted", job_wanted_name(now->wanted));
     if (reason[0])
