@@ -31,7 +31,7 @@ static const char style[] =
     "table{border-collapse:collapse;width:100%;font-size:.87rem;font-variant-numeric:tabular-nums}"
     "th,td{text-align:left;padding:.25rem .7rem .25rem 0;border-bottom:1px solid var(--line);"
     "font-weight:400;vertical-align:top;overflow-wrap:anywhere}"
-    "tr:last-child>*{border-bottom:0}td.n,th.n{text-align:right}"
+    ".files th{white-space:nowrap}tr:last-child>*{border-bottom:0}td.n,th.n{text-align:right}"
     ".swatch{display:inline-block;width:2.2em;height:1em;border-radius:3px;vertical-align:-.12em;"
     "border:1px solid var(--line);margin-right:.4em}"
     ".bar{display:block;height:.6em;margin:.4em 0;border-radius:3px;background:var(--accent)}"
@@ -382,7 +382,7 @@ static void put_others(struct buf *out, const cJSON *report, bool plain) {
 static void put_files(struct buf *out, const cJSON *files) {
     if (!cJSON_IsArray(files))
         return;
-    buf_puts(out, "<h2>Files</h2><div class=card><table>");
+    buf_puts(out, "<h2>Files</h2><div class=\"card files\"><table>");
     for (const cJSON *file = files->child; file; file = file->next) {
         buf_puts(out, "<tr><th>");
         put_value(out, cJSON_GetObjectItemCaseSensitive(file, "name"));

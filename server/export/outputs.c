@@ -1,0 +1,309 @@
+/* outputs.c -- see outputs.h. Owns the order of the files and how each is put in place; the
+ * pictures themselves are made in pictures.c, the page in report_html.c. */
+#include "server/export/outputs.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "common/vec.h"
+#include "server/export/mesh_ply.h"
+#include "server/export/pictures.h"
+#include "server/export/report_html.h"
+
+#define MIME_EXR "image/x-exr"
+#define MIME_PNG "image/png"
+#define MIME_PLY "model/ply"
+#define MIME_HTML "text/html; charset=utf-8"
+
+#define PAGE_LIMIT ((size_t)1 << 29)  /* bytes */
+#define PAGE_COMPARISONS 24           /* side-by-sides embedded in the page; files of all are written */
+
+struct kind {
+    enum picture_kind kind;
+    const char *stem;
+    enum image_exr_type type;
+    const char *title, *about; /* about: for report.json and the page */
+};
+
+static const struct kind kinds[] = {
+    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour",
+     "linear Rec. 709 reflectance by texel"},
+    {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission",
+     "radiance of each emitter's front side, exactly 0 elsewhere; compressed by 1 / (1 + maximum) "
+     "in the preview"},
+    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness",
+     "by segment, 0 to 1; the microfacet width is its square"},
+    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular",
+     "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
+    {PICTURE_CONFIDENCE, "confidence", IMAGE_FLOAT, "Confidence",
+     "observations by texel and the spread of their radiance; in the preview from blue (few) to "
+     "yellow (many), red where no photograph sees the surface"},
+};
+#define KIND_COUNT (sizeof kinds / sizeof *kinds)
+
+struct export {
+    const char *dir;
+    const struct export_input *input;
+    export_announce *announce;
+    void *user;
+    cJSON *files; /* array: what was written; NULL for previews alone */
+};
+
+/* --- putting files in place --------------------------------------------------------------- */
+
+/* Lists a file that is in place, then tells of it. */
+static enum status tell(struct export *e, const char *type, const char *name,
+                        const char *content_type, const char *about, struct error *err) {
+    if (e->files) {
+        cJSON *file = cJSON_CreateObject();
+        json_add_string(file, "name", name);
+        json_add_string(file, "content_type", content_type);
+        json_add_string(file, "about", about);
+        cJSON_AddItemToArray(e->files, file);
+    }
+    return e->announce(e->user, type, name, content_type, err);
+}
+
+/* Gives a complete temporary file its name after its content is on disk. */
+static enum status put_in_place(const char *temporary, const char *path, struct error *err) {
+    int fd = open(temporary, O_RDONLY | O_CLOEXEC);
+    enum status status = STATUS_OK;
+    if (fd < 0 || fsync(fd) != 0)
+        status = error_set_errno(err, errno, "%s", temporary);
+    if (fd >= 0)
+        close(fd);
+    if (status == STATUS_OK && rename(temporary, path) != 0)
+        status = error_set_errno(err, errno, "%s", path);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err);
+    if (status != STATUS_OK)
+        unlink(temporary);
+    return status;
+}
+
+enum image_format { FORMAT_PNG, FORMAT_EXR_HALF, FORMAT_EXR_FLOAT };
+
+static enum status put_image(struct export *e, const char *type, const char *name,
+                             const struct image *image, enum image_format format,
+                             const char *about, struct error *err) {
+    char *path = file_join(e->dir, name), *temporary = mem_printf("%s.part", path);
+    enum status status;
+    if (format == FORMAT_PNG)
+        status = image_write_png(temporary, image, 1.0f, err);
+    else
+        status = image_write_exr(temporary, image,
+                                 format == FORMAT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true, err);
+    if (status == STATUS_OK)
+        status = put_in_place(temporary, path, err);
+    else
+        unlink(temporary);
+    if (status == STATUS_OK)
+        status = tell(e, type, name, format == FORMAT_PNG ? MIME_PNG : MIME_EXR, about, err);
+    mem_free(temporary);
+    mem_free(path);
+    return status;
+}
+
+static enum status put_bytes(struct export *e, const char *name, const char *content_type,
+                             const void *data, size_t length, struct error *err) {
+    char *path = file_join(e->dir, name);
+    enum status status = file_replace(path, data, length, err);
+    if (status == STATUS_OK)
+        status = e->announce(e->user, EVENT_OUTPUT, name, content_type, err);
+    mem_free(path);
+    return status;
+}
+
+static enum status make_folder(const struct export *e, const char *name, struct error *err) {
+    char *path = file_join(e->dir, name);
+    enum status status = file_make_dirs(path, err);
+    mem_free(path);
+    return status;
+}
+
+/* --- previews and textures ---------------------------------------------------------------- */
+
+static enum status put_previews(struct export *e, struct error *err) {
+    enum status status = make_folder(e, "preview", err);
+    for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
+        struct image image;
+        char name[64];
+        if (kinds[k].kind == PICTURE_CONFIDENCE && !e->input->confidence_count)
+            continue;
+        snprintf(name, sizeof name, "preview/%s.png", kinds[k].stem);
+        picture_preview(e->input, kinds[k].kind, &image);
+        status = put_image(e, EVENT_PREVIEW, name, &image, FORMAT_PNG, kinds[k].about, err);
+        image_release(&image);
+    }
+    return status;
+}
+
+static enum status put_textures(struct export *e, struct error *err) {
+    uint32_t *source = picture_margin(e->input->inverse);
+    enum status status = STATUS_OK;
+    for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
+        struct image image;
+        char name[64];
+        snprintf(name, sizeof name, "%s.exr", kinds[k].stem);
+        picture_texture(e->input, kinds[k].kind, source, &image);
+        status = put_image(e, EVENT_OUTPUT, name, &image,
+                           kinds[k].type == IMAGE_HALF ? FORMAT_EXR_HALF : FORMAT_EXR_FLOAT,
+                           kinds[k].about, err);
+        image_release(&image);
+    }
+    mem_free(source);
+    return status;
+}
+
+static enum status put_mesh(struct export *e, struct error *err) {
+    const struct export_input *in = e->input;
+    char *path = file_join(e->dir, "scene.ply");
+    enum status status = mesh_ply_write(path, in->mesh, in->segments, in->atlas, err);
+    if (status == STATUS_OK)
+        status = tell(e, EVENT_OUTPUT, "scene.ply", MIME_PLY,
+                          "the mesh with its atlas coordinates s, t and its segments", err);
+    mem_free(path);
+    return status;
+}
+
+static void comparison_file(char name[64], size_t i) {
+    snprintf(name, 64, "compare/%03zu.png", i);
+}
+
+static enum status put_comparisons(struct export *e, struct error *err) {
+    size_t count = e->input->comparison_count;
+    enum status status = count ? make_folder(e, "compare", err) : STATUS_OK;
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        struct image image;
+        char name[64];
+        comparison_file(name, i);
+        picture_comparison(&e->input->comparison[i], &image);
+        status = put_image(e, EVENT_OUTPUT, name, &image, FORMAT_PNG,
+                           "held-out photograph, its re-render, their difference", err);
+        image_release(&image);
+    }
+    return status;
+}
+
+/* --- the report --------------------------------------------------------------------------- */
+
+/* One entry a segment: what was found, over how much surface. */
+static cJSON *describe_segments(const struct export_input *in) {
+    size_t count = in->segments->count;
+    double *area = mem_calloc(count, sizeof *area);
+    double(*color)[3] = mem_calloc(count, sizeof *color);
+    size_t *triangles = mem_calloc(count, sizeof *triangles);
+    size_t *texels = mem_calloc(count, sizeof *texels);
+    for (size_t t = 0; t < in->mesh->triangle_count; t++) {
+        uint32_t s = in->segments->of_triangle[t];
+        triangles[s]++;
+        area[s] += 0.5 * (double)vec3_length(mesh_cross(in->mesh, t));
+    }
+    for (size_t i = 0; i < in->inverse->valid_count; i++) {
+        uint32_t texel = in->inverse->valid[i];
+        uint32_t s = in->segments->of_triangle[in->inverse->triangle[texel]];
+        texels[s]++;
+        for (int c = 0; c < 3; c++)
+            color[s][c] += (double)in->materials->base_color.texel[texel][c];
+    }
+    cJSON *list = cJSON_CreateArray();
+    for (size_t s = 0; s < count; s++) {
+        double weight = texels[s] ? 1.0 / (double)texels[s] : 0.0;
+        rgb e = in->materials->emission[s];
+        cJSON *entry = cJSON_CreateObject();
+        json_add_int(entry, "segment", (int64_t)s); /* as scene.ply numbers it */
+        json_add_int(entry, "id", in->segments->id[s]);
+        json_add_int(entry, "triangles", (int64_t)triangles[s]);
+        json_add_int(entry, "texels", (int64_t)texels[s]);
+        json_add_number(entry, "area_m2", area[s]);
+        json_add(entry, "mean_base_color",
+                 cJSON_CreateDoubleArray((double[]){color[s][0] * weight, color[s][1] * weight,
+                                                    color[s][2] * weight}, 3));
+        json_add_number(entry, "roughness", (double)in->materials->roughness[s]);
+        json_add_number(entry, "specular", (double)in->materials->specular[s]);
+        json_add_bool(entry, "emitter", in->is_emitter[s]);
+        json_add(entry, "emission",
+                 cJSON_CreateDoubleArray((double[]){(double)e.r, (double)e.g, (double)e.b}, 3));
+        cJSON_AddItemToArray(list, entry);
+    }
+    mem_free(texels);
+    mem_free(triangles);
+    mem_free(color);
+    mem_free(area);
+    return list;
+}
+
+static enum status put_page(struct export *e, const cJSON *report, struct error *err) {
+    size_t shown = e->input->comparison_count;
+    if (shown > PAGE_COMPARISONS)
+        shown = PAGE_COMPARISONS;
+    struct report_picture texture[KIND_COUNT];
+    struct report_picture *comparison = mem_array(shown, sizeof *comparison);
+    for (size_t k = 0; k < KIND_COUNT; k++)
+        texture[k] = (struct report_picture){
+            mem_printf("%s/preview/%s.png", e->dir, kinds[k].stem), kinds[k].title,
+            kinds[k].about};
+    for (size_t i = 0; i < shown; i++) {
+        char name[64];
+        comparison_file(name, i);
+        comparison[i] = (struct report_picture){file_join(e->dir, name),
+                                                e->input->comparison[i].name, NULL};
+    }
+    struct report_page page = {e->input->title, report, KIND_COUNT, shown, texture, comparison};
+    struct buf html;
+    buf_init(&html, PAGE_LIMIT);
+    enum status status = report_html(&page, &html, err);
+    if (status == STATUS_OK)
+        status = put_bytes(e, "report.html", MIME_HTML, html.data, html.length, err);
+    buf_release(&html);
+    for (size_t i = 0; i < shown; i++)
+        mem_free((char *)comparison[i].path);
+    mem_free(comparison);
+    for (size_t k = 0; k < KIND_COUNT; k++)
+        mem_free((char *)texture[k].path);
+    return status;
+}
+
+static enum status put_report(struct export *e, struct error *err) {
+    cJSON *report = cJSON_Duplicate(e->input->report, true);
+    json_add_string(report, "title", e->input->title);
+    json_add(report, "segments", describe_segments(e->input));
+    json_add(report, "files", cJSON_Duplicate(e->files, true));
+    char *text = cJSON_Print(report); /* with line breaks: people read it too */
+    enum status status = put_bytes(e, "report.json", MIME_JSON, text, strlen(text), err);
+    cJSON_free(text);
+    if (status == STATUS_OK)
+        status = put_page(e, report, err);
+    cJSON_Delete(report);
+    return status;
+}
+
+/* --- entry points ------------------------------------------------------------------------- */
+
+enum status export_preview(const char *dir, const struct export_input *input,
+                           export_announce *announce, void *user, struct error *err) {
+    struct export e = {dir, input, announce, user, NULL};
+    return put_previews(&e, err);
+}
+
+enum status export_outputs(const char *dir, const struct export_input *input,
+                           export_announce *announce, void *user, struct error *err) {
+    struct export e = {dir, input, announce, user, cJSON_CreateArray()};
+    enum status status = put_previews(&e, err);
+    if (status == STATUS_OK)
+        status = put_textures(&e, err);
+    if (status == STATUS_OK)
+        status = put_mesh(&e, err);
+    if (status == STATUS_OK)
+        status = put_comparisons(&e, err);
+    if (status == STATUS_OK)
+        status = put_report(&e, err);
+    cJSON_Delete(e.files);
+    return status;
+}

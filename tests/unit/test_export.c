@@ -1,0 +1,229 @@
+/* outputs.c and its pictures: a job's files, written and read back. */
+#include <sys/stat.h>
+
+#include "common/buf.h"
+#include "common/file.h"
+#include "common/image.h"
+#include "common/json.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "server/demo/room.h"
+#include "server/export/outputs.h"
+#include "server/export/pictures.h"
+#include "server/ingest/ply.h"
+#include "tests/check.h"
+
+struct announced {
+    const char *dir;
+    int previews, outputs;
+    char last[64];
+    bool refuse;
+};
+
+/* The file is there, whole and under its final name, when it is announced. */
+static enum status hear(void *user, const char *type, const char *name, const char *content_type,
+                        struct error *err) {
+    struct announced *a = user;
+    struct stat info;
+    char *path = file_join(a->dir, name);
+    CHECK_THAT(stat(path, &info) == 0 && info.st_size > 0, "%s", name);
+    CHECK(strchr(content_type, '/') != NULL);
+    mem_free(path);
+    a->previews += strcmp(type, EVENT_PREVIEW) == 0;
+    a->outputs += strcmp(type, EVENT_OUTPUT) == 0;
+    snprintf(a->last, sizeof a->last, "%s", name);
+    return a->refuse ? error_set(err, STATUS_CANCELLED, "enough") : STATUS_OK;
+}
+
+static void read_back(const char *dir, const char *name, struct image *image) {
+    struct error err;
+    char *path = file_join(dir, name);
+    enum status status = image_read(path, image, NULL, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    mem_free(path);
+}
+
+/* Valid texels hold the values, the margin holds a valid neighbour's, the rest is 0. */
+static void test_textures(const char *dir, const struct export_input *in) {
+    struct image color, roughness, emission, confidence;
+    read_back(dir, "base_color.exr", &color);
+    read_back(dir, "roughness.exr", &roughness);
+    read_back(dir, "emission.exr", &emission);
+    read_back(dir, "confidence.exr", &confidence);
+    CHECK(color.width == in->atlas->width && color.height == in->atlas->height);
+    CHECK_STRING(confidence.channel[0], "count");
+    size_t margin = 0;
+    for (size_t i = 0; i < (size_t)color.width * color.height; i++) {
+        uint32_t triangle = in->inverse->triangle[i];
+        bool filled = color.pixel[3 * i] != 0.0f;
+        if (triangle == INVERSE_UV_NONE) {
+            margin += filled;
+            CHECK(confidence.pixel[2 * i] == 0.0f);
+            continue;
+        }
+        uint32_t s = in->segments->of_triangle[triangle];
+        float wanted = in->materials->base_color.texel[i][1];
+        CHECK_NEAR(color.pixel[3 * i + 1], wanted, 1e-3f * wanted);
+        CHECK_NEAR(roughness.pixel[3 * i], in->materials->roughness[s], 1e-3);
+        CHECK_NEAR(emission.pixel[3 * i + 2], in->materials->emission[s].b,
+                   1e-3f * in->materials->emission[s].b);
+        CHECK(confidence.pixel[2 * i] == in->confidence_count[i]);
+    }
+    CHECK_THAT(margin > in->inverse->valid_count / 20, "%zu texels of margin", margin);
+    image_release(&color);
+    image_release(&roughness);
+    image_release(&emission);
+    image_release(&confidence);
+}
+
+/* Each texel within reach of a valid one shows one that is nearly the nearest. */
+static void test_margin(void) {
+    enum { SIZE = 64 };
+    static uint32_t triangle[SIZE * SIZE];
+    struct inverse_uv inverse = {.width = SIZE, .height = SIZE, .triangle = triangle};
+    const uint32_t at[2] = {20 * SIZE + 20, 24 * SIZE + 50};
+    for (size_t i = 0; i < SIZE * SIZE; i++)
+        triangle[i] = INVERSE_UV_NONE;
+    triangle[at[0]] = triangle[at[1]] = 0;
+    uint32_t *source = picture_margin(&inverse);
+    for (int y = 0; y < SIZE; y++) {
+        for (int x = 0; x < SIZE; x++) {
+            int a = (x - 20) * (x - 20) + (y - 20) * (y - 20);
+            int b = (x - 50) * (x - 50) + (y - 24) * (y - 24);
+            int nearest = a < b ? a : b, reach = EXPORT_MARGIN * EXPORT_MARGIN;
+            uint32_t wanted = nearest > reach ? INVERSE_UV_NONE : a <= b ? at[0] : at[1];
+            uint32_t found = source[y * SIZE + x];
+            CHECK_THAT(found == wanted || (a == b && found == at[1]), "at %d %d", x, y);
+        }
+    }
+    mem_free(source);
+}
+
+/* One exposure for both; equal pictures differ nowhere; signs by colour. */
+static void test_comparison(void) {
+    static const char *const names[] = {"R", "G", "B"};
+    struct image photograph, render, picture;
+    image_init(&photograph, 10, 1, 3, names);
+    image_init(&render, 10, 1, 3, names);
+    for (int i = 0; i < 30; i++)
+        photograph.pixel[i] = render.pixel[i] = 2.0f;
+    for (int c = 0; c < 3; c++) {
+        render.pixel[c] = 4.0f;      /* first pixel too bright */
+        render.pixel[3 + c] = 1.0f;  /* second too dark */
+        photograph.pixel[6 + c] = NAN;
+    }
+    struct export_comparison comparison = {"a", &photograph, &render};
+    picture_comparison(&comparison, &picture);
+    CHECK(picture.width == 38 && picture.height == 1);
+    const float *p = picture.pixel, *r = p + 3 * 14, *d = p + 3 * 28;
+    CHECK_NEAR(p[0], 0.6, 1e-6); /* the 80th percentile */
+    CHECK_NEAR(r[0], 1.2, 1e-6);
+    CHECK_NEAR(r[3], 0.3, 1e-6);
+    CHECK(d[0] > d[1] && d[1] == d[2]);
+    CHECK(d[5] > d[3] && d[3] == d[4]);
+    CHECK(isnan(d[6]));
+    CHECK(d[9] == d[10] && d[10] == d[11]);
+    image_release(&photograph);
+    image_release(&render);
+    image_release(&picture);
+}
+
+static size_t occurrences(const char *text, const char *part) {
+    size_t count = 0;
+    for (const char *at = strstr(text, part); at; at = strstr(at + 1, part))
+        count++;
+    return count;
+}
+
+static void test_report(const char *dir, size_t segments) {
+    struct error err;
+    struct buf page;
+    cJSON *report = NULL;
+    char *path = file_join(dir, "report.json");
+    CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)segments);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 12);
+    CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
+    cJSON_Delete(report);
+    mem_free(path);
+    path = file_join(dir, "report.html");
+    buf_init(&page, 1 << 26);
+    CHECK(file_read(path, &page, &err) == STATUS_OK);
+    const char *text = buf_text(&page);
+    CHECK(strstr(text, "room &lt;1&gt; &amp; &quot;2&quot;") != NULL);
+    CHECK(strstr(text, "<1>") == NULL);
+    CHECK(strstr(text, "http") == NULL && strstr(text, "src=\"data:image/png") != NULL);
+    CHECK(occurrences(text, "<img") == 6);
+    CHECK(occurrences(text, "<svg") == 1 && occurrences(text, "</svg>") == 1);
+    CHECK(occurrences(text, "<table>") == occurrences(text, "</table>"));
+    CHECK(occurrences(text, "<figure>") == occurrences(text, "</figure>"));
+    buf_release(&page);
+    mem_free(path);
+}
+
+static void test_mesh(const char *dir, const struct mesh *wanted) {
+    struct mesh mesh;
+    struct error err;
+    char *path = file_join(dir, "scene.ply");
+    enum status status = ply_read(path, "scene.ply", 1 << 20, &mesh, NULL, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    CHECK(mesh.triangle_count == wanted->triangle_count && mesh.normal != NULL);
+    for (size_t t = 0; t < mesh.triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            CHECK(memcmp(&mesh.position[mesh.index[t][k]], &wanted->position[wanted->index[t][k]],
+                         sizeof(vec3)) == 0);
+    mesh_release(&mesh);
+    mem_free(path);
+}
+
+int main(void) {
+    static const char *const names[] = {"R", "G", "B"};
+    char dir[] = "/tmp/unbake-export-XXXXXX";
+    struct parallel *pool = parallel_new(1);
+    struct room room;
+    struct error err;
+    CHECK(mkdtemp(dir) != NULL);
+    test_margin();
+    test_comparison();
+    CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
+    size_t texels = (size_t)room.atlas.width * room.atlas.height;
+    float *count = mem_calloc(texels, sizeof *count), *spread = mem_calloc(texels, sizeof *spread);
+    for (size_t i = 0; i < texels; i++)
+        count[i] = (float)(i % 9), spread[i] = 0.1f;
+    bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
+    struct image photograph;
+    image_init(&photograph, 16, 12, 3, names);
+    struct export_comparison comparison = {"images/003.exr", &photograph, &photograph};
+    cJSON *report = NULL;
+    static const char text[] = "{\"seed\":1,\"stages\":[{\"name\":\"refine\",\"seconds\":2.5}],"
+                               "\"series\":{\"loss\":[[0,1],[1,0.5],[2,0.02]],\"one\":[[0,1]]},"
+                               "\"views\":[{\"name\":\"a\",\"msre\":0.01}],\"settings\":{\"a\":1}}";
+    CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
+    struct export_input in = {
+        "room <1> & \"2\"", &room.mesh, &room.segments, &room.atlas, &room.inverse, &room.materials,
+        NULL, NULL, is_emitter, 1, &comparison, report};
+
+    struct announced heard = {.dir = dir};
+    CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
+    CHECK(heard.previews == 4 && heard.outputs == 0); /* no confidence yet */
+    in.confidence_count = count, in.confidence_spread = spread;
+    heard = (struct announced){.dir = dir};
+    enum status status = export_outputs(dir, &in, hear, &heard, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    CHECK_THAT(heard.previews == 5 && heard.outputs == 9, "%d, %d", heard.previews, heard.outputs);
+    CHECK_STRING(heard.last, "report.html");
+    test_textures(dir, &in);
+    test_mesh(dir, &room.mesh);
+    test_report(dir, room.segments.count);
+    heard.refuse = true;
+    CHECK(export_outputs(dir, &in, hear, &heard, &err) == STATUS_CANCELLED);
+
+    cJSON_Delete(report);
+    image_release(&photograph);
+    mem_free(count);
+    mem_free(spread);
+    room_release(&room);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+    parallel_free(pool);
+    return check_result();
+}
