@@ -21,6 +21,7 @@
 
 #define CONVEX_FACTOR 0.3f    /* of an outward fold's weight: objects bulge, borders between two
                                * objects are mostly hollows */
+#define FLAT 0.002f           /* weight that is no fold at all: 3.6 degrees inwards, 6.6 outwards */
 #define BONUS 0.5             /* weight by which a region of 1 / BONUS_PARTS of the mesh may differ */
 #define BONUS_PARTS 100000.0
 #define SMALL_PARTS 5000.0    /* a region of less than 1 / SMALL_PARTS of the mesh is small */
@@ -107,7 +108,8 @@ static struct link *make_links(const struct mesh *mesh, const struct adjacency *
         float bend = fmaxf(0.0f, 1.0f - vec3_dot(normal[a], normal[b]));
         vec3 between = vec3_sub(centre_of(mesh, b), centre_of(mesh, a));
         bool convex = vec3_dot(vec3_sub(normal[b], normal[a]), between) > 0.0f;
-        link[(*count)++] = (struct link){convex ? CONVEX_FACTOR * bend : bend, h};
+        float weight = convex ? CONVEX_FACTOR * bend : bend;
+        link[(*count)++] = (struct link){fmaxf(0.0f, weight - FLAT), h};
     }
     mem_free(normal);
     qsort(link, *count, sizeof *link, lightest_first);
