@@ -14,6 +14,7 @@
 #include "server/worker/order.h"
 #include "server/worker/progress.h"
 #include "server/worker/sandbox.h"
+#include "server/worker/tasks.h"
 
 #define LOCK_TRIES 100 /* of 0.1 s: a worker that was just killed may still be dying */
 
@@ -51,7 +52,17 @@ static void confine(const struct order *order, struct progress *progress) {
                  result.text);
 }
 
-static enum status work(const struct order *order, struct error *err) {
+static enum status work(const struct order *order, struct progress *progress, struct error *err) {
+    static const struct {
+        const char *kind;
+        enum status (*run)(const struct order *, struct progress *, struct error *);
+    } tasks[] = {
+        {"reconstruct", task_reconstruct},
+        {"check", task_check},
+    };
+    for (size_t i = 0; i < sizeof tasks / sizeof tasks[0]; i++)
+        if (strcmp(order->kind, tasks[i].kind) == 0)
+            return tasks[i].run(order, progress, err);
     return error_set(err, STATUS_INTERNAL, "job.json: unknown kind \"%.40s\"", order->kind);
 }
 
@@ -80,7 +91,7 @@ int worker_main(int argc, char **argv) {
         status = take_folder(argv[1], &err);
     if (status == STATUS_OK) {
         confine(&order, &progress);
-        status = work(&order, &err);
+        status = work(&order, &progress, &err);
     }
     if (status != STATUS_OK)
         log_error("%s", err.message);

@@ -1,0 +1,64 @@
+/* check.c -- whether an uploaded scene can be used: unpacked, read in full, every problem told.
+ *
+ * The archive is what is durable. What is unpacked from it is flushed to the disk before the
+ * scene may be called ready, since nothing unpacks it a second time. */
+#include <errno.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "common/parallel.h"
+#include "server/ingest/bundle.h"
+#include "server/worker/tasks.h"
+
+static enum status flush(const char *dir, struct error *err) {
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot open folder %s", dir);
+    enum status status = STATUS_OK;
+    if (syncfs(fd) != 0)
+        status = error_set_errno(err, errno, "cannot flush folder %s", dir);
+    close(fd);
+    return status;
+}
+
+static void tell_problems(struct progress *progress, const cJSON *problems) {
+    const cJSON *problem;
+    cJSON_ArrayForEach(problem, problems) {
+        const char *file, *reason, *hint;
+        if (json_string(problem, "file", "a problem", "", &file, NULL) == STATUS_OK &&
+            json_string(problem, "reason", "a problem", "", &reason, NULL) == STATUS_OK &&
+            json_string(problem, "hint", "a problem", "", &hint, NULL) == STATUS_OK)
+            progress_problem(progress, file, reason, hint);
+    }
+}
+
+enum status task_check(const struct order *order, struct progress *progress, struct error *err) {
+    struct bundle_limits limits = bundle_default_limits();
+    char *archive = file_join(order->dir, "archive"), *files = file_join(order->dir, "files");
+    struct parallel *pool = parallel_new(order->thread_count);
+    cJSON *problems = cJSON_CreateArray();
+    struct scene scene;
+    /* What an earlier check left that was killed, or of an earlier opinion on the content. */
+    enum status status = file_remove_tree(files, err);
+    if (status == STATUS_OK)
+        status = bundle_unpack(archive, files, &limits, err);
+    if (status == STATUS_OK) {
+        status = bundle_load(files, NULL, &limits, pool, &scene, problems, err);
+        tell_problems(progress, problems);
+        if (status == STATUS_OK)
+            status = flush(order->dir, err);
+        if (status == STATUS_OK)
+            progress_scene(progress, bundle_facts(&scene));
+        if (status == STATUS_OK)
+            scene_release(&scene);
+        else
+            file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
+    }
+    cJSON_Delete(problems);
+    parallel_free(pool);
+    mem_free(files);
+    mem_free(archive);
+    return status;
+}

@@ -1,0 +1,339 @@
+/* run.c -- a reconstruction inside a worker: the clocks, the checkpoint, the previews, the
+ * outputs, and what is said of them.
+ *
+ * 1. A file is announced after it is whole under its final name, with the hash of what is there.
+ * 2. Checkpoints come every checkpoint_interval_sec, but never take more than CHECKPOINT_SHARE of
+ *    the time: where the disk is slow the interval grows. Previews likewise.
+ * 3. SIGTERM, or a daemon that is gone, stops the work at its next step, after a checkpoint.
+ *    Signals are blocked and asked for where the engine asks (no handlers, no globals). */
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "common/parallel.h"
+#include "common/protocol.h"
+#include "common/sha256.h"
+#include "server/export/outputs.h"
+#include "server/ingest/bundle.h"
+#include "server/reconstruct/reconstruct.h"
+#include "server/worker/checkpoint.h"
+#include "server/worker/tasks.h"
+
+#define CHECKPOINT_SHARE 0.02
+#define PREVIEW_SHARE 0.05
+#define PROGRESS_INTERVAL_SEC 0.25
+#define METRIC_INTERVAL_SEC 1.0 /* of one series */
+#define HANG_UP_INTERVAL_SEC 1.0
+#define SERIES_MAX 16
+
+struct run {
+    const struct order *order;
+    struct progress *progress;
+    struct checkpoint *checkpoint;
+    char *out_dir;
+    bool stop;
+    bool preview_asked; /* by SIGUSR1 */
+    double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
+    double preview_interval_sec;
+    size_t series_count;
+    struct {
+        char name[32];
+        double next;
+    } series[SERIES_MAX];
+};
+
+static double now_sec(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+/* --- what the engine asks ------------------------------------------------------------------- */
+
+static void signals_of_ours(sigset_t *set) {
+    sigemptyset(set);
+    sigaddset(set, SIGTERM);
+    sigaddset(set, SIGUSR1);
+}
+
+/* Whether nobody reads the pipe any more: the daemon has died without taking us with it. */
+static bool hung_up(struct run *run) {
+    double now = now_sec();
+    if (run->progress->fd < 0 || now < run->next_hang_up_test)
+        return false;
+    run->next_hang_up_test = now + HANG_UP_INTERVAL_SEC;
+    struct pollfd pipe = {.fd = run->progress->fd};
+    return poll(&pipe, 1, 0) == 1 && (pipe.revents & POLLERR);
+}
+
+static bool stop_requested(void *user) {
+    struct run *run = user;
+    static const struct timespec at_once = {0, 0};
+    sigset_t set;
+    int number;
+    signals_of_ours(&set);
+    while ((number = sigtimedwait(&set, NULL, &at_once)) > 0) {
+        if (number == SIGTERM)
+            run->stop = true;
+        else
+            run->preview_asked = true;
+    }
+    if (hung_up(run))
+        run->stop = true;
+    return run->stop;
+}
+
+static bool checkpoint_due(void *user) {
+    const struct run *run = user;
+    return now_sec() >= run->next_checkpoint;
+}
+
+static bool preview_due(void *user) {
+    const struct run *run = user;
+    return run->preview_asked || now_sec() >= run->next_preview;
+}
+
+/* --- what it tells --------------------------------------------------------------------------- */
+
+static void tell_stage(void *user, const char *stage) {
+    const struct run *run = user;
+    progress_stage(run->progress, stage);
+}
+
+static void tell_progress(void *user, const char *stage, double done, double total,
+                          double eta_sec) {
+    struct run *run = user;
+    double now = now_sec();
+    if (now < run->next_progress && done < total)
+        return;
+    run->next_progress = now + PROGRESS_INTERVAL_SEC;
+    progress_step(run->progress, stage, done, total, eta_sec);
+}
+
+static void tell_metric(void *user, const char *series, long step, double value) {
+    struct run *run = user;
+    double now = now_sec();
+    size_t i = 0;
+    while (i < run->series_count && strcmp(run->series[i].name, series) != 0)
+        i++;
+    if (i == SERIES_MAX || strlen(series) >= sizeof run->series[0].name)
+        return;
+    if (i == run->series_count) {
+        strcpy(run->series[i].name, series);
+        run->series_count++;
+    } else if (now < run->series[i].next) {
+        return;
+    }
+    run->series[i].next = now + METRIC_INTERVAL_SEC;
+    progress_metric(run->progress, series, step, value);
+}
+
+static void tell_log(void *user, const char *message) {
+    const struct run *run = user;
+    progress_log(run->progress, "info", message);
+}
+
+/* --- checkpoints ----------------------------------------------------------------------------- */
+
+static enum status save_checkpoint(void *user, long iteration, const struct state_array *array,
+                                   size_t count, struct error *err) {
+    struct run *run = user;
+    struct checkpoint_cost cost;
+    enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
+    if (status != STATUS_OK)
+        return status;
+    double wait = cost.seconds / CHECKPOINT_SHARE;
+    if (wait < run->order->checkpoint_interval_sec)
+        wait = run->order->checkpoint_interval_sec;
+    run->next_checkpoint = now_sec() + wait;
+    progress_checkpoint(run->progress, iteration, cost.written_bytes, cost.seconds);
+    return STATUS_OK;
+}
+
+/* A checkpoint that does not fit (of another version of the program) is as good as none: its
+ * work is lost, the job is not. */
+static enum status load_checkpoint(void *user, struct state_array *array, size_t count,
+                                   bool *found, struct error *err) {
+    struct run *run = user;
+    long iteration;
+    enum status status = checkpoint_load(run->checkpoint, array, count, found, &iteration, err);
+    if (status != STATUS_CORRUPT)
+        return status;
+    progress_log(run->progress, "warning",
+                 "the checkpoint does not fit this program's state: starting from the beginning");
+    *found = false;
+    return checkpoint_clear(run->checkpoint, err);
+}
+
+/* What the state depends on. Settings are what the user gave: defaults belong to the program. */
+static char *fingerprint_of(const struct order *order) {
+    char hex[SHA256_HEX_SIZE];
+    char *settings = json_text(order->settings);
+    sha256_of(settings, strlen(settings), hex);
+    mem_free(settings);
+    return mem_printf("scene %s settings %s", order->scene_id, hex);
+}
+
+/* --- files ------------------------------------------------------------------------------------ */
+
+static enum status announce(void *user, const char *type, const char *name,
+                            const char *content_type, struct error *err) {
+    struct run *run = user;
+    char *path = file_join(run->out_dir, name);
+    char hex[SHA256_HEX_SIZE];
+    struct stat info;
+    enum status status = sha256_of_file(path, hex, err);
+    if (status == STATUS_OK && stat(path, &info) != 0)
+        status = error_set_errno(err, errno, "cannot look at %s", path);
+    if (status == STATUS_OK)
+        progress_file(run->progress, type, name, (uint64_t)info.st_size, hex, content_type);
+    mem_free(path);
+    return status;
+}
+
+/* The part of an export's input that stands from the first iteration on. */
+static struct export_input input_of(const struct reconstruction *r) {
+    return (struct export_input){
+        .title = "unbake",
+        .mesh = &r->scene->mesh,
+        .segments = &r->segments,
+        .atlas = &r->atlas,
+        .inverse = &r->inverse,
+        .materials = &r->materials,
+        .confidence_count = r->confidence_count,
+        .confidence_spread = r->confidence_spread,
+        .is_emitter = r->is_emitter,
+        .report = r->report,
+    };
+}
+
+static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
+    struct run *run = user;
+    double start = now_sec();
+    struct export_input input = input_of(r);
+    enum status status = export_preview(run->out_dir, &input, announce, run, err);
+    double end = now_sec(), wait = (end - start) / PREVIEW_SHARE;
+    if (wait < run->preview_interval_sec)
+        wait = run->preview_interval_sec;
+    run->next_preview = end + wait;
+    run->preview_asked = false;
+    return status;
+}
+
+static enum status write_outputs(struct run *run, const struct reconstruction *r,
+                                 struct error *err) {
+    struct export_comparison *comparison =
+        mem_calloc(r->held_out_count ? r->held_out_count : 1, sizeof *comparison);
+    for (size_t i = 0; i < r->held_out_count; i++)
+        comparison[i] = (struct export_comparison){.name = r->held_out[i].name,
+                                                   .photograph = &r->held_out[i].photograph,
+                                                   .render = &r->held_out[i].render};
+    struct export_input input = input_of(r);
+    input.comparison = comparison;
+    input.comparison_count = r->held_out_count;
+    progress_stage(run->progress, "export");
+    enum status status = export_outputs(run->out_dir, &input, announce, run, err);
+    mem_free(comparison);
+    return status;
+}
+
+/* --- the whole ---------------------------------------------------------------------------------- */
+
+static enum status load_scene(struct run *run, const struct settings *settings,
+                              struct parallel *pool, struct scene *scene, struct error *err) {
+    struct bundle_limits limits = bundle_default_limits();
+    cJSON *problems = cJSON_CreateArray();
+    progress_stage(run->progress, "load");
+    enum status status = bundle_load(run->order->scene, settings_text(settings, "transforms"),
+                                     &limits, pool, scene, problems, err);
+    /* Only with another transforms file than the one that the scene's check has read. */
+    const cJSON *problem;
+    cJSON_ArrayForEach(problem, problems) {
+        char *text = json_text(problem);
+        progress_log(run->progress, "error", text);
+        mem_free(text);
+    }
+    cJSON_Delete(problems);
+    for (size_t i = 0; status == STATUS_OK && i < scene->warning_count; i++)
+        progress_log(run->progress, "warning", scene->warning[i]);
+    return status;
+}
+
+static enum status open_checkpoint(struct run *run, struct error *err) {
+    char note[512];
+    char *path = file_join(run->order->dir, "checkpoint.db");
+    char *fingerprint = fingerprint_of(run->order);
+    enum status status = checkpoint_open(&run->checkpoint, path, fingerprint, note, err);
+    if (status == STATUS_OK && note[0])
+        progress_log(run->progress, "warning", note);
+    mem_free(fingerprint);
+    mem_free(path);
+    return status;
+}
+
+static enum status reconstruct(struct run *run, const struct settings *settings,
+                               struct parallel *pool, struct error *err) {
+    struct scene scene;
+    struct reconstruction r = {0};
+    const struct reconstruct_hooks hooks = {
+        .user = run,
+        .stop_requested = stop_requested,
+        .stage = tell_stage,
+        .progress = tell_progress,
+        .metric = tell_metric,
+        .log = tell_log,
+        .checkpoint_due = checkpoint_due,
+        .preview_due = preview_due,
+        .checkpoint_save = save_checkpoint,
+        .checkpoint_load = load_checkpoint,
+        .preview = write_preview,
+    };
+    enum status status = load_scene(run, settings, pool, &scene, err);
+    if (status != STATUS_OK)
+        return status;
+    double now = now_sec();
+    run->next_checkpoint = now + run->order->checkpoint_interval_sec;
+    run->next_preview = now; /* the first one shows that something happens */
+    status = stop_requested(run) ? error_set(err, STATUS_CANCELLED, "stopped after stage load")
+                                 : reconstruct_run(&scene, settings, pool, &hooks, &r, err);
+    if (status == STATUS_OK)
+        status = write_outputs(run, &r, err);
+    reconstruct_release(&r);
+    scene_release(&scene);
+    return status;
+}
+
+enum status task_reconstruct(const struct order *order, struct progress *progress,
+                             struct error *err) {
+    struct run run = {.order = order, .progress = progress};
+    struct settings settings;
+    sigset_t set;
+    signals_of_ours(&set);
+    sigprocmask(SIG_BLOCK, &set, NULL); /* before the pool's threads, which inherit it */
+    settings_init(&settings);
+    run.out_dir = file_join(order->dir, "out");
+    struct parallel *pool = NULL;
+    enum status status = settings_apply(&settings, order->settings, NULL, err);
+    if (status == STATUS_OK)
+        status = file_make_dirs(run.out_dir, err);
+    if (status == STATUS_OK)
+        status = open_checkpoint(&run, err);
+    if (status == STATUS_OK) {
+        run.preview_interval_sec = settings_number(&settings, "preview_interval_sec");
+        pool = parallel_new(order->thread_count);
+        status = reconstruct(&run, &settings, pool, err);
+    }
+    parallel_free(pool);
+    checkpoint_close(run.checkpoint);
+    settings_release(&settings);
+    mem_free(run.out_dir);
+    return status;
+}

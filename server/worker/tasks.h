@@ -1,0 +1,17 @@
+/* tasks.h -- the kinds of work that a worker can be told to do. */
+#ifndef UNBAKE_WORKER_TASKS_H
+#define UNBAKE_WORKER_TASKS_H
+
+#include "common/error.h"
+#include "server/worker/order.h"
+#include "server/worker/progress.h"
+
+/* Unpacks DIR/archive to DIR/files and reads all of it; reports every problem. */
+enum status task_check(const struct order *order, struct progress *progress, struct error *err);
+
+/* Reconstructs, from the newest checkpoint on; leaves the outputs in DIR/out. STATUS_CANCELLED
+ * when asked to stop (a checkpoint was saved). */
+enum status task_reconstruct(const struct order *order, struct progress *progress,
+                             struct error *err);
+
+#endif
