@@ -59,11 +59,6 @@ struct flight {
     float pdf; /* of its direction by solid angle; 0 for a camera ray */
 };
 
-/* A light sample that waits for its shadow ray. */
-struct shadow {
-    uint32_t vertex;
-};
-
 struct path_batch {
     size_t capacity, count;
     int max_depth, depth_count;       /* depths used by the last trace */
@@ -76,11 +71,10 @@ struct path_batch {
     struct accel_ray *ray, *shadow_ray;
     struct accel_hit *hit;
     uint8_t *occluded;
-    struct shadow *shadow;
+    uint32_t *shadow;                 /* vertices whose light sample waits for its shadow ray */
     uint32_t *key;                    /* [capacity] sampler key per path */
     uint32_t *sample;
     bool *dropped;                    /* [capacity] the path's estimate was not finite */
-    rgb *adjoint;                     /* [capacity] per path */
     uint64_t ray_count, dropped_count;
 };
 
@@ -272,7 +266,7 @@ static size_t scatter(struct path_batch *b, const struct world *world,
         if (lit) {
             vec2 place = sampler_pair(key, sample, pair + PAIR_LIGHT);
             if (sample_light(b, world, v, at, &bsdf, choices.x, place, &b->shadow_ray[shadows]))
-                b->shadow[shadows++].vertex = (uint32_t)at;
+                b->shadow[shadows++] = (uint32_t)at;
         }
         vec2 direction = sampler_pair(key, sample, pair + PAIR_DIRECTION);
         v->wi = bsdf_sample(&bsdf, v->wo, choices.y, direction.x, direction.y);
@@ -305,7 +299,7 @@ static void gather_light(struct path_batch *b, const struct world *world, int de
     accel_occluded_many(world->accel, shadow_count, b->shadow_ray, b->occluded);
     b->ray_count += shadow_count;
     for (size_t i = 0; i < shadow_count; i++) {
-        struct vertex *v = &b->vertex[depth][b->shadow[i].vertex];
+        struct vertex *v = &b->vertex[depth][b->shadow[i]];
         if (b->occluded[i]) {
             v->incident = (rgb){0.0f, 0.0f, 0.0f};
             v->light_factor = 0.0f;

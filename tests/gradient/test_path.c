@@ -1,0 +1,265 @@
+/* Derivatives of path radiances, by every kind of parameter, through one bounce and through many,
+ * against central differences with common random numbers; and what the two-estimate loss is for.
+ *
+ * Where the parameter moves no sampling decision the two agree path by path. Where it does
+ * (roughness and specular of a glossy surface) they differ per path, having the same mean: a z-test
+ * over many groups. */
+#include "tests/render/box.h"
+
+#define BATCH 512
+
+/* A parameter of the box. */
+enum kind { TEXEL, SEGMENT_COLOR, ROUGHNESS, SPECULAR, EMISSION };
+
+struct parameter {
+    const char *name;
+    enum kind kind;
+    uint32_t which; /* texel or segment */
+    bool exact;     /* moves no sampling decision */
+    int depth;
+};
+
+/* The wall texture's rectangle of the slab's block, or the like. */
+static bool texel_of_segment(uint32_t texel, uint32_t segment) {
+    uint32_t x = texel % BOX_SIDE, y = texel / BOX_SIDE;
+    return segment == 0 ? y < 36 : segment == 1 ? y >= 36 && x < 14 : y >= 36 && x >= 14;
+}
+
+static void nudge(struct box *b, const struct parameter *p, float amount) {
+    struct materials *m = &b->materials;
+    switch (p->kind) {
+    case TEXEL:
+        m->base_color.texel[p->which][1] += amount;
+        break;
+    case SEGMENT_COLOR:
+        for (uint32_t i = 0; i < BOX_SIDE * BOX_SIDE; i++)
+            for (int c = 0; c < 3 && texel_of_segment(i, p->which); c++)
+                m->base_color.texel[i][c] += amount;
+        break;
+    case ROUGHNESS:
+        m->roughness[p->which] += amount;
+        break;
+    case SPECULAR:
+        m->specular[p->which] += amount;
+        break;
+    case EMISSION:
+        m->emission[p->which].g += amount;
+        world_update_lights(&b->world);
+        break;
+    }
+}
+
+static double read_log(const struct gradient_log *log, const struct parameter *p) {
+    double sum = 0.0;
+    if (p->kind == ROUGHNESS)
+        return log->segment[p->which].d_roughness;
+    if (p->kind == SPECULAR)
+        return log->segment[p->which].d_specular;
+    if (p->kind == EMISSION)
+        return log->segment[p->which].d_emission[1];
+    for (size_t i = 0; i < log->entry_count; i++) {
+        const struct gradient_entry *e = &log->entry[i];
+        for (uint32_t k = 0; k < 4; k++) {
+            if (e->weight[k] == 0.0f)
+                continue;
+            uint32_t texel = e->first + k % 2 + k / 2 * BOX_SIDE;
+            if (p->kind == TEXEL && texel == p->which)
+                sum += (double)(e->weight[k] * e->d.g);
+            else if (p->kind == SEGMENT_COLOR && texel_of_segment(texel, p->which))
+                sum += (double)(e->weight[k] * (e->d.r + e->d.g + e->d.b));
+        }
+    }
+    return sum;
+}
+
+/* The sum of all channels of the batch's radiances. */
+static double trace(struct path_batch *batch, const struct box *b, const struct path_settings *settings,
+                    uint32_t group, rgb *radiance) {
+    struct ray ray[BATCH];
+    struct path_key key[BATCH];
+    for (uint32_t i = 0; i < BATCH; i++) {
+        ray[i] = box_ray(group * BATCH + i);
+        key[i] = (struct path_key){group * BATCH + i, 0, 0};
+    }
+    path_batch_trace(batch, &b->world, settings, BATCH, ray, key, radiance);
+    double sum = 0.0;
+    for (int i = 0; i < BATCH; i++)
+        sum += (double)(radiance[i].r + radiance[i].g + radiance[i].b);
+    return sum;
+}
+
+static void check_parameter(struct box *b, const struct parameter *p) {
+    struct path_settings settings = {p->depth, 99, 21};
+    struct path_batch *batch = path_batch_new(BATCH, p->depth);
+    struct gradient_log *log = gradient_log_new(3);
+    rgb radiance[BATCH], one[BATCH];
+    for (int i = 0; i < BATCH; i++)
+        one[i] = (rgb){1.0f, 1.0f, 1.0f};
+    float h = p->kind == EMISSION ? 0.5f : p->kind == SEGMENT_COLOR ? 0.01f : 0.02f;
+    if (p->kind == TEXEL)
+        h = 0.1f;
+    uint32_t groups = p->exact ? 20 : 300;
+    double found = 0.0, wanted = 0.0, square = 0.0, size = 0.0;
+    for (uint32_t g = 0; g < groups; g++) {
+        trace(batch, b, &settings, g, radiance);
+        gradient_log_clear(log);
+        path_batch_backward(batch, &b->world, one, log);
+        double ours = read_log(log, p);
+        nudge(b, p, h);
+        double up = trace(batch, b, &settings, g, radiance);
+        nudge(b, p, -2.0f * h);
+        double down = trace(batch, b, &settings, g, radiance);
+        nudge(b, p, h);
+        double theirs = (up - down) / (2.0 * (double)h);
+        found += ours / groups;
+        wanted += theirs / groups;
+        size += fabs(ours) / groups;
+        square += (ours - theirs) * (ours - theirs) / groups;
+    }
+    double error = p->exact ? 2e-3 * size + 2e-3
+                            : 3.5 * sqrt((square - (found - wanted) * (found - wanted)) / groups) + 1e-3 * size;
+    printf("%-34s depth %d: %.6g, differences %.6g +- %.2g\n", p->name, p->depth, found, wanted, error);
+    CHECK_THAT(fabs(found - wanted) <= error, "%s: %g, differences say %g +- %g", p->name, found, wanted,
+               error);
+    CHECK_THAT(size > 0.0, "%s: no derivative at all", p->name);
+    gradient_log_free(log);
+    path_batch_free(batch);
+}
+
+static void check_parameters(void) {
+    struct box b;
+    box_init(&b);
+    box_build(&b);
+    /* Not glossy: base colour and roughness move no decision. One emitter: neither does it. */
+    const uint32_t texel = 8 * BOX_SIDE + 40; /* on the back wall */
+    const struct parameter matte[] = {
+        {"a texel", TEXEL, texel, true, 2},
+        {"a texel", TEXEL, texel, true, 7},
+        {"walls' base colour", SEGMENT_COLOR, 0, true, 2},
+        {"walls' base colour", SEGMENT_COLOR, 0, true, 7},
+        {"slab's base colour", SEGMENT_COLOR, 1, true, 7},
+        {"lamp's base colour", SEGMENT_COLOR, 2, true, 7},
+        {"walls' roughness (matte)", ROUGHNESS, 0, true, 2},
+        {"walls' roughness (matte)", ROUGHNESS, 0, true, 7},
+        {"lamp's emission", EMISSION, 2, true, 1},
+        {"lamp's emission", EMISSION, 2, true, 2},
+        {"lamp's emission", EMISSION, 2, true, 7},
+    };
+    for (size_t i = 0; i < sizeof matte / sizeof *matte; i++)
+        check_parameter(&b, &matte[i]);
+    b.materials.specular[0] = 0.4f;
+    b.materials.specular[1] = 0.9f;
+    b.materials.roughness[1] = 0.3f;
+    const struct parameter glossy[] = {
+        {"slab's roughness", ROUGHNESS, 1, false, 2}, {"slab's roughness", ROUGHNESS, 1, false, 6},
+        {"walls' roughness", ROUGHNESS, 0, false, 6}, {"slab's specular", SPECULAR, 1, false, 2},
+        {"walls' specular", SPECULAR, 0, false, 6},   {"walls' base colour (glossy)", SEGMENT_COLOR, 0, false, 6},
+    };
+    for (size_t i = 0; i < sizeof glossy / sizeof *glossy; i++)
+        check_parameter(&b, &glossy[i]);
+    /* What does not shine has a derivative by emission too: it would, if it did. */
+    struct path_settings settings = {3, 99, 22};
+    struct path_batch *batch = path_batch_new(BATCH, 3);
+    struct gradient_log *log = gradient_log_new(3);
+    rgb radiance[BATCH], one[BATCH];
+    for (int i = 0; i < BATCH; i++)
+        one[i] = (rgb){1.0f, 1.0f, 1.0f};
+    trace(batch, &b, &settings, 0, radiance);
+    path_batch_backward(batch, &b.world, one, log);
+    CHECK(log->segment[1].d_emission[0] > 0.0);
+    gradient_log_free(log);
+    path_batch_free(batch);
+    box_release(&b);
+}
+
+/* d/d(walls' base colour) of sum (mean radiance - target)^2 at one sample per pixel: from two
+ * independent estimates without bias, from one with. */
+static void check_loss(void) {
+    enum { PIXELS = 64, ROUNDS = 6000 };
+    struct box b;
+    box_init(&b);
+    box_build(&b);
+    struct path_settings settings = {3, 99, 23};
+    struct path_batch *batch[2] = {path_batch_new(PIXELS, 3), path_batch_new(PIXELS, 3)};
+    struct gradient_log *log = gradient_log_new(3);
+    const struct parameter walls = {"walls", SEGMENT_COLOR, 0, true, 3};
+    const float target = 0.4f;
+    double mean[PIXELS][3] = {{0}}, slope[PIXELS][3] = {{0}};
+    double two = 0.0, two_square = 0.0, one = 0.0, one_square = 0.0;
+    for (uint32_t round = 0; round < ROUNDS; round++) {
+        struct ray ray[PIXELS];
+        struct path_key key[PIXELS];
+        rgb radiance[2][PIXELS], adjoint[PIXELS];
+        for (uint32_t half = 0; half < 2; half++) {
+            for (uint32_t i = 0; i < PIXELS; i++) {
+                ray[i] = box_ray(i);
+                key[i] = (struct path_key){i, 2 * round + half, 0};
+            }
+            path_batch_trace(batch[half], &b.world, &settings, PIXELS, ray, key, radiance[half]);
+        }
+        double value[2];
+        for (int both = 0; both < 2; both++) { /* 0: each half with the other's residual; 1: its own */
+            value[both] = 0.0;
+            for (int half = 0; half < 2; half++) {
+                for (int i = 0; i < PIXELS; i++) {
+                    rgb from = radiance[both == 0 ? 1 - half : half][i];
+                    adjoint[i] = (rgb){from.r - target, from.g - target, from.b - target};
+                }
+                gradient_log_clear(log);
+                path_batch_backward(batch[half], &b.world, adjoint, log);
+                value[both] += read_log(log, &walls);
+            }
+        }
+        two += value[0] / ROUNDS;
+        two_square += value[0] * value[0] / ROUNDS;
+        one += value[1] / ROUNDS;
+        one_square += value[1] * value[1] / ROUNDS;
+        /* The truth: mean radiance and mean slope, each pixel and channel apart. */
+        for (int i = 0; i < PIXELS; i++) {
+            mean[i][0] += (double)radiance[0][i].r / ROUNDS;
+            mean[i][1] += (double)radiance[0][i].g / ROUNDS;
+            mean[i][2] += (double)radiance[0][i].b / ROUNDS;
+        }
+    }
+    /* Slopes by pixel, from batches of one pixel many times over. */
+    rgb radiance[PIXELS], adjoint[PIXELS];
+    for (uint32_t i = 0; i < PIXELS; i++) {
+        struct ray ray[PIXELS];
+        struct path_key key[PIXELS];
+        for (uint32_t part = 0; part < 48; part++) {
+            for (uint32_t k = 0; k < PIXELS; k++) {
+                ray[k] = box_ray(i);
+                key[k] = (struct path_key){i, 100000, part * PIXELS + k};
+            }
+            path_batch_trace(batch[0], &b.world, &settings, PIXELS, ray, key, radiance);
+            for (int c = 0; c < 3; c++) {
+                for (int k = 0; k < PIXELS; k++)
+                    adjoint[k] = (rgb){c == 0, c == 1, c == 2};
+                gradient_log_clear(log);
+                path_batch_backward(batch[0], &b.world, adjoint, log);
+                slope[i][c] += read_log(log, &walls) / (48.0 * PIXELS);
+            }
+        }
+    }
+    double truth = 0.0;
+    for (int i = 0; i < PIXELS; i++)
+        for (int c = 0; c < 3; c++)
+            truth += 2.0 * (mean[i][c] - (double)target) * slope[i][c];
+    double two_error = sqrt((two_square - two * two) / ROUNDS);
+    double one_error = sqrt((one_square - one * one) / ROUNDS);
+    printf("squared loss: truth %.4f; two estimates %.4f +- %.4f; one %.4f +- %.4f\n", truth, two,
+           two_error, one, one_error);
+    double slack = 0.01 * fabs(truth); /* of the truth's own sampling */
+    CHECK(fabs(two - truth) < 3.5 * two_error + slack);
+    CHECK(fabs(one - truth) > 8.0 * one_error + slack);
+    gradient_log_free(log);
+    path_batch_free(batch[0]);
+    path_batch_free(batch[1]);
+    box_release(&b);
+}
+
+int main(void) {
+    check_parameters();
+    check_loss();
+    return check_result();
+}
