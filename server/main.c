@@ -23,6 +23,8 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/config.h"
+#include "server/demo/generate.h"
+#include "server/evaluate/evaluate.h"
 #include "server/http/api.h"
 #include "server/http/listener.h"
 #include "server/job/scheduler.h"
@@ -38,6 +40,8 @@ static const struct command {
     int (*run)(int argc, char **argv);
     const char *help;
 } commands[] = {
+    {"demo-room", demo_command, "DIR: make a room whose materials and lights are known"},
+    {"evaluate", evaluate_command, "ROOM OUTPUTS: compare a job's outputs with a known room"},
     {"worker", worker_main, "DIR: one attempt of a job; the daemon runs it"},
 };
 #define COMMAND_COUNT (sizeof commands / sizeof *commands)

@@ -38,6 +38,11 @@ forbid server/ingest 'server/(render|reconstruct|export)/' 'ingest sees only sce
 forbid server/reconstruct 'server/(ingest|export)/' 'reconstruct sees only render and scene'
 forbid server/export 'server/(render|reconstruct|ingest)/' 'export sees only scene'
 
+forbid "server/demo server/evaluate" 'server/(http|store|job|worker)/' 'tools know only the engine'
+forbid server/demo 'server/(ingest|reconstruct|export|evaluate)/' 'demo sees only render and scene'
+forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
+    'only main.c sees the tools'
+
 own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/http/listener.c server/http/mhd.h
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c

@@ -1,0 +1,372 @@
+/* evaluate.c -- see evaluate.h. */
+#include "server/evaluate/evaluate.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/evaluate/recovered.h"
+#include "server/evaluate/seen.h"
+#include "server/ingest/bundle.h"
+#include "server/reconstruct/metrics.h"
+#include "server/render/film.h"
+#include "server/scene/scene.h"
+
+#define OBJECTS_LIMIT ((size_t)1 << 26) /* bytes of objects.json */
+
+/* All that the views share. */
+struct evaluator {
+    const struct evaluate_settings *settings;
+    struct parallel *pool;
+    const char *room;
+    struct scene scene;
+    struct recovered recovered;
+    bool *emits;           /* [triangle_count] by the truth */
+    struct camera *train;  /* [train_count] */
+    size_t train_count;
+    double median;         /* radiance of the training pixels */
+};
+
+struct evaluate_settings evaluate_default_settings(void) {
+    return (struct evaluate_settings){.samples = 16, .spp = 64, .max_depth = 16, .seed = 7};
+}
+
+/* --- the truth by object ------------------------------------------------------------------ */
+
+/* What the recovered room says about one object. */
+struct object {
+    double area, emitting_area;
+};
+
+/* Areas of the object's triangles, all and those whose segment was found to emit; marks its
+ * triangles when it does emit. */
+static struct object look_at_object(struct evaluator *e, int64_t id, bool emits) {
+    const struct mesh *mesh = &e->scene.mesh;
+    struct object object = {0.0, 0.0};
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        if (mesh->object_id[t] != id)
+            continue;
+        double area = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
+        uint32_t segment = e->recovered.segments.of_triangle[t];
+        object.area += area;
+        if (!rgb_is_black(e->recovered.materials.emission[segment]))
+            object.emitting_area += area;
+        e->emits[t] = emits;
+    }
+    return object;
+}
+
+static enum status score_objects(struct evaluator *e, struct evaluation *v, struct error *err) {
+    char *path = file_join(e->room, "truth/objects.json");
+    cJSON *list = NULL;
+    enum status status = json_read(path, OBJECTS_LIMIT, &list, err);
+    if (status == STATUS_OK && !cJSON_IsArray(list))
+        status = error_set(err, STATUS_INPUT, "%s: not a list of objects", path);
+    if (status == STATUS_OK && !e->scene.mesh.object_id)
+        status = error_set(err, STATUS_INPUT, "%s: the mesh has no object_id", e->room);
+    for (const cJSON *o = list ? list->child : NULL; o && status == STATUS_OK; o = o->next) {
+        const cJSON *emission = cJSON_GetObjectItemCaseSensitive(o, "emission");
+        double id;
+        bool emits = false;
+        for (const cJSON *c = emission ? emission->child : NULL; c; c = c->next)
+            emits = emits || c->valuedouble > 0.0;
+        status = json_number(o, "id", "truth/objects.json", -1.0, &id, err);
+        struct object found = look_at_object(e, (int64_t)id, emits);
+        if (found.area == 0.0)
+            continue; /* of an object whose triangles all were degenerate */
+        bool mostly = found.emitting_area > 0.5 * found.area;
+        v->emitters += emits;
+        v->emitters_found += emits && mostly;
+        v->emitters_missed += emits && !mostly;
+        v->emitters_false += !emits && found.emitting_area > 0.0;
+    }
+    cJSON_Delete(list);
+    mem_free(path);
+    return status;
+}
+
+/* --- photographs -------------------------------------------------------------------------- */
+
+static int by_value(const void *a, const void *b) {
+    float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Radiance of a pixel's channels; false where it is masked or not finite. */
+static bool pixel_radiance(const struct photograph *p, uint32_t x, uint32_t y,
+                           struct photograph_sample *sample) {
+    return photograph_sample(p, (float)x + 0.5f, (float)y + 0.5f, sample);
+}
+
+/* The median over pixels and channels of all training photographs. */
+static double training_median(const struct scene *scene) {
+    size_t total = 0, count = 0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        if (!scene->photograph[i].is_test)
+            total += (size_t)scene->photograph[i].camera.width * scene->photograph[i].camera.height;
+    float *value = mem_array(3 * total + 1, sizeof *value);
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        const struct photograph *p = &scene->photograph[i];
+        for (uint32_t y = 0; !p->is_test && y < p->camera.height; y++) {
+            for (uint32_t x = 0; x < p->camera.width; x++) {
+                struct photograph_sample s;
+                if (!pixel_radiance(p, x, y, &s))
+                    continue;
+                value[count++] = s.radiance.r;
+                value[count++] = s.radiance.g;
+                value[count++] = s.radiance.b;
+            }
+        }
+    }
+    qsort(value, count, sizeof *value, by_value);
+    double median = count ? (double)value[count / 2] : 0.0;
+    mem_free(value);
+    return median;
+}
+
+static const char *const rgb_names[] = {"R", "G", "B"};
+
+/* The photograph's radiance and, in the same way clipped, what the recovered room shows there.
+ * Masked pixels are NaN, which metrics_msre leaves out. */
+static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
+                      struct image *photograph, struct image *render) {
+    struct path_settings path = {.max_depth = (int)e->settings->max_depth, .roulette_depth = 5,
+                                 .seed = e->settings->seed};
+    struct image film; /* has standard errors too */
+    uint32_t width = p->camera.width, height = p->camera.height;
+    film_render(&e->recovered.world, &p->camera, e->settings->spp, &path, view, e->pool, &film);
+    image_init(photograph, width, height, 3, rgb_names);
+    image_init(render, width, height, 3, rgb_names);
+    for (uint32_t y = 0; y < height; y++) {
+        for (uint32_t x = 0; x < width; x++) {
+            size_t pixel = (size_t)y * width + x;
+            const float *lit = film.pixel + pixel * film.channel_count;
+            float *a = photograph->pixel + 3 * pixel, *b = render->pixel + 3 * pixel;
+            struct photograph_sample s;
+            if (!pixel_radiance(p, x, y, &s)) {
+                a[0] = a[1] = a[2] = NAN;
+                continue;
+            }
+            a[0] = s.radiance.r, a[1] = s.radiance.g, a[2] = s.radiance.b;
+            b[0] = fminf(lit[0], s.clip_radiance.r);
+            b[1] = fminf(lit[1], s.clip_radiance.g);
+            b[2] = fminf(lit[2], s.clip_radiance.b);
+        }
+    }
+    image_release(&film);
+}
+
+/* --- pictures to look at ------------------------------------------------------------------ */
+
+/* Files list channels by name: B comes before R. */
+struct rgb_columns {
+    int at[3];
+};
+
+static struct rgb_columns find_rgb(const struct image *image, const char *prefix) {
+    struct rgb_columns columns;
+    for (int c = 0; c < 3; c++) {
+        char name[64];
+        snprintf(name, sizeof name, "%s%c", prefix, "RGB"[c]);
+        columns.at[c] = image_channel(image, name);
+    }
+    return columns;
+}
+
+/* `a` beside `b`, of each the channels prefixR, prefixG and prefixB. */
+static enum status write_pair(const struct evaluator *e, const char *what, const char *stem,
+                              const struct image *a, const struct image *b, const char *prefix,
+                              float scale, struct error *err) {
+    enum { GAP = 4 };
+    struct image pair;
+    const struct image *side[2] = {a, b};
+    image_init(&pair, 2 * a->width + GAP, a->height, 3, rgb_names);
+    for (int k = 0; k < 2; k++) {
+        struct rgb_columns columns = find_rgb(side[k], prefix);
+        for (uint32_t y = 0; y < a->height; y++) {
+            for (uint32_t x = 0; x < a->width; x++) {
+                size_t to = (size_t)y * pair.width + x + (k ? a->width + GAP : 0);
+                const float *from = side[k]->pixel +
+                                    ((size_t)y * a->width + x) * side[k]->channel_count;
+                for (int c = 0; c < 3; c++)
+                    pair.pixel[3 * to + (size_t)c] = from[columns.at[c]];
+            }
+        }
+    }
+    char *path = mem_printf("%s/%s_%s.png", e->settings->pictures_dir, what, stem);
+    enum status status = image_write_png(path, &pair, scale, err);
+    mem_free(path);
+    image_release(&pair);
+    return status;
+}
+
+/* --- one test view ------------------------------------------------------------------------ */
+
+/* "images/004.exr" -> "004"; the caller's. */
+static char *stem_of(const char *name) {
+    const char *slash = strrchr(name, '/'), *start = slash ? slash + 1 : name;
+    const char *dot = strrchr(start, '.');
+    return mem_strndup(start, dot ? (size_t)(dot - start) : strlen(start));
+}
+
+static enum status read_truth(const struct evaluator *e, const struct photograph *p,
+                              const char *stem, struct image *truth, struct error *err) {
+    static const char *const needed[] = {"base_color.R", "base_color.G", "base_color.B",
+                                         "roughness", "specular", "emission.R", "emission.G",
+                                         "emission.B", "object_id"};
+    char *path = mem_printf("%s/truth/%s.exr", e->room, stem);
+    enum status status = image_read(path, truth, NULL, err);
+    for (size_t i = 0; i < sizeof needed / sizeof *needed && status == STATUS_OK; i++)
+        if (image_channel(truth, needed[i]) < 0)
+            status = error_set(err, STATUS_INPUT, "%s: has no channel %s", path, needed[i]);
+    if (status == STATUS_OK &&
+        (truth->width != p->camera.width || truth->height != p->camera.height))
+        status = error_set(err, STATUS_INPUT, "%s: is not of its photograph's size", path);
+    mem_free(path);
+    return status;
+}
+
+/* The truth's own samples may have met what ours did not. */
+static void mark_by_truth(const struct image *truth, uint8_t *flags) {
+    struct rgb_columns emission = find_rgb(truth, "emission.");
+    int object = image_channel(truth, "object_id");
+    for (size_t i = 0; i < (size_t)truth->width * truth->height; i++) {
+        const float *t = truth->pixel + i * truth->channel_count;
+        bool emits = false;
+        for (int c = 0; c < 3; c++)
+            emits = emits || t[emission.at[c]] > 0.0f;
+        if (emits || t[object] < 0.0f)
+            flags[i] = 0;
+    }
+}
+
+static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view,
+                                    const char *stem, double *msre, struct error *err) {
+    struct image photograph, render;
+    enum status status = STATUS_OK;
+    make_pair(e, p, view, &photograph, &render);
+    *msre = metrics_msre(&photograph, &render, e->median);
+    if (e->settings->pictures_dir)
+        status = write_pair(e, "view", stem, &photograph, &render, "",
+                            e->median > 0.0 ? (float)(0.2 / e->median) : 1.0f, err);
+    image_release(&photograph);
+    image_release(&render);
+    return status;
+}
+
+static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view,
+                              struct evaluation *v, double *msre, struct error *err) {
+    struct seen seen = {e->recovered.world.accel, &e->scene.mesh, e->emits, e->train,
+                        e->train_count};
+    struct image truth = {0}, found = {0};
+    char *stem = stem_of(p->name);
+    uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
+    enum status status = read_truth(e, p, stem, &truth, err);
+    if (status != STATUS_OK)
+        goto out;
+    film_render_first_hits(&e->recovered.world, &p->camera, e->settings->samples,
+                           e->settings->seed, e->pool, &found);
+    seen_flags(&seen, &p->camera, e->pool, flags);
+    mark_by_truth(&truth, flags);
+    score_add(&v->score, &found, &truth, flags);
+    if (e->settings->pictures_dir)
+        status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
+    if (status == STATUS_OK && e->settings->spp)
+        status = score_photograph(e, p, view, stem, msre, err);
+out:
+    image_release(&found);
+    image_release(&truth);
+    mem_free(flags);
+    mem_free(stem);
+    return status;
+}
+
+static enum status score_views(struct evaluator *e, struct evaluation *v, struct error *err) {
+    enum status status = STATUS_OK;
+    double sum = 0.0, squares = 0.0;
+    for (size_t i = 0; i < e->scene.photograph_count && status == STATUS_OK; i++) {
+        const struct photograph *p = &e->scene.photograph[i];
+        double msre = NAN;
+        if (!p->is_test)
+            continue;
+        status = score_view(e, p, (uint32_t)i, v, &msre, err);
+        v->view_count++;
+        sum += msre;
+        squares += msre * msre;
+    }
+    double n = (double)v->view_count;
+    v->msre = sum / n;
+    v->msre_deviation = sqrt(fmax(0.0, squares / n - v->msre * v->msre));
+    if (status == STATUS_OK && v->view_count == 0)
+        status = error_set(err, STATUS_INPUT, "%s: no photograph is held out (split test)", e->room);
+    return status;
+}
+
+/* --- all ---------------------------------------------------------------------------------- */
+
+static enum status load_room(struct evaluator *e, struct error *err) {
+    struct bundle_limits limits = bundle_default_limits();
+    cJSON *problems = cJSON_CreateArray();
+    enum status status = bundle_load(e->room, NULL, &limits, e->pool, &e->scene, problems, err);
+    cJSON_Delete(problems);
+    if (status != STATUS_OK)
+        return status;
+    e->train = mem_array(e->scene.photograph_count, sizeof *e->train);
+    for (size_t i = 0; i < e->scene.photograph_count; i++)
+        if (!e->scene.photograph[i].is_test)
+            e->train[e->train_count++] = e->scene.photograph[i].camera;
+    e->emits = mem_calloc(e->scene.mesh.triangle_count, sizeof *e->emits);
+    e->median = training_median(&e->scene);
+    return STATUS_OK;
+}
+
+enum status evaluate_outputs(const char *room, const char *outputs,
+                             const struct evaluate_settings *settings, struct parallel *pool,
+                             struct evaluation *v, struct error *err) {
+    struct evaluator e = {.settings = settings, .pool = pool, .room = room};
+    memset(v, 0, sizeof *v);
+    enum status status = load_room(&e, err);
+    if (status != STATUS_OK)
+        return status;
+    status = recovered_load(outputs, &e.scene.mesh, pool, &e.recovered, err);
+    if (status != STATUS_OK)
+        goto out;
+    status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
+    if (status == STATUS_OK)
+        status = score_objects(&e, v, err);
+    if (status == STATUS_OK)
+        status = score_views(&e, v, err);
+    recovered_release(&e.recovered);
+out:
+    mem_free(e.emits);
+    mem_free(e.train);
+    scene_release(&e.scene);
+    return status;
+}
+
+cJSON *evaluate_to_json(const struct evaluation *v) {
+    const struct score *s = &v->score;
+    cJSON *root = cJSON_CreateObject();
+    json_add_int(root, "views", (int64_t)v->view_count);
+    json_add_number(root, "base_color_psnr_db", score_psnr_db(s->base_color_seen));
+    json_add_number(root, "base_color_psnr_all_db", score_psnr_db(s->base_color_all));
+    json_add_number(root, "seen_share",
+                    s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
+    json_add_number(root, "roughness_psnr_db", score_psnr_db(s->roughness));
+    json_add_number(root, "roughness_rms_error", sqrt(score_mean(s->roughness)));
+    json_add_number(root, "specular_psnr_db", score_psnr_db(s->specular));
+    json_add_number(root, "specular_rms_error", sqrt(score_mean(s->specular)));
+    json_add_number(root, "emission_iou", score_emission_iou(s));
+    json_add_number(root, "emission_log_error", score_mean(s->emission_log));
+    json_add_int(root, "emitters", (int64_t)v->emitters);
+    json_add_int(root, "emitters_found", (int64_t)v->emitters_found);
+    json_add_int(root, "emitters_missed", (int64_t)v->emitters_missed);
+    json_add_int(root, "emitters_false", (int64_t)v->emitters_false);
+    json_add_number(root, "msre", v->msre);
+    json_add_number(root, "msre_deviation", v->msre_deviation);
+    return root;
+}

@@ -1,0 +1,32 @@
+/* recovered.h -- a finished job's outputs, read back as something to render.
+ *
+ * Only the files that a user gets are read: scene.ply for the atlas coordinates and the segments,
+ * the EXR textures for the values. Geometry comes from the room itself: scene.ply must list the
+ * same triangles. */
+#ifndef UNBAKE_EVALUATE_RECOVERED_H
+#define UNBAKE_EVALUATE_RECOVERED_H
+
+#include "common/error.h"
+#include "common/parallel.h"
+#include "server/render/world.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+struct recovered {
+    struct segments segments;
+    struct atlas atlas;        /* no charts: corners only */
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+};
+
+/* `mesh` is borrowed until recovered_release. Roughness, specular and emission are one value a
+ * segment: each segment's is read where a texel of it is. */
+enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
+                           struct recovered *recovered, struct error *err);
+void recovered_release(struct recovered *recovered);
+
+#endif

@@ -1,0 +1,163 @@
+/* score.c against figures worked out by hand; evaluate.c on outputs that are the truth itself,
+ * and on outputs that are off by a known amount. */
+#include "common/file.h"
+#include "common/image.h"
+#include "common/json.h"
+#include "common/mem.h"
+#include "common/parallel.h"
+#include "server/demo/generate.h"
+#include "server/demo/room.h"
+#include "server/evaluate/evaluate.h"
+#include "server/evaluate/score.h"
+#include "server/export/outputs.h"
+#include "tests/check.h"
+
+enum { BASE = 0, ROUGHNESS = 3, SPECULAR = 4, EMISSION = 5, OBJECT = 8, CHANNELS = 9 };
+static const char *const channels[CHANNELS] = {"base_color.R", "base_color.G", "base_color.B",
+                                               "roughness", "specular", "emission.R", "emission.G",
+                                               "emission.B", "object_id"};
+
+/* A row of six pixels: objects 0 0 0 0 1 1. */
+static void test_score(void) {
+    struct image truth, found;
+    struct score score = {0};
+    image_init(&truth, 6, 1, CHANNELS, channels);
+    image_init(&found, 6, 1, CHANNELS, channels);
+    for (size_t i = 0; i < 6; i++) {
+        float *t = truth.pixel + i * CHANNELS, *f = found.pixel + i * CHANNELS;
+        for (int c = 0; c < 3; c++)
+            t[BASE + c] = 0.5f, f[BASE + c] = 0.6f;
+        t[ROUGHNESS] = 0.4f, f[ROUGHNESS] = 0.5f;
+        t[SPECULAR] = 0.5f, f[SPECULAR] = 0.5f;
+        t[OBJECT] = i < 4 ? 0.0f : 1.0f;
+    }
+    float *f = found.pixel, *t = truth.pixel;
+    f[2 * CHANNELS + BASE] = 1.5f;            /* clamped to 1: off by 0.5 */
+    t[4 * CHANNELS + EMISSION] = 2.0f;        /* emits in truth alone */
+    t[5 * CHANNELS + EMISSION + 1] = 1.0f;    /* emits in both */
+    f[5 * CHANNELS + EMISSION + 1] = 3.0f;
+    f[0 * CHANNELS + EMISSION + 2] = 1.0f;    /* emits in ours alone */
+    const uint8_t plain = SCORE_PLAIN, both = SCORE_PLAIN | SCORE_SEEN;
+    const uint8_t flags[6] = {both, both, both, plain, 0, 0};
+    score_add(&score, &found, &truth, flags);
+
+    CHECK(score.pixels == 6 && score.plain_pixels == 4 && score.seen_pixels == 3);
+    /* 9 values of which 8 are off by 0.1 and one by 0.5; 12 of which 11 and one */
+    CHECK_NEAR(score_mean(score.base_color_seen), (8 * 0.01 + 0.25) / 9, 1e-8);
+    CHECK_NEAR(score_mean(score.base_color_all), (11 * 0.01 + 0.25) / 12, 1e-8);
+    CHECK_NEAR(score_psnr_db(score.base_color_seen), 14.3573, 1e-4);
+    /* Pixel 3 borders on another object, pixels 0 to 2 do not. */
+    CHECK(score.roughness.count == 3);
+    CHECK_NEAR(score_psnr_db(score.roughness), 20.0, 1e-4);
+    CHECK(isinf(score_psnr_db(score.specular)));
+    CHECK_NEAR(score_emission_iou(&score), 1.0 / 3.0, 1e-12);
+    /* log 3, log 4 - log 2, log 2, squared, over 18 values */
+    CHECK_NEAR(score_mean(score.emission_log),
+               (log(3) * log(3) + log(2) * log(2) + log(2) * log(2)) / 18, 1e-7);
+    struct score nothing = {0};
+    CHECK(isnan(score_psnr_db(nothing.roughness)) && score_emission_iou(&nothing) == 1.0);
+    image_release(&truth);
+    image_release(&found);
+}
+
+static enum status hear(void *user, const char *type, const char *name, const char *content_type,
+                        struct error *err) {
+    (void)user, (void)type, (void)name, (void)content_type, (void)err;
+    return STATUS_OK;
+}
+
+/* Writes a room's own materials as if a job had found them. */
+static void export_room(const char *dir, const struct room *room) {
+    struct error err;
+    size_t texels = (size_t)room->atlas.width * room->atlas.height;
+    float *zero = mem_calloc(texels, sizeof *zero);
+    bool is_emitter[ROOM_OBJECT_COUNT] = {false};
+    cJSON *report = cJSON_CreateObject();
+    struct export_input in = {"room", &room->mesh, &room->segments, &room->atlas, &room->inverse,
+                              &room->materials, zero, zero, is_emitter, 0, NULL, report};
+    enum status status = export_outputs(dir, &in, hear, NULL, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    cJSON_Delete(report);
+    mem_free(zero);
+}
+
+static struct evaluation evaluate(const char *room, const char *outputs, struct parallel *pool) {
+    struct evaluate_settings settings = evaluate_default_settings();
+    struct evaluation v = {0};
+    struct error err = {0};
+    settings.spp = 64;
+    enum status status = evaluate_outputs(room, outputs, &settings, pool, &v, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    return v;
+}
+
+/* The truth's figures are as good as half precision and sampling allow; moving every base colour
+ * by 0.1 costs what arithmetic says; a lamp that is off is missed, a wall that glows is false. */
+static void test_known(const char *dir, struct parallel *pool) {
+    struct demo_settings demo = demo_default_settings();
+    struct room room;
+    struct error err;
+    char *outputs = file_join(dir, "out");
+    demo.width = 32, demo.height = 24, demo.train_count = 6, demo.test_count = 2;
+    demo.spp = 16, demo.test_spp = 128, demo.texture_size = 256, demo.max_depth = 6;
+    CHECK(demo_generate(dir, &demo, pool, NULL, NULL, &err) == STATUS_OK);
+    CHECK(file_make_dirs(outputs, &err) == STATUS_OK);
+    CHECK(room_init(&room, 256, demo.wall_radiance, demo.ceiling_radiance, pool, &err) == STATUS_OK);
+
+    export_room(outputs, &room);
+    struct evaluation v = evaluate(dir, outputs, pool);
+    CHECK(v.view_count == 2 && v.emitters == 2 && v.emitters_found == 2);
+    CHECK(v.emitters_missed == 0 && v.emitters_false == 0);
+    CHECK_THAT(score_psnr_db(v.score.base_color_all) > 35.0, "%g dB", /* samples differ */
+               score_psnr_db(v.score.base_color_all));
+    CHECK_THAT(score_psnr_db(v.score.roughness) > 60.0, "%g dB", score_psnr_db(v.score.roughness));
+    CHECK_THAT(score_emission_iou(&v.score) > 0.95, "%g", score_emission_iou(&v.score));
+    CHECK_THAT(v.msre < 0.1, "MSRE %g", v.msre);
+    CHECK(v.score.seen_pixels > v.score.plain_pixels / 2 &&
+          v.score.seen_pixels < v.score.plain_pixels);
+
+    for (size_t i = 0; i < room.inverse.valid_count; i++)
+        for (int c = 0; c < 3; c++) {
+            float *value = &room.materials.base_color.texel[room.inverse.valid[i]][c];
+            *value += *value < 0.5f ? 0.1f : -0.1f;
+        }
+    for (int o = 0; o < ROOM_OBJECT_COUNT; o++)
+        room.materials.specular[o] = 0.0f;
+    room.materials.emission[ROOM_CEILING_EMITTER] = rgb_gray(0.0f);
+    room.materials.emission[ROOM_FLOOR] = rgb_gray(0.5f);
+    export_room(outputs, &room);
+    struct evaluation w = evaluate(dir, outputs, pool);
+    CHECK(w.emitters_found == 1 && w.emitters_missed == 1 && w.emitters_false == 1);
+    CHECK_NEAR(score_psnr_db(w.score.base_color_all), 20.0, 0.5);
+    CHECK(score_emission_iou(&w.score) < 0.9);
+    CHECK(w.msre > 3.0 * v.msre);
+
+    room_release(&room);
+    mem_free(outputs);
+}
+
+/* Outputs of another room, and no outputs at all, are refused with a sentence. */
+static void test_refused(const char *dir, struct parallel *pool) {
+    struct evaluate_settings settings = evaluate_default_settings();
+    struct evaluation v;
+    struct error err;
+    CHECK(evaluate_outputs(dir, "/nonexistent", &settings, pool, &v, &err) == STATUS_NOT_FOUND);
+    char *path = file_join(dir, "out/scene.ply");
+    CHECK(file_replace(path, "ply\n", 4, &err) == STATUS_OK);
+    char *outputs = file_join(dir, "out");
+    CHECK(evaluate_outputs(dir, outputs, &settings, pool, &v, &err) == STATUS_INPUT);
+    mem_free(outputs);
+    mem_free(path);
+}
+
+int main(void) {
+    char dir[] = "/tmp/unbake-evaluate-XXXXXX";
+    struct parallel *pool = parallel_new(2);
+    CHECK(mkdtemp(dir) != NULL);
+    test_score();
+    test_known(dir, pool);
+    test_refused(dir, pool);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+    parallel_free(pool);
+    return check_result();
+}
