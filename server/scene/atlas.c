@@ -21,7 +21,7 @@
 #define GUESS_ROUNDS 4    /* drawings to find the density of that */
 #define SEARCH_STEP 1.015 /* of the density, until one fits and one does not */
 #define SEARCH_END 1.003  /* ratio of those two at which the search ends */
-#define MIN_DENSITY 1e-3  /* of the one at which the mesh's area takes all texels: not worth less */
+#define MIN_DENSITY 1e-3  /* of the most that could fit: not worth less */
 
 /* The charts drawn at one density. */
 struct drawing {
@@ -151,13 +151,21 @@ static double fill_at(struct drawing *drawing, const struct charts *charts, doub
     return (double)cells / (side * side);
 }
 
+/* A density over which the area or the longest chart cannot fit. */
+static double most_density(const struct charts *charts, const struct grid *grid) {
+    double longest = 0.0;
+    for (size_t c = 0; c < charts->count; c++)
+        longest = fmax(longest, (double)fmaxf(charts->extent[c].x, charts->extent[c].y));
+    return fmin((double)grid->size / sqrt(charts->flat_area), (double)grid->size / longest);
+}
+
 /* A density at which the shapes about fill the grid to FIRST_FILL. */
 static double guess_density(struct drawing *drawing, const struct charts *charts,
                             const struct grid *grid, double full) {
     double density = full;
     for (int round = 0; round < GUESS_ROUNDS; round++) {
         double fill = fill_at(drawing, charts, density, grid);
-        density *= isfinite(fill) ? sqrt(FIRST_FILL / fill) : 0.8;
+        density = fmin(density * (isfinite(fill) ? sqrt(FIRST_FILL / fill) : 0.8), full);
     }
     return density;
 }
@@ -166,7 +174,7 @@ static double guess_density(struct drawing *drawing, const struct charts *charts
 static double search_density(struct drawing *best, const struct charts *charts,
                              const struct grid *grid) {
     struct drawing trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
-    double full = (double)grid->size / sqrt(charts->flat_area); /* charts take all texels */
+    double full = most_density(charts, grid);
     double density = guess_density(&trial, charts, grid, full);
     double fits = 0.0, fails = INFINITY, step = SEARCH_STEP;
     while (density > full * MIN_DENSITY && (fits == 0.0 || fails / fits > SEARCH_END)) {

@@ -46,11 +46,39 @@ static bool edge_separates(const struct flat_triangle *a, const struct flat_tria
     return false;
 }
 
-static void cells_of(const struct grid *g, const struct flat_triangle *t, size_t cell[4]) {
-    cell[0] = (size_t)((min3(t->x) - g->x0) * g->per_metre);
-    cell[1] = (size_t)((max3(t->x) - g->x0) * g->per_metre);
-    cell[2] = (size_t)((min3(t->y) - g->y0) * g->per_metre);
-    cell[3] = (size_t)((max3(t->y) - g->y0) * g->per_metre);
+static size_t cell_at(double place, double origin, double per_metre) {
+    return (size_t)fmax(0.0, (place - origin) * per_metre);
+}
+
+static void rows_of(const struct grid *g, const struct flat_triangle *t, size_t *first,
+                    size_t *last) {
+    *first = cell_at(min3(t->y), g->y0, g->per_metre);
+    *last = cell_at(max3(t->y), g->y0, g->per_metre);
+}
+
+/* Columns of the grid that the triangle meets in a row, which has some. The strip is taken a
+ * little higher than the row: rounding must not lose a cell. */
+static void columns_of(const struct grid *g, const struct flat_triangle *t, size_t row,
+                       size_t *first, size_t *last) {
+    double bottom = g->y0 + ((double)row - 0.01) / g->per_metre;
+    double top = g->y0 + ((double)row + 1.01) / g->per_metre;
+    double low = INFINITY, high = -INFINITY;
+    for (int i = 0; i < 3; i++) {
+        int j = i == 2 ? 0 : i + 1;
+        double dy = t->y[j] - t->y[i];
+        if (fmax(t->y[i], t->y[j]) < bottom || fmin(t->y[i], t->y[j]) > top)
+            continue;
+        /* Parts of the edge at which it enters and leaves the strip. */
+        double a = dy != 0.0 ? (bottom - t->y[i]) / dy : 0.0, b = dy != 0.0 ? (top - t->y[i]) / dy : 1.0;
+        double enter = fmin(1.0, fmax(0.0, fmin(a, b))), leave = fmax(0.0, fmin(1.0, fmax(a, b)));
+        double x[2] = {t->x[i] + enter * (t->x[j] - t->x[i]), t->x[i] + leave * (t->x[j] - t->x[i])};
+        low = fmin(low, fmin(x[0], x[1]));
+        high = fmax(high, fmax(x[0], x[1]));
+    }
+    *first = cell_at(low - 0.01 / g->per_metre, g->x0, g->per_metre);
+    *last = cell_at(high + 0.01 / g->per_metre, g->x0, g->per_metre);
+    if (*last >= g->columns)
+        *last = g->columns - 1;
 }
 
 static void grid_init(struct grid *g, const struct flat_triangle *triangle, size_t count) {
@@ -65,7 +93,7 @@ static void grid_init(struct grid *g, const struct flat_triangle *triangle, size
     double width = x1 - g->x0, height = y1 - g->y0;
     /* Long thin charts: no more than `count` cells along either side. */
     double cell = fmax(sqrt(width * height / (double)count), fmax(width, height) / (double)count);
-    g->per_metre = cell > 0.0 ? 1.0 / cell : 0.0;
+    g->per_metre = 1.0 / cell;
     g->columns = (size_t)(width * g->per_metre) + 1;
     g->rows = (size_t)(height * g->per_metre) + 1;
     g->head = mem_array(g->columns * g->rows, sizeof *g->head);
@@ -79,43 +107,50 @@ static void grid_release(struct grid *g) {
 }
 
 static bool lies_over_one(const struct grid *g, const struct flat_triangle *triangle, size_t i,
-                          const size_t cell[4], double depth) {
-    for (size_t y = cell[2]; y <= cell[3]; y++)
-        for (size_t x = cell[0]; x <= cell[1]; x++)
+                          double depth) {
+    size_t y, bottom, left, right;
+    for (rows_of(g, &triangle[i], &y, &bottom); y <= bottom; y++) {
+        columns_of(g, &triangle[i], y, &left, &right);
+        for (size_t x = left; x <= right; x++)
             for (uint32_t e = g->head[y * g->columns + x]; e != NONE; e = g->entry[e].next) {
                 const struct flat_triangle *other = &triangle[g->entry[e].triangle];
                 if (!edge_separates(&triangle[i], other, depth) &&
                     !edge_separates(other, &triangle[i], depth))
                     return true;
             }
+    }
     return false;
 }
 
-static void enter(struct grid *g, size_t i, const size_t cell[4]) {
-    for (size_t y = cell[2]; y <= cell[3]; y++)
-        for (size_t x = cell[0]; x <= cell[1]; x++) {
-            if (g->entry_count == g->entry_capacity) {
-                g->entry_capacity = g->entry_capacity ? 2 * g->entry_capacity : 256;
-                g->entry = mem_realloc_array(g->entry, g->entry_capacity, sizeof *g->entry);
-            }
-            uint32_t *head = &g->head[y * g->columns + x];
-            g->entry[g->entry_count] = (struct entry){(uint32_t)i, *head};
-            *head = (uint32_t)g->entry_count++;
-        }
+static void add(struct grid *g, size_t cell, size_t i) {
+    if (g->entry_count == g->entry_capacity) {
+        g->entry_capacity = g->entry_capacity ? 2 * g->entry_capacity : 256;
+        g->entry = mem_realloc_array(g->entry, g->entry_capacity, sizeof *g->entry);
+    }
+    g->entry[g->entry_count] = (struct entry){(uint32_t)i, g->head[cell]};
+    g->head[cell] = (uint32_t)g->entry_count++;
+}
+
+static void enter(struct grid *g, const struct flat_triangle *triangle, size_t i) {
+    size_t y, bottom, left, right;
+    for (rows_of(g, &triangle[i], &y, &bottom); y <= bottom; y++) {
+        columns_of(g, &triangle[i], y, &left, &right);
+        for (size_t x = left; x <= right; x++)
+            add(g, y * g->columns + x, i);
+    }
 }
 
 size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth,
                     bool *dropped) {
     struct grid g;
-    size_t dropped_count = 0, cell[4];
+    size_t dropped_count = 0;
     grid_init(&g, triangle, count);
     for (size_t i = 0; i < count; i++) {
-        cells_of(&g, &triangle[i], cell);
-        dropped[i] = lies_over_one(&g, triangle, i, cell, depth);
+        dropped[i] = lies_over_one(&g, triangle, i, depth);
         if (dropped[i])
             dropped_count++;
         else
-            enter(&g, i, cell);
+            enter(&g, triangle, i);
     }
     grid_release(&g);
     return dropped_count;

@@ -228,6 +228,18 @@ static vec3 flat(float u, float v, void *user) {
     return (vec3){3.0f * u, 2.0f * v, 0.0f};
 }
 
+/* A disc of thin triangles around one vertex. */
+static vec3 fan(float u, float v, void *user) {
+    (void)user;
+    return (vec3){v * cosf(6.2831853f * u), v * sinf(6.2831853f * u), 0.0f};
+}
+
+/* Hundred kilometres by a millimetre, far from the origin. */
+static vec3 thread(float u, float v, void *user) {
+    (void)user;
+    return (vec3){1e5f * u, 0.001f * v, 5e5f};
+}
+
 static void test_density(void) {
     struct mesh mesh = room_grid(3, 2, flat, NULL);
     struct segments segments;
@@ -284,6 +296,8 @@ int main(void) {
     test_shape(ramp, 400, 3, 8);
     test_shape(sphere, 60, 30, 24);
     test_shape(noisy_sheet, 100, 100, 1);
+    test_shape(fan, 3000, 1, 1);
+    test_shape(thread, 20, 1, 1);
     test_density();
     test_fragments();
     test_room("rooms/staircase2", 1024, 0.80, 0.98);
