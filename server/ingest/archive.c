@@ -48,8 +48,9 @@ static enum status library_error(struct unpacking *u, const char *entry) {
         return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry,
                          text ? text : "unknown fault");
     if (u->entry_count == 0)
-        return error_set(u->err, status, "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s",
-                         u->name, text ? text : "unknown fault");
+        return error_set(u->err, status,
+                         "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s", u->name,
+                         text ? text : "unknown fault");
     return error_set(u->err, status, "%s is damaged or cut off: %s", u->name,
                      text ? text : "unknown fault");
 }

@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -30,7 +31,18 @@ struct bundle_limits bundle_default_limits(void) {
 enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
                           struct error *err) {
     struct archive_limits own = {limits->file_count, limits->total_bytes, limits->ratio};
-    return archive_unpack(archive, "the archive", dir, &own, err);
+    enum status status = archive_unpack(archive, "the archive", dir, &own, err);
+    if (status != STATUS_OK)
+        return status;
+    /* A scene that is called ready must outlive a power cut; one call for thousands of files. */
+    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0 || syncfs(fd) != 0)
+        status = error_set_errno(err, errno, "cannot sync folder %s", dir);
+    if (fd >= 0)
+        close(fd);
+    if (status != STATUS_OK)
+        file_remove_tree(dir, NULL);
+    return status;
 }
 
 /* --- the folder -------------------------------------------------------------------------- */
@@ -170,10 +182,10 @@ static char *search_mesh(const char *root, struct findings *f) {
         mem_free(found);
         found = NULL;
     } else if (!found && other) {
-        findings_problem(f, other, "no mesh: %s is not in a format that is read; a mesh must be PLY", other);
+        findings_problem(f, other, "no mesh: the format of %s is not read; a mesh must be PLY", other);
     } else if (!found) {
         findings_problem(f, "mesh.ply", points > 0
-                             ? "no mesh: the PLY files at the bundle's top are point clouds, without faces"
+                             ? "no mesh: the PLY files at the bundle's top are point clouds"
                              : "no mesh: the bundle has no PLY file at its top");
     }
     free_names(names, count);
@@ -197,8 +209,8 @@ static char *find_mesh(const char *root, const char *transforms_name, const stru
     return search_mesh(root, f);
 }
 
-static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit, struct scene *scene,
-                             struct findings *f, struct error *err) {
+static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit,
+                             struct scene *scene, struct findings *f, struct error *err) {
     struct ply_report report;
     struct error own;
     char *path = file_join(root, name);
@@ -240,8 +252,9 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
         far_count += vec3_length(vec3_sub(origin, centre)) > reach;
     }
     if (far_count > 0)
-        findings_warning(f, "%zu of %zu cameras stand farther from the mesh's centre than twice its diagonal: are "
-                         "poses and mesh in the same units and axes?", far_count, scene->photograph_count);
+        findings_warning(f, "%zu of %zu cameras stand farther from the mesh's centre than twice its "
+                         "diagonal: are poses and mesh in the same units and axes?", far_count,
+                         scene->photograph_count);
 }
 
 /* --- all of it --------------------------------------------------------------------------- */
@@ -249,7 +262,8 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
 static void take_warnings(struct findings *f, struct scene *scene) {
     if (f->warning_count > FINDINGS_MAX) {
         char *last = f->warning[FINDINGS_MAX - 1];
-        f->warning[FINDINGS_MAX - 1] = mem_printf("... and %zu warnings more", f->warning_count - FINDINGS_MAX + 1);
+        f->warning[FINDINGS_MAX - 1] =
+            mem_printf("... and %zu warnings more", f->warning_count - FINDINGS_MAX + 1);
         mem_free(last);
         f->warning_count = FINDINGS_MAX;
     }
@@ -272,7 +286,8 @@ static enum status sum_up(const struct findings *f, struct error *err) {
     }
     if (f->problem_count == 1)
         return error_set(err, STATUS_INPUT, "%s", reason ? reason : "");
-    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s", f->problem_count, reason ? reason : "");
+    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s", f->problem_count,
+                     reason ? reason : "");
 }
 
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,

@@ -75,7 +75,8 @@ static uint16_t *make_srgb_table(void) {
     return table;
 }
 
-static void convert_srgb(const struct loading *l, const struct image *image, struct photograph *photo) {
+static void convert_srgb(const struct loading *l, const struct image *image,
+                         struct photograph *photo) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3; c++) {
@@ -86,15 +87,18 @@ static void convert_srgb(const struct loading *l, const struct image *image, str
 
 /* Values beyond what a half holds become lower bounds, as clipped ones are; negative ones, left
  * by reconstruction filters, become 0. */
-static void convert_linear(const struct image *image, struct photograph *photo, struct outcome *outcome) {
+static void convert_linear(const struct image *image, struct photograph *photo,
+                           struct outcome *outcome) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
     for (size_t i = 0; i < count; i++) {
         const float *in = image->pixel + i * stride;
         bool finite = isfinite(in[0]) && isfinite(in[1]) && isfinite(in[2]);
         outcome->not_finite_count += !finite;
         outcome->clamped_count += finite && fmaxf(in[0], fmaxf(in[1], in[2])) > HALF_LARGEST;
-        for (size_t c = 0; c < 3; c++)
-            photo->pixel[i][c] = image_half_from_float(finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN);
+        for (size_t c = 0; c < 3; c++) {
+            float value = finite ? clampf(in[c], 0.0f, HALF_LARGEST) : NAN;
+            photo->pixel[i][c] = image_half_from_float(value);
+        }
     }
     if (outcome->clamped_count > 0)
         photo->clip = HALF_LARGEST;
@@ -160,15 +164,16 @@ static void set_exposure(const struct transforms_frame *frame, const struct imag
     photo->exposure = photo->exposure_known ? single : 1.0f;
 }
 
-static enum status check_size(const struct loading *l, const struct transforms_frame *frame, const char *path,
-                              struct camera *camera, struct error *err) {
+static enum status check_size(const struct loading *l, const struct transforms_frame *frame,
+                              const char *path, struct camera *camera, struct error *err) {
     struct image image;
     enum status status = image_probe(path, &image, NULL, err);
     if (status != STATUS_OK)
         return status;
     uint64_t pixels = (uint64_t)image.width * image.height;
     if (pixels > l->pixel_limit)
-        status = error_set(err, STATUS_LIMIT, "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
+        status = error_set(err, STATUS_LIMIT,
+                           "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
                            pixels, l->pixel_limit);
     else
         status = transforms_camera(frame, image.width, image.height, camera, err);
@@ -244,20 +249,22 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
         sources[o->source]++;
         rotated += o->orientation > 1;
         if (o->not_finite_count > 0)
-            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->not_finite_count);
+            findings_warning(f, "%s: %zu pixels are not finite and are not used", name,
+                             o->not_finite_count);
         if (o->clamped_count > 0)
             findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name,
                              o->clamped_count);
     }
     if (rotated > 0)
-        findings_warning(f, "the EXIF orientation of %zu photographs was ignored: poses are taken to be for the "
-                         "pixels as stored", rotated);
+        findings_warning(f, "the EXIF orientation of %zu photographs was ignored: poses are taken to "
+                         "be for the pixels as stored", rotated);
     size_t given = sources[EXPOSURE_FACTOR] + sources[EXPOSURE_CAMERA] + sources[EXPOSURE_EXIF] +
                    sources[EXPOSURE_HDR];
     for (int s = EXPOSURE_FACTOR; s <= EXPOSURE_HDR; s++) {
         if (sources[s] > 0 && sources[s] < given) {
-            findings_warning(f, "exposures come from different sources (%zu from \"exposure\", %zu from "
-                             "\"exposure_time\", %zu from EXIF, %zu HDR taken as 1): they may not agree in units",
+            findings_warning(f, "exposures come from different sources (%zu from \"exposure\", %zu "
+                             "from \"exposure_time\", %zu from EXIF, %zu HDR taken as 1): they may "
+                             "not agree in units",
                              sources[EXPOSURE_FACTOR], sources[EXPOSURE_CAMERA], sources[EXPOSURE_EXIF],
                              sources[EXPOSURE_HDR]);
             break;
@@ -266,14 +273,15 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
 }
 
 /* Turns each frame's outcome into problems, in the frames' order. */
-static enum status collect(struct loading *l, const char *name, struct findings *f, struct error *err) {
+static enum status collect(struct loading *l, const char *name, struct findings *f,
+                           struct error *err) {
     enum status status = STATUS_OK;
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         const struct transforms_frame *frame = &l->transforms->frame[i];
         struct outcome *o = &l->outcome[i];
         if (!l->path[i])
-            findings_warning(f, "%s: frames[%zu] names %s, which is not in the bundle; it was left out", name,
-                             frame->number, frame->file);
+            findings_warning(f, "%s: frames[%zu] names %s, which is not in the bundle; it was left "
+                             "out", name, frame->number, frame->file);
         if (o->status == STATUS_OK)
             continue;
         make_relative(&o->err, l->dir);
@@ -301,7 +309,8 @@ static void keep_loaded(struct loading *l, struct scene *scene) {
     scene->photograph_count = kept;
 }
 
-static void check_count(const struct scene *scene, const char *name, size_t named_count, struct findings *f) {
+static void check_count(const struct scene *scene, const char *name, size_t named_count,
+                        struct findings *f) {
     size_t train_count = 0;
     for (size_t i = 0; i < scene->photograph_count; i++)
         train_count += !scene->photograph[i].is_test;

@@ -36,8 +36,8 @@ struct reader {
 static enum status value_error(struct reader *r, const char *what) {
     bool ascii = r->header.format == PLY_ASCII;
     return error_set(r->err, STATUS_INPUT, "%s, %s %zu: %s %" PRIu64 " %s", r->cursor.name,
-                     ascii ? "line" : "byte", ascii ? r->cursor.line : r->cursor.at, r->element, r->record,
-                     what);
+                     ascii ? "line" : "byte", ascii ? r->cursor.line : r->cursor.at, r->element,
+                     r->record, what);
 }
 
 static uint64_t load(const uint8_t *at, size_t bytes, bool big) {
@@ -163,7 +163,8 @@ static enum status begin_element(struct reader *r, const struct ply_element *e) 
     for (size_t i = 0; i < e->property_count; i++) {
         const struct ply_property *p = &r->header.property[e->first + i];
         /* A character and a separator per ASCII value; an empty list still has its length. */
-        least += r->header.format == PLY_ASCII ? 2 : ply_type_bytes(p->is_list ? p->count_type : p->type);
+        enum ply_type first = p->is_list ? p->count_type : p->type;
+        least += r->header.format == PLY_ASCII ? 2 : ply_type_bytes(first);
     }
     uint64_t rest = r->cursor.size - r->cursor.at + 1; /* the last line may lack its end */
     if (least > 0 && e->count > rest / least)
@@ -207,8 +208,8 @@ static enum status read_vertices(struct reader *r, const struct ply_element *e, 
         if (usable)
             target[k] = (signed char)i;
         else if (i < 3)
-            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->cursor.name,
-                             wanted[i]);
+            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s",
+                             r->cursor.name, wanted[i]);
         else
             has_normal = false;
     }
@@ -250,7 +251,8 @@ struct face_sink {
     uint32_t triangle[POLYGON_MAX_CORNERS][3];
 };
 
-static enum status read_corners(struct reader *r, const struct ply_property *p, struct face_sink *sink) {
+static enum status read_corners(struct reader *r, const struct ply_property *p,
+                                struct face_sink *sink) {
     uint64_t count;
     enum status status = read_list_count(r, p, &count);
     if (status == STATUS_OK && count > POLYGON_MAX_CORNERS)
@@ -264,7 +266,7 @@ static enum status read_corners(struct reader *r, const struct ply_property *p, 
             char what[128];
             snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu",
                      value, sink->mesh->vertex_count - 1);
-            return value_error(r, sink->mesh->vertex_count ? what : "refers to a vertex, but there are none");
+            return value_error(r, sink->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
         }
         sink->corner[i] = (uint32_t)value;
         sink->position[i] = sink->mesh->position[sink->corner[i]];
@@ -285,12 +287,13 @@ static void reserve_triangles(struct face_sink *sink, size_t wanted) {
         mesh->object_id = mem_realloc_array(mesh->object_id, sink->capacity, sizeof *mesh->object_id);
 }
 
-static enum status add_face(struct reader *r, struct face_sink *sink, size_t face, int64_t object_id) {
+static enum status add_face(struct reader *r, struct face_sink *sink, size_t face,
+                            int64_t object_id) {
     struct mesh *mesh = sink->mesh;
     size_t made = sink->corner_count - 2;
     if (made > sink->limit - mesh->triangle_count)
-        return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit", r->cursor.name,
-                         sink->limit);
+        return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit",
+                         r->cursor.name, sink->limit);
     reserve_triangles(sink, mesh->triangle_count + made);
     polygon_triangulate(sink->position, sink->corner_count, sink->triangle);
     for (size_t i = 0; i < made; i++) {
@@ -312,10 +315,11 @@ static enum status find_face_properties(struct reader *r, const struct ply_eleme
     if (*list == SIZE_MAX || !r->header.property[e->first + *list].is_list ||
         r->header.property[e->first + *list].type >= PLY_FLOAT32)
         return error_set(r->err, STATUS_INPUT,
-                         "%s: its faces have no list vertex_indices of an integer type", r->cursor.name);
+                         "%s: its faces have no list vertex_indices of an integer type",
+                         r->cursor.name);
     *id = find_property(r, e, "object_id");
-    if (*id != SIZE_MAX &&
-        (r->header.property[e->first + *id].is_list || r->header.property[e->first + *id].type >= PLY_FLOAT32))
+    const struct ply_property *p = *id != SIZE_MAX ? &r->header.property[e->first + *id] : NULL;
+    if (p && (p->is_list || p->type >= PLY_FLOAT32))
         return error_set(r->err, STATUS_INPUT,
                          "%s: the faces' object_id must be one integer per face", r->cursor.name);
     return STATUS_OK;

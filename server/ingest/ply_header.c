@@ -1,5 +1,5 @@
-/* ply_header.c -- see ply_header.h. The format is Turk's, "The PLY Polygon File Format" (1994), with
- * the type names (int8, float32...) that later writers added. */
+/* ply_header.c -- see ply_header.h. The format is Turk's, "The PLY Polygon File Format" (1994),
+ * with the type names (int8, float32...) that later writers added. */
 #include "server/ingest/ply_header.h"
 
 #include <errno.h>
@@ -60,8 +60,8 @@ static bool parse_type(const char *word, enum ply_type *type) {
 }
 
 static enum status header_error(struct parser *p, const char *what, const char *word) {
-    return error_set(p->err, STATUS_INPUT, "%s, line %zu: %s%s%s%s", p->cursor->name, p->cursor->line, what,
-                     word ? " \"" : "", word ? word : "", word ? "\"" : "");
+    return error_set(p->err, STATUS_INPUT, "%s, line %zu: %s%s%s%s", p->cursor->name,
+                     p->cursor->line, what, word ? " \"" : "", word ? word : "", word ? "\"" : "");
 }
 
 static enum status parse_element(struct parser *p, char *const *word, size_t words) {

@@ -101,7 +101,8 @@ static enum camera_model read_model(struct context *c) {
     struct error err;
     bool fisheye = false;
     if (!name) {
-        if (json_bool(holder(c, "is_fisheye"), "is_fisheye", c->place, false, &fisheye, &err) != STATUS_OK) {
+        const cJSON *object = holder(c, "is_fisheye");
+        if (json_bool(object, "is_fisheye", c->place, false, &fisheye, &err) != STATUS_OK) {
             findings_error(c->findings, c->name, &err);
             c->ok = false;
         }
@@ -145,7 +146,8 @@ static double angle(struct context *c, const char *key) {
     double value = number(c, key, NAN);
     if (!isnan(value) && !(value > 0.0 && value < 3.14)) {
         char text[128];
-        snprintf(text, sizeof text, "%s is %.9g, it must be an angle in radians below pi", key, value);
+        snprintf(text, sizeof text, "%s is %.9g, it must be an angle in radians below pi", key,
+                 value);
         problem(c, text);
         return NAN;
     }
@@ -172,10 +174,12 @@ static void read_lens(struct context *c, struct lens *lens) {
 enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
                               struct camera *camera, struct error *err) {
     const struct lens *lens = &frame->lens;
-    if ((!isnan(lens->width) && lens->width != width) || (!isnan(lens->height) && lens->height != height))
-        return error_set(err, STATUS_INPUT, "the picture is %u x %u pixels, but frames[%zu] says %.0f x %.0f",
-                         width, height, frame->number, isnan(lens->width) ? width : lens->width,
-                         isnan(lens->height) ? height : lens->height);
+    double stated_width = isnan(lens->width) ? width : lens->width;
+    double stated_height = isnan(lens->height) ? height : lens->height;
+    if (stated_width != width || stated_height != height)
+        return error_set(err, STATUS_INPUT,
+                         "the picture is %u x %u pixels, but frames[%zu] says %.0f x %.0f", width,
+                         height, frame->number, stated_width, stated_height);
     double fx = lens->fl_x, fy = lens->fl_y;
     if (isnan(fx) && !isnan(lens->angle_x))
         fx = 0.5 * width / tan(0.5 * lens->angle_x);
@@ -184,13 +188,16 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
     /* Square pixels unless the file says otherwise. */
     fx = isnan(fx) ? fy : fx;
     fy = isnan(fy) ? fx : fy;
-    double cx = isnan(lens->cx) ? 0.5 * width : lens->cx, cy = isnan(lens->cy) ? 0.5 * height : lens->cy;
+    double cx = isnan(lens->cx) ? 0.5 * width : lens->cx;
+    double cy = isnan(lens->cy) ? 0.5 * height : lens->cy;
     if (!(fx > 1e-3 * width && fx < 1e4 * width && fy > 1e-3 * height && fy < 1e4 * height))
-        return error_set(err, STATUS_INPUT, "a focal length of %.6g x %.6g pixels cannot belong to a picture "
-                         "of %u x %u", fx, fy, width, height);
+        return error_set(err, STATUS_INPUT,
+                         "a focal length of %.6g x %.6g pixels cannot belong to a picture of %u x %u",
+                         fx, fy, width, height);
     if (!(fabs(cx) < 10.0 * width && fabs(cy) < 10.0 * height))
-        return error_set(err, STATUS_INPUT, "the principal point %.6g, %.6g lies far outside the picture "
-                         "of %u x %u", cx, cy, width, height);
+        return error_set(err, STATUS_INPUT,
+                         "the principal point %.6g, %.6g lies far outside the picture of %u x %u",
+                         cx, cy, width, height);
     *camera = (struct camera){
         .model = lens->model, .width = width, .height = height,
         .fx = (float)fx, .fy = (float)fy, .cx = (float)cx, .cy = (float)cy,
@@ -319,7 +326,8 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
     frame->mask = path(c, object, "mask_path");
     struct lens *lens = &frame->lens;
     read_lens(c, lens);
-    if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) && isnan(lens->angle_y))
+    if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) &&
+        isnan(lens->angle_y))
         problem(c, "no focal length: expected fl_x, fl_y or camera_angle_x");
     read_pose(c, frame);
     read_exposure(c, frame);

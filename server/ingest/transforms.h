@@ -27,7 +27,13 @@ struct lens {
 };
 
 /* Where a frame's exposure comes from; a bundle that mixes sources has mixed units. */
-enum exposure_source { EXPOSURE_UNKNOWN, EXPOSURE_FACTOR, EXPOSURE_CAMERA, EXPOSURE_EXIF, EXPOSURE_HDR };
+enum exposure_source {
+    EXPOSURE_UNKNOWN,
+    EXPOSURE_FACTOR, /* "exposure" */
+    EXPOSURE_CAMERA, /* "exposure_time", "iso", "f_number" */
+    EXPOSURE_EXIF,
+    EXPOSURE_HDR     /* a linear picture without any of these: 1 */
+};
 
 struct transforms_frame {
     size_t number;          /* position in `frames`, from 0 */

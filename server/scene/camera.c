@@ -1,8 +1,10 @@
 /* camera.c -- see camera.h. The models are those of OpenCV's calib3d and fisheye pages:
  *
- *   OPENCV          r^2 = x^2 + y^2,  s = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
+ *   OPENCV          r^2 = x^2 + y^2
+ *                   s = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
  *                   x' = s x + 2 p1 x y + p2 (r^2 + 2 x^2),  y' = s y + p1 (r^2 + 2 y^2) + 2 p2 x y
- *   OPENCV_FISHEYE  t = atan r,  t' = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8),  (x', y') = t' (x, y) / r
+ *   OPENCV_FISHEYE  t = atan r,  t' = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)
+ *                   (x', y') = t' (x, y) / r
  *
  * with (x, y) = (X / Z, Y / Z). The Jacobian determinant is positive at the axis; where it stops
  * being so, the picture folds over. The radial part's fold is found once (camera_find_fold); the

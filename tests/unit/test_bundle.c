@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "tests/check.h"
 
-static char work[] = "/tmp/unbake-test-bundle-XXXXXX";
+static char work[64]; /* in memory where possible: unpacking syncs the file system */
 static struct parallel *pool;
 
 #define POSE "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2],[0,0,0,1]]"
@@ -286,6 +286,32 @@ static void test_single_folder(void) {
     mem_free(litter);
 }
 
+/* From an archive to a scene. */
+static void test_archive(void) {
+    put_good();
+    char *archive = mem_printf("%s.tar.gz", work), *dir = mem_printf("%s-files", work);
+    char *command = mem_printf("tar -C '%s' -czf '%s' .", work, archive);
+    struct bundle_limits limits = bundle_default_limits();
+    struct scene scene;
+    struct error err = {.message = ""};
+    cJSON *problems = cJSON_CreateArray();
+    CHECK(system(command) == 0);
+    CHECK_THAT(bundle_unpack(archive, dir, &limits, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(bundle_load(dir, NULL, &limits, pool, &scene, problems, &err) == STATUS_OK, "%s",
+               err.message);
+    CHECK(scene.photograph_count == 3);
+    scene_release(&scene);
+    file_remove_tree(dir, NULL);
+    CHECK(truncate(archive, 200) == 0);
+    CHECK(bundle_unpack(archive, dir, &limits, &err) == STATUS_INPUT && access(dir, F_OK) != 0);
+    CHECK(strstr(err.message, "the archive"));
+    cJSON_Delete(problems);
+    unlink(archive);
+    mem_free(archive);
+    mem_free(command);
+    mem_free(dir);
+}
+
 static void test_real(const char *root, const char *room, const char *transforms, size_t frames, size_t triangles) {
     char *dir = mem_printf("%s/%s", root, room);
     if (access(dir, R_OK) != 0) {
@@ -313,6 +339,8 @@ static void test_real(const char *root, const char *room, const char *transforms
 }
 
 int main(void) {
+    snprintf(work, sizeof work, "%s/unbake-test-bundle-XXXXXX",
+             access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
     CHECK(mkdtemp(work) != NULL);
     pool = parallel_new(2);
     test_good();
@@ -320,6 +348,7 @@ int main(void) {
     test_bad();
     test_many();
     test_single_folder();
+    test_archive();
     const char *root = getenv("UNBAKE_TEST_DATA");
     root = root ? root : "../shared/data";
     test_real(root, "rooms/staircase2", NULL, 80, 28000);
