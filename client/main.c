@@ -11,12 +11,17 @@
 #include "common/protocol.h"
 
 /* SIGINT and SIGTERM are read from a descriptor, where request.c waits for them: no handler runs
- * in the middle of anything. */
+ * in the middle of anything. One that the caller ignores (nohup, a background job of a script)
+ * stays ignored. */
 static int block_signals(void) {
+    static const int numbers[] = {SIGINT, SIGTERM};
     sigset_t set;
     sigemptyset(&set);
-    sigaddset(&set, SIGINT);
-    sigaddset(&set, SIGTERM);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        struct sigaction action;
+        if (sigaction(numbers[i], NULL, &action) == 0 && action.sa_handler != SIG_IGN)
+            sigaddset(&set, numbers[i]);
+    }
     sigprocmask(SIG_BLOCK, &set, NULL);
     return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }

@@ -23,6 +23,8 @@ static void take_state(struct view *v, const cJSON *data) {
     copy(v->wanted, sizeof v->wanted, data, "wanted");
     copy(v->stage, sizeof v->stage, data, "stage");
     copy(v->reason, sizeof v->reason, data, "reason");
+    if (strcmp(v->wanted, "run") == 0)
+        v->wanted[0] = '\0';
     double progress = member_number(data, "progress", -1.0);
     if (progress >= 0.0) {
         v->done = progress;

@@ -18,7 +18,8 @@ struct view_metric {
 
 struct view {
     int64_t job;
-    char state[16], wanted[16];
+    char state[16];
+    char wanted[16];     /* "pause" or "cancel" while that is asked for and not done; else "" */
     char stage[48];
     double done, total;  /* of the stage; total 0: unknown */
     double eta_sec;      /* when it was reported; negative: unknown */

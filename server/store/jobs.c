@@ -107,7 +107,7 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
                          job->request_sha256);
     if (status == STATUS_OK) {
         *id = sqlite3_last_insert_rowid(store->sql.db);
-        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\",\"attempt\":0}",
+        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}",
                                     err);
     }
     return store_end(store, status, *id, err);
