@@ -1,7 +1,7 @@
 #!/bin/bash
 # The client against the real daemon: submit, watch, show, get with its resumption, what is asked
 # of jobs, exit statuses, --json of every command, mistakes.
-. tests/api/lib.sh
+. tests/api/client.sh
 quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
 long="--set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64"
 

@@ -1,7 +1,7 @@
 #!/bin/bash
 # `watch` goes on where it was while the daemon is killed and started again, and Ctrl-C leaves the
 # job alone.
-. tests/api/lib.sh
+. tests/api/client.sh
 long="--set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64"
 
 running_attempt() { # NUMBER

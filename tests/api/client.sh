@@ -1,4 +1,4 @@
-# lib.sh -- for the tests that drive the real daemon: `. tests/api/lib.sh` with the build folder
+# client.sh -- for the tests of the client: `. tests/api/client.sh`, with the build folder
 # in $1. Makes a temporary folder ($tmp), and removes it and the daemon when the test ends.
 # shellcheck shell=bash disable=SC2034
 set -u
@@ -27,7 +27,7 @@ fail() {
 # second start takes the same port.
 daemon_start() {
     rm -f "$tmp/port"
-    "$build/unbaked" --data "$tmp/data" --listen "127.0.0.1:$port" --port-file "$tmp/port" "$@" \
+    "$build/unbaked" --data "$tmp/data" --listen "127.0.0.1:$port" --port-file "$tmp/port" --set min_free_mib=1 "$@" \
         >/dev/null 2>>"$tmp/daemon.log" &
     daemon_pid=$!
     for _ in $(seq 200); do
