@@ -28,7 +28,7 @@ struct stream {
     struct image_source *source; /* reading */
     int fd;                      /* writing */
     int io_error;                /* errno of the first refused write */
-    char message[256];           /* the library's first complaint */
+    char message[256];           /* reading: the library's first complaint */
 };
 
 static void *limited_alloc(size_t bytes) {
@@ -53,6 +53,14 @@ static void note_error(exr_const_context_t context, exr_result_t code, const cha
         printable(message, stream->message, sizeof stream->message);
 }
 
+/* While it writes, the library holds its lock when it reports, and asking it for the stream
+ * would wait for that lock for ever. */
+static void drop_error(exr_const_context_t context, exr_result_t code, const char *message) {
+    (void)context;
+    (void)code;
+    (void)message;
+}
+
 static int64_t stream_read(exr_const_context_t context, void *user, void *buffer, uint64_t size,
                            uint64_t offset, exr_stream_error_func_ptr_t report) {
     (void)context;
@@ -69,6 +77,8 @@ static int64_t stream_size(exr_const_context_t context, void *user) {
 
 static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer,
                             uint64_t size, uint64_t offset, exr_stream_error_func_ptr_t report) {
+    (void)context;
+    (void)report;
     struct stream *stream = user;
     uint64_t done = 0;
     while (done < size) {
@@ -78,7 +88,6 @@ static int64_t stream_write(exr_const_context_t context, void *user, const void 
             continue;
         if (wrote <= 0) {
             stream->io_error = wrote < 0 ? errno : EIO;
-            report(context, EXR_ERR_WRITE_IO, "write failed");
             return -1;
         }
         done += (uint64_t)wrote;
@@ -86,9 +95,10 @@ static int64_t stream_write(exr_const_context_t context, void *user, const void 
     return (int64_t)done;
 }
 
-static exr_context_initializer_t initializer(struct stream *stream) {
+static exr_context_initializer_t initializer(struct stream *stream,
+                                             exr_error_handler_cb_t on_error) {
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    init.error_handler_fn = note_error;
+    init.error_handler_fn = on_error;
     init.alloc_fn = limited_alloc;
     init.free_fn = free;
     init.user_data = stream;
@@ -453,7 +463,7 @@ enum status image_read_exr(struct image_source *source, bool probe, struct image
                            struct image_info *info, struct error *err) {
     struct stream stream = {.source = source, .fd = -1};
     struct reader r = {.stream = &stream};
-    exr_context_initializer_t init = initializer(&stream);
+    exr_context_initializer_t init = initializer(&stream, note_error);
     exr_result_t code = exr_start_read(&r.context, source->name, &init);
     if (code != EXR_ERR_SUCCESS)
         return refuse(&stream, code, err);
@@ -537,7 +547,7 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
     struct stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640)};
     if (stream.fd < 0)
         return error_set_errno(err, errno, "cannot create %s", path);
-    exr_context_initializer_t init = initializer(&stream);
+    exr_context_initializer_t init = initializer(&stream, drop_error);
     exr_context_t context;
     exr_result_t code = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (code == EXR_ERR_SUCCESS) {
@@ -553,8 +563,7 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
         status = error_set_errno(err, stream.io_error, "cannot write %s", path);
     else if (code != EXR_ERR_SUCCESS)
         status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path,
-                           stream.message[0] ? stream.message
-                                             : exr_get_default_error_message(code));
+                           exr_get_default_error_message(code));
     if (close(stream.fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot close %s", path);
     return status;

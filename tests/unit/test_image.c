@@ -1,0 +1,379 @@
+/* test_image.c -- what the readers make of a picture: values that other programs read from the
+ * same files (ImageMagick 6.9, Pillow 12, OpenEXR's Python module 3.4), round trips through our
+ * writers, order of channels, windows, limits and the sentences of refusals. */
+#include "common/image.h"
+
+#include <dirent.h>
+#include <stdint.h>
+#include <sys/stat.h>
+
+#include "tests/check.h"
+
+static struct error err;
+static char scratch[64];
+
+static float at(const struct image *image, uint32_t x, uint32_t y, uint32_t c) {
+    return image->pixel[((size_t)y * image->width + x) * image->channel_count + c];
+}
+
+/* Reads the file or reports that it did not. */
+static bool reads(const char *path, struct image *image, struct image_info *info) {
+    enum status status = image_read(path, image, info, &err);
+    CHECK_THAT(status == STATUS_OK, "%s", err.message);
+    return status == STATUS_OK;
+}
+
+static void check_refused(const char *path, const char *part_of_message) {
+    struct image image;
+    enum status status = image_read(path, &image, NULL, &err);
+    CHECK_THAT(status == STATUS_INPUT, "%s gives status %s", path, status_name(status));
+    CHECK_THAT(status == STATUS_OK || strstr(err.message, part_of_message), "%s", err.message);
+    image_release(&image);
+}
+
+static void write_file(const void *data, size_t size) {
+    FILE *file = fopen(scratch, "wb");
+    CHECK(file && fwrite(data, 1, size, file) == size);
+    if (file)
+        fclose(file);
+}
+
+/* ------------------------------------------------------------------------------- values */
+
+static void halves(void) {
+    for (uint32_t bits = 0; bits < 65536; bits++) {
+        float value = image_float_from_half((uint16_t)bits);
+        uint32_t exponent = bits >> 10 & 31, mantissa = bits & 0x3ff;
+        double wanted = exponent ? ldexp(1024 + mantissa, (int)exponent - 25)
+                                 : ldexp(mantissa, -24);
+        if (exponent == 31)
+            CHECK(mantissa ? isnan(value) : isinf(value));
+        else
+            CHECK(fabs((double)value) == wanted);
+        CHECK(!signbit(value) == !(bits & 0x8000));
+        uint16_t back = image_half_from_float(value);
+        CHECK(exponent == 31 && mantissa ? (back & 0x7fff) > 0x7c00 : back == bits);
+    }
+    /* Half-way between neighbours the even one wins; a little more and the upper one does. */
+    for (uint32_t bits = 0; bits < 0x7bff; bits++) {
+        float low = image_float_from_half((uint16_t)bits);
+        float high = image_float_from_half((uint16_t)(bits + 1)), middle = (low + high) / 2;
+        CHECK(image_half_from_float(middle) == bits + (bits & 1));
+        CHECK(image_half_from_float(nextafterf(middle, 1e9f)) == bits + 1);
+        CHECK(image_half_from_float(nextafterf(middle, 0)) == bits);
+    }
+    CHECK(image_half_from_float(65519.99f) == 0x7bff);
+    CHECK(image_half_from_float(65520.0f) == 0x7c00);
+    CHECK(image_half_from_float(-1e30f) == 0xfc00);
+}
+
+static void srgb(void) {
+    CHECK_NEAR(image_srgb_to_linear(0.5f), 0.21404114048, 1e-7);
+    CHECK_NEAR(image_srgb_to_linear(0.02f), 0.02 / 12.92, 1e-9);
+    CHECK_NEAR(image_linear_to_srgb(0.18f), 0.46135612950, 1e-7);
+    for (int i = 0; i <= 255; i++) {
+        float value = (float)i / 255.0f;
+        CHECK_NEAR(image_linear_to_srgb(image_srgb_to_linear(value)), value, 1e-6);
+    }
+}
+
+/* ---------------------------------------------------------------------------------- EXR */
+
+static void exr_round_trip(uint32_t channel_count, enum image_exr_type type, bool tiled) {
+    static const char *const names[] = {"id", "A", "B", "G", "R"};
+    static const char *const sorted[] = {"R", "G", "B", "A", "id"};
+    struct image image, back;
+    struct image_info info;
+    image_init(&image, 131, 77, channel_count, names);
+    size_t count = (size_t)131 * 77 * channel_count;
+    for (size_t i = 0; i < count; i++)
+        image.pixel[i] = (float)(i % 997) * 0.731f - 100 * (float)(i % channel_count);
+    image.pixel[5] = INFINITY;
+    CHECK(image_write_exr(scratch, &image, type, tiled, &err) == STATUS_OK);
+    if (reads(scratch, &back, &info)) {
+        CHECK(back.width == 131 && back.height == 77 && back.channel_count == channel_count);
+        CHECK(info.encoding == IMAGE_LINEAR && info.bits == (type == IMAGE_HALF ? 16 : 32));
+        CHECK(info.orientation == 1 && info.exposure_time_sec == 0);
+        for (uint32_t c = 0; c < channel_count; c++) {
+            int from = image_channel(&image, back.channel[c]);
+            CHECK(channel_count < 5 || strcmp(back.channel[c], sorted[c]) == 0);
+            size_t wrong = 0;
+            for (size_t i = 0; from >= 0 && i < (size_t)131 * 77; i++) {
+                float wanted = image.pixel[i * channel_count + (size_t)from];
+                if (type == IMAGE_HALF)
+                    wanted = image_float_from_half(image_half_from_float(wanted));
+                wrong += back.pixel[i * channel_count + c] != wanted;
+            }
+            CHECK_THAT(from >= 0 && wrong == 0, "channel %s: %zu", back.channel[c], wrong);
+        }
+        image_release(&back);
+    }
+    image_release(&image);
+}
+
+static void exr_same_bytes(void) {
+    static const char *const names[] = {"R", "G", "B"};
+    struct image image;
+    image_init(&image, 100, 100, 3, names);
+    for (size_t i = 0; i < 30000; i++)
+        image.pixel[i] = sinf((float)i);
+    for (int tiled = 0; tiled < 2; tiled++) {
+        char *bytes[2] = {malloc(1 << 18), malloc(1 << 18)};
+        size_t size[2];
+        for (int k = 0; k < 2; k++) {
+            CHECK(image_write_exr(scratch, &image, IMAGE_HALF, tiled, &err) == STATUS_OK);
+            FILE *file = fopen(scratch, "rb");
+            size[k] = file ? fread(bytes[k], 1, 1 << 18, file) : 0;
+            if (file)
+                fclose(file);
+        }
+        CHECK(size[0] > 1000 && size[0] == size[1] && memcmp(bytes[0], bytes[1], size[0]) == 0);
+        free(bytes[0]);
+        free(bytes[1]);
+    }
+    image_release(&image);
+    CHECK(image_write_exr("/nonexistent/a.exr", &image, IMAGE_HALF, false, &err) ==
+          STATUS_NOT_FOUND);
+}
+
+static void exr_disk_full(void) {
+    static const char *const names[] = {"Y"};
+    struct image image;
+    image_init(&image, 64, 64, 1, names);
+    if (access("/dev/full", W_OK) == 0) {
+        CHECK(image_write_exr("/dev/full", &image, IMAGE_FLOAT, true, &err) == STATUS_NO_SPACE);
+        CHECK(image_write_png("/dev/full", &image, 1, &err) == STATUS_NO_SPACE);
+    }
+    image_release(&image);
+}
+
+/* Small files of every kind, made by OpenEXR's Python module: channels R, G, B hold
+ * 10 * row + column, the same plus 100, plus 200; 20 x 12 pixels of data at (3, 2). */
+static void exr_kinds(void) {
+    static const char *const compressions[] = {"no", "rle", "zips", "zip", "piz", "pxr24"};
+    struct image image;
+    for (size_t i = 0; i < sizeof compressions / sizeof compressions[0]; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "tests/data/image/%s.exr", compressions[i]);
+        if (!reads(path, &image, NULL))
+            continue;
+        CHECK(image.width == 25 && image.height == 15 && image.channel_count == 4);
+        CHECK(at(&image, 3, 2, 0) == 0 && at(&image, 22, 13, 0) == 129);
+        CHECK(at(&image, 4, 3, 1) == 111 && at(&image, 4, 3, 2) == 211);
+        CHECK(at(&image, 3, 2, 3) == 1 && at(&image, 2, 2, 3) == 0 && at(&image, 23, 2, 3) == 0);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/parts.exr", &image, NULL)) { /* Z alone, then RGB tiled, half */
+        CHECK(image.channel_count == 3 && image.width == 20 && at(&image, 19, 11, 2) == 329);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/overscan.exr", &image, NULL)) { /* shows x 8 to 12, y 4 to 6 */
+        CHECK(image.width == 5 && image.height == 3);
+        CHECK(at(&image, 0, 0, 0) == 25 && at(&image, 4, 2, 0) == 49);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/grey_uint.exr", &image, NULL)) { /* Y half and id uint */
+        CHECK(image.channel_count == 4 && image_channel(&image, "id") == 3);
+        CHECK(at(&image, 1, 1, 0) == 11 && at(&image, 1, 1, 2) == 11);
+        CHECK(at(&image, 19, 11, 3) == 1000129);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/ripmap.exr", &image, NULL)) {
+        CHECK(image.width == 20 && image.height == 12 && at(&image, 19, 11, 1) == 229);
+        image_release(&image);
+    }
+    check_refused("tests/data/image/dwaa.exr", "DWAA");
+    CHECK(err.hint[0] != '\0');
+    check_refused("tests/data/image/b44_float.exr", "B44");
+    check_refused("tests/data/image/chroma.exr", "subsampled");
+    check_refused("tests/data/image/apart.exr", "outside");
+}
+
+/* ------------------------------------------------------------------------- PNG and JPEG */
+
+static void png_round_trip(void) {
+    static const char *const names[] = {"R", "G", "B"};
+    struct image image, back;
+    struct image_info info;
+    image_init(&image, 256, 3, 3, names);
+    for (uint32_t x = 0; x < 256; x++)
+        for (uint32_t y = 0; y < 3; y++)
+            for (uint32_t c = 0; c < 3; c++)
+                image.pixel[(y * 256 + x) * 3 + c] = image_srgb_to_linear((float)x / 255) / 4;
+    image.pixel[1] = NAN;
+    image.pixel[5] = 7;
+    image.pixel[6] = -7;
+    CHECK(image_write_png(scratch, &image, 4, &err) == STATUS_OK);
+    if (reads(scratch, &back, &info)) {
+        CHECK(back.channel_count == 3 && info.encoding == IMAGE_SRGB && info.bits == 8);
+        for (uint32_t x = 3; x < 256; x++)
+            CHECK(at(&back, x, 0, 1) == (float)x / 255.0f && at(&back, x, 2, 2) == (float)x / 255);
+        CHECK(at(&back, 0, 0, 0) == 1 && at(&back, 0, 0, 1) == 0 && at(&back, 0, 0, 2) == 1);
+        CHECK(at(&back, 1, 0, 2) == 1 && at(&back, 2, 0, 0) == 0);
+        image_release(&back);
+    }
+    image_release(&image);
+
+    static const char *const grey[] = {"roughness"};
+    image_init(&image, 2, 2, 1, grey);
+    image.pixel[0] = image_srgb_to_linear(0.6f);
+    for (int k = 0; k < 2; k++) {
+        CHECK(image_write_png(scratch, &image, 1, &err) == STATUS_OK);
+        if (reads(scratch, &back, NULL)) {
+            CHECK(at(&back, 0, 0, 0) == 0.6f && at(&back, 0, 0, 2) == 0.6f);
+            CHECK(at(&back, 1, 1, 0) == (float)k && at(&back, 1, 1, 1) == 0);
+            image_release(&back);
+        }
+        image.pixel[3] = INFINITY; /* now it takes colour */
+    }
+    image_release(&image);
+}
+
+static const float pixel_tolerance = 1e-6f;
+
+static void check_pixel(const struct image *image, uint32_t x, uint32_t y, double r, double g,
+                        double b) {
+    CHECK_NEAR(at(image, x, y, 0), r / 255, pixel_tolerance);
+    CHECK_NEAR(at(image, x, y, 1), g / 255, pixel_tolerance);
+    CHECK_NEAR(at(image, x, y, 2), b / 255, pixel_tolerance);
+}
+
+static void jpeg(void) {
+    struct image image;
+    struct image_info info;
+    if (reads("tests/data/image/exif_little.jpg", &image, &info)) {
+        CHECK(image.width == 24 && image.height == 16 && image.channel_count == 3);
+        CHECK(info.encoding == IMAGE_SRGB && info.bits == 8 && info.orientation == 6);
+        CHECK_NEAR(info.exposure_time_sec, 1.0 / 1666, 1e-12);
+        CHECK(info.iso == 400 && info.f_number == 2.8);
+        check_pixel(&image, 0, 0, 0, 2, 121);
+        check_pixel(&image, 13, 7, 130, 105, 127);
+        check_pixel(&image, 23, 15, 230, 222, 137);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/exif_big.jpg", &image, &info)) {
+        CHECK(info.iso == 102400 && info.f_number == 2.8 && info.orientation == 6);
+        check_pixel(&image, 23, 15, 230, 224, 128);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/progressive.jpg", &image, &info)) {
+        CHECK(info.iso == 0 && info.orientation == 1);
+        check_pixel(&image, 13, 7, 130, 105, 127);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/grey.jpg", &image, NULL)) {
+        check_pixel(&image, 13, 7, 115, 115, 115);
+        image_release(&image);
+    }
+    if (reads("tests/data/image/exif.png", &image, &info)) {
+        CHECK(info.iso == 200 && info.orientation == 6);
+        check_pixel(&image, 23, 15, 230, 225, 128);
+        image_release(&image);
+    }
+    check_refused("tests/data/image/cmyk.jpg", "CMYK");
+}
+
+/* A file cut anywhere must be refused: a half-decoded photograph would be taken for light. */
+static void cut_short(const char *path) {
+    static unsigned char bytes[1 << 16];
+    FILE *file = fopen(path, "rb");
+    size_t size = file ? fread(bytes, 1, sizeof bytes, file) : 0;
+    if (file)
+        fclose(file);
+    CHECK_THAT(size > 100 && size < sizeof bytes, "%s", path);
+    /* The last bytes of a JPEG or PNG only say that it ends. */
+    for (size_t cut = 0; cut + 2 < size; cut += 1 + size / 500) {
+        struct image image;
+        enum status status = image_read_memory("cut", bytes, cut, &image, NULL, &err);
+        CHECK_THAT(status == STATUS_INPUT, "%s cut to %zu bytes", path, cut);
+        image_release(&image);
+    }
+}
+
+/* ------------------------------------------------------------------------ Radiance, misc */
+
+static void radiance(void) {
+    static const char runs[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n-Y 2 +X 8\n"
+                               "\2\2\0\10\210\200\10\0\10\20\30\40\50\60\70\210\0\210\201"
+                               "\2\2\0\10\210\1\210\2\210\3\210\0";
+    static const char flat[] = "#?RGBE\n\n-Y 1 +X 6\n\200\100\40\201\1\1\1\3\10\0\0\200\4\0\0\200";
+    struct image image;
+    write_file(runs, sizeof runs - 1);
+    if (reads(scratch, &image, NULL)) {
+        CHECK(image.width == 8 && image.height == 2 && image.channel_count == 3);
+        CHECK(at(&image, 0, 0, 0) == 0.5f && at(&image, 7, 0, 1) == 56.0f / 256);
+        CHECK(at(&image, 3, 0, 2) == 0 && at(&image, 3, 1, 0) == 0);
+        image_release(&image);
+    }
+    write_file(flat, sizeof flat - 1);
+    if (reads(scratch, &image, NULL)) {
+        CHECK(at(&image, 0, 0, 0) == 1 && at(&image, 3, 0, 0) == 1 && at(&image, 3, 0, 2) == 0.25f);
+        CHECK(at(&image, 4, 0, 0) == 8.0f / 256 && at(&image, 5, 0, 0) == 4.0f / 256);
+        image_release(&image);
+    }
+    write_file(flat, sizeof flat - 2);
+    check_refused(scratch, "row 0");
+    static const char other[] = "#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\nabcd";
+    write_file(other, sizeof other - 1);
+    check_refused(scratch, "xyze");
+    static const char turned[] = "#?RADIANCE\n\n+X 1 -Y 1\nabcd";
+    write_file(turned, sizeof turned - 1);
+    check_refused(scratch, "+X 1 -Y 1");
+}
+
+static void probing(void) {
+    static const char *const files[] = {"exif_little.jpg", "exif.png", "zip.exr", "parts.exr"};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        char path[64];
+        snprintf(path, sizeof path, "tests/data/image/%s", files[i]);
+        struct image whole, header;
+        struct image_info whole_info, header_info;
+        if (!reads(path, &whole, &whole_info))
+            continue;
+        CHECK(image_probe(path, &header, &header_info, &err) == STATUS_OK);
+        CHECK(header.pixel == NULL && header.width == whole.width);
+        CHECK(header.height == whole.height && header.channel_count == whole.channel_count);
+        CHECK(memcmp(header.channel, whole.channel, sizeof *whole.channel * whole.channel_count) == 0);
+        CHECK(header_info.iso == whole_info.iso && header_info.bits == whole_info.bits);
+        image_release(&whole);
+        image_release(&header);
+    }
+}
+
+static void other_files(void) {
+    struct image image;
+    CHECK(image_read("/nonexistent.png", &image, NULL, &err) == STATUS_NOT_FOUND);
+    image_release(&image);
+    write_file("", 0);
+    check_refused(scratch, "empty");
+    write_file("GIF89a........", 14);
+    check_refused(scratch, "not a picture");
+    check_refused("/tmp", "regular");
+    unlink(scratch);
+    CHECK(mkfifo(scratch, 0600) == 0);
+    check_refused(scratch, "regular"); /* and does not wait for a writer */
+    unlink(scratch);
+}
+
+int main(void) {
+    snprintf(scratch, sizeof scratch, "/tmp/unbake-image-%d", (int)getpid());
+    halves();
+    srgb();
+    for (uint32_t channel_count = 1; channel_count <= 5; channel_count++)
+        for (int kind = 0; kind < 4; kind++)
+            exr_round_trip(channel_count, kind & 1 ? IMAGE_FLOAT : IMAGE_HALF, kind & 2);
+    exr_same_bytes();
+    exr_disk_full();
+    exr_kinds();
+    png_round_trip();
+    jpeg();
+    cut_short("tests/data/image/exif_little.jpg");
+    cut_short("tests/data/image/progressive.jpg");
+    cut_short("tests/data/image/exif.png");
+    cut_short("tests/data/image/zip.exr");
+    cut_short("tests/data/image/no.exr");
+    radiance();
+    probing();
+    other_files();
+    return check_result();
+}
