@@ -46,7 +46,10 @@ struct run {
     size_t series_count;
     struct {
         char name[32];
-        double next;
+        double next;    /* when the next value may be told */
+        bool is_held;   /* the newest value has not been told: it is when the stage ends, so that */
+        long step;      /* a curve always has its last point */
+        double value;
     } series[SERIES_MAX];
 };
 
@@ -103,8 +106,18 @@ static bool preview_due(void *user) {
 
 /* --- what it tells --------------------------------------------------------------------------- */
 
+static void tell_held_metrics(struct run *run) {
+    for (size_t i = 0; i < run->series_count; i++) {
+        if (run->series[i].is_held)
+            progress_metric(run->progress, run->series[i].name, run->series[i].step,
+                            run->series[i].value);
+        run->series[i].is_held = false;
+    }
+}
+
 static void tell_stage(void *user, const char *stage) {
-    const struct run *run = user;
+    struct run *run = user;
+    tell_held_metrics(run);
     progress_stage(run->progress, stage);
 }
 
@@ -129,9 +142,12 @@ static void tell_metric(void *user, const char *series, long step, double value)
     if (i == run->series_count) {
         strcpy(run->series[i].name, series);
         run->series_count++;
-    } else if (now < run->series[i].next) {
-        return;
     }
+    run->series[i].is_held = now < run->series[i].next;
+    run->series[i].step = step;
+    run->series[i].value = value;
+    if (run->series[i].is_held)
+        return;
     run->series[i].next = now + METRIC_INTERVAL_SEC;
     progress_metric(run->progress, series, step, value);
 }
@@ -239,7 +255,7 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
     struct export_input input = input_of(r);
     input.comparison = comparison;
     input.comparison_count = r->held_out_count;
-    progress_stage(run->progress, "export");
+    tell_stage(run, "export");
     enum status status = export_outputs(run->out_dir, &input, announce, run, err);
     mem_free(comparison);
     return status;
@@ -251,7 +267,7 @@ static enum status load_scene(struct run *run, const struct settings *settings,
                               struct parallel *pool, struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     cJSON *problems = cJSON_CreateArray();
-    progress_stage(run->progress, "load");
+    tell_stage(run, "load");
     enum status status = bundle_load(run->order->scene, settings_text(settings, "transforms"),
                                      &limits, pool, scene, problems, err);
     /* Only with another transforms file than the one that the scene's check has read. */
