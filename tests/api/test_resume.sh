@@ -1,0 +1,97 @@
+#!/bin/bash
+# One job, done in peace on two threads, on one thread, and killed with SIGKILL again and again
+# (its worker, the daemon, both) while it goes on from its checkpoints: the same textures, byte
+# for byte. UNBAKE_KILLS sets how often (5).
+set -u
+build=$1
+kills=${UNBAKE_KILLS:-5}
+dir=$(mktemp -d /tmp/unbake-test-resume-XXXXXX) || exit 1
+daemon=
+
+fail() {
+    echo "failed: $*"
+    tail -n 30 "$dir"/*.log
+    exit 1
+}
+# shellcheck disable=SC2317
+clean_up() {
+    [ -n "$daemon" ] && kill -KILL "$daemon" 2>/dev/null
+    rm -rf "$dir"
+}
+trap clean_up EXIT
+
+# start NAME THREADS: a daemon on the data folder $dir/NAME; its URL goes to UNBAKE_SERVER.
+start() {
+    rm -f "$dir/port"
+    "$build/unbaked" --data "$dir/$1" --listen 127.0.0.1:0 --port-file "$dir/port" \
+        --set "threads=$2" --set max_attempts=100 --set checkpoint_interval_sec=1 \
+        --set min_free_mib=0 >>"$dir/$1.log" 2>&1 &
+    daemon=$!
+    for _ in $(seq 500); do
+        [ -s "$dir/port" ] && break
+        sleep 0.02
+    done
+    UNBAKE_SERVER=http://127.0.0.1:$(cat "$dir/port" 2>/dev/null)
+    export UNBAKE_SERVER
+}
+stop() {
+    kill "$daemon" && wait "$daemon" || fail "the daemon did not stop cleanly: $?"
+    daemon=
+}
+submit() {
+    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=80 \
+        --set texels_per_iteration=2048 --set coarse_levels=1 --set report_samples=4 >/dev/null 2>&1 ||
+        fail "submit"
+}
+# textures NAME: the hashes of what the job left.
+textures() {
+    (cd "$dir/$1/jobs/1/out" && sha256sum base_color.exr roughness.exr specular.exr emission.exr \
+        confidence.exr scene.ply) || fail "no textures in $1"
+}
+state() {
+    "$build/unbake" show 1 2>/dev/null | awk '$1 == "state" { print $2 }'
+}
+
+"$build/unbaked" demo-room "$dir/room" --frames 8 --test-frames 1 --spp 4 --test-spp 4 \
+    --width 64 --height 48 >"$dir/room.log" 2>&1 || fail "the demo room"
+
+for threads in 2 1; do
+    start "peace$threads" "$threads"
+    submit
+    "$build/unbake" watch 1 >/dev/null || fail "the undisturbed job on $threads threads"
+    stop
+    textures "peace$threads" >"$dir/peace$threads.sums"
+done
+cmp -s "$dir/peace1.sums" "$dir/peace2.sums" || fail "one and two threads differ"
+
+RANDOM=11
+start war 2
+submit
+for ((i = 0; i < kills; i++)); do
+    sleep "$((RANDOM % 2)).$((RANDOM % 90 + 10))"
+    worker=$(awk '/runs as process/ { for (i = 1; i < NF; i++) if ($i == "process") p = $(i + 1) }
+                  END { print p }' "$dir/war.log")
+    # The kernel kills the daemon's children with it: "both" is the daemon.
+    if ((i % 2)) && [ -n "$worker" ] && grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null; then
+        kill -KILL "$worker"
+    else
+        kill -KILL "$daemon"
+        wait "$daemon" 2>/dev/null
+        [ -n "$worker" ] && for _ in $(seq 500); do
+            grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null || break
+            sleep 0.01
+        done
+        grep -qa "$dir/war" "/proc/${worker:-none}/cmdline" 2>/dev/null &&
+            fail "worker $worker outlived its daemon"
+        start war 2
+    fi
+    [ "$(state)" = succeeded ] && break
+done
+"$build/unbake" watch 1 >/dev/null || fail "the disturbed job"
+curl -s -H 'Accept: application/x-ndjson' "$UNBAKE_SERVER/v1/jobs/1/events?after=0" >"$dir/events.log"
+grep -q "resumed at iteration" "$dir/events.log" || fail "it never went on from a checkpoint"
+stop
+grep -q "attempt 2 runs" "$dir/war.log" || fail "it was never interrupted"
+textures war >"$dir/war.sums"
+cmp -s "$dir/peace2.sums" "$dir/war.sums" || fail "$(diff "$dir/peace2.sums" "$dir/war.sums")"
+echo "$(grep -c 'runs as process' "$dir/war.log") attempts, equal textures"
