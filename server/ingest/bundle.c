@@ -3,7 +3,6 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -31,18 +30,7 @@ struct bundle_limits bundle_default_limits(void) {
 enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
                           struct error *err) {
     struct archive_limits own = {limits->file_count, limits->total_bytes, limits->ratio};
-    enum status status = archive_unpack(archive, "the archive", dir, &own, err);
-    if (status != STATUS_OK)
-        return status;
-    /* A scene that is called ready must outlive a power cut; one call for thousands of files. */
-    int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0 || syncfs(fd) != 0)
-        status = error_set_errno(err, errno, "cannot sync folder %s", dir);
-    if (fd >= 0)
-        close(fd);
-    if (status != STATUS_OK)
-        file_remove_tree(dir, NULL);
-    return status;
+    return archive_unpack(archive, "the archive", dir, &own, err);
 }
 
 /* --- the folder -------------------------------------------------------------------------- */

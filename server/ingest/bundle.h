@@ -27,8 +27,8 @@ struct bundle_limits bundle_default_limits(void);
 
 /* Unpacks an archive (zip, tar, tar.gz, tar.zst) into the new folder `dir`. Refuses absolute
  * paths, paths that climb out, links, devices, too much of anything; a single folder at the top
- * is stepped into by bundle_load. What is unpacked is on disk when it returns STATUS_OK; on
- * failure nothing of `dir` is left. */
+ * is stepped into by bundle_load. On failure nothing of `dir` is left; on success the caller
+ * sees to it that what was unpacked reaches the disk. */
 enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
                           struct error *err);
 

@@ -201,7 +201,8 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     photo->clip = photo->is_hdr ? INFINITY : l->clip;
     outcome->orientation = info.orientation;
     set_exposure(frame, &info, photo, outcome);
-    if (image.channel_count < 3) {
+    /* Colour comes first where there is any (image_read). */
+    if (image_channel(&image, "B") != 2) {
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
     } else {
         photo->pixel = mem_array((size_t)image.width * image.height, sizeof *photo->pixel);

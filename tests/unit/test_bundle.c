@@ -3,6 +3,7 @@
 #include "server/ingest/bundle.h"
 
 #include <sys/stat.h>
+#include <zlib.h>
 
 #include "common/file.h"
 #include "common/image.h"
@@ -100,6 +101,50 @@ static void test_good(void) {
     CHECK(cJSON_GetObjectItem(facts, "hdr_count")->valueint == 2);
     CHECK(cJSON_GetObjectItem(cJSON_GetObjectItem(facts, "exposure"), "unknown_count")->valueint == 1);
     cJSON_Delete(facts);
+    scene_release(&scene);
+    cJSON_Delete(problems);
+}
+
+/* Puts an eXIf chunk behind the header of a PNG: turned by 90 degrees, 1/50 s, f/2, ISO 400. */
+static void add_exif(const char *name) {
+    static const uint8_t tiff[] = {
+        'I', 'I', 42, 0, 8, 0, 0, 0,
+        2, 0, 0x12, 0x01, 3, 0, 1, 0, 0, 0, 6, 0, 0, 0,       /* Orientation */
+        0x69, 0x87, 4, 0, 1, 0, 0, 0, 38, 0, 0, 0, 0, 0, 0, 0, /* where the Exif directory is */
+        3, 0, 0x9a, 0x82, 5, 0, 1, 0, 0, 0, 80, 0, 0, 0,      /* ExposureTime */
+        0x9d, 0x82, 5, 0, 1, 0, 0, 0, 88, 0, 0, 0,            /* FNumber */
+        0x27, 0x88, 3, 0, 1, 0, 0, 0, 0x90, 0x01, 0, 0,       /* ISO */
+        0, 0, 0, 0, 1, 0, 0, 0, 50, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0};
+    uint8_t chunk[12 + sizeof tiff] = {0, 0, 0, sizeof tiff, 'e', 'X', 'I', 'f'};
+    memcpy(chunk + 8, tiff, sizeof tiff);
+    uint32_t sum = (uint32_t)crc32(0, chunk + 4, 4 + sizeof tiff);
+    for (int i = 0; i < 4; i++)
+        chunk[8 + sizeof tiff + (size_t)i] = (uint8_t)(sum >> (24 - 8 * i));
+    char *path = file_join(work, name);
+    struct buf old, longer;
+    buf_init(&old, 1 << 20);
+    buf_init(&longer, 1 << 20);
+    CHECK(file_read(path, &old, NULL) == STATUS_OK);
+    buf_append(&longer, old.data, 33); /* signature and IHDR */
+    buf_append(&longer, chunk, sizeof chunk);
+    buf_append(&longer, old.data + 33, old.length - 33);
+    CHECK(file_replace(path, longer.data, longer.length, NULL) == STATUS_OK);
+    buf_release(&old);
+    buf_release(&longer);
+    mem_free(path);
+}
+
+static void test_exif(void) {
+    struct scene scene;
+    struct error err;
+    cJSON *problems;
+    put_good();
+    add_exif("b.png");
+    CHECK_THAT(load(&scene, &problems, &err) == STATUS_OK, "%s", err.message);
+    const struct photograph *b = &scene.photograph[1];
+    CHECK(b->exposure_known && b->camera.width == 8);
+    CHECK_NEAR(b->exposure, 1.0 / 50.0 * 4.0 / 4.0, 1e-8);
+    CHECK(has_warning(&scene, "EXIF orientation of 1"));
     scene_release(&scene);
     cJSON_Delete(problems);
 }
@@ -344,6 +389,7 @@ int main(void) {
     CHECK(mkdtemp(work) != NULL);
     pool = parallel_new(2);
     test_good();
+    test_exif();
     test_variants();
     test_bad();
     test_many();
