@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -64,6 +65,35 @@ static char *find_picture(const char *dir, const char *name) {
         mem_free(longer);
     }
     return NULL;
+}
+
+struct named {
+    const char *file;
+    size_t number; /* of the frame */
+};
+
+static int by_file(const void *a, const void *b) {
+    const struct named *x = a, *y = b;
+    int order = strcmp(x->file, y->file);
+    return order ? order : (x->number > y->number) - (x->number < y->number);
+}
+
+/* One picture with two poses: one of them is wrong. Compared after the files were found, so that
+ * "a" and "a.png" are the same. */
+static void find_duplicates(const struct loading *l, const char *name, struct findings *f) {
+    size_t count = l->transforms->frame_count;
+    struct named *sorted = mem_array(count, sizeof *sorted);
+    for (size_t i = 0; i < count; i++) {
+        const struct transforms_frame *frame = &l->transforms->frame[i];
+        sorted[i] = (struct named){l->path[i] ? l->path[i] : frame->file, frame->number};
+    }
+    if (count > 1)
+        qsort(sorted, count, sizeof *sorted, by_file);
+    for (size_t i = 1; i < count; i++)
+        if (strcmp(sorted[i].file, sorted[i - 1].file) == 0)
+            findings_problem(f, name, "frames[%zu] and frames[%zu] both name %s",
+                             sorted[i - 1].number, sorted[i].number, sorted[i].file);
+    mem_free(sorted);
 }
 
 /* --- pixels ------------------------------------------------------------------------------ */
@@ -336,6 +366,7 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     l.clip = image_float_from_half(l.half_of_srgb[(size_t)(CLIP_CODE / 255.0f * 65535.0f + 0.5f)]);
     for (size_t i = 0; i < t->frame_count; i++)
         l.path[i] = find_picture(dir, t->frame[i].file);
+    find_duplicates(&l, name, f);
     parallel_for(pool, t->frame_count, load_body, &l);
     enum status status = collect(&l, name, f, err);
     keep_loaded(&l, scene);

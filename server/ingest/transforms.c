@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/image.h"
@@ -336,25 +335,6 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
     return c->ok && listed;
 }
 
-static int by_file(const void *a, const void *b) {
-    const struct transforms_frame *const *x = a, *const *y = b;
-    int order = strcmp((*x)->file, (*y)->file);
-    return order ? order : ((*x)->number > (*y)->number) - ((*x)->number < (*y)->number);
-}
-
-static void find_duplicates(struct context *c, const struct transforms *t) {
-    const struct transforms_frame **sorted = mem_array(t->frame_count, sizeof *sorted);
-    for (size_t i = 0; i < t->frame_count; i++)
-        sorted[i] = &t->frame[i];
-    if (t->frame_count > 1)
-        qsort(sorted, t->frame_count, sizeof *sorted, by_file);
-    for (size_t i = 1; i < t->frame_count; i++)
-        if (strcmp(sorted[i]->file, sorted[i - 1]->file) == 0)
-            findings_problem(c->findings, c->name, "frames[%zu] and frames[%zu] both name %s",
-                             sorted[i - 1]->number, sorted[i]->number, sorted[i]->file);
-    mem_free(sorted);
-}
-
 /* What is wrong at the top is reported here, once, instead of once per frame. */
 static bool read_top(struct context *c, struct transforms *t) {
     static const char *const lists[3] = {"train_filenames", "val_filenames", "test_filenames"};
@@ -399,7 +379,6 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
         else
             frame_release(frame);
     }
-    find_duplicates(&c, t);
     if (c.scaled_count > 0)
         findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out",
                          name, c.scaled_count);

@@ -5,7 +5,7 @@
  * FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye, exposure, exposure_time (s), iso, f_number. Per
  * frame: file_path, transform_matrix, mask_path, split (train, test, val). At the top: `mesh` or
  * ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val is test.
- * Everything else is ignored. */
+ * Everything else is ignored. k4 to k6 are OpenCV's: with a pinhole lens, the denominator. */
 #ifndef UNBAKE_INGEST_TRANSFORMS_H
 #define UNBAKE_INGEST_TRANSFORMS_H
 

@@ -240,6 +240,7 @@ static const struct bad bad_bundles[] = {
     {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," POSE "}"), NULL, NULL, "transforms.json", "file_path \"../../a.exr\" leads out"},
     {ONE_OF_THREE("{\"file_path\":\"\"," POSE "}"), NULL, NULL, "transforms.json", "file_path is empty"},
     {ONE_OF_THREE(FRAME("./a.exr")), NULL, NULL, "transforms.json", "frames[0] and frames[3] both name a.exr"},
+    {ONE_OF_THREE(FRAME("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"split\":\"dev\"}"), NULL, NULL, "transforms.json", "split must be"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"exposure\":-1}"), NULL, NULL, "transforms.json", "exposure is -1"},
     {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE ",\"mask_path\":\"m.png\"}," FRAME("b.png") "," FRAME("c.exr") "]}",
