@@ -85,17 +85,22 @@ void hub_tick(struct hub *hub, double now_sec) {
 
 /* --- text -------------------------------------------------------------------------------- */
 
-/* One event. `members` is the inside of its data object, with no braces; may be empty. */
+/* One event; takes data, an object, which gets `at` and `attempt` where it lacks them. */
 static void render(struct subscriber *s, int64_t id, int64_t at_ms, int attempt, const char *type,
-                   const char *members, size_t length) {
+                   cJSON *data) {
     char at[VIEW_TIME_SIZE];
     view_time(at_ms, at);
+    if (!cJSON_GetObjectItemCaseSensitive(data, "at"))
+        json_add_string(data, "at", at);
+    if (!cJSON_GetObjectItemCaseSensitive(data, "attempt"))
+        json_add_int(data, "attempt", attempt);
+    char *text = json_text(data);
     if (s->is_ndjson)
-        buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":", (long long)id, type);
+        buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":%s}\n", (long long)id, type, text);
     else
-        buf_printf(&s->text, "id: %lld\nevent: %s\ndata: ", (long long)id, type);
-    buf_printf(&s->text, "{\"at\":\"%s\",\"attempt\":%d%s%.*s}%s", at, attempt, length ? "," : "",
-               (int)length, members, s->is_ndjson ? "}\n" : "\n\n");
+        buf_printf(&s->text, "id: %lld\nevent: %s\ndata: %s\n\n", (long long)id, type, text);
+    mem_free(text);
+    cJSON_Delete(data);
 }
 
 struct batch {
@@ -106,26 +111,21 @@ struct batch {
 static void render_row(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
                        const char *data) {
     struct batch *b = user;
-    size_t length = strlen(data);
-    bool has_members = length > 2 && data[0] == '{' && data[length - 1] == '}';
-    render(b->s, id, at_ms, attempt, type, has_members ? data + 1 : "", has_members ? length - 2 : 0);
+    cJSON *object = cJSON_Parse(data);
+    render(b->s, id, at_ms, attempt, type, object ? object : cJSON_CreateObject());
     b->s->sent_id = id;
     b->count++;
 }
 
 static void render_snapshot(struct subscriber *s, const struct job *job) {
-    cJSON *value = view_job(job);
-    cJSON_DeleteItemFromObject(value, "attempt"); /* every event has it anyway */
-    json_add_bool(value, "snapshot", true);
-    char *text = json_text(value);
+    cJSON *data = view_job(job);
+    json_add_bool(data, "snapshot", true);
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     if (!s->is_ndjson)
         buf_puts(&s->text, "retry: 3000\n");
     render(s, s->sent_id, (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000, job->attempt, EVENT_STATE,
-           text + 1, strlen(text) - 2);
-    mem_free(text);
-    cJSON_Delete(value);
+           data);
 }
 
 /* Renders what the database has after sent_id; sets has_ended after the last event of a job that

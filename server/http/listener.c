@@ -431,7 +431,6 @@ static enum status start_library(struct listener *l, const struct listener_confi
         MHD_OPTION_CONNECTION_LIMIT, config->connection_max,
         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->limits.idle_sec,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, POOL_BYTES,
-        MHD_OPTION_STRICT_FOR_CLIENT, 1,
         MHD_OPTION_URI_LOG_CALLBACK, on_target, l,
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, l,
         MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,

@@ -1,0 +1,257 @@
+/* Event streams: snapshot, replay without gap or repetition, end, keep-alives, idle and stopping. */
+#include <pthread.h>
+#include <sys/resource.h>
+
+#include "common/json.h"
+#include "tests/api/rig.h"
+
+static int open_stream(const struct rig *rig, int64_t job, const char *query, const char *fields) {
+    int fd = rig_connect(rig);
+    char *text = mem_printf("GET /v1/jobs/%lld/events%s HTTP/1.1\r\nHost: localhost\r\n%s\r\n", (long long)job,
+                            query, fields);
+    rig_send(fd, text, strlen(text));
+    mem_free(text);
+    return fd;
+}
+
+/* Undoes the chunked coding of what came so far, in place; whole chunks only. */
+static char *unchunk(const struct buf *reply) {
+    const char *at = rig_body(reply), *end = buf_text(reply) + reply->length;
+    char *out = mem_alloc(reply->length + 1), *to = out;
+    for (;;) {
+        char *digits_end;
+        size_t size = strtoul(at, &digits_end, 16);
+        if (digits_end == at || size == 0 || digits_end + 2 + size + 2 > end)
+            break;
+        memcpy(to, digits_end + 2, size);
+        to += size;
+        at = digits_end + 2 + size + 2;
+    }
+    *to = '\0';
+    return out;
+}
+
+static void add_metric(struct rig *rig, int64_t job, int attempt, int step) {
+    char data[64];
+    struct error err;
+    snprintf(data, sizeof data, "{\"series\":\"loss\",\"step\":%d,\"value\":0.5}", step);
+    rig_must(store_event_add(rig->store, job, attempt, EVENT_METRIC, data, &err), &err, "store_event_add");
+}
+
+static void check_life(struct rig *rig) {
+    struct error err;
+    struct buf reply;
+    int64_t job = rig_job(rig);
+    buf_init(&reply, 1 << 20);
+    int fd = open_stream(rig, job, "", "");
+    rig_receive(fd, &reply, "\"snapshot\":true");
+    CHECK(rig_status(&reply) == 200);
+    CHECK(strstr(buf_text(&reply), "Content-Type: text/event-stream\r\n"));
+    CHECK(strstr(buf_text(&reply), "X-Accel-Buffering: no\r\n"));
+    CHECK(strstr(buf_text(&reply), "retry: 3000\nid: "));
+    CHECK(strstr(buf_text(&reply), "event: state\ndata: {\""));
+    CHECK(strstr(buf_text(&reply), "\"state\":\"queued\""));
+
+    int attempt = rig_run_job(rig, job);
+    rig_receive(fd, &reply, "\"state\":\"running\"");
+    add_metric(rig, job, attempt, 7);
+    rig_receive(fd, &reply, "\"step\":7");
+    CHECK(strstr(buf_text(&reply), "event: metric\n"));
+    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+    rig_receive(fd, &reply, "\r\n0\r\n\r\n"); /* the end of the body, without closing */
+    CHECK(strstr(buf_text(&reply), "\"state\":\"succeeded\""));
+    CHECK(strstr(buf_text(&reply), "\r\n0\r\n\r\n"));
+    close(fd);
+    buf_release(&reply);
+
+    /* Too late for anything: 204 stops an EventSource; one that never saw it gets the snapshot. */
+    int64_t last = 0;
+    char fields[64], path[64];
+    rig_must(store_event_last(rig->store, job, &last, &err), &err, "store_event_last");
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events", (long long)job);
+    snprintf(fields, sizeof fields, "Last-Event-ID: %lld\r\n", (long long)last);
+    CHECK(rig_get(rig, path, fields, &reply) == 204);
+    buf_release(&reply);
+    CHECK(rig_get(rig, path, "", &reply) == 200);
+    CHECK(strstr(buf_text(&reply), "\"state\":\"succeeded\"") && strstr(buf_text(&reply), "\"snapshot\":true"));
+    buf_release(&reply);
+    CHECK(rig_get(rig, path, "Last-Event-ID: x\r\n", &reply) == 400);
+    buf_release(&reply);
+    CHECK(rig_get(rig, "/v1/jobs/999/events", "", &reply) == 404);
+    buf_release(&reply);
+    CHECK(rig_get(rig, "/v1/jobs/9x/events", "", &reply) == 404);
+    buf_release(&reply);
+}
+
+/* All that is stored, as JSON lines: each parses, ids grow, the snapshot has the asked-for id. */
+static void check_ndjson(struct rig *rig) {
+    struct error err;
+    struct buf reply;
+    int64_t job = rig_job(rig);
+    int attempt = rig_run_job(rig, job);
+    for (int i = 0; i < 200; i++)
+        add_metric(rig, job, attempt, i);
+    rig_must(store_job_fail(rig->store, job, attempt, "no", "why", &err), &err, "store_job_fail");
+    char path[64];
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events?after=0", (long long)job);
+    CHECK(rig_get(rig, path, "Accept: application/x-ndjson\r\n", &reply) == 200);
+    char *text = unchunk(&reply), *rest = text;
+    double previous = -1;
+    int count = 0, metrics = 0;
+    while (*rest) {
+        char *line = strsep(&rest, "\n");
+        cJSON *event;
+        CHECK_THAT(json_parse(line, strlen(line), "line", &event, &err) == STATUS_OK, "%s", line);
+        double id = cJSON_GetNumberValue(cJSON_GetObjectItem(event, "id"));
+        const cJSON *data = cJSON_GetObjectItem(event, "data");
+        CHECK_THAT(id > previous && (count > 0 || id == 0), "id %.0f after %.0f", id, previous);
+        CHECK(cJSON_HasObjectItem(data, "at") && cJSON_HasObjectItem(data, "attempt"));
+        metrics += strcmp(cJSON_GetStringValue(cJSON_GetObjectItem(event, "event")), EVENT_METRIC) == 0;
+        previous = id;
+        count++;
+        cJSON_Delete(event);
+        if (!rest)
+            break;
+    }
+    CHECK_THAT(metrics == 200, "%d of 200", metrics);
+    mem_free(text);
+    buf_release(&reply);
+}
+
+#define STORM_EVENTS 1500
+
+struct publisher {
+    struct rig *rig;
+    int64_t job;
+    int attempt;
+};
+
+static void *publish(void *user) {
+    struct publisher *p = user;
+    struct error err;
+    for (int i = 0; i < STORM_EVENTS; i++)
+        add_metric(p->rig, p->job, p->attempt, i);
+    rig_must(store_job_succeed(p->rig->store, p->job, p->attempt, &err), &err, "store_job_succeed");
+    return NULL;
+}
+
+/* Takes the ids of events out of text, checks that they are the next ones, returns the last. */
+static int64_t follow(char *text, int64_t last, int *metrics) {
+    for (char *at = text; (at = strstr(at, "id: ")) != NULL; at += 4) {
+        long long id = strtoll(at + 4, NULL, 10);
+        char *end = strstr(at, "\n\n");
+        if (!end)
+            break; /* cut off: comes again */
+        *end = '\0';
+        bool is_snapshot = strstr(at, "\"snapshot\":true") != NULL;
+        if (is_snapshot)
+            CHECK_THAT(id == last, "snapshot %lld after %lld", id, (long long)last);
+        else
+            CHECK_THAT(id > last, "event %lld after %lld", id, (long long)last);
+        if (strstr(at, "event: metric")) {
+            int step = -1;
+            sscanf(strstr(at, "\"step\":"), "\"step\":%d", &step);
+            CHECK_THAT(step == *metrics, "step %d where %d was due", step, *metrics);
+            (*metrics)++;
+        }
+        last = id;
+        at = end - 3;
+    }
+    return last;
+}
+
+/* Connections that break off at any byte while events pour in: the parts make the whole. */
+static void check_reconnects(struct rig *rig) {
+    struct publisher p = {rig, rig_job(rig), 0};
+    p.attempt = rig_run_job(rig, p.job);
+    pthread_t thread;
+    pthread_create(&thread, NULL, publish, &p);
+    int64_t last = 0;
+    int metrics = 0, connections = 0;
+    for (int status = 200; status == 200; connections++) {
+        char fields[64];
+        struct buf reply;
+        buf_init(&reply, 1 << 24);
+        snprintf(fields, sizeof fields, "Last-Event-ID: %lld\r\n", (long long)last);
+        int fd = open_stream(rig, p.job, "", fields);
+        rig_receive(fd, &reply, "\r\n\r\n");
+        /* Some more, a different amount each time; a late one reads to the end. */
+        size_t enough = reply.length + (size_t)(connections * 977 % 9000);
+        char chunk[4096];
+        ssize_t got = 1;
+        while (got > 0 && reply.length < enough && !strstr(buf_text(&reply), "\r\n0\r\n\r\n")) {
+            got = recv(fd, chunk, sizeof chunk, 0);
+            buf_append(&reply, chunk, got > 0 ? (size_t)got : 0);
+        }
+        close(fd);
+        status = rig_status(&reply);
+        char *text = unchunk(&reply);
+        last = follow(text, last, &metrics);
+        mem_free(text);
+        buf_release(&reply);
+        CHECK(status == 200 || status == 204);
+        if (connections > 5000)
+            break;
+    }
+    pthread_join(thread, NULL);
+    CHECK_THAT(metrics == STORM_EVENTS, "%d of %d events, %d connections", metrics, STORM_EVENTS, connections);
+}
+
+static double cpu_seconds(void) {
+    struct rusage use;
+    getrusage(RUSAGE_SELF, &use);
+    return (double)(use.ru_utime.tv_sec + use.ru_stime.tv_sec) +
+           1e-6 * (double)(use.ru_utime.tv_usec + use.ru_stime.tv_usec);
+}
+
+/* Many open streams: one event reaches all, silence costs nothing and brings keep-alives, one
+ * too many is refused, a deleted job ends its streams, and stopping ends the others. */
+static void check_many(struct rig *rig) {
+    enum { COUNT = 60 };
+    int64_t job = rig_job(rig), doomed = rig_job(rig);
+    int fds[COUNT];
+    struct buf replies[COUNT], refusal;
+    struct error err;
+    for (int i = 0; i < COUNT; i++) {
+        buf_init(&replies[i], 1 << 20);
+        fds[i] = open_stream(rig, i == 0 ? doomed : job, "", "");
+        rig_receive(fds[i], &replies[i], "\"snapshot\":true");
+    }
+    char path[64];
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events", (long long)job);
+    CHECK(rig_get(rig, path, "", &refusal) == 503);
+    CHECK(strstr(buf_text(&refusal), "Retry-After: "));
+    buf_release(&refusal);
+
+    double before = cpu_seconds();
+    for (int i = 1; i < COUNT; i++)
+        rig_receive(fds[i], &replies[i], ": keepalive\n\n");
+    CHECK_THAT(cpu_seconds() - before < 0.5, "%.3f s of processor time", cpu_seconds() - before);
+
+    rig_run_job(rig, job);
+    for (int i = 1; i < COUNT; i++) {
+        rig_receive(fds[i], &replies[i], "\"state\":\"running\"");
+        CHECK(strstr(buf_text(&replies[i]), "\"state\":\"running\""));
+    }
+    rig_must(store_job_delete(rig->store, doomed, &err), &err, "store_job_delete");
+    rig_receive(fds[0], &replies[0], "\r\n0\r\n\r\n");
+    CHECK(strstr(buf_text(&replies[0]), "\r\n0\r\n\r\n"));
+
+    rig_stop(rig);
+    for (int i = 0; i < COUNT; i++) {
+        rig_receive(fds[i], &replies[i], NULL);
+        CHECK_THAT(strstr(buf_text(&replies[i]), "\r\n0\r\n\r\n"), "stream %d was cut off", i);
+        close(fds[i]);
+        buf_release(&replies[i]);
+    }
+}
+
+int main(void) {
+    struct rig rig;
+    rig_start(&rig, &rig_patient, 1);
+    check_life(&rig);
+    check_ndjson(&rig);
+    check_reconnects(&rig);
+    check_many(&rig);
+    return check_result();
+}

@@ -1,0 +1,145 @@
+/* Requests that two servers may read differently, or that a page in a browser may send: each is
+ * refused with its status, on a connection that is then closed; and the good ones pass. */
+#include "tests/api/rig.h"
+
+#define HOST "Host: localhost\r\n"
+#define CLOSE "Connection: close\r\n"
+
+static const struct {
+    const char *what, *text;
+    int status; /* 0: the library may refuse it as it likes, or close without a word */
+} cases[] = {
+    {"a plain request", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 200},
+    {"HTTP/1.0 without Host", "GET /healthz HTTP/1.0\r\n\r\n", 200},
+    {"a HEAD", "HEAD /healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 200},
+    {"Host of IPv6", "GET /healthz HTTP/1.1\r\nHost: [::1]:80\r\n" CLOSE "\r\n", 200},
+    {"Host of the configuration", "GET /healthz HTTP/1.1\r\nHost: lab.example.org\r\n" CLOSE "\r\n", 200},
+    {"a chunked body", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE
+     "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n", 404},
+    {"a body that nobody wants", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "Content-Length: 3\r\n\r\nabc", 200},
+
+    {"no Host", "GET /healthz HTTP/1.1\r\n" CLOSE "\r\n", 400},
+    {"two Hosts", "GET /healthz HTTP/1.1\r\n" HOST HOST CLOSE "\r\n", 400},
+    {"an empty Host", "GET /healthz HTTP/1.1\r\nHost:\r\n" CLOSE "\r\n", 400},
+    {"a Host with a path", "GET /healthz HTTP/1.1\r\nHost: localhost/x\r\n" CLOSE "\r\n", 400},
+    {"a Host with a user", "GET /healthz HTTP/1.1\r\nHost: a@localhost\r\n" CLOSE "\r\n", 400},
+    {"another Host (DNS rebinding)", "GET /healthz HTTP/1.1\r\nHost: evil.org\r\n" CLOSE "\r\n", 403},
+    {"a Host like loopback", "GET /healthz HTTP/1.1\r\nHost: 127.0.0.1.evil.org\r\n" CLOSE "\r\n", 403},
+    {"a change from another origin", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE
+     "Origin: http://evil.org\r\nContent-Length: 0\r\n\r\n", 403},
+    {"a change from a null origin", "DELETE /v1/jobs/1 HTTP/1.1\r\n" HOST CLOSE "Origin: null\r\n\r\n", 403},
+    {"a change from this origin", "DELETE /v1/jobs/1 HTTP/1.1\r\n" HOST CLOSE "Origin: http://localhost\r\n\r\n", 404},
+    {"a look from another origin", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "Origin: http://evil.org\r\n\r\n", 200},
+
+    {"two equal Content-Lengths", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Content-Length: 3\r\nContent-Length: 3\r\n\r\nabc", 400},
+    {"two Content-Lengths", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Content-Length: 3\r\nContent-Length: 30\r\n\r\nabc", 400},
+    {"a list of lengths", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Content-Length: 3, 3\r\n\r\nabc", 0},
+    {"a signed length", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Content-Length: +3\r\n\r\nabc", 0},
+    {"a negative length", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Content-Length: -3\r\n\r\nabc", 0},
+    {"a hexadecimal length", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Content-Length: 0x3\r\n\r\nabc", 0},
+    {"a length beyond numbers", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Content-Length: 99999999999999999999999\r\n\r\nabc", 0},
+    {"length and coding", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Content-Length: 3\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400},
+    {"coding and length", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Transfer-Encoding: chunked\r\nContent-Length: 3\r\n\r\n0\r\n\r\n", 400},
+    {"two codings", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 400},
+    {"another coding", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Transfer-Encoding: gzip\r\n\r\n", 400},
+    {"a list of codings", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Transfer-Encoding: gzip, chunked\r\n\r\n0\r\n\r\n", 400},
+    {"a disguised coding", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Transfer-Encoding: xchunked\r\n\r\n0\r\n\r\n", 400},
+    {"a field with a space before its colon", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST
+     "Content-Length : 3\r\n\r\nabc", 400},
+    {"a control byte in a field", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-A: a\001b\r\n\r\n", 400},
+    {"a DEL in a field", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-A: a\177b\r\n\r\n", 400},
+    {"a field whose name is no word", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "a b: c\r\n\r\n", 400},
+    {"two Idempotency-Keys", "POST /v1/jobs HTTP/1.1\r\n" HOST CLOSE
+     "Idempotency-Key: a\r\nIdempotency-Key: b\r\nContent-Length: 0\r\n\r\n", 400},
+    {"two Ranges", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "Range: bytes=0-1\r\nRange: bytes=1-2\r\n\r\n", 400},
+    {"an unknown expectation", "POST /v1/jobs HTTP/1.1\r\n" HOST CLOSE "Expect: tea\r\nContent-Length: 1\r\n\r\n", 417},
+    {"HTTP/1.7", "GET /healthz HTTP/1.7\r\n" HOST CLOSE "\r\n", 0},
+    {"HTTP/2.0", "GET /healthz HTTP/2.0\r\n" HOST CLOSE "\r\n", 0},
+    {"no version", "GET /healthz\r\n\r\n", 0},
+    {"no HTTP at all", "\x16\x03\x01\x02\r\n\r\n", 0},
+
+    {"a path that climbs", "GET /v1/../etc/passwd HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"an encoded path that climbs", "GET /v1/jobs/1/outputs/%2e%2e%2fstate.db HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"slashes in disguise that climb", "GET /v1/jobs/1/outputs/a%2f..%2f..%2fb HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"an encoded NUL", "GET /healthz%00.png HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"an encoded line end", "GET /healthz%0d%0aX: HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a double slash", "GET //healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a slash at the end", "GET /healthz/ HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a broken escape", "GET /healthz%4 HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"an absolute target", "GET http://evil.org/healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a star", "OPTIONS * HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"an unknown path", "GET /v2/jobs HTTP/1.1\r\n" HOST CLOSE "\r\n", 404},
+    {"an encoded slash between parts", "GET /v1%2fjobs HTTP/1.1\r\n" HOST CLOSE "\r\n", 404},
+    {"an unknown method", "BREW /healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 405},
+    {"a method in lower case", "get /healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 405},
+    {"TRACE", "TRACE /healthz HTTP/1.1\r\n" HOST CLOSE "\r\n", 405},
+    {"CONNECT", "CONNECT localhost:80 HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a query that nobody knows", "GET /healthz?x=1 HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+    {"a query twice", "GET /v1/jobs?limit=1&limit=2 HTTP/1.1\r\n" HOST CLOSE "\r\n", 400},
+};
+
+/* A reply's length is known, so what follows the first one on a connection would show. */
+static int replies_in(const char *text) {
+    int count = 0;
+    for (const char *at = text; (at = strstr(at, "HTTP/1.1 ")) != NULL; at++)
+        count++;
+    return count;
+}
+
+static void check_bytes(struct rig *rig, const char *what, const char *text, size_t length, int wanted) {
+    struct buf reply;
+    int status = rig_ask(rig, text, length, &reply);
+    CHECK_THAT(status == wanted || (wanted == 0 && (status >= 400 || reply.length == 0)),
+               "%s: %d, not %d: %s", what, status, wanted, rig_body(&reply));
+    if (wanted != 0) /* the library's own refusals repeat their head as their body */
+        CHECK_THAT(replies_in(buf_text(&reply)) <= 1, "%s: more than one reply", what);
+    if (wanted == 400 || wanted == 403)
+        CHECK_THAT(strstr(buf_text(&reply), "application/problem+json"), "%s: %s", what, buf_text(&reply));
+    buf_release(&reply);
+}
+
+/* Heads and fields that are too large, and bytes that no text can hold. */
+static void check_large(struct rig *rig) {
+    char *text = mem_alloc(200000);
+    int used = sprintf(text, "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-Large: ");
+    memset(text + used, 'a', 100000);
+    memcpy(text + used + 100000, "\r\n\r\n", 4);
+    check_bytes(rig, "a field of 100 kB", text, (size_t)used + 100004, 431);
+    used = sprintf(text, "GET /");
+    memset(text + used, 'a', 100000);
+    int end = sprintf(text + used + 100000, " HTTP/1.1\r\n" HOST CLOSE "\r\n");
+    check_bytes(rig, "a target of 100 kB", text, (size_t)(used + 100000 + end), 414);
+    /* The library ends a value at a NUL, before anybody can see it: what matters is that there is
+     * one reading of it, and that nothing behind it is taken for a request. */
+    static const char nul_value[] = "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-A: a\0b\r\n\r\n";
+    check_bytes(rig, "a NUL in a field", nul_value, sizeof nul_value - 1, 200);
+    static const char nul_length[] = "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE
+                                     "Content-Length: 3\0""0\r\n\r\nabc";
+    check_bytes(rig, "a NUL in Content-Length", nul_length, sizeof nul_length - 1, 404);
+    mem_free(text);
+}
+
+int main(void) {
+    struct rig rig;
+    rig_start(&rig, &rig_patient, 15);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        check_bytes(&rig, cases[i].what, cases[i].text, strlen(cases[i].text), cases[i].status);
+    check_large(&rig);
+    struct buf reply;
+    CHECK(rig_get(&rig, "/healthz", "X-Request-Id: my-id.1\r\n", &reply) == 200);
+    CHECK(strstr(buf_text(&reply), "X-Request-Id: my-id.1\r\n"));
+    buf_release(&reply);
+    CHECK(rig_get(&rig, "/healthz", "X-Request-Id: a\"b\r\n", &reply) == 200);
+    CHECK(!strstr(buf_text(&reply), "a\"b"));
+    buf_release(&reply);
+    rig_stop(&rig);
+    return check_result();
+}
