@@ -193,6 +193,7 @@ static void reply_early(struct exchange *x) {
         MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
     struct response *reply = x->reply;
     struct buf text;
+    request_drop_body(&x->request);
     buf_init(&text, 16384);
     buf_printf(&text, "HTTP/1.1 %d Refused\r\nConnection: close\r\nX-Request-Id: %s\r\nContent-Length: %llu\r\n",
                reply->status, x->request.id, (unsigned long long)reply->length);
@@ -287,6 +288,8 @@ static struct response *begin(struct exchange *x, const char *method, const char
         refusal = problem(r, 400, "%s", x->target_error.message);
     if (!refusal)
         refusal = routes_begin(l->api, r);
+    if (refusal)
+        request_drop_body(r);
     if (refusal && r->has_body)
         refusal->must_close = true; /* nobody will read the body */
     if (!refusal && r->has_body)

@@ -18,8 +18,13 @@ void request_release(struct request *r) {
         mem_free(r->fields[i].value);
     }
     mem_free(r->fields);
+    request_drop_body(r);
+}
+
+void request_drop_body(struct request *r) {
     buf_release(&r->body);
     upload_free(r->upload);
+    r->upload = NULL;
 }
 
 const char *request_field(const struct request *r, const char *name) {

@@ -130,16 +130,25 @@ static inline const char *rig_body(const struct buf *reply) {
 
 /* --- the store, by hand ------------------------------------------------------------------ */
 
-static inline int64_t rig_job(struct rig *rig) {
-    static const char scene[] = "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff";
+#define RIG_SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
+
+/* A scene that is ready, there once. */
+static inline void rig_scene(struct rig *rig) {
     struct error err;
-    bool flag;
+    bool existed;
+    rig_must(store_scene_add(rig->store, RIG_SCENE, "room", 10, &existed, &err), &err, "store_scene_add");
+    if (!existed)
+        rig_must(store_scene_ready(rig->store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
+}
+
+/* A queued job on it. */
+static inline int64_t rig_job(struct rig *rig) {
+    struct error err;
+    bool replayed;
     int64_t id;
-    rig_must(store_scene_add(rig->store, scene, "room", 10, &flag, &err), &err, "store_scene_add");
-    if (!flag)
-        rig_must(store_scene_ready(rig->store, scene, "{}", &err), &err, "store_scene_ready");
-    struct job_new job = {.scene_id = scene, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 2};
-    rig_must(store_job_add(rig->store, &job, 1000, &id, &flag, &err), &err, "store_job_add");
+    rig_scene(rig);
+    struct job_new job = {.scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 2};
+    rig_must(store_job_add(rig->store, &job, 1000, &id, &replayed, &err), &err, "store_job_add");
     return id;
 }
 
