@@ -42,7 +42,7 @@ TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
 BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
 FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 
-.PHONY: all help deps demo test tests bench asan tsan install clean
+.PHONY: all help deps demo test tests bench asan tsan fuzz install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -111,6 +111,17 @@ asan: ## run the tests under the address and undefined-behaviour sanitizers
 tsan: ## run the tests under the thread sanitizer
 	@$(MAKE) --no-print-directory B=build/tsan CFLAGS="-O1 -g" SANITIZE="-fsanitize=thread" tests
 	@tests/run.sh build/tsan $(T)
+
+FUZZ_SECONDS ?= 60
+fuzz: deps ## search for crashes for FUZZ_SECONDS (60) with each fuzz program, under the sanitizers
+	@$(MAKE) --no-print-directory B=build/asan CFLAGS="-O1 -g" \
+	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" \
+	    $(patsubst $(B)/%,build/asan/%,$(FUZZ_BIN))
+	@for program in $(patsubst $(B)/%,build/asan/%,$(FUZZ_BIN)); do \
+	    echo "$$program"; \
+	    UNBAKE_BUILD=build/asan FUZZ_SECONDS=$(FUZZ_SECONDS) FUZZ_SEED=$${FUZZ_SEED:-$$(date +%s)} \
+	        $$program || [ $$? -eq 77 ] || exit 1; \
+	done
 
 install: all ## install under PREFIX (/usr/local)
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/unbake

@@ -92,5 +92,5 @@ int main(int argc, char **argv) {
     mutate_add(&m, "vectors/exr-tinyexr", "");
     mutate_add(&m, "vectors/exr-damaged", "");
     mutate_add(&m, "vectors/assimp/OBJ", ".jpg");
-    return mutate_run(&m, argc, argv, 4000, target);
+    return mutate_run(&m, argc, argv, 6000, target);
 }
