@@ -439,6 +439,19 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
     return status;
 }
 
+/* A finished job needs no checkpoint; it may be gigabytes. Every other outcome can be taken up
+ * again from it. */
+static void drop_checkpoint(const struct attempt *a) {
+    static const char *const names[] = {"checkpoint.db", "checkpoint.db-journal"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        struct error err;
+        char *path = file_join(a->dir, names[i]);
+        if (file_remove_tree(path, &err) != STATUS_OK)
+            log_warning("job %lld: %s", (long long)a->job_id, err.message);
+        mem_free(path);
+    }
+}
+
 enum status attempt_settle(struct attempt *a, struct store *store, struct error *err) {
     struct verdict verdict;
     judge(a, &verdict);
@@ -447,6 +460,8 @@ enum status attempt_settle(struct attempt *a, struct store *store, struct error 
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
+    if (a->job_id && verdict.outcome == OUTCOME_OK && status == STATUS_OK)
+        drop_checkpoint(a);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
         [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};

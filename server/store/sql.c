@@ -14,7 +14,7 @@ static enum status fail(struct sql *sql, int code, const char *doing, struct err
     int os = sql->db ? sqlite3_system_errno(sql->db) : 0;
     switch (code & 0xff) {
     case SQLITE_FULL:
-        error_set(err, STATUS_NO_SPACE, "%s: the disk is full", sql->path);
+        error_set(err, STATUS_NO_SPACE, "%s: no space left on the disk", sql->path);
         return error_hint(err, "Free some space on the disk that holds the file.");
     case SQLITE_IOERR:
         if (os == ENOSPC || os == EDQUOT || os == EFBIG)
