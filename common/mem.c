@@ -18,6 +18,11 @@ static void *check(void *pointer, size_t bytes) {
     return pointer;
 }
 
+void mem_exhausted(const char *who) {
+    fprintf(stderr, "out of memory: %s could not go on\n", who);
+    _Exit(MEM_EXIT_STATUS);
+}
+
 bool mem_overflows(size_t count, size_t size) {
     return size != 0 && count > SIZE_MAX / size;
 }

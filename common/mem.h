@@ -24,6 +24,9 @@ char *mem_strndup(const char *text, size_t length);
 char *mem_printf(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void mem_free(void *pointer);
 
+/* Ends the process as the functions above do, for a library that has told of its failure. */
+void mem_exhausted(const char *who) __attribute__((noreturn));
+
 /* True when count * size does not fit size_t. */
 bool mem_overflows(size_t count, size_t size);
 

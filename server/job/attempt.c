@@ -391,10 +391,11 @@ static void judge(const struct attempt *a, struct verdict *v) {
         say(v, OUTCOME_STOPPED, "", "");
     if (v->outcome != OUTCOME_CRASH)
         return;
+    if (a->has_end && a->end_status != STATUS_OK) /* it could speak for itself */
+        return;
     char *words = supervisor_last_words(&a->worker, LAST_WORDS_MAX);
     size_t used = strlen(v->reason);
-    /* Its last words often are the reason: not twice. */
-    if (words[0] && !strstr(v->reason, words))
+    if (words[0])
         snprintf(v->reason + used, sizeof v->reason - used, "; its last words: %s", words);
     mem_free(words);
 }

@@ -43,8 +43,10 @@ static void query_occluded(RTCScene scene, struct RTCRay *ray) {
 
 #endif
 
-static enum status device_error(RTCDevice device, const char *doing, struct error *err) {
-    enum RTCError code = rtcGetDeviceError(device);
+/* `code` is what rtcGetDeviceError told: asking clears it. */
+static enum status device_error(enum RTCError code, const char *doing, struct error *err) {
+    if (code == RTC_ERROR_OUT_OF_MEMORY)
+        mem_exhausted("the ray tracing library");
     enum status status = code == RTC_ERROR_UNSUPPORTED_CPU ? STATUS_UNAVAILABLE : STATUS_INTERNAL;
     return error_set(err, status, "the ray tracing library failed while %s (its code %d)", doing,
                      (int)code);
@@ -77,20 +79,21 @@ enum status accel_new(struct accel **result, const struct mesh *mesh, struct par
     RTCGeometry geometry = NULL;
     a->device = rtcNewDevice("threads=1,user_threads=1");
     if (!a->device) {
-        status = device_error(NULL, "starting", err);
+        status = device_error(rtcGetDeviceError(NULL), "starting", err);
         goto out;
     }
     a->scene = rtcNewScene(a->device);
     rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_HIGH);
     geometry = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (!attach_mesh(geometry, mesh)) {
-        status = device_error(a->device, "taking the mesh", err);
+        status = device_error(rtcGetDeviceError(a->device), "taking the mesh", err);
         goto out;
     }
     rtcAttachGeometryByID(a->scene, geometry, 0);
     rtcCommitScene(a->scene);
-    if (rtcGetDeviceError(a->device) != RTC_ERROR_NONE) {
-        status = device_error(a->device, "building the acceleration structure", err);
+    enum RTCError built = rtcGetDeviceError(a->device);
+    if (built != RTC_ERROR_NONE) {
+        status = device_error(built, "building the acceleration structure", err);
         goto out;
     }
     *result = a;
