@@ -24,7 +24,7 @@ cleanup() {
 trap cleanup EXIT
 
 fail() {
-    echo "line ${BASH_LINENO[1]}: $*"
+    echo "line ${BASH_LINENO[-2]}: $*" # of the test itself, however deep this was called
     failures=$((failures + 1))
 }
 

@@ -1,112 +1,112 @@
 #!/bin/bash
 # The client against the real daemon: submit, watch, show, get with its resumption, what is asked
 # of jobs, exit statuses, --json of every command, mistakes.
-. tests/api/client.sh
+. tests/api/client.sh "$@"
 quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
 long="--set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64"
 
-# json FILTER: $out must be JSON, and FILTER true of it.
-json() {
-    jq -e "$1" <<<"$out" >/dev/null 2>&1 || fail "not so: $1: $out" 1
+# so FILTER: $out must be JSON, and FILTER true of it.
+so() {
+    jq -e "$1" <<<"$out" >/dev/null 2>&1 || fail "not so: $1: $out"
 }
 
-make_room "$tmp/room"
+make_room "$work/room"
 daemon_start
 
 # --- a whole job ---------------------------------------------------------------------------------
 
-run 0 submit "$tmp/room" $quick --dry-run
+run 0 submit "$work/room" $quick --dry-run
 has "$out" "is not on the server"
 run 0 list --json
-json '. == []'
-run 0 submit "$tmp/room" $quick --name 'my room' --label who=me --priority 3 --watch
+so '. == []'
+run 0 submit "$work/room" $quick --name 'my room' --label who=me --priority 3 --watch
 has "$out" "job 1 is queued: my room"
 has "$out" "job 1 succeeded"
 has "$err" "sent room (8 files"
 run 0 show last --json
-json '.id == 1 and .state == "succeeded" and .name == "my room" and .labels.who == "me" and .priority == 3'
-json '.settings.texture_size == 64 and (.outputs | length) > 5'
+so '.id == 1 and .state == "succeeded" and .name == "my room" and .labels.who == "me" and .priority == 3'
+so '.settings.texture_size == 64 and (.outputs | length) > 5'
 scene=$(jq -r .scene <<<"$out")
 run 0 show 1
 has "$out" "who=me"
 has "$out" "base_color.exr"
 
 # The scene's name is the SHA-256 of a tar that anybody can make.
-tar_sha=$(cd "$tmp/room" && find . -type f -printf '%P\n' | LC_ALL=C sort |
+tar_sha=$(cd "$work/room" && find . -type f -printf '%P\n' | LC_ALL=C sort |
     tar --format=gnu --owner=0 --group=0 --numeric-owner --mode=0644 --mtime=@0 -b1 -cf - -T - | sha256sum)
-same "$scene" "${tar_sha%% *}"
+equal "$scene" "${tar_sha%% *}"
 
 # The same room again: nothing is sent. An archive of it is a scene of its own.
-touch "$tmp/room/mesh.ply"
-run 0 submit "$tmp/room" $quick -q
-same "$out" 2
-same "$err" ""
-run 0 submit "$tmp/room" $quick --dry-run --json
-json '.dry_run and .scene_state == "ready" and .upload_bytes == 0 and .settings.seed == 1'
-tar -C "$tmp" -czf "$tmp/packed.tar.gz" room
-run 0 submit "$tmp/packed.tar.gz" $quick --watch --json
-same "$(jq -s 'map(select(.event == "state" and .data.state == "succeeded")) | length' <<<"$out")" 1
-same "$(jq -s '.[0].name' <<<"$out")" '"packed"'
+touch "$work/room/mesh.ply"
+run 0 submit "$work/room" $quick -q
+equal "$out" 2
+equal "$err" ""
+run 0 submit "$work/room" $quick --dry-run --json
+so '.dry_run and .scene_state == "ready" and .upload_bytes == 0 and .settings.seed == 1'
+tar -C "$work" -czf "$work/packed.tar.gz" room
+run 0 submit "$work/packed.tar.gz" $quick --watch --json
+equal "$(jq -s 'map(select(.event == "state" and .data.state == "succeeded")) | length' <<<"$out")" 1
+equal "$(jq -s '.[0].name' <<<"$out")" '"packed"'
 run 0 submit --scene "${scene:0:10}" $quick --watch -q
-same "$out" 4
+equal "$out" 4
 
 # --- watch, logs -----------------------------------------------------------------------------------
 
 run 0 watch 1
 has "$out" "job 1 succeeded"
 run 0 watch 1 --json --all
-same "$(jq -s 'map(.event) | contains(["state", "progress", "metric", "output", "log"])' <<<"$out")" true
+equal "$(jq -s 'map(.event) | contains(["state", "progress", "metric", "output", "log"])' <<<"$out")" true
 run 0 logs 1 --json
-json '.job == 1 and (.log | type) == "string"'
+so '.job == 1 and (.log | type) == "string"'
 run 0 logs 1 --follow
 has "$out" "info: "
 
 # --- get -------------------------------------------------------------------------------------------
 
-run 0 get 1 -o "$tmp/got" --json
-json 'length > 5 and all(.[]; .action == "fetched")'
+run 0 get 1 -o "$work/got" --json
+so 'length > 5 and all(.[]; .action == "fetched")'
 jq -r '.[] | "\(.sha256)  \(.path)"' <<<"$out" | sha256sum --quiet -c - || fail "a file has another SHA-256"
-[ -s "$tmp/got/preview/base_color.png" ] || fail "no preview"
-find "$tmp/got" -name '*.part' | grep . && fail "parts are left"
-run 0 get 1 -o "$tmp/got" --json
-json 'all(.[]; .action == "present")'
+[ -s "$work/got/preview/base_color.png" ] || fail "no preview"
+find "$work/got" -name '*.part' | grep . && fail "parts are left"
+run 0 get 1 -o "$work/got" --json
+so 'all(.[]; .action == "present")'
 
-texture=$tmp/got/base_color.exr
-cp "$texture" "$tmp/whole"
+texture=$work/got/base_color.exr
+cp "$texture" "$work/whole"
 size=$(stat -c %s "$texture")
-head -c $((size / 2)) "$tmp/whole" >"$texture.part"
+head -c $((size / 2)) "$work/whole" >"$texture.part"
 rm "$texture"
-run 0 get 1 base_color.exr -o "$tmp/got" --json
-json 'length == 1 and .[0].action == "resumed"'
-cmp -s "$texture" "$tmp/whole" || fail "the resumed file differs"
+run 0 get 1 base_color.exr -o "$work/got" --json
+so 'length == 1 and .[0].action == "resumed"'
+cmp -s "$texture" "$work/whole" || fail "the resumed file differs"
 
 head -c $((size / 2)) /dev/zero >"$texture.part"
 rm "$texture"
-run 0 get 1 base_color.exr -o "$tmp/got" --json
-json 'length == 1 and .[0].action == "fetched"'
-cmp -s "$texture" "$tmp/whole" || fail "a wrong .part spoilt the file"
+run 0 get 1 base_color.exr -o "$work/got" --json
+so 'length == 1 and .[0].action == "fetched"'
+cmp -s "$texture" "$work/whole" || fail "a wrong .part spoilt the file"
 
 echo damaged >"$texture"
-run 0 get last 'base_*' 'report.*' -o "$tmp/got"
-run 0 get 1 'base_color.exr' -o "$tmp/got"
-cmp -s "$texture" "$tmp/whole" || fail "a damaged file was taken for the right one"
-(cd "$tmp" && "$build/unbake" get 1 report.json -q) || fail "get without -o"
-[ -s "$tmp/job-1/report.json" ] || fail "no job-1/report.json"
-run 3 get 1 base_colour.exr -o "$tmp/got"
+run 0 get last 'base_*' 'report.*' -o "$work/got"
+run 0 get 1 'base_color.exr' -o "$work/got"
+cmp -s "$texture" "$work/whole" || fail "a damaged file was taken for the right one"
+(cd "$work" && "$build/unbake" get 1 report.json -q) || fail "get without -o"
+[ -s "$work/job-1/report.json" ] || fail "no job-1/report.json"
+run 3 get 1 base_colour.exr -o "$work/got"
 has "$err" "did you mean base_color.exr?"
-ln -s "$tmp/whole" "$tmp/got/report.html.part"
-rm "$tmp/got/report.html"
-run 7 get 1 report.html -o "$tmp/got"
+ln -s "$work/whole" "$work/got/report.html.part"
+rm "$work/got/report.html"
+run 7 get 1 report.html -o "$work/got"
 
 # --- what is asked of jobs -------------------------------------------------------------------------
 
-run 0 submit "$tmp/room" $long -q
+run 0 submit "$work/room" $long -q
 job=$out
 wait_for 60 job_is "$job" running
 run 6 rm "$job"
 run 6 resume 1
 run 0 pause "$job" --json
-json '.state == "paused" or .wanted == "pause"'
+so '.state == "paused" or .wanted == "pause"'
 wait_for 60 job_is "$job" paused
 run 0 resume "$job"
 has "$out" "job $job is"
@@ -129,50 +129,50 @@ run 3 show "$job"
 # --- lists -----------------------------------------------------------------------------------------
 
 run 0 list --json --limit 2
-json 'length == 2 and .[0].id > .[1].id'
+so 'length == 2 and .[0].id > .[1].id'
 run 0 list --state succeeded --json
-json 'length == 4 and all(.[]; .state == "succeeded")'
+so 'length == 4 and all(.[]; .state == "succeeded")'
 run 0 list
 has "$out" "my room"
 run 0 list --state failed
-same "$out" ""
+equal "$out" ""
 run 0 scenes --json
-json 'length == 2'
+so 'length == 2'
 run 0 scenes show "${scene:0:8}" --json
-json '.state == "ready" and .facts.triangle_count == 12'
+so '.state == "ready" and .facts.triangle_count == 12'
 run 0 scenes show "$scene"
 has "$out" triangle_count
 run 3 scenes show ffffffff
 run 0 settings --json
-json 'map(.name) | contains(["texture_size", "seed"])'
+so 'map(.name) | contains(["texture_size", "seed"])'
 run 0 settings seed
 has "$out" seed
 run 0 version --json
-json '.client.version == .server.version'
+so '.client.version == .server.version'
 
 # --- what is refused -------------------------------------------------------------------------------
 
-run 4 submit "$tmp/room" --set texture_siz=1 --set texture_size=7 --priority 1000
+run 4 submit "$work/room" --set texture_siz=1 --set texture_size=7 --priority 1000
 has "$err" "did you mean texture_size?"
 has "$err" "settings.texture_size: "
 has "$err" "priority: "
-run 4 submit "$tmp/room" --set texture_size=7 --json
-same "$out" ""
+run 4 submit "$work/room" --set texture_size=7 --json
+equal "$out" ""
 jq -e '.status == 422 and (.invalid_params | length) == 1' <<<"$err" >/dev/null || fail "no invalid_params: $err"
 
-echo "this is no archive" >"$tmp/bad.zip"
-run 1 submit "$tmp/bad.zip" --watch
+echo "this is no archive" >"$work/bad.zip"
+run 1 submit "$work/bad.zip" --watch
 has "$out" "failed"
 bad=$("$build/unbake" scenes -q | head -n 1)
 run 0 scenes show "$bad" --json
-json '.state == "rejected" and (.problems | length) > 0'
-make_room "$tmp/broken"
-head -c 60 "$tmp/room/images/1.png" >"$tmp/broken/images/1.png"
-run 1 submit "$tmp/broken" --watch
+so '.state == "rejected" and (.problems | length) > 0'
+make_room "$work/broken"
+head -c 60 "$work/room/images/1.png" >"$work/broken/images/1.png"
+run 1 submit "$work/broken" --watch
 has "$out" "images/1.png"
 
-run 2 submit "$tmp/nothing-here"
-run 2 submit "$tmp/room" --set novalue
+run 2 submit "$work/nothing-here"
+run 2 submit "$work/room" --set novalue
 run 2 sumbit
 has "$err" 'did you mean "submit"?'
 run 2 list --jsno
@@ -193,7 +193,7 @@ done
 daemon_end TERM || fail "the daemon did not end with 0"
 run 5 list --retry 0.2
 has "$err" "Connection refused"
-run 5 submit "$tmp/room" --retry 0
+run 5 submit "$work/room" --retry 0
 run 0 version --json
-json '.server == null'
-exit $((failures > 0))
+so '.server == null'
+finish
