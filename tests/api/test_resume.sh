@@ -1,7 +1,7 @@
 #!/bin/bash
-# One job, done in peace on two threads, on one thread, and killed with SIGKILL again and again
-# (its worker, the daemon, both) while it goes on from its checkpoints: the same textures, byte
-# for byte. UNBAKE_KILLS sets how often (5).
+# One job, done in peace on two threads, on one thread, and interrupted again and again (its
+# worker killed with SIGKILL, the daemon with it, the daemon stopped) while it goes on from its
+# checkpoints: the same textures, byte for byte. UNBAKE_KILLS sets how often (5).
 set -u
 build=$1
 kills=${UNBAKE_KILLS:-5}
@@ -72,7 +72,10 @@ for ((i = 0; i < kills; i++)); do
     worker=$(awk '/runs as process/ { for (i = 1; i < NF; i++) if ($i == "process") p = $(i + 1) }
                   END { print p }' "$dir/war.log")
     # The kernel kills the daemon's children with it: "both" is the daemon.
-    if ((i % 2)) && [ -n "$worker" ] && grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null; then
+    if ((i % 3 == 2)); then
+        stop
+        start war 1
+    elif ((i % 3 == 1)) && [ -n "$worker" ] && grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null; then
         kill -KILL "$worker"
     else
         kill -KILL "$daemon"
