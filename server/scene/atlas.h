@@ -3,6 +3,9 @@
  * Charts are connected, nearly planar sets of triangles of one segment, projected at one
  * density (texels per metre) and packed with a gap. Atlas coordinates are in texels, x to the
  * right and y down from the image's top left corner; texel (i, j) covers [i, i+1) x [j, j+1).
+ * They are whole multiples of 1 / COVERAGE_UNITS (coverage.h), so it is exact which texels are
+ * covered. A chart is projected along one direction: a triangle that leans keeps at least
+ * cos(CHART_MAX_LEAN_DEG) of its area (atlas_chart.h), and most keep nearly all.
  * In a PLY, s = x / width and t = 1 - y / height (origin lower left). */
 #ifndef UNBAKE_SCENE_ATLAS_H
 #define UNBAKE_SCENE_ATLAS_H
