@@ -69,7 +69,8 @@ static void columns_of(const struct grid *g, const struct flat_triangle *t, size
         if (fmax(t->y[i], t->y[j]) < bottom || fmin(t->y[i], t->y[j]) > top)
             continue;
         /* Parts of the edge at which it enters and leaves the strip. */
-        double a = dy != 0.0 ? (bottom - t->y[i]) / dy : 0.0, b = dy != 0.0 ? (top - t->y[i]) / dy : 1.0;
+        double a = dy != 0.0 ? (bottom - t->y[i]) / dy : 0.0;
+        double b = dy != 0.0 ? (top - t->y[i]) / dy : 1.0;
         double enter = fmin(1.0, fmax(0.0, fmin(a, b))), leave = fmax(0.0, fmin(1.0, fmax(a, b)));
         double x[2] = {t->x[i] + enter * (t->x[j] - t->x[i]), t->x[i] + leave * (t->x[j] - t->x[i])};
         low = fmin(low, fmin(x[0], x[1]));

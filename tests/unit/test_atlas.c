@@ -215,8 +215,8 @@ static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, ui
         CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, &err) == STATUS_OK, "%s",
                    err.message);
         check_atlas(&atlas, &mesh, &segments);
-        CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u", atlas.chart_count,
-                   columns, rows, sizes[i]);
+        CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u",
+                   atlas.chart_count, columns, rows, sizes[i]);
         atlas_release(&atlas);
     }
     segments_release(&segments);
