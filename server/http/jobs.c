@@ -231,8 +231,9 @@ static struct response *add_job(struct api *api, const struct request *r, const 
     bool replayed = false;
     enum status status = store_job_add(api->store, &job, api->config.queue_limit, &id, &replayed, &err);
     mem_free(settings);
-    if (status == STATUS_CONFLICT && job.idempotency_key)
-        return problem_full(r, 422, err.message, "a new request needs a new Idempotency-Key", NULL);
+    /* The key was used for another request, or the scene was rejected or removed just now. */
+    if (status == STATUS_CONFLICT || status == STATUS_NOT_FOUND)
+        return problem_full(r, 422, err.message, err.hint, NULL);
     if (status != STATUS_OK)
         return problem_from(r, &err);
     if (!replayed)

@@ -361,8 +361,11 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     int status = x->reply ? x->reply->status : 0;
     if (status >= 100 && status < 600)
         atomic_fetch_add(&l->api->request_count[status / 100], 1);
-    log_debug("request %s: %s -> %d%s", x->request.id, x->request.target.path, status,
-              code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ", cut short");
+    /* What may have changed something is worth a line; looking is not. */
+    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "other"};
+    void (*log_line)(const char *format, ...) = x->request.method == METHOD_GET ? log_debug : log_info;
+    log_line("request %s: %s %s: %d%s", x->request.id, names[x->request.method], x->request.target.path, status,
+             code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ", cut short");
     bool was_stream = x->reply && x->reply->stream && x->reply->stream->wake;
     response_free(x->reply); /* closes the stream: after this nobody wakes x */
     if (was_stream)
@@ -481,7 +484,7 @@ void listener_quiesce(struct listener *l) {
 static void settle(struct listener *l) {
     struct timespec until;
     clock_gettime(CLOCK_REALTIME, &until);
-    until.tv_sec += 10;
+    until.tv_sec += 3; /* for streams whose clients do not read, too long; for others, plenty */
     pthread_mutex_lock(&l->mutex);
     l->is_closing = true;
     l->clerks_stop = true;

@@ -6,6 +6,7 @@
 
 #include "common/buf.h"
 #include "common/mem.h"
+#include "common/utf8.h"
 
 static int hex_digit(char c) {
     if (c >= '0' && c <= '9')
@@ -17,7 +18,8 @@ static int hex_digit(char c) {
     return -1;
 }
 
-/* Decodes text[length] into a string of the caller's; NULL for a broken escape or a control byte. */
+/* Decodes text[length] into a string of the caller's; NULL for a broken escape, a control byte or
+ * what is not UTF-8. */
 static char *decode(const char *text, size_t length, int plus_is_space) {
     char *out = mem_alloc(length + 1);
     size_t used = 0;
@@ -39,7 +41,8 @@ static char *decode(const char *text, size_t length, int plus_is_space) {
         out[used++] = (char)c;
     }
     out[used] = '\0';
-    return out;
+    if (utf8_valid(out, used, NULL))
+        return out;
 bad:
     mem_free(out);
     return NULL;
@@ -64,8 +67,8 @@ static enum status parse_path(struct target *t, struct error *err) {
             return error_set(err, STATUS_INPUT, "the path has more than %d parts", TARGET_SEGMENTS_MAX);
         char *segment = decode(at, length, 0);
         if (!segment)
-            return error_set(err, STATUS_INPUT, "part %zu of the path has a broken %%-escape or "
-                             "stands for a control byte", t->segment_count + 1);
+            return error_set(err, STATUS_INPUT, "part %zu of the path has a broken %%-escape, or "
+                             "stands for a control byte or no UTF-8", t->segment_count + 1);
         t->segments[t->segment_count++] = segment;
         if (climbs(segment))
             return error_set(err, STATUS_INPUT, "part %zu of the path is empty, \".\" or \"..\"",
@@ -89,8 +92,8 @@ static enum status parse_query(struct target *t, const char *query, struct error
         if (!name || !value) {
             mem_free(name);
             mem_free(value);
-            return error_set(err, STATUS_INPUT, "query parameter %zu has a broken %%-escape or "
-                             "stands for a control byte", t->query_count + 1);
+            return error_set(err, STATUS_INPUT, "query parameter %zu has a broken %%-escape, or "
+                             "stands for a control byte or no UTF-8", t->query_count + 1);
         }
         int repeated = target_query(t, name) != NULL;
         t->names[t->query_count] = name;
@@ -108,6 +111,12 @@ enum status target_parse(struct target *t, const char *raw, struct error *err) {
     memset(t, 0, sizeof *t);
     size_t path_length = strcspn(raw, "?");
     t->path = mem_strndup(raw, path_length);
+    for (char *at = t->path; *at; at++)
+        if (*at <= 0x20 || *at >= 0x7f) /* negative, too: for logs and replies */
+            *at = '?';
+    for (const char *at = raw; *at; at++)
+        if (*at <= 0x20 || *at >= 0x7f)
+            return error_set(err, STATUS_INPUT, "the request target has a byte that no URL may have");
     if (raw[0] != '/')
         return error_set(err, STATUS_INPUT, "the request target does not begin with a slash");
     if (strchr(raw, '#'))

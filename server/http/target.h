@@ -2,7 +2,7 @@
  * %00 before anybody can tell them from what they stand for.
  *
  * 1. A segment is decoded after the path was split, so an encoded slash never splits a path.
- * 2. No decoded text holds a control byte or a NUL; no path holds an empty, "." or ".." part,
+ * 2. Decoded text is UTF-8 and holds no control byte; no path holds an empty, "." or ".." part,
  *    whether written with slashes or with %2F. */
 #ifndef UNBAKE_HTTP_TARGET_H
 #define UNBAKE_HTTP_TARGET_H
@@ -15,7 +15,7 @@
 #define TARGET_QUERY_MAX 16
 
 struct target {
-    char *path; /* as sent, without the query; owned */
+    char *path; /* as sent, without the query, '?' for what no URL may have; owned */
     char *segments[TARGET_SEGMENTS_MAX]; /* decoded; owned; none for "/" */
     size_t segment_count;
     char *names[TARGET_QUERY_MAX], *values[TARGET_QUERY_MAX]; /* decoded query; owned */

@@ -119,6 +119,8 @@ call DELETE "/v1/scenes/$scene"; expect 409 "a scene with queued jobs"
 # --- removal ---
 call DELETE "/v1/jobs/$job"; expect 204; call GET "/v1/jobs/$job"; expect 404; call DELETE "/v1/jobs/$job"; expect 404
 call GET /v1/jobs/0; expect 404; call GET /v1/jobs/1x; expect 404; call GET /v1/jobs/99999999999999999999; expect 404
+call GET "/v1/jobs/$(printf '%0.s%%C3%%A4' $(seq 50))x"; expect 404 "a name cut in the middle of a letter"; field .detail | iconv -f utf-8 -t utf-8 >"$work/out" || fail "the reply is no UTF-8"
+call GET '/v1/jobs?name=%ff'; expect 400
 
 # --- a full queue ---
 for i in $(seq 60); do post /v1/jobs "{\"scene\":\"$scene\"}"; [ "$status" = 201 ] || break; done

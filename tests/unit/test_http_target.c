@@ -34,7 +34,7 @@ int main(void) {
         "", "*", "v1", "http://localhost/v1", "//", "//evil.org/", "/v1//jobs", "/v1/jobs/", "/..", "/a/../b",
         "/a/./b", "/a/%2e%2e/b", "/a%2f..%2fb", "/a%2F", "/%2fa", "/a%2f%2fb", "/a%00b", "/a%0ab", "/a%7fb",
         "/a%", "/a%2", "/a%zz", "/%%41", "/a#b", "/1/2/3/4/5/6/7/8/9/10/11/12/13/14/15/16/17",
-        "/a?x=%0", "/a?x=%00", "/a?x=1&x=2", "/a?x&x",
+        "/a%ff", "/a%c3", "/a?x=%ff", "/\xC3\xA4", "/a b", "/a\033b", "/a?x=%0", "/a?x=%00", "/a?x=1&x=2", "/a?x&x",
         "/a?a=&b=&c=&d=&e=&f=&g=&h=&i=&j=&k=&l=&m=&n=&o=&p=&q=",
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
