@@ -24,7 +24,9 @@ static void set_header(struct image *image, uint32_t width, uint32_t height,
 
 void image_allocate(struct image *image) {
     size_t pixel_count = (size_t)image->width * image->height;
-    image->pixel = mem_calloc_large(pixel_count, image->channel_count * sizeof(float));
+    /* Fresh from the kernel, such memory costs nothing until a decoder gets that far: a header
+     * that lies about a large picture is cheap. */
+    image->pixel = mem_calloc(pixel_count, image->channel_count * sizeof(float));
 }
 
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,

@@ -16,7 +16,7 @@
 /* Deflate's best ratio is 1032 : 1. */
 #define MAX_RATIO 1032
 /* What libpng may ask for at once, for text and profiles that we do not want. */
-#define MAX_CHUNK_BYTES ((png_alloc_size_t)64 << 20)
+#define MAX_CHUNK_BYTES ((png_alloc_size_t)8 << 20)
 
 /* ---------------------------------------------------------------------------- reading */
 
@@ -90,10 +90,10 @@ static void read_header(struct reader *r) {
         png_error(r->png, "the file is too short for its picture's size");
     r->info->encoding = IMAGE_SRGB;
     r->info->bits = depth == 16 ? 16 : 8;
-    png_uint_32 exif_size = 0;
-    png_bytep exif = NULL;
-    if (png_get_eXIf_1(r->png, r->png_info, &exif_size, &exif) != 0)
-        image_parse_exif(exif, exif_size, r->info);
+    png_unknown_chunkp kept;
+    int kept_count = png_get_unknown_chunks(r->png, r->png_info, &kept);
+    for (int i = 0; i < kept_count; i++) /* only eXIf is kept */
+        image_parse_exif(kept[i].data, kept[i].size, r->info);
     set_transforms(r, color);
 }
 
@@ -147,6 +147,9 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
         png_set_read_fn(r.png, &r, read_bytes);
         png_set_user_limits(r.png, IMAGE_MAX_SIDE, IMAGE_MAX_SIDE);
         png_set_chunk_malloc_max(r.png, MAX_CHUNK_BYTES);
+        /* libpng's own handler of eXIf asks for the length a file claims, 2 GiB if it likes;
+         * as an "unknown" chunk it falls under the limit above. */
+        png_set_keep_unknown_chunks(r.png, PNG_HANDLE_CHUNK_ALWAYS, (png_const_bytep) "eXIf", 1);
         png_set_crc_action(r.png, PNG_CRC_ERROR_QUIT, PNG_CRC_WARN_DISCARD);
         read_header(&r);
         if (!probe)
