@@ -23,6 +23,8 @@ static const struct setting table[] = {
      "how many times base colour is first solved at half the size"},
     {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.05",
      "first step size of emission, in logarithms of radiance"},
+    {"guided", SETTING_BOOL, "", 0, 0, NULL, "true",
+     "coarse levels keep the detail that the photographs show; false: the published algorithm"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0",
      "optimiser steps; 0: as many as time_limit_sec holds"},
     {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "8",

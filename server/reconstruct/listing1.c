@@ -132,7 +132,10 @@ static bool add_pair(const struct refine *f, struct scratch *s, size_t first, ui
     bool clean = views_clean(f->views, view);
     uint32_t x = texel % r->atlas.width, y = texel / r->atlas.width;
     for (int i = 0; i < f->samples; i++) {
-        struct path_key key = {texel, (uint32_t)f->counters.iteration, sample_number + (uint32_t)i};
+        /* The halves must be independent, and samples of one key are stratified against each
+         * other: each half has a key of its own. */
+        struct path_key key = {texel, (uint32_t)(2 * f->counters.iteration) + (uint32_t)(i & 1),
+                               sample_number + (uint32_t)i / 2};
         /* Where in the texel: the photograph saw all of it, not its centre. */
         uint64_t bits = rng_key(f->path.seed ^ key.iteration, key.index, key.sample);
         uint32_t triangle;
@@ -170,7 +173,7 @@ static size_t add_texel(const struct refine *f, struct scratch *s, uint32_t texe
     for (size_t k = 0; k < seen; k++) {
         size_t first = pair_count * (size_t)f->samples;
         uint32_t photograph = f->views->train[view[k].train];
-        if (add_pair(f, s, first, texel, &view[k], (uint32_t)(k * (size_t)f->samples)))
+        if (add_pair(f, s, first, texel, &view[k], (uint32_t)(k * ((size_t)f->samples + 1) / 2)))
             s->pair[pair_count++] =
                 (struct pair){first, photograph, r->segments.of_triangle[triangle],
                               views_clean(f->views, &view[k]) ? 1.0f : UNCLEAN_TRUST};
@@ -438,6 +441,36 @@ static void report(struct refine *f) {
     }
 }
 
+/* Gives every block of the coarsest level a mid grey on average and, within it, the detail that the
+ * photographs show: light hardly changes over a few texels, so their ratios are the surface's. */
+static void start_from_detail(struct refine *f) {
+    struct texture *texture = &f->r->materials.base_color;
+    const struct observed *o = &f->r->observed;
+    uint32_t side = 1u << f->coarse_levels;
+    for (uint32_t y0 = 0; y0 < texture->height; y0 += side) {
+        for (uint32_t x0 = 0; x0 < texture->width; x0 += side) {
+            double sum[3] = {0}, count = 0.0;
+            for (int pass = 0; pass < 2; pass++) {
+                for (uint32_t y = y0; y < y0 + side && y < texture->height; y++) {
+                    for (uint32_t x = x0; x < x0 + side && x < texture->width; x++) {
+                        size_t texel = (size_t)y * texture->width + x;
+                        if (texture->texel[texel][3] == 0.0f || o->radiance[texel][0] == 0)
+                            continue;
+                        count += pass == 0;
+                        for (int c = 0; c < 3; c++) {
+                            double value = log((double)image_float_from_half(o->radiance[texel][c]));
+                            if (pass == 0)
+                                sum[c] += value;
+                            else
+                                texture->texel[texel][c] *= (float)exp(value - sum[c] / count);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 static void refine_init(struct refine *f, struct reconstruction *r, const struct views *views,
                         const struct reconstruct_hooks *hooks) {
     const struct settings *set = r->settings;
@@ -453,6 +486,8 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
         .seed = (uint64_t)settings_number(set, "seed"),
     };
     f->counters.level = f->coarse_levels;
+    if (settings_bool(set, "guided"))
+        start_from_detail(f);
     f->observed = mem_calloc(r->segments.count, sizeof *f->observed);
     emitters_observe(r, views, f->observed);
     for (size_t s = 0; s < r->segments.count; s++)

@@ -19,6 +19,11 @@
 /* Base colour of an emitter moves at this share of the rate. */
 #define EMITTER_SLOWDOWN 0.05f
 
+/* A block moves in the logarithm, at this multiple of the rate: the same speed at a mid grey; and
+ * not down to 0, from where no factor would bring it back. */
+#define BLOCK_RATE 2.0f
+#define BLOCK_MIN 0.002f
+
 #define CHUNK 1024 /* touched texels a work item */
 
 static size_t blocks_across(uint32_t texels, int level) {
@@ -79,10 +84,15 @@ void params_refine(struct params *p, int level) {
     params_set_level(p, level);
 }
 
+static float slowdown(const struct params *p, size_t texel) {
+    if (p->is_emitter && p->is_emitter[p->segments->of_triangle[p->inverse->triangle[texel]]])
+        return EMITTER_SLOWDOWN;
+    return 1.0f;
+}
+
 static void move_texel(struct params *p, size_t number, const float *step, float rate) {
     float *texel = p->materials->base_color.texel[number];
-    if (p->is_emitter && p->is_emitter[p->segments->of_triangle[p->inverse->triangle[number]]])
-        rate *= EMITTER_SLOWDOWN;
+    rate *= slowdown(p, number);
     for (int c = 0; c < 3; c++)
         texel[c] = clampf(texel[c] + rate * step[c], 0.0f, 1.0f);
 }
@@ -107,6 +117,14 @@ static void step_texels(void *user, size_t chunk, int thread) {
     }
 }
 
+/* A block moves by a common factor: what differs within it stays. */
+static void scale_texel(struct params *p, size_t number, const float *step, float rate) {
+    float *texel = p->materials->base_color.texel[number];
+    rate *= slowdown(p, number);
+    for (int c = 0; c < 3; c++)
+        texel[c] = clampf(texel[c] * expf(rate * step[c]), BLOCK_MIN, 1.0f);
+}
+
 static void step_blocks(void *user, size_t chunk, int thread) {
     (void)thread;
     struct step_job *job = user;
@@ -125,13 +143,14 @@ static void step_blocks(void *user, size_t chunk, int thread) {
             for (size_t x = x0; x < x0 + side && x < texture->width; x++) {
                 size_t texel = y * texture->width + x;
                 if (texture->texel[texel][3] != 0.0f)
-                    move_texel(p, texel, step, job->rate);
+                    scale_texel(p, texel, step, BLOCK_RATE * job->rate);
             }
         }
     }
 }
 
-/* Adds the texels' derivatives up by block, in the gradient's order, and lists the blocks. */
+/* Adds up by block, in the gradient's order, the derivatives by the logarithm of the block's common
+ * factor, and lists the blocks. */
 static size_t sum_blocks(struct params *p, const struct gradient *gradient) {
     uint32_t width = p->materials->base_color.width;
     size_t across = blocks_across(width, p->level), count = 0;
@@ -149,9 +168,10 @@ static size_t sum_blocks(struct params *p, const struct gradient *gradient) {
             p->block_stamp[block] = p->stamp;
             p->block[count++] = (uint32_t)block;
         }
-        sum[0] += d->r;
-        sum[1] += d->g;
-        sum[2] += d->b;
+        const float *value = p->materials->base_color.texel[texel];
+        sum[0] += value[0] * d->r;
+        sum[1] += value[1] * d->g;
+        sum[2] += value[2] * d->b;
     }
     return count;
 }

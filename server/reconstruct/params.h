@@ -1,6 +1,7 @@
 /* params.h -- the unknowns of a reconstruction and how an optimiser step moves them.
  *
- * Base colour moves in [0, 1]; roughness and specular in [ROUGHNESS_MIN, 1] and [0, 1]; emission
+ * Base colour moves in [0, 1], texel by texel or, at the coarse levels, a block of texels by a
+ * common factor; roughness and specular in [ROUGHNESS_MIN, 1] and [0, 1]; emission
  * in the logarithm of radiance, since lamps outshine walls by factors of thousands. All of it,
  * with the moments, is the state that a checkpoint holds. */
 #ifndef UNBAKE_RECONSTRUCT_PARAMS_H
@@ -35,7 +36,7 @@ struct params {
     struct adam base_color;      /* an entry a texel, or a block at coarse levels */
     struct adam roughness, specular, emission; /* an entry a segment */
     float (*log_emission)[3];    /* [segment_count]; owned */
-    int level;                   /* blocks of 2^level texels a side move together */
+    int level;                   /* blocks of 2^level texels a side move by a common factor */
     /* Scratch of the coarse levels; NULL at level 0; owned. */
     float (*block_sum)[3];       /* [blocks at level 1] zero between steps */
     uint32_t *block_stamp;       /* [blocks at level 1] the step that last listed the block */

@@ -95,12 +95,17 @@ static enum status prepare(struct run *run, struct error *err) {
     return STATUS_OK;
 }
 
+static enum status observe(struct run *run, struct error *err) {
+    (void)err; /* nothing here can fail */
+    observed_make(&run->r->observed, &run->views, &run->r->atlas, &run->r->inverse, run->r->pool);
+    return STATUS_OK;
+}
+
 static enum status refine(struct run *run, struct error *err) {
     return listing1_run(run->r, &run->views, run->hooks, err);
 }
 
 static enum status report(struct run *run, struct error *err) {
-    report_confidence(run->r, &run->views);
     world_update_lights(&run->r->world);
     return report_held_out(run->r, &run->views, run->hooks, err);
 }
@@ -117,6 +122,8 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
     run.stages = cJSON_AddArrayToObject(r->report, "stages");
     enum status status = run_stage(&run, "prepare", prepare, err);
     if (status == STATUS_OK)
+        status = run_stage(&run, "observe", observe, err);
+    if (status == STATUS_OK)
         status = run_stage(&run, "refine", refine, err);
     if (status == STATUS_OK)
         status = run_stage(&run, "report", report, err);
@@ -131,8 +138,7 @@ void reconstruct_release(struct reconstruction *r) {
     }
     mem_free(r->held_out);
     mem_free(r->is_emitter);
-    mem_free(r->confidence_count);
-    mem_free(r->confidence_spread);
+    observed_release(&r->observed);
     world_release(&r->world);
     materials_release(&r->materials);
     inverse_uv_release(&r->inverse);

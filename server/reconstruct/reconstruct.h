@@ -17,6 +17,7 @@
 #include "common/parallel.h"
 #include "common/settings.h"
 #include "server/reconstruct/state.h"
+#include "server/reconstruct/observe.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
@@ -61,8 +62,7 @@ struct reconstruction {
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    float *confidence_count;         /* [height][width] photographs that see the texel; owned */
-    float *confidence_spread;        /* [height][width] relative spread of what they show; owned */
+    struct observed observed;        /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
     size_t held_out_count;
     struct held_out *held_out;       /* [held_out_count]; owned */

@@ -9,9 +9,6 @@
 #include "server/render/film.h"
 #include "server/render/path.h"
 
-/* At most this many texels are asked for their views one by one; larger atlases ask for one texel
- * of a block and give its answer to the whole block. */
-#define CONFIDENCE_TEXELS ((size_t)8 << 20)
 /* HDR frames are shown with their median at this fraction of white. */
 #define SHOWN_MEDIAN 0.2
 /* Seed offset that keeps the report's random numbers apart from the optimiser's. */
@@ -144,82 +141,4 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         hooks->metric(hooks->user, "msre", 0, msre);
     }
     return STATUS_OK;
-}
-
-struct confidence_job {
-    struct reconstruction *r;
-    const struct views *views;
-    uint32_t side; /* texels of a block */
-};
-
-/* The first valid texel of a block, or INVERSE_UV_NONE. */
-static uint32_t block_texel(const struct confidence_job *job, uint32_t x0, uint32_t y0) {
-    const struct inverse_uv *inverse = &job->r->inverse;
-    for (uint32_t y = y0; y < y0 + job->side && y < inverse->height; y++) {
-        for (uint32_t x = x0; x < x0 + job->side && x < inverse->width; x++) {
-            if (inverse->triangle[(size_t)y * inverse->width + x] != INVERSE_UV_NONE)
-                return y * inverse->width + x;
-        }
-    }
-    return INVERSE_UV_NONE;
-}
-
-static void confidence_of(const struct confidence_job *job, uint32_t texel, float *count, float *spread) {
-    struct reconstruction *r = job->r;
-    uint32_t triangle;
-    float b1, b2;
-    *count = *spread = 0.0f;
-    if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)(texel % r->inverse.width) + 0.5f,
-                           (float)(texel / r->inverse.width) + 0.5f, &triangle, &b1, &b2))
-        return;
-    vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
-    vec3 normal = vec3_normalize(mesh_cross(&r->scene->mesh, triangle));
-    double sum = 0.0, squares = 0.0, seen = 0.0;
-    for (uint32_t t = 0; t < job->views->train_count; t++) {
-        struct view view;
-        struct photograph_sample s;
-        if (!views_sees(job->views, t, point, normal, &view) || !views_clean(job->views, &view) ||
-            !photograph_sample(&r->scene->photograph[job->views->train[t]], view.x, view.y, &s))
-            continue;
-        double value = log(fmax((double)rgb_mean(s.radiance), 1e-6 * (double)job->views->median_radiance));
-        seen += 1.0;
-        sum += value;
-        squares += value * value;
-    }
-    *count = (float)seen;
-    if (seen > 1.0)
-        *spread = (float)sqrt(fmax(0.0, (squares - sum * sum / seen) / (seen - 1.0)));
-}
-
-static void confidence_row(void *user, size_t row, int thread) {
-    (void)thread;
-    const struct confidence_job *job = user;
-    struct reconstruction *r = job->r;
-    uint32_t width = r->inverse.width, y0 = (uint32_t)row * job->side;
-    for (uint32_t x0 = 0; x0 < width; x0 += job->side) {
-        uint32_t texel = block_texel(job, x0, y0);
-        if (texel == INVERSE_UV_NONE)
-            continue;
-        float count, spread;
-        confidence_of(job, texel, &count, &spread);
-        for (uint32_t y = y0; y < y0 + job->side && y < r->inverse.height; y++) {
-            for (uint32_t x = x0; x < x0 + job->side && x < width; x++) {
-                size_t i = (size_t)y * width + x;
-                if (r->inverse.triangle[i] == INVERSE_UV_NONE)
-                    continue;
-                r->confidence_count[i] = count;
-                r->confidence_spread[i] = spread;
-            }
-        }
-    }
-}
-
-void report_confidence(struct reconstruction *r, const struct views *views) {
-    size_t texels = (size_t)r->inverse.width * r->inverse.height;
-    struct confidence_job job = {.r = r, .views = views, .side = 1};
-    while (r->inverse.valid_count / job.side / job.side > CONFIDENCE_TEXELS)
-        job.side *= 2;
-    r->confidence_count = mem_calloc_large(texels, sizeof(float));
-    r->confidence_spread = mem_calloc_large(texels, sizeof(float));
-    parallel_for(r->pool, (r->inverse.height + job.side - 1) / job.side, confidence_row, &job);
 }

@@ -10,8 +10,4 @@
 enum status report_held_out(struct reconstruction *r, const struct views *views,
                             const struct reconstruct_hooks *hooks, struct error *err);
 
-/* Fills r->confidence_count and r->confidence_spread: how many training photographs see each texel
- * and the standard deviation of the logarithm of what they show of it. */
-void report_confidence(struct reconstruction *r, const struct views *views);
-
 #endif

@@ -224,8 +224,8 @@ static struct export_input input_of(const struct reconstruction *r) {
         .atlas = &r->atlas,
         .inverse = &r->inverse,
         .materials = &r->materials,
-        .confidence_count = r->confidence_count,
-        .confidence_spread = r->confidence_spread,
+        .confidence_count = r->observed.count,
+        .confidence_spread = r->observed.spread,
         .is_emitter = r->is_emitter,
         .report = r->report,
     };

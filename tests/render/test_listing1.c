@@ -256,7 +256,7 @@ static void test_recovers(struct scene *scene) {
     double error[OBJECTS] = {0}, bias[OBJECTS] = {0}, count[OBJECTS] = {0};
     for (size_t i = 0; i < r.inverse.valid_count; i++) {
         uint32_t texel = r.inverse.valid[i];
-        if (r.confidence_count[texel] < 2.0f)
+        if (r.observed.count[texel] < 2.0f)
             continue;
         uint32_t segment = r.segments.of_triangle[r.inverse.triangle[texel]];
         const float *t = r.materials.base_color.texel[texel];
