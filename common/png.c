@@ -74,7 +74,23 @@ static void set_transforms(struct reader *r, int color) {
         png_set_gray_to_rgb(r->png);
 }
 
+/* libpng asks for the memory that a chunk claims before it reads it, up to 2 GiB whatever its
+ * limit says: a chunk must not claim more than the file has. What follows IEND is not read. */
+static void check_chunks(struct reader *r) {
+    uint64_t size = r->source->size, at = 8;
+    uint8_t head[8];
+    while (image_source_read(r->source, at, head, sizeof head) == sizeof head) {
+        uint64_t length = (uint64_t)png_get_uint_32(head);
+        if (length + 12 > size - at)
+            png_error(r->png, "a chunk is longer than the file");
+        if (memcmp(head + 4, "IEND", 4) == 0)
+            break;
+        at += length + 12;
+    }
+}
+
 static void read_header(struct reader *r) {
+    check_chunks(r);
     png_read_info(r->png, r->png_info);
     png_uint_32 width, height;
     int depth, color;
@@ -90,10 +106,10 @@ static void read_header(struct reader *r) {
         png_error(r->png, "the file is too short for its picture's size");
     r->info->encoding = IMAGE_SRGB;
     r->info->bits = depth == 16 ? 16 : 8;
-    png_unknown_chunkp kept;
-    int kept_count = png_get_unknown_chunks(r->png, r->png_info, &kept);
-    for (int i = 0; i < kept_count; i++) /* only eXIf is kept */
-        image_parse_exif(kept[i].data, kept[i].size, r->info);
+    png_uint_32 exif_size = 0;
+    png_bytep exif = NULL;
+    if (png_get_eXIf_1(r->png, r->png_info, &exif_size, &exif) != 0)
+        image_parse_exif(exif, exif_size, r->info);
     set_transforms(r, color);
 }
 
@@ -147,9 +163,6 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
         png_set_read_fn(r.png, &r, read_bytes);
         png_set_user_limits(r.png, IMAGE_MAX_SIDE, IMAGE_MAX_SIDE);
         png_set_chunk_malloc_max(r.png, MAX_CHUNK_BYTES);
-        /* libpng's own handler of eXIf asks for the length a file claims, 2 GiB if it likes;
-         * as an "unknown" chunk it falls under the limit above. */
-        png_set_keep_unknown_chunks(r.png, PNG_HANDLE_CHUNK_ALWAYS, (png_const_bytep) "eXIf", 1);
         png_set_crc_action(r.png, PNG_CRC_ERROR_QUIT, PNG_CRC_WARN_DISCARD);
         read_header(&r);
         if (!probe)
