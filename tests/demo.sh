@@ -49,7 +49,7 @@ step "photographing a room of known materials: $dir/room"
 tar -C "$dir/room" --exclude=./truth -cf "$dir/room.tar" . || fail "the room could not be packed"
 
 step "starting unbaked on a free port of the loopback address"
-"$build/unbaked" --data "$data" --listen 127.0.0.1:0 --port-file "$data/port" \
+"$build/unbaked" --data "$data" --listen 127.0.0.1:0 --port-file "$data/port" --set min_free_mib=64 \
     2>"$dir/unbaked.log" &
 daemon=$!
 for _ in $(seq 100); do

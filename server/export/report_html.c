@@ -11,6 +11,7 @@
 #define PICTURE_LIMIT ((size_t)1 << 26) /* bytes of one embedded PNG */
 #define CURVE_POINTS 480                /* more are thinned */
 #define SEGMENT_ROWS 60                 /* the rest is in report.json */
+#define LIST_ITEMS 16                   /* of a list that has no section of its own; likewise */
 
 static const char style[] =
     ":root{color-scheme:light dark;--ink:#1d2229;--soft:#667080;--line:#d9dde3;--page:#f6f7f9;"
@@ -90,10 +91,13 @@ static void put_value(struct buf *out, const cJSON *value) {
         }
         buf_puts(out, "</table>");
     } else if (cJSON_IsArray(value)) {
-        for (const cJSON *item = value->child; item; item = item->next) {
+        int items = cJSON_GetArraySize(value);
+        if (items > LIST_ITEMS)
+            buf_printf(out, " %d entries, in report.json", items);
+        for (const cJSON *item = value->child; item && items <= LIST_ITEMS; item = item->next) {
             put_value(out, item);
-            if (item->next)
-                buf_puts(out, cJSON_IsObject(item) ? "" : ", ");
+            if (item->next && !cJSON_IsObject(item))
+                buf_puts(out, ", ");
         }
     } else {
         buf_puts(out, "–");
@@ -175,8 +179,8 @@ static void put_curve(struct buf *out, const char *name, const cJSON *series) {
                        LEFT, WIDTH - RIGHT, y, y, LEFT - 6, y + 4.0,
                        logarithmic ? exp(value) : value);
         }
-        buf_printf(out, "<text x=\"%d\" y=\"%d\">step %.0f</text>"
-                   "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.0f</text><path d=\"",
+        buf_printf(out, "<text x=\"%d\" y=\"%d\">%.4g</text>"
+                   "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text><path d=\"",
                    LEFT, HEIGHT - 6, point[0].step, WIDTH - RIGHT, HEIGHT - 6,
                    point[count - 1].step);
         size_t stride = (count + CURVE_POINTS - 1) / CURVE_POINTS;
