@@ -30,6 +30,8 @@ forbid server/http "$engine|server/worker/" 'http never sees the engine or the w
 forbid server/store "$engine|server/(http|worker)/" 'store never sees the engine, http or the worker'
 forbid server/job "$engine|server/http/" 'job never sees the engine or http'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
+forbid server/worker 'server/(http|job)/|server/store/(store|internal)' \
+    "the worker never sees the daemon's memory"
 forbid "server/scene server/render server/reconstruct server/ingest server/export" \
     'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
 forbid server/scene 'server/(render|reconstruct|ingest|export)/' 'scene is data, no rays'

@@ -1,5 +1,6 @@
 /* test_checkpoint.c -- checkpoint.db: what is saved comes back, the unchanged is not written
- * again, damage is found, a full disk or a kill leaves the one before. */
+ * again, damage is found, a full disk or a kill leaves the one before. UNBAKE_KILLS sets the
+ * number of kills (15). */
 #include "server/worker/checkpoint.h"
 
 #include <fcntl.h>
@@ -262,7 +263,9 @@ static void test_kill(const char *path) {
     uint32_t random = 99;
     long last = 100;
     save_iteration(path, last);
-    for (int round = 0; round < 15; round++) {
+    const char *kills = getenv("UNBAKE_KILLS");
+    int rounds = kills ? atoi(kills) : 15;
+    for (int round = 0; round < rounds; round++) {
         int ends[2];
         CHECK(pipe(ends) == 0);
         pid_t child = fork();

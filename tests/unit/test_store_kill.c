@@ -1,5 +1,6 @@
 /* test_store_kill.c -- a process that writes to the store is killed at random moments, again and
- * again: every change that was acknowledged is there, nothing is there twice, the file is whole. */
+ * again: every change that was acknowledged is there, nothing is there twice, the file is whole.
+ * UNBAKE_KILLS sets how often (25). */
 #include <signal.h>
 #include <sqlite3.h>
 #include <sys/wait.h>
@@ -11,7 +12,6 @@
 #include "tests/check.h"
 
 #define SCENE "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
-#define ROUNDS 25
 #define KEYS_MAX 20000
 
 static struct error err;
@@ -123,9 +123,11 @@ int main(void) {
     if (!mkdtemp(dir))
         return 1;
     struct acknowledged *last = mem_calloc(KEYS_MAX, sizeof *last); /* by key */
+    const char *kills = getenv("UNBAKE_KILLS");
+    int rounds = kills ? atoi(kills) : 25;
     uint32_t random = 4711;
     int next_key = 0, acknowledged_count = 0;
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < rounds; round++) {
         int ends[2];
         CHECK(pipe(ends) == 0);
         pid_t pid = fork();
@@ -166,8 +168,8 @@ int main(void) {
         store_close(store);
         check_integrity(dir);
     }
-    printf("%d kills, %d acknowledged changes, none lost\n", ROUNDS, acknowledged_count);
-    CHECK(acknowledged_count > ROUNDS);
+    printf("%d kills, %d acknowledged changes, none lost\n", rounds, acknowledged_count);
+    CHECK(acknowledged_count > rounds);
     OK(file_remove_tree(dir, &err));
     mem_free(last);
     return check_result();
