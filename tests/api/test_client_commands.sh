@@ -61,6 +61,24 @@ so '.job == 1 and (.log | type) == "string"'
 run 0 logs 1 --follow
 has "$out" "info: "
 
+# On a terminal a line is drawn in place, in colour; NO_COLOR and TERM=dumb are honoured; what
+# others name cannot drive the terminal.
+screen() { # ENVIRONMENT... COMMAND
+    TERM=xterm script -qec "env $*" /dev/null </dev/null
+}
+escape=$'\033'
+out=$(screen "$build/unbake" watch 1)
+has "$out" "$escape[32msucceeded$escape[0m"
+out=$(screen NO_COLOR=1 "$build/unbake" watch 1)
+has "$out" "job 1 succeeded"
+out=$(screen TERM=dumb "$build/unbake" list)
+[[ $out != *"$escape"* ]] || fail "escape sequences on a dumb terminal: $out"
+run 0 submit --scene "$scene" $quick --name "evil$escape[2Jname" --watch
+[[ $out$err != *"$escape"* ]] || fail "escape sequences came through: $out $err"
+run 0 list
+[[ $out != *"$escape"* ]] || fail "escape sequences came through: $out"
+run 0 rm last
+
 # --- get -------------------------------------------------------------------------------------------
 
 run 0 get 1 -o "$work/got" --json
@@ -196,4 +214,22 @@ has "$err" "Connection refused"
 run 5 submit "$work/room" --retry 0
 run 0 version --json
 so '.server == null'
+
+# --- an upload that is too large, and one that is interrupted ---------------------------------------
+
+daemon_start --set max_upload_mib=1
+head -c 3000000 /dev/urandom >"$work/large.tar"
+run 4 submit "$work/large.tar"
+has "$err" "larger than 1048576 bytes"
+daemon_end TERM
+daemon_start
+truncate -s 4G "$work/larger.tar"
+env --default-signal=INT "$build/unbake" submit "$work/larger.tar" >/dev/null 2>"$work/interrupted" &
+sleep 0.5
+kill -INT $!
+wait $!
+equal $? 130
+has "$(cat "$work/interrupted")" "no job was queued"
+run 0 scenes --json
+so 'length == 4'
 finish
