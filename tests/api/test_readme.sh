@@ -16,10 +16,14 @@ while read -r name _; do
     done
 done < <("$build/unbake" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]* .*\)/\1/p')
 
-"$build/unbake" settings --json -q --retry 0 --server http://127.0.0.1:1 |
-    jq -r '.[] | "| `\(.name)` | \(.default) |"' >"${TMPDIR:-/tmp}/unbake-readme.$$"
-while read -r line; do present "$line"; done <"${TMPDIR:-/tmp}/unbake-readme.$$"
-rm -f "${TMPDIR:-/tmp}/unbake-readme.$$"
+# A setting's row: what must be there, a tab, and the row to write where it is not.
+while IFS=$'\t' read -r start row; do
+    grep -qF -- "$start" README.md || fail "this row of the settings is missing or has changed: $row"
+done < <("$build/unbake" settings --json -q --retry 0 --server http://127.0.0.1:1 | jq -r '.[] |
+    (if .choices then .choices | join(", ") elif .minimum != null then
+        ("\(.minimum) to \(.maximum) \(.unit)" | rtrimstr(" ")) elif .type == "bool" then "true, false"
+     else .type end) as $values |
+    "| `\(.name)` | \(.default) |\t| `\(.name)` | \(.default) | \($values) | \(.help) |"')
 known=$("$build/unbake" settings -q --retry 0 --server http://127.0.0.1:1 | awk 'NR > 1 {print $1}')
 for name in $(sed -n '/^## Settings/,/^## /s/^| `\([a-z_]*\)`.*/\1/p' README.md); do
     grep -qx "$name" <<<"$known" || fail "there is no setting $name"
