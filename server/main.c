@@ -198,7 +198,7 @@ static int read_invocation(int argc, char **argv, struct invocation *in) {
 static enum status lock_folder(const char *dir, int *fd, struct error *err) {
     *fd = -1;
     if (file_make_dirs(dir, err) != STATUS_OK)
-        return err->status;
+        return error_hint(err, "--data DIR takes another data folder");
     char *path = file_join(dir, "lock");
     char holder[32] = "";
     enum status status = STATUS_OK;
