@@ -54,6 +54,9 @@ help: ## list the targets
 deps: ## install the Debian packages that are missing (root or sudo)
 	@deploy/install-deps.sh
 
+# The kernels of the engine: loops that must vectorise. No floating-point exception is ever read.
+$(B)/obj/server/render/%.o: ALL_CFLAGS += -O3 -fno-trapping-math
+
 $(B)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -MMD -MP -c -o $@ $<

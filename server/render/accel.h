@@ -40,8 +40,9 @@ bool accel_intersect(const struct accel *accel, vec3 origin, vec3 direction, flo
                      struct accel_hit *hit);
 bool accel_occluded(const struct accel *accel, vec3 origin, vec3 direction, float near_m, float far_m);
 
-/* The same for many rays: hit[i].triangle is ACCEL_NONE for a ray that meets nothing;
- * occluded[i] is 0 or 1. Each ray's result is that of the single query. */
+/* The same for many rays, several at once: hit[i].triangle is ACCEL_NONE for a ray that meets
+ * nothing; occluded[i] is 0 or 1. Rays beside each other that leave one point in about one
+ * direction are fastest. */
 void accel_intersect_many(const struct accel *accel, size_t count, const struct accel_ray *ray,
                           struct accel_hit *hit);
 void accel_occluded_many(const struct accel *accel, size_t count, const struct accel_ray *ray,

@@ -36,13 +36,19 @@ struct bsdf_value {
     float pdf; /* by solid angle of wi */
 };
 
-/* Derivatives of the same by the scalar parameters; that by base colour is `diffuse`. */
+/* The factors again and their derivatives by the scalar parameters; `diffuse` is also the
+ * derivative of f cos by base colour, channel by channel. */
 struct bsdf_derivative {
-    float diffuse;               /* d (f cos) / d base_color, per channel */
+    float diffuse, specular;
     float diffuse_by_roughness;  /* times base_color */
     float specular_by_roughness;
     float specular_by_specular;
 };
+
+/* fmaxf without its care for NaN, which keeps loops from vectorising. */
+static inline float bsdf_max(float a, float b) {
+    return a > b ? a : b;
+}
 
 static inline float bsdf_eta(float specular) {
     return 2.0f / (1.0f - sqrtf(0.08f * specular)) - 1.0f;
@@ -80,11 +86,11 @@ static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specu
     struct bsdf b;
     b.base_color = base_color;
     b.roughness = roughness;
-    b.alpha = fmaxf(BSDF_MIN_ALPHA, roughness * roughness);
+    b.alpha = bsdf_max(BSDF_MIN_ALPHA, roughness * roughness);
     b.eta = bsdf_eta(specular);
     float f0 = 0.08f * specular;
     float shiny = f0 > 0.0f ? f0 + (1.0f - f0) * bsdf_schlick(cos_wo) : 0.0f;
-    float diffuse = fmaxf(rgb_luminance(base_color), 0.1f);
+    float diffuse = bsdf_max(rgb_luminance(base_color), 0.1f);
     b.specular_chance = shiny / (shiny + diffuse);
     return b;
 }
@@ -122,7 +128,7 @@ static inline float bsdf_diffuse(float roughness, float cos_d, float cos_o, floa
 
 /* Zero for wi at or below the horizon. */
 static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi) {
-    float cos_i = fmaxf(wi.z, 1e-12f); /* keeps the arithmetic finite below the horizon */
+    float cos_i = bsdf_max(wi.z, 1e-12f); /* keeps the arithmetic finite below the horizon */
     vec3 above = {wi.x, wi.y, cos_i};
     struct bsdf_ggx t = bsdf_ggx(b->alpha, wo, above);
     float f = bsdf_fresnel(t.cos_d, b->eta);
@@ -145,7 +151,7 @@ static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi
  * lobe's width does not move. */
 static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float specular, vec3 wo,
                                                    vec3 wi) {
-    float cos_i = fmaxf(wi.z, 1e-12f);
+    float cos_i = bsdf_max(wi.z, 1e-12f);
     vec3 above = {wi.x, wi.y, cos_i};
     float alpha = b->alpha;
     struct bsdf_ggx t = bsdf_ggx(alpha, wo, above);
@@ -164,17 +170,18 @@ static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float s
     float log_v = -alpha * ((wo.x * wo.x + wo.y * wo.y) / (t.root_o * sum_o) +
                             (wi.x * wi.x + wi.y * wi.y) / (t.root_i * sum_i));
     float dv = t.d * v;
+    d.specular = bsdf_fresnel(t.cos_d, b->eta) * dv;
     float alpha_by_roughness =
         b->roughness * b->roughness > BSDF_MIN_ALPHA ? 2.0f * b->roughness : 0.0f;
-    d.specular_by_roughness =
-        bsdf_fresnel(t.cos_d, b->eta) * dv * (log_d + log_v) * alpha_by_roughness;
+    d.specular_by_roughness = d.specular * (log_d + log_v) * alpha_by_roughness;
 
-    float x = sqrtf(0.08f * fmaxf(specular, 1e-4f)), one = 1.0f - x;
+    float x = sqrtf(0.08f * bsdf_max(specular, 1e-4f)), one = 1.0f - x;
     float eta = 2.0f / one - 1.0f, eta_by_specular = 2.0f / (one * one) * 0.04f / x;
     d.specular_by_specular = dv * bsdf_fresnel_by_eta(t.cos_d, eta) * eta_by_specular;
 
     float lit = wi.z > 0.0f ? 1.0f : 0.0f;
     d.diffuse *= lit;
+    d.specular *= lit;
     d.diffuse_by_roughness *= lit;
     d.specular_by_roughness *= lit;
     d.specular_by_specular *= lit;
@@ -184,16 +191,15 @@ static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float s
 /* A unit vector on the circle for u in [0, 1): the angle 2 pi u by polynomials over a quarter
  * turn, accurate to 2e-7, without a call that would keep a loop from vectorising. */
 static inline vec2 bsdf_circle(float u) {
-    float quarter = floorf(4.0f * u + 0.5f);
-    float x = (4.0f * u - quarter) * (0.5f * BSDF_PI); /* in [-pi/4, pi/4] */
+    int quarter = (int)(4.0f * u + 0.5f);
+    float x = (4.0f * u - (float)quarter) * (0.5f * BSDF_PI); /* in [-pi/4, pi/4] */
     float x2 = x * x;
     float s = x * (1.0f + x2 * (-1.6666667e-1f + x2 * (8.3333310e-3f + x2 * -1.9840874e-4f)));
     float c = 1.0f + x2 * (-0.5f + x2 * (4.1666645e-2f + x2 * (-1.3887316e-3f + x2 * 2.4433157e-5f)));
-    float odd = quarter - 2.0f * floorf(0.5f * quarter); /* 1 for the second and fourth quarter */
-    float half = floorf(0.5f * quarter);
-    float turn = 1.0f - 2.0f * (half - 2.0f * floorf(0.5f * half));
-    float cosine = odd != 0.0f ? -s : c, sine = odd != 0.0f ? c : s;
-    return (vec2){turn * cosine, turn * sine};
+    bool odd = (quarter & 1) != 0;
+    float sign = (quarter & 2) != 0 ? -1.0f : 1.0f;
+    float cosine = odd ? -s : c, sine = odd ? c : s;
+    return (vec2){sign * cosine, sign * sine};
 }
 
 /* A direction for uniform numbers in [0, 1): `lobe` chooses the lobe, (u, v) the direction. May lie
@@ -203,7 +209,7 @@ static inline vec3 bsdf_sample(const struct bsdf *b, vec3 wo, float lobe, float 
     vec2 circle = bsdf_circle(u);
     float r = sqrtf(v);
     float x = r * circle.x, y = r * circle.y;
-    float z2 = fmaxf(0.0f, 1.0f - x * x - y * y);
+    float z2 = bsdf_max(0.0f, 1.0f - x * x - y * y);
     vec3 cosine = {x, y, sqrtf(z2)};
 
     /* Visible normals (Heitz 2018): wo stretched to the unit hemisphere's configuration. */
@@ -211,15 +217,15 @@ static inline vec3 bsdf_sample(const struct bsdf *b, vec3 wo, float lobe, float 
     vec3 stretched = vec3_scale((vec3){a * wo.x, a * wo.y, wo.z},
                                 1.0f / sqrtf(a * a * (wo.x * wo.x + wo.y * wo.y) + wo.z * wo.z));
     float across2 = stretched.x * stretched.x + stretched.y * stretched.y;
-    float over = across2 > 1e-14f ? 1.0f / sqrtf(fmaxf(across2, 1e-14f)) : 0.0f;
+    float over = across2 > 1e-14f ? 1.0f / sqrtf(bsdf_max(across2, 1e-14f)) : 0.0f;
     vec3 t1 = {over > 0.0f ? -stretched.y * over : 1.0f, stretched.x * over, 0.0f};
     vec3 t2 = vec3_cross(stretched, t1);
     float s = 0.5f * (1.0f + stretched.z);
-    float p = (1.0f - s) * sqrtf(fmaxf(0.0f, 1.0f - x * x)) + s * y;
-    float up = sqrtf(fmaxf(0.0f, 1.0f - x * x - p * p));
+    float p = (1.0f - s) * sqrtf(bsdf_max(0.0f, 1.0f - x * x)) + s * y;
+    float up = sqrtf(bsdf_max(0.0f, 1.0f - x * x - p * p));
     vec3 n = vec3_mad(vec3_mad(vec3_scale(t1, x), p, t2), up, stretched);
-    vec3 h = {a * n.x, a * n.y, fmaxf(0.0f, n.z)};
-    h = vec3_scale(h, 1.0f / sqrtf(fmaxf(vec3_dot(h, h), 1e-30f)));
+    vec3 h = {a * n.x, a * n.y, bsdf_max(0.0f, n.z)};
+    h = vec3_scale(h, 1.0f / sqrtf(bsdf_max(vec3_dot(h, h), 1e-30f)));
     vec3 mirror = vec3_mad(vec3_neg(wo), 2.0f * vec3_dot(wo, h), h);
 
     bool shiny = lobe < b->specular_chance;

@@ -40,28 +40,6 @@ static void table_release(struct light_table *t) {
     memset(t, 0, sizeof *t);
 }
 
-/* The entry whose range holds u in [0, 1), and where in the range. */
-static uint32_t table_pick(const struct light_table *t, float u, float *probability, float *rest) {
-    float scaled = u * (float)t->count;
-    size_t at = (size_t)scaled < t->count ? (size_t)scaled : t->count - 1;
-    uint32_t low = t->guide[at], high = t->guide[at + 1];
-    /* Rounding of u * count may have passed a boundary: the search's ends are checked. */
-    while (low > 0 && t->cumulative[low] > u)
-        low--;
-    while (high + 1 < t->count && t->cumulative[high + 1] <= u)
-        high++;
-    while (low < high) {
-        uint32_t middle = low + (high - low) / 2;
-        if (t->cumulative[middle + 1] <= u)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    *probability = t->cumulative[low + 1] - t->cumulative[low];
-    *rest = *probability > 0.0f ? (u - t->cumulative[low]) / *probability : 0.5f;
-    return low;
-}
-
 static float row_sine(const struct lights *l, size_t row) {
     return (float)sin(PI * ((double)row + 0.5) / (double)(l->height - 1));
 }
@@ -163,8 +141,7 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
 
 static void sample_environment(const struct lights *l, float pick, float u, float v,
                                struct light_sample *s) {
-    float probability, rest;
-    uint32_t cell = table_pick(&l->cells, pick, &probability, &rest);
+    uint32_t cell = light_table_pick(&l->cells, pick);
     uint32_t row = cell / l->width, column = cell - row * l->width;
     double phi = 2.0 * PI * ((double)column + 0.5 + (double)u) / (double)l->width;
     double theta = PI * ((double)row + (double)v) / (double)(l->height - 1);
@@ -187,9 +164,7 @@ void lights_sample(const struct lights *l, vec3 point, float pick, float u, floa
     }
     if (!(l->triangles.total > 0.0))
         return;
-    float probability, rest;
-    float at = fminf((pick - chance) / (1.0f - chance), 0x1.fffffep-1f);
-    const struct light_triangle *t = &l->triangle[table_pick(&l->triangles, at, &probability, &rest)];
+    const struct light_triangle *t = lights_pick(l, pick);
     float root = sqrtf(u);
     s->point = vec3_mad(vec3_mad(t->corner, root * (1.0f - v), t->edge1), root * v, t->edge2);
     s->normal = t->normal;

@@ -48,6 +48,20 @@ struct lights {
     struct light_table cells; /* (height - 1) rows of `width` cells */
 };
 
+/* The entry whose range holds u in [0, 1): a linear search from the guide's entry, of about one
+ * step on average. */
+static inline uint32_t light_table_pick(const struct light_table *t, float u) {
+    size_t at = (size_t)(u * (float)t->count);
+    at = at < t->count ? at : t->count - 1;
+    uint32_t entry = t->guide[at];
+    /* Rounding of u * count may have passed a boundary. */
+    while (entry > 0 && t->cumulative[entry] > u)
+        entry--;
+    while (entry + 1 < t->count && t->cumulative[entry + 1] <= u)
+        entry++;
+    return entry;
+}
+
 /* A sampled direction towards light. */
 struct light_sample {
     vec3 point, normal; /* on the emitter; normal towards its front */
@@ -68,6 +82,13 @@ void lights_update(struct lights *lights, const struct mesh *mesh, const struct 
 /* True when anything shines. */
 static inline bool lights_any(const struct lights *lights) {
     return lights->triangles.total > 0.0 || lights->environment_chance > 0.0f;
+}
+
+/* The triangle for a number in [0, 1) that did not choose the environment (at or above
+ * environment_chance); there must be one. */
+static inline const struct light_triangle *lights_pick(const struct lights *lights, float pick) {
+    float at = (pick - lights->environment_chance) / (1.0f - lights->environment_chance);
+    return &lights->triangle[light_table_pick(&lights->triangles, at < 0x1.fffffep-1f ? at : 0x1.fffffep-1f)];
 }
 
 /* Picks a direction as seen from `point` for numbers in [0, 1). */

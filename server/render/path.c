@@ -1,21 +1,22 @@
 /* path.c -- see path.h.
  *
- * A batch advances all of its paths one surface at a time. Vertex k of a path is kept with what
- * the backward walk needs; with the names of struct vertex, the radiance that leaves it is
+ * A batch advances all of its paths one surface at a time: nearest hits of all, then block by
+ * block the shading of the vertices found (lanes.h, shade.c), then all shadow rays. Vertex k of
+ * a path is kept with what the backward walk needs; with the names of struct vertex_block, the
+ * radiance that leaves it is
  *
- *   L_k = emission_weight * Le + f(light) * incident + f(wi) * scale * L_(k+1)
+ *   L_k = emission_weight * emission + f(light) * incident + f(wi) * scale * L_(k+1)
  *
  * where f includes the cosine, `incident` holds the light sample's radiance, density, weight and
  * visibility, and scale = 1 / (density of wi * chance of going on). Derivatives follow term by
  * term, with d L_(k+1) = d L_k * f(wi) * scale.
  *
  * Invariants:
- *   1. vertices of one depth are in the order of their paths, so what a path logs and adds does
- *      not depend on the other paths in the batch;
+ *   1. vertices of one depth are in the order of their paths: what a path adds and logs, and in
+ *      which order, does not depend on timing;
  *   2. weights and densities are constants of the derivative (detached sampling). No path ends
  *      because its throughput is 0, only because the sampled direction is below the horizon or
- *      by roulette with a chance of at least MIN_CHANCE: where a base colour is 0 its derivative
- *      is not;
+ *      by roulette with a chance that is never 0: where a base colour is 0 its derivative is not;
  *   3. multiple importance sampling by the power heuristic (Veach 1997, section 9.2.4). */
 #include "server/render/path.h"
 
@@ -25,32 +26,11 @@
 
 #include "common/mem.h"
 #include "server/render/accel.h"
-#include "server/render/bsdf.h"
 #include "server/render/light.h"
 #include "server/render/sampler.h"
+#include "server/render/shade.h"
 
 #define MAX_DEPTH 32
-#define MIN_CHANCE 0.05f
-#define MAX_CHANCE 0.95f
-
-/* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
-enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX };
-
-struct vertex {
-    uint32_t path;
-    uint32_t parent;               /* number in the depth before */
-    uint32_t segment;
-    uint32_t light_segment;        /* of the light sample, LIGHT_ENVIRONMENT where none */
-    rgb beta;                      /* from the camera to here */
-    float emission_weight;         /* 0 on the back */
-    struct gradient_entry taps;    /* where base_color came from; d is the backward walk's */
-    rgb base_color;
-    vec3 wo, light, wi;            /* in the shading frame */
-    rgb incident;                  /* 0: no light sample */
-    float light_factor;            /* incident = light_factor * emission of light_segment */
-    float scale;                   /* 0: the path ends here */
-    rgb next;                      /* L_(k+1) */
-};
 
 /* A path under way to its next surface. */
 struct flight {
@@ -59,23 +39,31 @@ struct flight {
     float pdf; /* of its direction by solid angle; 0 for a camera ray */
 };
 
+/* A light sample that waits for its shadow ray. */
+struct shadow {
+    uint32_t path, vertex;
+    rgb gain;
+};
+
 struct path_batch {
     size_t capacity, count;
     int max_depth, depth_count;       /* depths used by the last trace */
+    bool ended;                       /* vertices of the last depth used do not scatter */
     size_t vertex_count[MAX_DEPTH];
-    struct vertex *vertex[MAX_DEPTH]; /* [capacity] each, owned */
-    vec3 *point, *normal;             /* [capacity] of the present depth's vertices: world place,
-                                       * geometric normal */
-    vec3 (*frame)[3];                 /* [capacity] shading frame, third is the normal */
+    struct vertex_block *vertex[MAX_DEPTH]; /* [capacity / LANES, rounded up] each, owned */
+    struct shade_block *shade;
+    struct shade_derivative *derivative;
     struct flight *flight;            /* [capacity] */
-    struct accel_ray *ray, *shadow_ray;
-    struct accel_hit *hit;
-    uint8_t *occluded;
-    uint32_t *shadow;                 /* vertices whose light sample waits for its shadow ray */
-    uint32_t *key;                    /* [capacity] sampler key per path */
-    uint32_t *sample;
+    struct accel_ray *ray, *shadow_ray; /* [capacity] */
+    struct accel_hit *hit;            /* [capacity] */
+    struct shadow *shadow;            /* [capacity] */
+    uint8_t *occluded;                /* [capacity] */
+    uint32_t *key, *sample;           /* [capacity] per path, of the sampler */
     bool *dropped;                    /* [capacity] the path's estimate was not finite */
+    size_t flight_count, shadow_count;
     uint64_t ray_count, dropped_count;
+    void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray);
+    void *tap_user;
 };
 
 struct path_batch *path_batch_new(size_t capacity, int max_depth) {
@@ -83,17 +71,17 @@ struct path_batch *path_batch_new(size_t capacity, int max_depth) {
     struct path_batch *b = mem_calloc(1, sizeof *b);
     b->capacity = capacity;
     b->max_depth = max_depth;
+    size_t blocks = (capacity + LANES - 1) / LANES;
     for (int k = 0; k < max_depth; k++)
-        b->vertex[k] = mem_array(capacity, sizeof *b->vertex[k]);
-    b->point = mem_array(capacity, sizeof *b->point);
-    b->normal = mem_array(capacity, sizeof *b->normal);
-    b->frame = mem_array(capacity, sizeof *b->frame);
+        b->vertex[k] = mem_calloc_large(blocks, sizeof *b->vertex[k]);
+    b->shade = mem_calloc_large(1, sizeof *b->shade);
+    b->derivative = mem_calloc_large(1, sizeof *b->derivative);
     b->flight = mem_array(capacity, sizeof *b->flight);
     b->ray = mem_array(capacity, sizeof *b->ray);
     b->shadow_ray = mem_array(capacity, sizeof *b->shadow_ray);
     b->hit = mem_array(capacity, sizeof *b->hit);
-    b->occluded = mem_array(capacity, sizeof *b->occluded);
     b->shadow = mem_array(capacity, sizeof *b->shadow);
+    b->occluded = mem_array(capacity, sizeof *b->occluded);
     b->key = mem_array(capacity, sizeof *b->key);
     b->sample = mem_array(capacity, sizeof *b->sample);
     b->dropped = mem_array(capacity, sizeof *b->dropped);
@@ -105,58 +93,22 @@ void path_batch_free(struct path_batch *b) {
         return;
     for (int k = 0; k < b->max_depth; k++)
         mem_free(b->vertex[k]);
-    mem_free(b->point);
-    mem_free(b->normal);
-    mem_free(b->frame);
+    mem_free(b->shade);
+    mem_free(b->derivative);
     mem_free(b->flight);
     mem_free(b->ray);
     mem_free(b->shadow_ray);
     mem_free(b->hit);
-    mem_free(b->occluded);
     mem_free(b->shadow);
+    mem_free(b->occluded);
     mem_free(b->key);
     mem_free(b->sample);
     mem_free(b->dropped);
     mem_free(b);
 }
 
-static float power_heuristic(float a, float b) {
-    return a * a / (a * a + b * b);
-}
-
-static vec3 to_local(const vec3 frame[3], vec3 v) {
-    return (vec3){vec3_dot(frame[0], v), vec3_dot(frame[1], v), vec3_dot(frame[2], v)};
-}
-
-static vec3 to_world(const vec3 frame[3], vec3 v) {
-    return vec3_mad(vec3_mad(vec3_scale(frame[0], v.x), v.y, frame[1]), v.z, frame[2]);
-}
-
-/* The interpolated normal, turned to the viewer's side (materials are two-sided). */
-static vec3 shading_normal(const struct world_triangle *t, float b1, float b2, vec3 to_viewer) {
-    vec3 n = t->normal;
-    if (!t->flat) {
-        float b0 = 1.0f - b1 - b2, v[3];
-        for (int c = 0; c < 3; c++)
-            v[c] = b0 * (float)t->shading[0][c] + b1 * (float)t->shading[1][c] +
-                   b2 * (float)t->shading[2][c];
-        vec3 sum = {v[0], v[1], v[2]};
-        float length = vec3_length(sum);
-        if (length > 1.0f)
-            n = vec3_scale(sum, 1.0f / length);
-    }
-    return vec3_dot(n, to_viewer) < 0.0f ? vec3_neg(n) : n;
-}
-
-static rgb look_up(const struct texture *texture, float x, float y, struct gradient_entry *e) {
-    struct texture_taps taps;
-    texture_taps(texture, x, y, &taps);
-    rgb value = texture_gather(texture, &taps);
-    float right = (float)texture->width - 1.0f, bottom = (float)texture->height - 1.0f;
-    uint32_t i = (uint32_t)clampf(x - 0.5f, 0.0f, right), j = (uint32_t)clampf(y - 0.5f, 0.0f, bottom);
-    e->first = j * texture->width + i;
-    memcpy(e->weight, taps.weight, sizeof e->weight);
-    return value;
+static void add(rgb *to, rgb amount) {
+    *to = rgb_add(*to, amount);
 }
 
 /* What a ray that meets nothing brings. */
@@ -167,149 +119,223 @@ static void meet_nothing(struct path_batch *b, const struct world *world, int de
         return;
     rgb value = lights_environment(lights, direction);
     if (depth > 0) {
-        value = rgb_scale(value, power_heuristic(f->pdf, lights_pdf_environment(lights, direction)));
-        b->vertex[depth - 1][f->parent].next = value;
+        float other = lights_pdf_environment(lights, direction);
+        value = rgb_scale(value, f->pdf * f->pdf / (f->pdf * f->pdf + other * other));
+        lanes3_set_rgb(&b->vertex[depth - 1][f->parent / LANES].next, (int)(f->parent % LANES), value);
     }
-    radiance[f->path] = rgb_add(radiance[f->path], rgb_mul(f->beta, value));
+    add(&radiance[f->path], rgb_mul(f->beta, value));
 }
 
-/* Makes vertex number `at` of this depth from a hit; adds its emission. */
-static void meet_surface(struct path_batch *b, const struct world *world, size_t at, int depth,
-                         const struct flight *f, const struct accel_ray *ray,
-                         const struct accel_hit *hit, rgb *radiance) {
+/* Puts the vertex that a ray hit into a lane. */
+static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
+                      size_t flight) {
+    const struct flight *f = &b->flight[flight];
+    const struct accel_ray *ray = &b->ray[flight];
+    const struct accel_hit *hit = &b->hit[flight];
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const struct materials *m = world->materials;
-    struct vertex *v = &b->vertex[depth][at];
-    v->path = f->path;
-    v->parent = f->parent;
-    v->segment = t->segment;
-    v->beta = f->beta;
-    v->next = (rgb){0.0f, 0.0f, 0.0f};
-    v->scale = 0.0f;
-    v->incident = (rgb){0.0f, 0.0f, 0.0f};
-
-    vec3 to_viewer = vec3_neg(ray->direction);
-    float facing = vec3_dot(t->normal, to_viewer);
-    v->emission_weight = 0.0f;
-    if (facing > 0.0f) {
-        float pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, facing);
-        v->emission_weight = depth == 0 ? 1.0f : power_heuristic(f->pdf, pdf);
-        rgb emitted = rgb_scale(m->emission[t->segment], v->emission_weight);
-        radiance[f->path] = rgb_add(radiance[f->path], rgb_mul(f->beta, emitted));
+    struct shade_block *s = b->shade;
+    v->path[lane] = f->path;
+    v->parent[lane] = f->parent;
+    lanes3_set_rgb(&v->beta, lane, f->beta);
+    s->pdf[lane] = f->pdf;
+    s->key[lane] = b->key[f->path];
+    s->sample[lane] = b->sample[f->path];
+    lanes3_set(&s->origin, lane, ray->origin);
+    lanes3_set(&s->direction, lane, ray->direction);
+    s->distance_m[lane] = hit->distance_m;
+    s->b1[lane] = hit->b1;
+    s->b2[lane] = hit->b2;
+    lanes3_set(&s->normal, lane, t->normal);
+    s->plane[lane] = t->plane;
+    for (int k = 0; k < 3; k++) {
+        s->corner_x[k][lane] = t->corner[k].x;
+        s->corner_y[k][lane] = t->corner[k].y;
+        s->shading[k].x[lane] = (float)t->shading[k][0];
+        s->shading[k].y[lane] = (float)t->shading[k][1];
+        s->shading[k].z[lane] = (float)t->shading[k][2];
     }
-
-    /* The distance's rounding is taken out along the normal. */
-    vec3 p = vec3_mad(ray->origin, hit->distance_m, ray->direction);
-    b->point[at] = vec3_mad(p, t->plane - vec3_dot(t->normal, p), t->normal);
-    b->normal[at] = t->normal;
-    vec3 *frame = b->frame[at];
-    frame[2] = shading_normal(t, hit->b1, hit->b2, to_viewer);
-    vec3_frame(frame[2], &frame[0], &frame[1]);
-    v->wo = to_local(frame, to_viewer);
-    v->wo.z = fmaxf(v->wo.z, 1e-6f);
-
-    float b0 = 1.0f - hit->b1 - hit->b2;
-    float x = b0 * t->corner[0].x + hit->b1 * t->corner[1].x + hit->b2 * t->corner[2].x;
-    float y = b0 * t->corner[0].y + hit->b1 * t->corner[1].y + hit->b2 * t->corner[2].y;
-    v->base_color = look_up(&m->base_color, x, y, &v->taps);
+    s->flat[lane] = (float)t->flat;
+    uint32_t segment = t->segment;
+    v->segment[lane] = segment;
+    v->roughness[lane] = m->roughness[segment];
+    v->specular[lane] = m->specular[segment];
+    lanes3_set_rgb(&v->emission, lane, m->emission[segment]);
+    s->area_density[lane] = world->lights->area_density[segment];
 }
 
-static rgb reflect(const struct bsdf_value *f, rgb base_color, rgb light) {
-    return (rgb){(base_color.r * f->diffuse + f->specular) * light.r,
-                 (base_color.g * f->diffuse + f->specular) * light.g,
-                 (base_color.b * f->diffuse + f->specular) * light.b};
+static void add_emission(const struct vertex_block *v, int count, rgb *radiance) {
+    for (int i = 0; i < count; i++) {
+        rgb emission = lanes3_rgb(&v->emission, i);
+        if (!rgb_is_black(emission))
+            add(&radiance[v->path[i]],
+                rgb_mul(lanes3_rgb(&v->beta, i), rgb_scale(emission, v->emission_weight[i])));
+    }
 }
 
-/* Picks a point on the lights; true when a shadow ray must decide. */
-static bool sample_light(const struct path_batch *b, const struct world *world, struct vertex *v,
-                         size_t at, const struct bsdf *bsdf, float pick, vec2 place,
-                         struct accel_ray *ray) {
-    struct light_sample light;
-    lights_sample(world->lights, b->point[at], pick, place.x, place.y, &light);
-    if (!(light.pdf > 0.0f))
-        return false;
-    v->light = to_local(b->frame[at], light.direction);
-    struct bsdf_value f = bsdf_eval(bsdf, v->wo, v->light);
-    if (!(f.pdf > 0.0f))
-        return false;
-    v->light_factor = power_heuristic(light.pdf, f.pdf) / light.pdf;
-    v->light_segment = light.segment;
-    v->incident = rgb_scale(light.radiance, v->light_factor);
-    ray->origin = accel_offset(b->point[at], b->normal[at], light.direction);
-    ray->near_m = 0.0f;
-    ray->direction = light.direction;
-    ray->far_m = INFINITY;
-    if (light.segment != LIGHT_ENVIRONMENT) {
-        vec3 target = accel_offset(light.point, light.normal, vec3_neg(light.direction));
-        vec3 to = vec3_sub(target, ray->origin);
-        ray->far_m = vec3_length(to);
-        ray->direction = vec3_scale(to, 1.0f / ray->far_m);
+/* Chooses a light for every lane and loads its triangle; false when there is no light. */
+static bool pick_lights(struct shade_block *s, struct vertex_block *v, const struct lights *lights,
+                        int count) {
+    if (!(lights->triangles.total > 0.0))
+        return lights_any(lights);
+    for (int i = 0; i < count; i++) {
+        if (s->pick[i] < lights->environment_chance)
+            continue;
+        const struct light_triangle *t = lights_pick(lights, s->pick[i]);
+        lanes3_set(&s->light_corner, i, t->corner);
+        lanes3_set(&s->light_edge1, i, t->edge1);
+        lanes3_set(&s->light_edge2, i, t->edge2);
+        lanes3_set(&s->light_normal, i, t->normal);
+        lanes3_set_rgb(&s->radiance, i, lights->emission[t->segment]);
+        s->light_density[i] = lights->area_density[t->segment];
+        v->light_segment[i] = t->segment;
     }
     return true;
 }
 
-/* Samples light and the way on at every vertex of this depth. Returns the number of paths that
- * go on; *shadow_count shadow rays wait. */
-static size_t scatter(struct path_batch *b, const struct world *world,
-                      const struct path_settings *settings, int depth, size_t *shadow_count) {
-    const struct materials *m = world->materials;
-    size_t flights = 0, shadows = 0;
-    bool lit = lights_any(world->lights);
-    bool roulette = depth + 2 >= settings->roulette_depth;
-    for (size_t at = 0; at < b->vertex_count[depth]; at++) {
-        struct vertex *v = &b->vertex[depth][at];
-        uint32_t key = b->key[v->path], sample = b->sample[v->path];
-        uint32_t pair = (uint32_t)(depth + 1) * PAIRS_PER_VERTEX;
-        struct bsdf bsdf = bsdf_make(v->base_color, m->roughness[v->segment],
-                                     m->specular[v->segment], v->wo.z);
-        vec2 choices = sampler_pair(key, sample, pair + PAIR_CHOICES);
-        if (lit) {
-            vec2 place = sampler_pair(key, sample, pair + PAIR_LIGHT);
-            if (sample_light(b, world, v, at, &bsdf, choices.x, place, &b->shadow_ray[shadows]))
-                b->shadow[shadows++] = (uint32_t)at;
-        }
-        vec2 direction = sampler_pair(key, sample, pair + PAIR_DIRECTION);
-        v->wi = bsdf_sample(&bsdf, v->wo, choices.y, direction.x, direction.y);
-        struct bsdf_value f = bsdf_eval(&bsdf, v->wo, v->wi);
-        if (!(f.pdf > 0.0f))
+/* The lanes whose choice fell on the environment; its rare work is done lane by lane. */
+static void sample_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights,
+                               int count) {
+    for (int i = 0; i < count; i++) {
+        if (s->pick[i] >= lights->environment_chance)
             continue;
-        float scale = 1.0f / f.pdf;
-        rgb beta = rgb_scale(reflect(&f, v->base_color, v->beta), scale);
-        if (roulette) {
-            float chance = clampf(rgb_max(beta), MIN_CHANCE, MAX_CHANCE);
-            if (sampler_number(key, sample, pair + PAIR_ROULETTE) >= chance)
-                continue;
-            scale /= chance;
-            beta = rgb_scale(beta, 1.0f / chance);
-        }
-        v->scale = scale;
-        vec3 way = to_world(b->frame[at], v->wi);
-        b->flight[flights] = (struct flight){v->path, (uint32_t)at, beta, f.pdf};
-        b->ray[flights++] =
-            (struct accel_ray){accel_offset(b->point[at], b->normal[at], way), 0.0f, way, INFINITY};
+        struct light_sample light;
+        vec3 point = lanes3_get(&s->point, i);
+        lights_sample(lights, point, s->pick[i], s->light_u[i], s->light_v[i], &light);
+        v->light_segment[i] = LIGHT_ENVIRONMENT;
+        s->light_pdf[i] = light.pdf;
+        lanes3_set(&s->light_direction, i, light.direction);
+        lanes3_set_rgb(&s->radiance, i, light.radiance);
+        lanes3_set(&s->shadow_origin, i, accel_offset(point, lanes3_get(&s->normal, i), light.direction));
+        lanes3_set(&s->shadow_direction, i, light.direction);
+        s->shadow_far[i] = INFINITY;
     }
-    *shadow_count = shadows;
-    return flights;
+}
+
+static void prefetch_texels(const struct vertex_block *v, const struct texture *texture, int count) {
+    for (int i = 0; i < count; i++) {
+        const float(*texel)[4] = (const float(*)[4])texture->texel + v->first_texel[i];
+        __builtin_prefetch(texel);
+        __builtin_prefetch(texel + texture->width);
+    }
+}
+
+typedef float float4 __attribute__((vector_size(16)));
+
+/* The sums over the four texels, r g b and weight at once: a texel's fourth value is 1 where it
+ * is valid and 0 elsewhere. As texture_taps and texture_gather. */
+static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
+                          int count) {
+    size_t last_row = (size_t)(texture->height - 1) * texture->width;
+    for (int i = 0; i < count; i++) {
+        size_t first = v->first_texel[i];
+        size_t down = first < last_row ? texture->width : 0;
+        size_t right = (first + 1) % texture->width != 0 ? 1 : 0;
+        const float(*texel)[4] = (const float(*)[4])texture->texel + first;
+        const float *at[4] = {texel[0], texel[right], texel[down], texel[down + right]};
+        float x = s->column[i], y = s->row[i];
+        const float weight[4] = {(1.0f - x) * (1.0f - y), x * (1.0f - y), (1.0f - x) * y, x * y};
+        float4 sum = {0.0f, 0.0f, 0.0f, 0.0f};
+        for (int k = 0; k < 4; k++) {
+            float4 value;
+            memcpy(&value, at[k], sizeof value);
+            float valid = weight[k] * value[3];
+            s->filter[k][i] = valid;
+            sum += valid * value;
+        }
+        lanes3_set(&v->base_color, i, (vec3){sum[0], sum[1], sum[2]});
+        s->filter_sum[i] = sum[3];
+    }
+}
+
+/* Appends the rays that the block's vertices send out. */
+static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32_t first, int count) {
+    const struct shade_block *s = b->shade;
+    for (int i = 0; i < count; i++) {
+        if (s->shadow_wanted[i] == 0.0f)
+            continue;
+        b->shadow_ray[b->shadow_count] =
+            (struct accel_ray){lanes3_get(&s->shadow_origin, i), 0.0f,
+                               lanes3_get(&s->shadow_direction, i), s->shadow_far[i]};
+        b->shadow[b->shadow_count++] =
+            (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->gain, i)};
+    }
+    for (int i = 0; i < count; i++) {
+        if (s->way_open[i] == 0.0f)
+            continue;
+        b->ray[b->flight_count] = (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f,
+                                                     lanes3_get(&s->way, i), INFINITY};
+        b->flight[b->flight_count++] = (struct flight){v->path[i], first + (uint32_t)i,
+                                                       lanes3_rgb(&s->way_beta, i), s->way_pdf[i]};
+    }
+}
+
+/* Shades the `count` vertices loaded into a block of this depth. */
+static void shade(struct path_batch *b, const struct world *world, const struct path_settings *settings,
+                  int depth, size_t block, int count, rgb *radiance) {
+    struct vertex_block *v = &b->vertex[depth][block];
+    struct shade_block *s = b->shade;
+    const struct texture *texture = &world->materials->base_color;
+    shade_surface(v, s, texture->width, texture->height);
+    add_emission(v, count, radiance);
+    if (depth + 1 == settings->max_depth)
+        return;
+    prefetch_texels(v, texture, count);
+    memset(&v->next, 0, sizeof v->next);
+    shade_numbers(s, depth);
+    if (pick_lights(s, v, world->lights, count))
+        shade_light(s);
+    else
+        memset(s->light_pdf, 0, sizeof s->light_pdf);
+    if (world->lights->environment_chance > 0.0f)
+        sample_environment(s, v, world->lights, count);
+    gather_texels(v, s, texture, count);
+    shade_texture(v, s);
+    shade_scatter(v, s, depth + 2 >= settings->roulette_depth);
+    send_rays(b, v, (uint32_t)block * LANES, count);
+}
+
+/* Goes from the hits of this depth to the rays of the next. The new rays take the places of old
+ * ones, which a block has read before it is shaded. */
+static void shade_hits(struct path_batch *b, const struct world *world,
+                       const struct path_settings *settings, int depth, rgb *radiance) {
+    size_t arrived = b->flight_count, block = 0;
+    int lane = 0;
+    b->flight_count = b->shadow_count = 0;
+    for (size_t i = 0; i < arrived; i++) {
+        if (i + 8 < arrived && b->hit[i + 8].triangle != ACCEL_NONE)
+            __builtin_prefetch(&world->triangle[b->hit[i + 8].triangle]);
+        if (b->hit[i].triangle == ACCEL_NONE) {
+            meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
+            continue;
+        }
+        load_lane(b, world, &b->vertex[depth][block], lane++, i);
+        if (lane == LANES) {
+            shade(b, world, settings, depth, block++, LANES, radiance);
+            lane = 0;
+        }
+    }
+    b->vertex_count[depth] = block * LANES + (size_t)lane;
+    if (lane > 0)
+        shade(b, world, settings, depth, block, lane, radiance);
 }
 
 /* Traces the shadow rays; light samples that are hidden lose their radiance. */
-static void gather_light(struct path_batch *b, const struct world *world, int depth,
-                         size_t shadow_count, rgb *radiance) {
-    const struct materials *m = world->materials;
-    accel_occluded_many(world->accel, shadow_count, b->shadow_ray, b->occluded);
-    b->ray_count += shadow_count;
-    for (size_t i = 0; i < shadow_count; i++) {
-        struct vertex *v = &b->vertex[depth][b->shadow[i]];
-        if (b->occluded[i]) {
-            v->incident = (rgb){0.0f, 0.0f, 0.0f};
-            v->light_factor = 0.0f;
+static void gather_light(struct path_batch *b, const struct world *world, int depth, rgb *radiance) {
+    if (b->tap)
+        b->tap(b->tap_user, true, b->shadow_count, b->shadow_ray);
+    accel_occluded_many(world->accel, b->shadow_count, b->shadow_ray, b->occluded);
+    b->ray_count += b->shadow_count;
+    for (size_t i = 0; i < b->shadow_count; i++) {
+        const struct shadow *shadow = &b->shadow[i];
+        if (!b->occluded[i]) {
+            add(&radiance[shadow->path], shadow->gain);
             continue;
         }
-        struct bsdf bsdf = bsdf_make(v->base_color, m->roughness[v->segment],
-                                     m->specular[v->segment], v->wo.z);
-        struct bsdf_value f = bsdf_eval(&bsdf, v->wo, v->light);
-        rgb got = rgb_mul(v->beta, reflect(&f, v->base_color, v->incident));
-        radiance[v->path] = rgb_add(radiance[v->path], got);
+        struct vertex_block *v = &b->vertex[depth][shadow->vertex / LANES];
+        int lane = (int)(shadow->vertex % LANES);
+        lanes3_set(&v->incident, lane, (vec3){0.0f, 0.0f, 0.0f});
+        v->light_factor[lane] = 0.0f;
     }
 }
 
@@ -326,25 +352,17 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     }
     b->count = count;
     b->depth_count = 0;
-    size_t flights = count;
-    for (int depth = 0; depth < settings->max_depth && flights > 0; depth++) {
-        accel_intersect_many(world->accel, flights, b->ray, b->hit);
-        b->ray_count += flights;
-        size_t at = 0;
-        for (size_t i = 0; i < flights; i++) {
-            if (b->hit[i].triangle == ACCEL_NONE)
-                meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
-            else
-                meet_surface(b, world, at++, depth, &b->flight[i], &b->ray[i], &b->hit[i], radiance);
-        }
-        b->vertex_count[depth] = at;
+    b->flight_count = count;
+    for (int depth = 0; depth < settings->max_depth && b->flight_count > 0; depth++) {
+        if (b->tap)
+            b->tap(b->tap_user, false, b->flight_count, b->ray);
+        accel_intersect_many(world->accel, b->flight_count, b->ray, b->hit);
+        b->ray_count += b->flight_count;
+        shade_hits(b, world, settings, depth, radiance);
+        gather_light(b, world, depth, radiance);
         b->depth_count = depth + 1;
-        if (depth + 1 == settings->max_depth)
-            break;
-        size_t shadow_count;
-        flights = scatter(b, world, settings, depth, &shadow_count);
-        gather_light(b, world, depth, shadow_count, radiance);
     }
+    b->ended = b->depth_count == settings->max_depth;
     for (size_t i = 0; i < count; i++) {
         b->dropped[i] = !rgb_is_finite(radiance[i]);
         if (b->dropped[i]) {
@@ -354,75 +372,82 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     }
 }
 
-/* Adds f's derivative for light `light` from `wi`, times `adjoint`, to what is logged. */
-static void scatter_backward(const struct bsdf *bsdf, float specular, const struct vertex *v,
-                             vec3 wi, rgb light, rgb adjoint, rgb *d_base_color,
-                             struct gradient_segment *d) {
-    struct bsdf_derivative by = bsdf_backward(bsdf, specular, v->wo, wi);
-    rgb both = rgb_mul(adjoint, light);
-    *d_base_color = rgb_mad(*d_base_color, by.diffuse, both);
-    float sum = both.r + both.g + both.b;
-    float tinted = both.r * v->base_color.r + both.g * v->base_color.g + both.b * v->base_color.b;
-    d->d_roughness += (double)(tinted * by.diffuse_by_roughness + sum * by.specular_by_roughness);
-    d->d_specular += (double)(sum * by.specular_by_specular);
+static void log_emission(struct gradient_log *log, uint32_t segment, rgb amount) {
+    double *d = log->segment[segment].d_emission;
+    d[0] += (double)amount.r;
+    d[1] += (double)amount.g;
+    d[2] += (double)amount.b;
 }
 
-static void add_emission(struct gradient_segment *d, rgb amount) {
-    d->d_emission[0] += (double)amount.r;
-    d->d_emission[1] += (double)amount.g;
-    d->d_emission[2] += (double)amount.b;
+/* The last depth's vertices only emit. */
+static rgb end_backward(const struct vertex_block *v, int lane, rgb d_radiance, struct gradient_log *log) {
+    rgb adjoint = rgb_mul(d_radiance, lanes3_rgb(&v->beta, lane));
+    if (v->emission_weight[lane] > 0.0f)
+        log_emission(log, v->segment[lane], rgb_scale(adjoint, v->emission_weight[lane]));
+    return rgb_scale(lanes3_rgb(&v->emission, lane), v->emission_weight[lane]);
 }
 
-/* The derivatives at one vertex; returns L_k for the vertex before. */
-static rgb vertex_backward(struct vertex *v, const struct materials *m, rgb d_radiance,
-                           struct gradient_log *log, struct gradient_entry *entry) {
-    rgb adjoint = rgb_mul(d_radiance, v->beta);
-    struct gradient_segment *d = &log->segment[v->segment];
-    rgb out = rgb_scale(m->emission[v->segment], v->emission_weight);
-    add_emission(d, rgb_scale(adjoint, v->emission_weight));
-    rgb d_base_color = {0.0f, 0.0f, 0.0f};
-    float specular = m->specular[v->segment];
-    struct bsdf bsdf = bsdf_make(v->base_color, m->roughness[v->segment], specular, v->wo.z);
-    if (!rgb_is_black(v->incident)) {
-        struct bsdf_value f = bsdf_eval(&bsdf, v->wo, v->light);
-        out = rgb_add(out, reflect(&f, v->base_color, v->incident));
-        scatter_backward(&bsdf, specular, v, v->light, v->incident, adjoint, &d_base_color, d);
-        if (v->light_segment != LIGHT_ENVIRONMENT) {
-            rgb factor = rgb_scale(adjoint, v->light_factor);
-            add_emission(&log->segment[v->light_segment], reflect(&f, v->base_color, factor));
-        }
+/* Writes a lane's derivatives to the log. */
+static void log_lane(const struct vertex_block *v, const struct shade_derivative *d, int lane,
+                     struct gradient_log *log) {
+    struct gradient_segment *own = &log->segment[v->segment[lane]];
+    own->d_roughness += (double)d->d_roughness[lane];
+    own->d_specular += (double)d->d_specular[lane];
+    if (v->emission_weight[lane] > 0.0f)
+        log_emission(log, v->segment[lane], lanes3_rgb(&d->d_emission, lane));
+    if (v->light_factor[lane] > 0.0f && v->light_segment[lane] != LIGHT_ENVIRONMENT)
+        log_emission(log, v->light_segment[lane], lanes3_rgb(&d->d_light_emission, lane));
+    rgb d_base_color = lanes3_rgb(&d->d_base_color, lane);
+    if (rgb_is_black(d_base_color))
+        return;
+    log->entry[log->entry_count++] = (struct gradient_entry){
+        v->first_texel[lane],
+        {v->weight[0][lane], v->weight[1][lane], v->weight[2][lane], v->weight[3][lane]},
+        d_base_color};
+}
+
+static void backward_block(struct path_batch *b, int depth, size_t block, int count,
+                           const rgb *d_radiance, struct gradient_log *log) {
+    struct vertex_block *v = &b->vertex[depth][block];
+    struct shade_derivative *d = b->derivative;
+    bool ends = b->ended && depth == b->depth_count - 1;
+    for (int i = 0; i < count && !ends; i++)
+        lanes3_set_rgb(&d->d_radiance, i, d_radiance[v->path[i]]);
+    if (!ends)
+        shade_backward(v, d);
+    for (int i = 0; i < count; i++) {
+        uint32_t path = v->path[i];
+        if (b->dropped[path])
+            continue;
+        rgb out = ends ? end_backward(v, i, d_radiance[path], log) : lanes3_rgb(&d->out, i);
+        if (!ends)
+            log_lane(v, d, i, log);
+        if (depth > 0)
+            lanes3_set_rgb(&b->vertex[depth - 1][v->parent[i] / LANES].next,
+                           (int)(v->parent[i] % LANES), out);
     }
-    if (v->scale > 0.0f && !rgb_is_black(v->next)) {
-        struct bsdf_value f = bsdf_eval(&bsdf, v->wo, v->wi);
-        rgb light = rgb_scale(v->next, v->scale);
-        out = rgb_add(out, reflect(&f, v->base_color, light));
-        scatter_backward(&bsdf, specular, v, v->wi, light, adjoint, &d_base_color, d);
-    }
-    *entry = v->taps;
-    entry->d = d_base_color;
-    return out;
 }
 
 void path_batch_backward(struct path_batch *b, const struct world *world, const rgb *d_radiance,
                          struct gradient_log *log) {
+    (void)world; /* all that it has to say was kept with the vertices */
     for (int depth = b->depth_count - 1; depth >= 0; depth--) {
-        struct gradient_entry *entry = gradient_log_reserve(log, b->vertex_count[depth]);
-        size_t used = 0;
-        for (size_t i = 0; i < b->vertex_count[depth]; i++) {
-            struct vertex *v = &b->vertex[depth][i];
-            if (b->dropped[v->path])
-                continue;
-            rgb out = vertex_backward(v, world->materials, d_radiance[v->path], log, &entry[used]);
-            if (depth > 0)
-                b->vertex[depth - 1][v->parent].next = out;
-            if (!rgb_is_black(entry[used].d))
-                used++;
-        }
-        log->entry_count += used;
+        size_t count = b->vertex_count[depth];
+        gradient_log_reserve(log, count);
+        for (size_t first = 0; first < count; first += LANES)
+            backward_block(b, depth, first / LANES, (int)(count - first < LANES ? count - first : LANES),
+                           d_radiance, log);
     }
 }
 
 void path_batch_counts(const struct path_batch *b, uint64_t *ray_count, uint64_t *dropped_count) {
     *ray_count = b->ray_count;
     *dropped_count = b->dropped_count;
+}
+
+void path_batch_set_tap(struct path_batch *b,
+                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray),
+                        void *user) {
+    b->tap = tap;
+    b->tap_user = user;
 }

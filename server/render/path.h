@@ -9,6 +9,7 @@
 #ifndef UNBAKE_RENDER_PATH_H
 #define UNBAKE_RENDER_PATH_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -51,6 +52,13 @@ void path_batch_trace(struct path_batch *batch, const struct world *world,
  * in between. */
 void path_batch_backward(struct path_batch *batch, const struct world *world,
                          const rgb *d_radiance, struct gradient_log *log);
+
+/* Calls tap(user, shadow, count, ray) before each group of rays is traced; shadow tells rays that
+ * only ask whether anything is in the way. For benches that measure the same rays elsewhere. */
+struct accel_ray;
+void path_batch_set_tap(struct path_batch *batch,
+                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray),
+                        void *user);
 
 /* Rays traced and non-finite samples dropped through this batch since it was made. */
 void path_batch_counts(const struct path_batch *batch, uint64_t *ray_count, uint64_t *dropped_count);

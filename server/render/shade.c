@@ -1,0 +1,230 @@
+/* shade.c -- see shade.h. What each quantity means is told in lanes.h and path.c. */
+#include "server/render/shade.h"
+
+#include "server/render/accel.h"
+#include "server/render/bsdf.h"
+#include "server/render/sampler.h"
+
+#define MIN_CHANCE 0.05f
+#define MAX_CHANCE 0.95f
+
+/* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
+enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX };
+
+/* Sanitizers cannot run the resolver that picks a clone. */
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define KERNEL __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define KERNEL
+#endif
+
+#define FOR_LANES _Pragma("GCC ivdep") for (int i = 0; i < LANES; i++)
+
+static inline float power_heuristic(float a, float b) {
+    return a * a / (a * a + b * b);
+}
+
+/* clampf in a form that stays free of branches. */
+static inline float clamp_flat(float a, float least, float most) {
+    float up = a > least ? a : least;
+    return up < most ? up : most;
+}
+
+/* accel_offset without calls. */
+static inline vec3 offset(vec3 p, vec3 normal, vec3 direction) {
+    float x = p.x < 0.0f ? -p.x : p.x, y = p.y < 0.0f ? -p.y : p.y, z = p.z < 0.0f ? -p.z : p.z;
+    float size = x > y ? x : y;
+    size = size > z ? size : z;
+    float distance = (size + 1e-2f) * 0x1p-16f;
+    float side = vec3_dot(normal, direction) < 0.0f ? -distance : distance;
+    return vec3_mad(p, side, normal);
+}
+
+KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s,
+                          uint32_t width, uint32_t height) {
+    float right = (float)width - 1.0f, bottom = (float)height - 1.0f;
+    int stride = (int)width;
+    FOR_LANES {
+        vec3 direction = lanes3_get(&s->direction, i), normal = lanes3_get(&s->normal, i);
+        vec3 viewer = vec3_neg(direction);
+        float facing = vec3_dot(normal, viewer);
+        float distance = s->distance_m[i], flat = s->flat[i], pdf = s->pdf[i];
+        float light_pdf = s->area_density[i] * distance * distance / bsdf_max(facing, 1e-6f);
+        float weight = power_heuristic(pdf, light_pdf);
+        weight = pdf > 0.0f ? weight : 1.0f;
+        v->emission_weight[i] = facing > 0.0f ? weight : 0.0f;
+
+        /* The distance's rounding is taken out along the normal. */
+        vec3 p = vec3_mad(lanes3_get(&s->origin, i), distance, direction);
+        lanes3_set(&s->point, i, vec3_mad(p, s->plane[i] - vec3_dot(normal, p), normal));
+
+        /* The interpolated normal, turned to the viewer's side (materials are two-sided). */
+        float b1 = s->b1[i], b2 = s->b2[i], b0 = 1.0f - b1 - b2;
+        vec3 n = vec3_scale(lanes3_get(&s->shading[0], i), b0);
+        n = vec3_mad(n, b1, lanes3_get(&s->shading[1], i));
+        n = vec3_mad(n, b2, lanes3_get(&s->shading[2], i));
+        float length2 = vec3_dot(n, n);
+        float over = 1.0f / sqrtf(bsdf_max(length2, 1e-12f));
+        bool smooth = length2 > 1e-6f && flat == 0.0f;
+        n = (vec3){smooth ? n.x * over : normal.x, smooth ? n.y * over : normal.y,
+                   smooth ? n.z * over : normal.z};
+        float side = vec3_dot(n, viewer) < 0.0f ? -1.0f : 1.0f;
+        n = vec3_scale(n, side);
+        lanes3_set(&s->frame_normal, i, n);
+        vec3 a, b;
+        vec3_frame(n, &a, &b);
+        vec3 wo = {vec3_dot(a, viewer), vec3_dot(b, viewer), bsdf_max(vec3_dot(n, viewer), 1e-6f)};
+        lanes3_set(&v->wo, i, wo);
+
+        /* As in texture_taps. */
+        float x = b0 * s->corner_x[0][i] + b1 * s->corner_x[1][i] + b2 * s->corner_x[2][i];
+        float y = b0 * s->corner_y[0][i] + b1 * s->corner_y[1][i] + b2 * s->corner_y[2][i];
+        x = clamp_flat(x - 0.5f, 0.0f, right);
+        y = clamp_flat(y - 0.5f, 0.0f, bottom);
+        int column = (int)x, row = (int)y;
+        s->column[i] = x - (float)column;
+        s->row[i] = y - (float)row;
+        v->first_texel[i] = (uint32_t)(row * stride + column);
+    }
+}
+
+KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
+    uint32_t pair = (uint32_t)(depth + 1) * PAIRS_PER_VERTEX;
+    FOR_LANES {
+        uint32_t key = s->key[i], sample = s->sample[i];
+        vec2 choices = sampler_pair(key, sample, pair + PAIR_CHOICES);
+        vec2 light = sampler_pair(key, sample, pair + PAIR_LIGHT);
+        vec2 way = sampler_pair(key, sample, pair + PAIR_DIRECTION);
+        s->pick[i] = choices.x;
+        s->lobe[i] = choices.y;
+        s->light_u[i] = light.x;
+        s->light_v[i] = light.y;
+        s->way_u[i] = way.x;
+        s->way_v[i] = way.y;
+        s->roulette[i] = sampler_number(key, sample, pair + PAIR_ROULETTE);
+    }
+}
+
+KERNEL void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict s) {
+    FOR_LANES {
+        float sum = s->filter_sum[i];
+        float over = sum > 0.0f ? 1.0f / bsdf_max(sum, 1e-20f) : 0.0f;
+        v->base_color.x[i] *= over;
+        v->base_color.y[i] *= over;
+        v->base_color.z[i] *= over;
+        v->weight[0][i] = s->filter[0][i] * over;
+        v->weight[1][i] = s->filter[1][i] * over;
+        v->weight[2][i] = s->filter[2][i] * over;
+        v->weight[3][i] = s->filter[3][i] * over;
+    }
+}
+
+KERNEL void shade_light(struct shade_block *restrict s) {
+    FOR_LANES {
+        float u = sqrtf(s->light_u[i]), w = s->light_v[i];
+        vec3 normal = lanes3_get(&s->light_normal, i), point = lanes3_get(&s->point, i);
+        vec3 on = vec3_mad(lanes3_get(&s->light_corner, i), u * (1.0f - w), lanes3_get(&s->light_edge1, i));
+        on = vec3_mad(on, u * w, lanes3_get(&s->light_edge2, i));
+        vec3 to = vec3_sub(on, point);
+        float distance2 = vec3_dot(to, to);
+        float over = 1.0f / sqrtf(bsdf_max(distance2, 1e-30f));
+        vec3 direction = vec3_scale(to, over);
+        float cosine = -vec3_dot(direction, normal);
+        lanes3_set(&s->light_direction, i, direction);
+        float pdf = s->light_density[i] * distance2 / bsdf_max(cosine, 1e-6f);
+        s->light_pdf[i] = cosine > 0.0f ? pdf : 0.0f;
+
+        vec3 origin = offset(point, lanes3_get(&s->normal, i), direction);
+        vec3 ray = vec3_sub(offset(on, normal, vec3_neg(direction)), origin);
+        float length = sqrtf(vec3_dot(ray, ray));
+        lanes3_set(&s->shadow_origin, i, origin);
+        lanes3_set(&s->shadow_direction, i, vec3_scale(ray, 1.0f / bsdf_max(length, 1e-20f)));
+        s->shadow_far[i] = length;
+    }
+}
+
+static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
+    return (rgb){(base_color.r * f.diffuse + f.specular) * light.r,
+                 (base_color.g * f.diffuse + f.specular) * light.g,
+                 (base_color.b * f.diffuse + f.specular) * light.b};
+}
+
+KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool roulette) {
+    float least = roulette ? MIN_CHANCE : 1.0f, most = roulette ? MAX_CHANCE : 1.0f;
+    FOR_LANES {
+        vec3 n = lanes3_get(&s->frame_normal, i), a, b;
+        vec3_frame(n, &a, &b);
+        rgb base_color = lanes3_rgb(&v->base_color, i), beta = lanes3_rgb(&v->beta, i);
+        vec3 wo = lanes3_get(&v->wo, i);
+        struct bsdf bsdf = bsdf_make(base_color, v->roughness[i], v->specular[i], wo.z);
+
+        vec3 to = lanes3_get(&s->light_direction, i);
+        vec3 light = {vec3_dot(a, to), vec3_dot(b, to), vec3_dot(n, to)};
+        struct bsdf_value f = bsdf_eval(&bsdf, wo, light);
+        float light_pdf = s->light_pdf[i];
+        bool wanted = light_pdf > 0.0f && f.pdf > 0.0f;
+        float factor = wanted ? power_heuristic(light_pdf, f.pdf) / bsdf_max(light_pdf, 1e-30f) : 0.0f;
+        rgb incident = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
+        lanes3_set(&v->light, i, light);
+        lanes3_set_rgb(&v->incident, i, incident);
+        v->light_factor[i] = factor;
+        lanes3_set_rgb(&s->gain, i, rgb_mul(beta, reflect(f, base_color, incident)));
+        s->shadow_wanted[i] = wanted ? 1.0f : 0.0f;
+
+        vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->way_u[i], s->way_v[i]);
+        f = bsdf_eval(&bsdf, wo, wi);
+        float scale = f.pdf > 0.0f ? 1.0f / bsdf_max(f.pdf, 1e-30f) : 0.0f;
+        rgb onward = rgb_scale(reflect(f, base_color, beta), scale);
+        float largest = bsdf_max(onward.r, bsdf_max(onward.g, onward.b));
+        float chance = clamp_flat(largest, least, most), over = 1.0f / chance;
+        bool open = f.pdf > 0.0f && s->roulette[i] < chance;
+        v->scale[i] = open ? scale * over : 0.0f;
+        lanes3_set(&v->wi, i, wi);
+        vec3 way = vec3_mad(vec3_mad(vec3_scale(a, wi.x), wi.y, b), wi.z, n);
+        lanes3_set(&s->way, i, way);
+        lanes3_set(&s->way_origin, i, offset(lanes3_get(&s->point, i), lanes3_get(&s->normal, i), way));
+        lanes3_set_rgb(&s->way_beta, i, rgb_scale(onward, over));
+        s->way_pdf[i] = f.pdf;
+        s->way_open[i] = open ? 1.0f : 0.0f;
+    }
+}
+
+KERNEL void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d) {
+    FOR_LANES {
+        rgb adjoint = rgb_mul(lanes3_rgb(&d->d_radiance, i), lanes3_rgb(&v->beta, i));
+        rgb base_color = lanes3_rgb(&v->base_color, i);
+        vec3 wo = lanes3_get(&v->wo, i);
+        float specular = v->specular[i];
+        struct bsdf bsdf = bsdf_make(base_color, v->roughness[i], specular, wo.z);
+
+        rgb out = rgb_scale(lanes3_rgb(&v->emission, i), v->emission_weight[i]);
+        lanes3_set_rgb(&d->d_emission, i, rgb_scale(adjoint, v->emission_weight[i]));
+
+        /* Both terms that pass through the reflection: the light sample's and the path's. */
+        rgb from_light = lanes3_rgb(&v->incident, i);
+        rgb from_way = rgb_scale(lanes3_rgb(&v->next, i), v->scale[i]);
+        struct bsdf_derivative to_light = bsdf_backward(&bsdf, specular, wo, lanes3_get(&v->light, i));
+        struct bsdf_derivative to_way = bsdf_backward(&bsdf, specular, wo, lanes3_get(&v->wi, i));
+        struct bsdf_value light_value = {to_light.diffuse, to_light.specular, 0.0f};
+        struct bsdf_value way_value = {to_way.diffuse, to_way.specular, 0.0f};
+        out = rgb_add(out, reflect(light_value, base_color, from_light));
+        out = rgb_add(out, reflect(way_value, base_color, from_way));
+        lanes3_set_rgb(&d->out, i, out);
+        lanes3_set_rgb(&d->d_light_emission, i,
+                       reflect(light_value, base_color, rgb_scale(adjoint, v->light_factor[i])));
+
+        rgb light = rgb_mul(adjoint, from_light), way = rgb_mul(adjoint, from_way);
+        lanes3_set_rgb(&d->d_base_color, i,
+                       rgb_mad(rgb_scale(light, to_light.diffuse), to_way.diffuse, way));
+        float light_sum = light.r + light.g + light.b, way_sum = way.r + way.g + way.b;
+        rgb tinted_light = rgb_mul(light, base_color), tinted_way = rgb_mul(way, base_color);
+        float light_tinted = tinted_light.r + tinted_light.g + tinted_light.b;
+        float way_tinted = tinted_way.r + tinted_way.g + tinted_way.b;
+        d->d_roughness[i] = light_tinted * to_light.diffuse_by_roughness +
+                            light_sum * to_light.specular_by_roughness +
+                            way_tinted * to_way.diffuse_by_roughness +
+                            way_sum * to_way.specular_by_roughness;
+        d->d_specular[i] =
+            light_sum * to_light.specular_by_specular + way_sum * to_way.specular_by_specular;
+    }
+}

@@ -1,0 +1,31 @@
+/* shade.h -- the arithmetic of path.c: loops over the lanes of a block, compiled for several
+ * instruction sets of which the best is chosen when the program starts. All of them do the same
+ * IEEE operations in the same order: results do not depend on the choice. */
+#ifndef UNBAKE_RENDER_SHADE_H
+#define UNBAKE_RENDER_SHADE_H
+
+#include <stdbool.h>
+
+#include "server/render/lanes.h"
+
+/* From the hit and the triangle: point, frame, wo, weight of the emission, place in the texture of
+ * width x height texels. */
+void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
+                   uint32_t height);
+
+/* Random numbers of the vertex that ends segment number `depth` (0: the camera's). */
+void shade_numbers(struct shade_block *restrict s, int depth);
+
+/* From the texel values gathered: base colour and weights. */
+void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict s);
+
+/* From the chosen triangles: direction, distance and density of the light samples. */
+void shade_light(struct shade_block *restrict s);
+
+/* Reflection towards the light samples and on along the path. */
+void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool roulette);
+
+/* Derivatives of everything at a vertex, and the radiance that leaves it. */
+void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d);
+
+#endif
