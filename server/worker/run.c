@@ -2,12 +2,14 @@
  * outputs, and what is said of them.
  *
  * 1. A file is announced after it is whole under its final name, with the hash of what is there.
- * 2. Checkpoints come every checkpoint_interval_sec, but never take more than CHECKPOINT_SHARE of
- *    the time: where the disk is slow the interval grows. Previews likewise.
+ * 2. Checkpoints come every checkpoint_interval_sec. Where they would take more than
+ *    CHECKPOINT_SHARE of the time (a slow disk) the interval grows, at most CHECKPOINT_STRETCH
+ *    times: what a crash costs stays bounded. Previews likewise, without a bound.
  * 3. SIGTERM, or a daemon that is gone, stops the work at its next step, after a checkpoint.
  *    Signals are blocked and asked for where the engine asks (no handlers, no globals). */
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -28,6 +30,7 @@
 #include "server/worker/tasks.h"
 
 #define CHECKPOINT_SHARE 0.02
+#define CHECKPOINT_STRETCH 5.0
 #define PREVIEW_SHARE 0.05
 #define PROGRESS_INTERVAL_SEC 0.25
 #define METRIC_INTERVAL_SEC 1.0 /* of one series */
@@ -166,9 +169,9 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
     enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
     if (status != STATUS_OK)
         return status;
-    double wait = cost.seconds / CHECKPOINT_SHARE;
-    if (wait < run->order->checkpoint_interval_sec)
-        wait = run->order->checkpoint_interval_sec;
+    double interval = run->order->checkpoint_interval_sec;
+    double wait = fmin(fmax(cost.seconds / CHECKPOINT_SHARE, interval),
+                       interval * CHECKPOINT_STRETCH);
     run->next_checkpoint = now_sec() + wait;
     progress_checkpoint(run->progress, iteration, cost.written_bytes, cost.seconds);
     return STATUS_OK;
