@@ -156,6 +156,20 @@ static bool is_apart(const struct camera *camera, const struct camera *others, s
     return true;
 }
 
+/* Before the tests are chosen: counts from 0 again, candidates near a training camera set aside
+ * where enough others remain. */
+static void start_over(struct chooser *c, const struct camera *train, size_t train_count,
+                       size_t wanted) {
+    size_t free_count = CANDIDATES - train_count;
+    memset(c->count, 0, POINTS * sizeof *c->count);
+    for (size_t i = 0; i < CANDIDATES && free_count > wanted; i++) {
+        if (c->taken[i] || is_apart(&c->candidate[i], train, train_count))
+            continue;
+        c->taken[i] = true;
+        free_count--;
+    }
+}
+
 void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
                        size_t train_count, size_t test_count, uint64_t seed,
                        struct camera *camera) {
@@ -174,16 +188,9 @@ void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
     }
     for (size_t i = 0; i < train_count; i++)
         camera[i] = c.candidate[take_best(&c)];
-    /* Tests in the candidates' own, random order; the second pass takes near ones if it must. */
-    size_t done = train_count, wanted = train_count + test_count;
-    for (int pass = 0; pass < 2; pass++) {
-        for (size_t i = 0; i < CANDIDATES && done < wanted; i++) {
-            if (c.taken[i] || (pass == 0 && !is_apart(&c.candidate[i], camera, train_count)))
-                continue;
-            c.taken[i] = true;
-            camera[done++] = c.candidate[i];
-        }
-    }
+    start_over(&c, camera, train_count, test_count);
+    for (size_t i = 0; i < test_count; i++)
+        camera[train_count + i] = c.candidate[take_best(&c)];
     mem_free(c.count);
     mem_free(c.taken);
     mem_free(c.sees);

@@ -31,7 +31,7 @@ static const char style[] =
     "text-align:center;font-size:.82rem;color:var(--soft);margin-bottom:.3rem}"
     "table{border-collapse:collapse;width:100%;font-size:.87rem;font-variant-numeric:tabular-nums}"
     "th,td{text-align:left;padding:.25rem .7rem .25rem 0;border-bottom:1px solid var(--line);"
-    "font-weight:400;vertical-align:top;overflow-wrap:anywhere}"
+    "font-weight:400;vertical-align:top;overflow-wrap:break-word}"
     ".files th{white-space:nowrap}tr:last-child>*{border-bottom:0}td.n,th.n{text-align:right}"
     ".swatch{display:inline-block;width:2.2em;height:1em;border-radius:3px;vertical-align:-.12em;"
     "border:1px solid var(--line);margin-right:.4em}"
@@ -66,7 +66,7 @@ static void put_key(struct buf *out, const char *key) {
 }
 
 static void put_number(struct buf *out, double value) {
-    if (value == floor(value) && fabs(value) < 1e15)
+    if ((value == floor(value) || fabs(value) >= 1000.0) && fabs(value) < 1e15)
         buf_printf(out, "%.0f", value);
     else
         buf_printf(out, "%.4g", value);
