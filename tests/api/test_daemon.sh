@@ -65,9 +65,10 @@ background=
 for i in $(seq 20); do
     curl -sN -m 60 "$url/v1/jobs/${job:-1}/events" >"$work/stream$i" 2>/dev/null & background="$background $!"
 done
-curl -s -m 60 --limit-rate 2k -T "$work/junk" -X POST "$url/v1/scenes" >/dev/null 2>&1 & background="$background $!"
+curl -s -m 60 --limit-rate 2k -T "$work/junk" -X POST "$url/v1/scenes" >/dev/null 2>&1 & upload=$!
 sleep 0.5
 stop_daemon
+kill "$upload" # it would go on waiting for its rate
 equal "$daemon_status" 0 "exit status after SIGTERM"
 tail -n 1 "$work/log" | grep -q 'stopped$' || fail "the log does not end with 'stopped'"
 for pid in $background; do wait "$pid"; done

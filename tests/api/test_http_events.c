@@ -118,7 +118,7 @@ static void check_ndjson(struct rig *rig) {
     buf_release(&reply);
 }
 
-#define STORM_EVENTS 1500
+#define STORM_EVENTS 400
 
 struct publisher {
     struct rig *rig;
