@@ -118,7 +118,7 @@ static void check_ndjson(struct rig *rig) {
     buf_release(&reply);
 }
 
-#define STORM_EVENTS 400
+#define STORM_EVENTS 1000
 
 struct publisher {
     struct rig *rig;
@@ -176,7 +176,8 @@ static void check_reconnects(struct rig *rig) {
         int fd = open_stream(rig, p.job, "", fields);
         rig_receive(fd, &reply, "\r\n\r\n");
         /* Some more, a different amount each time; a late one reads to the end. */
-        size_t enough = reply.length + (size_t)(connections * 977 % 9000);
+        status = rig_status(&reply);
+        size_t enough = reply.length + (status == 200 ? (size_t)(connections * 977 % 9000) : 0);
         char chunk[4096];
         ssize_t got = 1;
         while (got > 0 && reply.length < enough && !strstr(buf_text(&reply), "\r\n0\r\n\r\n")) {
@@ -184,7 +185,6 @@ static void check_reconnects(struct rig *rig) {
             buf_append(&reply, chunk, got > 0 ? (size_t)got : 0);
         }
         close(fd);
-        status = rig_status(&reply);
         char *text = unchunk(&reply);
         last = follow(text, last, &metrics);
         mem_free(text);
