@@ -41,7 +41,7 @@ static const struct command table[] = {
      "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n",
      "  unbake watch last\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
      1, 1, watch_options, watch_run},
-    {"logs", "JOB", "print what the job's workers wrote", "",
+    {"logs", "JOB", "print what the job's log says so far", "",
      "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options, logs_run},
     {"get", "JOB [NAME...]", "fetch a job's outputs, also while it runs",
      "Fetches all outputs, or those named; a NAME may be a pattern such as 'preview/*'. Files that\n"

@@ -33,7 +33,8 @@ struct watch {
     struct client *client;
     struct view view;
     struct sse sse;
-    bool only_log;      /* `logs --follow` */
+    bool only_log;      /* `logs` */
+    bool only_past;     /* ends with what is stored by now: `logs` without --follow */
     bool connected;     /* something came over the present connection */
     double heard_at;    /* when the last event came */
     double progress_at; /* when the last progress came */
@@ -59,7 +60,8 @@ static void show_line(struct watch *w) {
     buf_release(&line);
 }
 
-/* On a terminal: as often as eyes want. Else: what is new at once, figures now and then. */
+/* On a terminal: as often as eyes want. Else: what is new at once, and figures now and then
+ * while there are new ones. */
 static void show(struct watch *w, bool urgent) {
     struct client *c = w->client;
     if (c->json || c->quiet || w->only_log || !w->view.state[0] || view_is_over(&w->view))
@@ -74,7 +76,8 @@ static void show(struct watch *w, bool urgent) {
     snprintf(state, sizeof state, "%s %s %s", w->view.state, w->view.stage, w->view.wanted);
     bool changed = strcmp(state, w->shown_state) != 0;
     memcpy(w->shown_state, state, sizeof state);
-    if (changed || (since >= PLAIN_SEC && !urgent))
+    bool moves = strcmp(w->view.state, JOB_STATE_RUNNING) == 0;
+    if (changed || (moves && since >= PLAIN_SEC && !urgent))
         show_line(w);
 }
 
@@ -148,7 +151,8 @@ static void on_tick(void *user, double sent) {
 
 static enum status follow_once(struct watch *w, struct reply *reply, struct error *err) {
     char path[64], last[SSE_ID_MAX + 20] = "";
-    snprintf(path, sizeof path, "/v1/jobs/%lld/events", (long long)w->view.job);
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events%s", (long long)w->view.job,
+             w->only_past ? "?follow=0" : "");
     if (w->sse.last_id[0])
         snprintf(last, sizeof last, "Last-Event-ID: %s", w->sse.last_id);
     struct request_call call = {
@@ -165,7 +169,7 @@ static enum status follow_once(struct watch *w, struct reply *reply, struct erro
     return request_run(w->client->request, &call, reply, err);
 }
 
-/* Follows the stream until the job is over. */
+/* Follows the stream until the job, or else the past, is over. */
 static enum status follow(struct watch *w, struct reply *reply, struct error *err) {
     struct client *c = w->client;
     bool ever = false, told = false;
@@ -174,7 +178,7 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
         enum status status = follow_once(w, reply, err);
         if (status != STATUS_OK && status != STATUS_UNAVAILABLE)
             return status;
-        if (reply->code == 204 || view_is_over(&w->view))
+        if (reply->code == 204 || view_is_over(&w->view) || (w->only_past && status == STATUS_OK))
             return STATUS_OK;
         if (w->connected) {
             ever = true;
@@ -251,18 +255,20 @@ static int interrupted(struct client *c, int64_t job) {
     return client_fail(c, NULL, &err);
 }
 
-static int watch_events(struct client *c, int64_t job, bool all, bool only_log) {
-    struct watch w = {.client = c, .only_log = only_log};
+/* From the job's first event on if `all`, else from now on; takes the fields of *w but for
+ * only_log and only_past. */
+static int watch_events(struct watch *w, struct client *c, int64_t job, bool all) {
     struct reply reply;
     struct error err;
     int code = CLIENT_OK;
-    view_init(&w.view, job);
-    sse_init(&w.sse, on_event, &w);
+    w->client = c;
+    view_init(&w->view, job);
+    sse_init(&w->sse, on_event, w);
     reply_init(&reply);
     if (all)
-        snprintf(w.sse.last_id, sizeof w.sse.last_id, "0");
-    enum status status = follow(&w, &reply, &err);
-    if (status == STATUS_OK && !only_log) {
+        snprintf(w->sse.last_id, sizeof w->sse.last_id, "0");
+    enum status status = follow(w, &reply, &err);
+    if (status == STATUS_OK && !w->only_log) {
         status = client_job_get(c, job, &reply, &err);
         if (status == STATUS_OK && !c->json && !c->quiet)
             print_outcome(c, reply.json);
@@ -273,13 +279,13 @@ static int watch_events(struct client *c, int64_t job, bool all, bool only_log) 
         code = interrupted(c, job);
     else if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
-    sse_release(&w.sse);
+    sse_release(&w->sse);
     reply_release(&reply);
     return code;
 }
 
 int watch_job(struct client *c, int64_t job, bool all) {
-    return watch_events(c, job, all, false);
+    return watch_events(&(struct watch){0}, c, job, all);
 }
 
 int watch_run(struct client *c, const struct options *o) {
@@ -295,22 +301,26 @@ int watch_run(struct client *c, const struct options *o) {
 
 /* --- logs ---------------------------------------------------------------------------------- */
 
-static enum status print_whole_log(struct client *c, int64_t job, struct reply *reply,
-                                   struct error *err) {
+/* What the job's processes wrote to their standard error: mostly nothing, and the last words of
+ * those that crashed. */
+static enum status print_stderr(struct client *c, int64_t job, struct reply *reply,
+                                struct error *err) {
     char path[80];
     snprintf(path, sizeof path, "/v1/jobs/%lld/log?bytes=1048576", (long long)job);
     enum status status = request_run(c->request, &(struct request_call){.path = path}, reply, err);
-    if (status != STATUS_OK)
+    const char *text = buf_text(&reply->body);
+    if (status != STATUS_OK || !*text)
         return status;
     if (c->json) {
-        cJSON *object = cJSON_CreateObject();
-        json_add_int(object, "job", job);
-        json_add_string(object, "log", buf_text(&reply->body));
-        client_print_json(c, object);
-        cJSON_Delete(object);
+        cJSON *data = cJSON_CreateObject();
+        json_add_string(data, "text", text);
+        print_event(c, "stderr", data, "0");
+        cJSON_Delete(data);
         return STATUS_OK;
     }
-    for (const char *at = buf_text(&reply->body); *at;) {
+    fprintf(c->out.out, "%s--- standard error of its processes:%s\n",
+            terminal_colour(&c->out, COLOUR_DIM), terminal_colour(&c->out, COLOUR_NONE));
+    for (const char *at = text; *at;) {
         struct buf line;
         size_t length = strcspn(at, "\n");
         char *raw = mem_strndup(at, length);
@@ -325,19 +335,15 @@ static enum status print_whole_log(struct client *c, int64_t job, struct reply *
 }
 
 int logs_run(struct client *c, const struct options *o) {
+    struct watch w = {.only_log = true, .only_past = !options_flag(o, "follow")};
     struct reply reply;
     struct error err;
     int64_t job;
-    int code = CLIENT_OK;
     reply_init(&reply);
     enum status status = client_job_id(c, o->word[0], &job, &reply, &err);
-    bool follow_it = options_flag(o, "follow");
-    if (status == STATUS_OK && !follow_it)
-        status = print_whole_log(c, job, &reply, &err);
-    if (status != STATUS_OK)
+    int code = status == STATUS_OK ? watch_events(&w, c, job, true) : client_fail(c, &reply, &err);
+    if (code == CLIENT_OK && print_stderr(c, job, &reply, &err) != STATUS_OK)
         code = client_fail(c, &reply, &err);
-    else if (follow_it)
-        code = watch_events(c, job, true, true);
     reply_release(&reply);
     return code;
 }

@@ -29,6 +29,7 @@ struct subscriber {
     struct api *api;
     int64_t job_id;
     bool is_ndjson;
+    bool is_past;         /* only what is stored by now: ?follow=0 */
     int64_t sent_id;      /* events up to here were rendered */
     struct buf text;      /* rendered, not yet read */
     size_t text_read;
@@ -129,7 +130,7 @@ static void render_snapshot(struct subscriber *s, const struct job *job) {
 }
 
 /* Renders what the database has after sent_id; sets has_ended after the last event of a job that
- * is in a terminal state, and when the job is gone. */
+ * is in a terminal state or that is not to be followed, and when the job is gone. */
 static void fetch(struct subscriber *s) {
     struct batch batch = {s, 0};
     struct store *store = s->api->store;
@@ -147,7 +148,7 @@ static void fetch(struct subscriber *s) {
         pthread_mutex_lock(&s->api->hub->mutex);
         s->is_dirty = true;
         pthread_mutex_unlock(&s->api->hub->mutex);
-    } else if (is_terminal) {
+    } else if (is_terminal || s->is_past) {
         s->has_ended = true;
     }
 }
@@ -220,13 +221,15 @@ static void subscriber_close(struct stream *base) {
     mem_free(s);
 }
 
-static struct stream *subscribe(struct api *api, const struct job *job, int64_t after, bool is_ndjson) {
+static struct stream *subscribe(struct api *api, const struct job *job, int64_t after, bool is_ndjson,
+                                bool is_past) {
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
     s->base.close = subscriber_close;
     s->api = api;
     s->job_id = job->id;
     s->is_ndjson = is_ndjson;
+    s->is_past = is_past;
     s->sent_id = after;
     s->is_dirty = true;
     s->last_sec = guard_now();
@@ -259,13 +262,16 @@ static enum status start_id(struct api *api, const struct request *r, int64_t jo
 }
 
 struct response *events_get(struct api *api, struct request *r) {
-    const char *accept = request_field(r, "Accept");
+    const char *accept = request_field(r, "Accept"), *follow = target_query(&r->target, "follow");
+    int64_t follows = 1;
     bool is_ndjson = accept && field_accepts(accept, MIME_NDJSON), is_resumed, has_more = false;
     int64_t id, after = 0;
     struct error err;
     struct job job;
     if (!field_number(r->target.segments[2], 1, INT64_MAX, &id))
         return problem(r, 404, "\"%.80s\" is no job's number", r->target.segments[2]);
+    if (follow && !field_number(follow, 0, 1, &follows))
+        return problem(r, 400, "follow must be 0 or 1");
     enum status status = start_id(api, r, id, &after, &is_resumed, &err);
     if (status == STATUS_INPUT)
         return problem(r, 400, "%s", err.message);
@@ -289,7 +295,7 @@ struct response *events_get(struct api *api, struct request *r) {
         response_field(reply, "Cache-Control", "no-store");
         response_field(reply, "X-Accel-Buffering", "no"); /* nginx: pass it on at once */
         if (!r->is_head)
-            reply->stream = subscribe(api, &job, after, is_ndjson);
+            reply->stream = subscribe(api, &job, after, is_ndjson, !follows);
     }
     job_release(&job);
     return reply;

@@ -32,7 +32,7 @@ static const struct route table[] = {
     {METHOD_POST, "/v1/jobs/{job}/pause", jobs_pause, 0, true, ""},
     {METHOD_POST, "/v1/jobs/{job}/resume", jobs_resume, 0, true, ""},
     {METHOD_POST, "/v1/jobs/{job}/retry", jobs_retry, 0, true, ""},
-    {METHOD_GET, "/v1/jobs/{job}/events", events_get, 0, false, "after"},
+    {METHOD_GET, "/v1/jobs/{job}/events", events_get, 0, false, "after follow"},
     {METHOD_GET, "/v1/jobs/{job}/log", jobs_log, 0, false, "bytes"},
     {METHOD_GET, "/v1/jobs/{job}/outputs", outputs_list, 0, false, ""},
     {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", outputs_get, 0, true, ""},

@@ -46,7 +46,7 @@ start_daemon() {
     "$build/unbaked" --data "$data" --listen 127.0.0.1:0 --port-file "$work/port" --set min_free_mib=1 \
         "$@" >"$work/stdout" 2>>"$work/log" &
     daemon_pid=$!
-    if ! wait_for 20 test -s "$work/port"; then
+    if ! wait_for 60 test -s "$work/port"; then
         cat "$work/log"
         exit 1
     fi

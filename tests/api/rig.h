@@ -67,7 +67,7 @@ static inline int rig_connect(const struct rig *rig) {
     struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(listener_port(rig->listener)),
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    struct timeval patience = {.tv_sec = 20};
+    struct timeval patience = {.tv_sec = 60};
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     if (connect(fd, (struct sockaddr *)&to, sizeof to) != 0) {
         perror("connect");

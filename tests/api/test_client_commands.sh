@@ -49,6 +49,8 @@ equal "$(jq -s 'map(select(.event == "state" and .data.state == "succeeded")) | 
 equal "$(jq -s '.[0].name' <<<"$out")" '"packed"'
 run 0 submit --scene "${scene:0:10}" $quick --watch -q
 equal "$out" 4
+run 0 submit "$work/room" --set seed=9007199254740991 --dry-run --json
+has "$out" '"seed":9007199254740991'
 
 # --- watch, logs -----------------------------------------------------------------------------------
 
@@ -56,8 +58,11 @@ run 0 watch 1
 has "$out" "job 1 succeeded"
 run 0 watch 1 --json --all
 equal "$(jq -s 'map(.event) | contains(["state", "progress", "metric", "output", "log"])' <<<"$out")" true
+run 0 logs 1
+has "$out" "info: "
+[[ $out != *"standard error"* ]] || fail "the worker wrote to its standard error: $out"
 run 0 logs 1 --json
-so '.job == 1 and (.log | type) == "string"'
+equal "$(jq -s 'map(.event) | unique' -c <<<"$out")" '["log"]'
 run 0 logs 1 --follow
 has "$out" "info: "
 

@@ -83,6 +83,25 @@ static void check_life(struct rig *rig) {
     buf_release(&reply);
 }
 
+/* Without following, the stream of a job that goes on ends after what is stored. */
+static void check_past(struct rig *rig) {
+    struct buf reply;
+    int64_t job = rig_job(rig);
+    int attempt = rig_run_job(rig, job);
+    for (int i = 0; i < 200; i++) /* more than one batch */
+        add_metric(rig, job, attempt, i);
+    char path[64];
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events?after=0&follow=0", (long long)job);
+    CHECK(rig_get(rig, path, "", &reply) == 200);
+    CHECK(strstr(buf_text(&reply), "\"step\":199") && strstr(buf_text(&reply), "\r\n0\r\n\r\n"));
+    buf_release(&reply);
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events?follow=2", (long long)job);
+    CHECK(rig_get(rig, path, "", &reply) == 400);
+    buf_release(&reply);
+    struct error err;
+    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+}
+
 /* All that is stored, as JSON lines: each parses, ids grow, the snapshot has the asked-for id. */
 static void check_ndjson(struct rig *rig) {
     struct error err;
@@ -250,6 +269,7 @@ int main(void) {
     struct rig rig;
     rig_start(&rig, &rig_patient, 1);
     check_life(&rig);
+    check_past(&rig);
     check_ndjson(&rig);
     check_reconnects(&rig);
     check_many(&rig);

@@ -49,6 +49,8 @@ equal "$(field '[.name,.state,.wanted,.priority,.labels.who,.settings.texture_si
     "first queued run -3 me 512 0 null null"
 field .created_at | grep -qE '^20[0-9-]{8}T[0-9:]{8}\.[0-9]{3}Z$' || fail "created_at is $(field .created_at)"
 post /v1/jobs "{\"scene\":\"$scene\"}"; expect 201; equal "$(field .name)" room "name taken from the scene"
+post '/v1/jobs?dry_run=1' "{\"scene\":\"$scene\",\"settings\":{\"seed\":9007199254740991}}"; expect 200
+grep -q '"seed":9007199254740991[,}]' "$work/body" || fail "the largest seed came back as $(field .settings.seed)"
 
 # --- idempotency ---
 body="{\"scene\":\"$scene\",\"name\":\"once\"}"

@@ -23,7 +23,7 @@ call GET "/v1/scenes/..%2f..%2fetc"; expect 400
 call GET "/v1/scenes/${one^^}"; expect 404 "an id in capitals"
 
 # --- what was uploaded is no archive: the check says so, the daemon is unharmed ---
-wait_for 30 scene_state "$one" rejected
+wait_for 60 scene_state "$one" rejected
 [ "$(field '.problems | length')" -ge 1 ] && [ -n "$(field '.problems[0].reason')" ] || fail "no reason: $(cat "$work/body")"
 call POST /v1/jobs -H 'Content-Type: application/json' -d "{\"scene\":\"$one\"}"; expect 422 "a job on a rejected scene"
 equal "$(field '.invalid_params[0].name')" scene
@@ -53,7 +53,7 @@ head -c 40000000 /dev/zero | call POST /v1/scenes -T -; expect 413 "far too larg
 # A client that goes away in the middle leaves nothing.
 curl -s -m 1 --limit-rate 50k -T "$work/one" -X POST "$url/v1/scenes" >/dev/null
 no_uploads() { [ -z "$(ls -A "$data/uploads")" ]; }
-wait_for 10 no_uploads
+wait_for 60 no_uploads
 equal "$(ls "$data/scenes")" "$one" "scenes on disk"
 
 # --- pages ---
@@ -74,7 +74,7 @@ call GET '/v1/scenes?limit=x'; expect 400
 call GET '/v1/scenes?cursor=garbage'; expect 400 "a cursor of somebody else's"
 
 # --- removal ---
-wait_for 30 scene_state "$one" rejected
+wait_for 60 scene_state "$one" rejected
 call DELETE "/v1/scenes/$one"; expect 204
 call GET "/v1/scenes/$one"; expect 404
 [ ! -e "$data/scenes/$one" ] || fail "the files are still there"
