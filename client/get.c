@@ -15,7 +15,7 @@
 
 #include "client/commands.h"
 #include "client/meter.h"
-#include "client/nearest.h"
+#include "common/nearest.h"
 #include "client/view.h"
 #include "common/file.h"
 #include "common/mem.h"

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "client/commands.h"
-#include "client/nearest.h"
+#include "common/nearest.h"
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "client/commands.h"
-#include "client/nearest.h"
+#include "common/nearest.h"
 #include "common/protocol.h"
 
 /* SIGINT and SIGTERM are read from a descriptor, where request.c waits for them: no handler runs

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "client/nearest.h"
+#include "common/nearest.h"
 #include "common/mem.h"
 
 static const struct option *find(const struct option *table, const char *name, size_t length) {

@@ -2,6 +2,8 @@
 #include "common/json.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/buf.h"
@@ -10,6 +12,7 @@
 #include "common/utf8.h"
 
 #define MAX_DEPTH 64
+#define WHOLE_MAX 9007199254740992.0 /* 2^53: every whole number up to it is a double */
 
 /* Line and column (from 1) of the byte `at`. */
 static void locate(const char *text, const char *at, size_t *line, size_t *column) {
@@ -124,11 +127,44 @@ enum status json_read(const char *path, size_t limit, cJSON **value, struct erro
     return status;
 }
 
-char *json_text(const cJSON *value) {
-    char *printed = cJSON_PrintUnformatted(value);
+/* cJSON prints 15 digits where that is equal within a relative tolerance, and so loses the end of
+ * whole numbers near 2^53 and the last bits of others. The numbers that it would not print
+ * exactly become raw text, the shortest of 15 or 17 digits that reads as the same number. */
+static void write_out_numbers(cJSON *first) {
+    for (cJSON *value = first; value; value = value->next) {
+        double number = value->valuedouble;
+        write_out_numbers(value->child);
+        if (!cJSON_IsNumber(value) || !isfinite(number) || number == (double)value->valueint)
+            continue;
+        char text[32];
+        bool is_whole = number == floor(number) && fabs(number) <= WHOLE_MAX;
+        snprintf(text, sizeof text, is_whole ? "%.0f" : "%.15g", number);
+        if (strtod(text, NULL) != number)
+            snprintf(text, sizeof text, "%.17g", number);
+        cJSON *raw = cJSON_CreateRaw(text);
+        value->type = cJSON_Raw;
+        value->valuestring = raw->valuestring;
+        raw->valuestring = NULL;
+        cJSON_Delete(raw);
+    }
+}
+
+static char *print(const cJSON *value, bool with_line_breaks) {
+    cJSON *copy = cJSON_Duplicate(value, true);
+    write_out_numbers(copy);
+    char *printed = with_line_breaks ? cJSON_Print(copy) : cJSON_PrintUnformatted(copy);
     char *text = mem_strdup(printed ? printed : "null");
     cJSON_free(printed);
+    cJSON_Delete(copy);
     return text;
+}
+
+char *json_text(const cJSON *value) {
+    return print(value, false);
+}
+
+char *json_page(const cJSON *value) {
+    return print(value, true);
 }
 
 static const char *type_name(const cJSON *value) {

@@ -21,8 +21,11 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
 /* Reads and parses a file of at most `limit` bytes. */
 enum status json_read(const char *path, size_t limit, cJSON **value, struct error *err);
 
-/* Compact text of the tree with no newline inside; the caller's (mem_free). */
+/* Compact text of the tree with no newline inside, or text with line breaks for people to read;
+ * the caller's (mem_free). A number reads back as the same double; whole ones up to 2^53 are
+ * written without an exponent. */
 char *json_text(const cJSON *value);
+char *json_page(const cJSON *value);
 
 /* The member as a finite number / string / boolean, or `fallback` when the member is absent
  * or null. A member of another type is STATUS_INPUT and names `what` and the key. */

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "common/word.h"
+#include "common/nearest.h"
 
 #define NAME_MAX_LENGTH 64
 #define TEXT_MAX_LENGTH 255
@@ -80,16 +80,11 @@ const struct setting *settings_find(const char *name) {
 }
 
 const char *settings_nearest(const char *name) {
-    const char *nearest = NULL;
-    size_t best = SIZE_MAX;
-    for (size_t i = 0; i < TABLE_COUNT; i++) {
-        size_t distance = word_distance(name, table[i].name);
-        if (distance < best) {
-            best = distance;
-            nearest = table[i].name;
-        }
-    }
-    return word_is_near(name, best) ? nearest : NULL;
+    struct nearest nearest;
+    nearest_init(&nearest, name);
+    for (size_t i = 0; i < TABLE_COUNT; i++)
+        nearest_offer(&nearest, table[i].name);
+    return nearest.best;
 }
 
 /* Index of a word in "a|b|c"; -1 when it is not one of them. */
@@ -182,8 +177,13 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
             return false;
         }
         if (number < t->minimum || number > t->maximum) {
-            snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g", t->minimum,
-                     t->maximum, *t->unit ? " " : "", t->unit, number);
+            const char *gap = *t->unit ? " " : "";
+            if (t->type == SETTING_INT)
+                snprintf(reason, size, "must be between %.0f and %.0f%s%s, found %.15g", t->minimum,
+                         t->maximum, gap, t->unit, number);
+            else
+                snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g",
+                         t->minimum, t->maximum, gap, t->unit, number);
             return false;
         }
         s->number[i] = number;

@@ -10,7 +10,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/word.h"
+#include "common/nearest.h"
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
 
@@ -101,15 +101,13 @@ void config_set(struct config *c, const char *name, const char *value, const cha
                 struct buf *problems) {
     const struct option *option = find(name);
     if (!option) {
-        size_t best = SIZE_MAX, nearest = 0;
-        for (size_t i = 0; i < TABLE_COUNT; i++) {
-            size_t distance = word_distance(name, table[i].name);
-            nearest = distance < best ? i : nearest;
-            best = distance < best ? distance : best;
-        }
-        bool is_near = word_is_near(name, best);
+        struct nearest nearest;
+        nearest_init(&nearest, name);
+        for (size_t i = 0; i < TABLE_COUNT; i++)
+            nearest_offer(&nearest, table[i].name);
         buf_printf(problems, "%s: there is no option \"%s\"%s%s%s\n", where, name,
-                   is_near ? "; did you mean " : "", is_near ? table[nearest].name : "", is_near ? "?" : "");
+                   nearest.best ? "; did you mean " : "", nearest.best ? nearest.best : "",
+                   nearest.best ? "?" : "");
         return;
     }
     if (option->type == OPTION_BOOL) {

@@ -275,9 +275,9 @@ static enum status put_report(struct export *e, struct error *err) {
     json_add_string(report, "title", e->input->title);
     json_add(report, "segments", describe_segments(e->input));
     json_add(report, "files", cJSON_Duplicate(e->files, true));
-    char *text = cJSON_Print(report); /* with line breaks: people read it too */
+    char *text = json_page(report);
     enum status status = put_bytes(e, "report.json", MIME_JSON, text, strlen(text), err);
-    cJSON_free(text);
+    mem_free(text);
     if (status == STATUS_OK)
         status = put_page(e, report, err);
     cJSON_Delete(report);

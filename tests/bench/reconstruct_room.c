@@ -152,12 +152,12 @@ static enum status run(int argc, char **argv, struct error *err) {
     if (status == STATUS_OK)
         status = write_outputs(argv[2], &r, err);
     if (status == STATUS_OK) {
-        char *text = cJSON_Print(cJSON_GetObjectItem(r.report, "metrics"));
+        char *text = json_page(cJSON_GetObjectItem(r.report, "metrics"));
         struct rusage usage;
         getrusage(RUSAGE_SELF, &usage);
         printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0,
                now_sec() - begin);
-        cJSON_free(text);
+        mem_free(text);
     }
     reconstruct_release(&r);
     scene_release(&scene);

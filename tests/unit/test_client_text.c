@@ -1,7 +1,7 @@
 /* The client's pieces that turn text into text: events, options, corrections, figures, bars. */
 #include "client/commands.h"
 #include "client/meter.h"
-#include "client/nearest.h"
+#include "common/nearest.h"
 #include "client/sse.h"
 #include "client/table.h"
 #include "client/view.h"

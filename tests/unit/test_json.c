@@ -51,6 +51,30 @@ static void test_members(void) {
     cJSON_Delete(object);
 }
 
+static void test_numbers(void) {
+    static const struct {
+        double number;
+        const char *text;
+    } cases[] = {
+        {0, "0"}, {-7, "-7"}, {2147483648.0, "2147483648"}, {9007199254740991.0, "9007199254740991"},
+        {-9007199254740991.0, "-9007199254740991"}, {0.1, "0.1"}, {1e300, "1e+300"},
+        {0.1 + 0.2, "0.30000000000000004"}, {1.0 / 3.0, "0.33333333333333331"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        cJSON *object = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(object, "list");
+        cJSON_AddItemToArray(list, cJSON_CreateNumber(cases[i].number));
+        char *wanted = mem_printf("{\"list\":[%s]}", cases[i].text), *text = json_text(object);
+        CHECK_STRING(text, wanted);
+        cJSON *read = cJSON_Parse(text);
+        CHECK(cJSON_GetArrayItem(cJSON_GetObjectItem(read, "list"), 0)->valuedouble ==
+              cases[i].number);
+        cJSON_Delete(read);
+        cJSON_Delete(object);
+        mem_free(wanted);
+        mem_free(text);
+    }
+}
+
 /* The public suite of JSON parsing: y_ must be taken, n_ refused, i_ may be either; none may
  * crash. cJSON is lenient about numbers and control characters, hence the allowance. */
 static void test_suite(void) {
@@ -92,6 +116,7 @@ static void test_suite(void) {
 int main(void) {
     test_refusals();
     test_members();
+    test_numbers();
     test_suite();
     return check_result();
 }

@@ -1,0 +1,49 @@
+/* nearest.c -- see nearest.h. */
+#include "common/nearest.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#define LENGTH_MAX 63
+
+static size_t least(size_t a, size_t b, size_t c) {
+    size_t least_two = a < b ? a : b;
+    return least_two < c ? least_two : c;
+}
+
+/* Levenshtein distance of words of at most LENGTH_MAX bytes, one row of its table at a time. */
+static size_t distance(const char *a, const char *b) {
+    size_t row[LENGTH_MAX + 1], length = strlen(b);
+    for (size_t j = 0; j <= length; j++)
+        row[j] = j;
+    for (size_t i = 1; a[i - 1]; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= length; j++) {
+            size_t changed = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = least(changed, row[j] + 1, row[j - 1] + 1);
+        }
+    }
+    return row[length];
+}
+
+void nearest_init(struct nearest *n, const char *typed) {
+    *n = (struct nearest){.typed = typed};
+}
+
+void nearest_offer(struct nearest *n, const char *candidate) {
+    size_t typed_length = strlen(n->typed), length = strlen(candidate);
+    size_t longer = typed_length > length ? typed_length : length;
+    if (longer > LENGTH_MAX)
+        return;
+    bool begins = typed_length >= 2 && typed_length < length &&
+                  memcmp(n->typed, candidate, typed_length) == 0;
+    size_t edits = begins ? 1 : distance(n->typed, candidate);
+    if (edits > longer / 3 + 1 || edits >= longer)
+        return;
+    if (!n->best || edits < n->distance) {
+        n->best = candidate;
+        n->distance = edits;
+    }
+}
