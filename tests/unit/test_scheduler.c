@@ -22,6 +22,11 @@
 #define SCENE_B "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
 #define SCENE_C "cccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
 
+/* Whoever waits for another process looks this often, WAIT_US apart: five minutes, since a disk
+ * that is busy with others' work makes each commit wait. */
+#define WAIT_TRIES 150000
+#define WAIT_US 2000
+
 static struct error err;
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
@@ -249,7 +254,7 @@ static int64_t submit(struct daemon *d, const char *scene, const char *role) {
 
 /* Waits until the job is in the state and, if given, in the stage; false when it does not come. */
 static bool wait_for(struct daemon *d, int64_t id, enum job_state state, const char *stage) {
-    for (int i = 0; i < 10000; i++) {
+    for (int i = 0; i < WAIT_TRIES; i++) {
         struct job job;
         if (store_job_get(d->store, id, &job, &err) != STATUS_OK)
             return false;
@@ -257,13 +262,13 @@ static bool wait_for(struct daemon *d, int64_t id, enum job_state state, const c
         job_release(&job);
         if (there)
             return true;
-        usleep(2000);
+        usleep(WAIT_US);
     }
     return false;
 }
 
 static bool wait_for_scene(struct daemon *d, const char *id, enum scene_state state) {
-    for (int i = 0; i < 10000; i++) {
+    for (int i = 0; i < WAIT_TRIES; i++) {
         struct scene_row row;
         if (store_scene_get(d->store, id, &row, &err) != STATUS_OK)
             return false;
@@ -271,7 +276,7 @@ static bool wait_for_scene(struct daemon *d, const char *id, enum scene_state st
         scene_row_release(&row);
         if (there)
             return true;
-        usleep(2000);
+        usleep(WAIT_US);
     }
     return false;
 }
@@ -414,7 +419,7 @@ static void test_false_start(struct daemon *d) {
     close(fd);
     daemon_start(d, 1, "/proc/self/exe");
     id = submit(d, SCENE_A, "good");
-    for (int i = 0; i < 5000; i++) {
+    for (int i = 0; i < WAIT_TRIES; i++) {
         struct job job;
         OK(store_job_get(d->store, id, &job, &err));
         bool tried = job.state == JOB_QUEUED && job.attempt > 0;
@@ -422,7 +427,7 @@ static void test_false_start(struct daemon *d) {
         job_release(&job);
         if (tried)
             break;
-        usleep(2000);
+        usleep(WAIT_US);
     }
     CHECK(unlink(jobs) == 0 && rename(away, jobs) == 0);
     scheduler_wake(d->scheduler);
@@ -478,21 +483,21 @@ static void test_daemon_killed(struct daemon *d) {
     close(ends[0]);
     char *job_dir = mem_printf("%s/jobs/%lld", d->dir, (long long)id);
     pid_t pid = 0;
-    for (int i = 0; i < 5000 && !pid; i++) {
-        usleep(2000);
+    for (int i = 0; i < WAIT_TRIES && !pid; i++) {
+        usleep(WAIT_US);
         pid = worker_pid(job_dir);
     }
     CHECK(pid > 0);
     kill(child, SIGKILL);
     waitpid(child, NULL, 0);
-    for (int i = 0; i < 5000 && worker_pid(job_dir); i++)
-        usleep(2000);
+    for (int i = 0; i < WAIT_TRIES && worker_pid(job_dir); i++)
+        usleep(WAIT_US);
     CHECK_THAT(worker_pid(job_dir) == 0, "worker %d outlived its daemon", (int)pid);
 
     daemon_start(d, 1, "/proc/self/exe");
     struct job job = {0};
-    for (int i = 0; i < 10000 && job.attempt < 2; i++) {
-        usleep(1000);
+    for (int i = 0; i < WAIT_TRIES && job.attempt < 2; i++) {
+        usleep(WAIT_US);
         job_release(&job);
         OK(store_job_get(d->store, id, &job, &err));
     }
