@@ -42,7 +42,10 @@ TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
 BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
 FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 
-.PHONY: all help deps demo test tests bench asan tsan fuzz install clean
+# The goals that build first and then run something build on all processors, unless told otherwise.
+BUILD = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
+
+.PHONY: all help deps demo test tests bench asan tsan asan-build tsan-build fuzz install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -95,31 +98,34 @@ $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommo
 tests: all $(TEST_BIN) $(FUZZ_BIN)
 
 demo: deps ## make a room, reconstruct it, show where the pictures are
-	@$(MAKE) --no-print-directory all
+	@+$(BUILD) all
 	@tests/demo.sh $(B)
 
-test: deps ## build and run all tests; T=name runs one (T=adam)
-	@$(MAKE) --no-print-directory tests
-	@tests/run.sh $(B) $(T)
+test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name runs one (T=adam)
+	@+$(BUILD) tests $(if $(T),,asan-build tsan-build)
+	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
 
 bench: deps ## print the speed ratios and write build/bench.json
-	@$(MAKE) --no-print-directory all $(BENCH_BIN)
+	@+$(BUILD) all $(BENCH_BIN)
 	@tests/bench/run.sh $(B)
 
-asan: ## run the tests under the address and undefined-behaviour sanitizers
+asan: deps ## run all tests under the address and undefined-behaviour sanitizers
+	@+$(BUILD) asan-build
+	@tests/run.sh "$(T)" build/asan
+
+tsan: deps ## run all tests under the thread sanitizer
+	@+$(BUILD) tsan-build
+	@tests/run.sh "$(T)" build/tsan
+
+asan-build:
 	@$(MAKE) --no-print-directory B=build/asan CFLAGS="-O1 -g" \
 	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" tests
-	@tests/run.sh build/asan $(T)
-
-tsan: ## run the tests under the thread sanitizer
+tsan-build:
 	@$(MAKE) --no-print-directory B=build/tsan CFLAGS="-O1 -g" SANITIZE="-fsanitize=thread" tests
-	@tests/run.sh build/tsan $(T)
 
 FUZZ_SECONDS ?= 60
 fuzz: deps ## search for crashes for FUZZ_SECONDS (60) with each fuzz program, under the sanitizers
-	@$(MAKE) --no-print-directory B=build/asan CFLAGS="-O1 -g" \
-	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" \
-	    $(patsubst $(B)/%,build/asan/%,$(FUZZ_BIN))
+	@+$(BUILD) asan-build
 	@for program in $(patsubst $(B)/%,build/asan/%,$(FUZZ_BIN)); do \
 	    echo "$$program"; \
 	    UNBAKE_BUILD=build/asan FUZZ_SECONDS=$(FUZZ_SECONDS) FUZZ_SEED=$${FUZZ_SEED:-$$(date +%s)} \

@@ -1,13 +1,19 @@
 #!/bin/bash
-# Runs the tests that were built under $1; $2, if given, is part of a test's name.
-# One line a test; a failing test's output follows its line. Last: "N passed, N failed, N skipped".
+# run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
+# NAME in their names. One line a test; a failing test's output follows its line. Last:
+# "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
+# their names; of several builds these run only what is worth its time there.
 set -u
-build=$1
-only=${2:-}
-export UNBAKE_BUILD=$build
-logs=$build/logs
-mkdir -p "$logs"
+only=$1
+shift
 passed=0 failed=0 skipped=0
+
+# Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
+# `make tsan` run them all the same.
+slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_readme"
+# The thread sanitizer has nothing to find in one thread either.
+slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment
+gradient/test_path fuzz/test_archive fuzz/test_image fuzz/test_ply fuzz/test_transforms"
 
 run_one() {
     local name=$1
@@ -24,17 +30,29 @@ run_one() {
     esac
 }
 
-[ -n "$only" ] || run_one includes tests/includes.sh
-for source in tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c \
-    tests/api/test_*.c tests/api/test_*.sh tests/fuzz/test_*.c tests/fuzz/test_*.sh; do
-    [ -e "$source" ] || continue
-    name=${source#tests/}
-    name=${name%.*}
-    [[ -z $only || $name == *"$only"* ]] || continue
-    case $source in
-    *.c) run_one "$name" "$build/tests/$name" ;;
-    *.sh) run_one "$name" bash "$source" "$build" ;;
+[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; run_one includes tests/includes.sh; }
+several=$(($# > 1))
+for build in "$@"; do
+    export UNBAKE_BUILD=$build
+    logs=$build/logs
+    mkdir -p "$logs"
+    prefix= slow=
+    case $build in
+    */asan) prefix=asan/ slow=$slow_asan ;;
+    */tsan) prefix=tsan/ slow=$slow_tsan ;;
     esac
+    for source in tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c \
+        tests/api/test_*.c tests/api/test_*.sh tests/fuzz/test_*.c tests/fuzz/test_*.sh; do
+        [ -e "$source" ] || continue
+        name=${source#tests/}
+        name=${name%.*}
+        [[ -z $only || $name == *"$only"* ]] || continue
+        [[ $several -eq 0 || " "${slow//$'\n'/ }" " != *" $name "* ]] || continue
+        case $source in
+        *.c) run_one "$prefix$name" "$build/tests/$name" ;;
+        *.sh) run_one "$prefix$name" bash "$source" "$build" ;;
+        esac
+    done
 done
 
 if [ $((passed + failed + skipped)) -eq 0 ]; then
