@@ -43,7 +43,7 @@ BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
 FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 
 # The goals that build first and then run something build on all processors, unless told otherwise.
-BUILD = $(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
+BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
 .PHONY: all help deps demo test tests bench asan tsan asan-build tsan-build fuzz install clean
 .SECONDARY:

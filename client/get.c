@@ -15,6 +15,7 @@
 
 #include "client/commands.h"
 #include "client/meter.h"
+#include "common/clock.h"
 #include "common/nearest.h"
 #include "client/view.h"
 #include "common/file.h"
@@ -172,7 +173,7 @@ static bool on_bytes(void *user, const struct reply *reply, const char *bytes, s
         f->resumed = false;
         f->write_status = empty_part(f);
     }
-    f->moved_at = meter_now();
+    f->moved_at = clock_sec();
     if (f->write_status == STATUS_OK && f->have + length > f->bytes) {
         f->have = f->bytes + 1; /* longer than listed: another version; the hash will not fit */
         return false;
@@ -216,7 +217,7 @@ static enum status request_rest(struct fetch *f) {
 /* Fetches until NAME.part is as long as the file, through breaks of the connection. */
 static enum status fetch_rest(struct fetch *f) {
     double patience = f->client->retry_sec >= 0.0 ? f->client->retry_sec : PATIENCE_SEC;
-    double last = meter_now();
+    double last = clock_sec();
     for (int tries = 0; f->have < f->bytes; tries++) {
         enum status status = request_rest(f);
         if (f->moved_at > last) {
@@ -225,7 +226,7 @@ static enum status fetch_rest(struct fetch *f) {
         }
         if (status == STATUS_OK && f->have < f->bytes)
             return STATUS_OK; /* a shorter version: the hash will not fit */
-        if (status != STATUS_OK && (status != STATUS_UNAVAILABLE || meter_now() - last > patience))
+        if (status != STATUS_OK && (status != STATUS_UNAVAILABLE || clock_sec() - last > patience))
             return status;
         if (status != STATUS_OK && !request_pause(f->client->request, tries, f->reply.retry_after_sec))
             return error_set(f->err, STATUS_CANCELLED, "interrupted");

@@ -1,23 +1,17 @@
 /* meter.c -- see meter.h. */
 #include "client/meter.h"
+#include "common/clock.h"
 
 #include <math.h>
-#include <time.h>
 
 #define SMOOTHING_SEC 4.0 /* how far back the rate remembers */
 #define MEASURE_SEC 0.25  /* shorter spans say little */
 #define REDRAW_SEC 0.1
 #define BAR_COLUMNS 24
 
-double meter_now(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done,
                  double total) {
-    double now = meter_now();
+    double now = clock_sec();
     *m = (struct meter){.terminal = terminal, .label = label, .total = total, .done = done,
                         .rate = -1.0, .measured_at = now, .measured_done = done};
     m->drawn_at = terminal && terminal->live ? now - REDRAW_SEC : now;
@@ -66,7 +60,7 @@ void meter_text(const struct meter *m, struct buf *out, size_t columns, bool uni
 }
 
 void meter_update(struct meter *m, double done) {
-    double now = meter_now();
+    double now = clock_sec();
     meter_measure(m, now, done);
     struct terminal *t = m->terminal;
     if (!t || now - m->drawn_at < (t->live ? REDRAW_SEC : METER_PLAIN_SEC))

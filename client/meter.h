@@ -18,9 +18,6 @@ struct meter {
     double drawn_at;
 };
 
-/* Seconds of a clock that never goes back. */
-double meter_now(void);
-
 /* `done` bytes are there already (a download that goes on) and do not count for the rate. */
 void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done,
                  double total);

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "client/meter.h"
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 
@@ -336,7 +337,7 @@ enum status request_run(struct request *r, const struct request_call *call, stru
     char *url = mem_printf("%s%s", r->server, call->path);
     char *body = call->body ? json_text(call->body) : NULL;
     bool same_twice = call->same_twice || !call->method;
-    double give_up_at = meter_now() + r->retry_sec;
+    double give_up_at = clock_sec() + r->retry_sec;
     enum status status;
     for (int tries = 0;; tries++) {
         bool unsent;
@@ -348,7 +349,7 @@ enum status request_run(struct request *r, const struct request_call *call, stru
             status = judge(&a);
         bool again = status == STATUS_UNAVAILABLE && !call->once &&
                      (same_twice || unsent || reply->code == 503);
-        if (!again || meter_now() + pause_length(tries, reply->retry_after_sec) > give_up_at)
+        if (!again || clock_sec() + pause_length(tries, reply->retry_after_sec) > give_up_at)
             break;
         if (!request_pause(r, tries, reply->retry_after_sec)) {
             status = cancelled(err);

@@ -12,6 +12,7 @@
 #include "client/meter.h"
 #include "client/sse.h"
 #include "client/view.h"
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 
@@ -48,7 +49,7 @@ static void show_line(struct watch *w) {
     struct terminal *t = &w->client->out;
     struct buf line;
     buf_init(&line, 4096);
-    double age = w->progress_at > 0.0 ? meter_now() - w->progress_at : 0.0;
+    double age = w->progress_at > 0.0 ? clock_sec() - w->progress_at : 0.0;
     view_line(&w->view, t, t->live ? terminal_width(t) - 1 : 1000, t->live, age, &line);
     if (t->live)
         terminal_draw(t, buf_text(&line));
@@ -56,7 +57,7 @@ static void show_line(struct watch *w) {
         fprintf(t->out, "%s\n", buf_text(&line));
         fflush(t->out);
     }
-    w->shown_at = meter_now();
+    w->shown_at = clock_sec();
     buf_release(&line);
 }
 
@@ -66,7 +67,7 @@ static void show(struct watch *w, bool urgent) {
     struct client *c = w->client;
     if (c->json || c->quiet || w->only_log || !w->view.state[0] || view_is_over(&w->view))
         return; /* the outcome gets lines of its own */
-    double since = meter_now() - w->shown_at;
+    double since = clock_sec() - w->shown_at;
     if (c->out.live) {
         if (urgent || since >= REDRAW_SEC)
             show_line(w);
@@ -121,7 +122,7 @@ static bool on_event(void *user, const char *type, const char *data, const char 
     struct watch *w = user;
     cJSON *value;
     w->connected = true;
-    w->heard_at = meter_now();
+    w->heard_at = clock_sec();
     if (json_parse(data, strlen(data), "event", &value, NULL) != STATUS_OK)
         return true; /* one broken event is no reason to stop watching */
     view_event(&w->view, type, value);
@@ -173,7 +174,7 @@ static enum status follow_once(struct watch *w, struct reply *reply, struct erro
 static enum status follow(struct watch *w, struct reply *reply, struct error *err) {
     struct client *c = w->client;
     bool ever = false, told = false;
-    w->heard_at = meter_now();
+    w->heard_at = clock_sec();
     for (int tries = 0;; tries++) {
         enum status status = follow_once(w, reply, err);
         if (status != STATUS_OK && status != STATUS_UNAVAILABLE)
@@ -191,7 +192,7 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
         if (status == STATUS_OK)
             error_set(err, STATUS_UNAVAILABLE, "%s ended the stream of events before the job ended",
                       request_server(c->request));
-        if (meter_now() - w->heard_at > patience)
+        if (clock_sec() - w->heard_at > patience)
             return STATUS_UNAVAILABLE;
         if (ever && !told && status != STATUS_OK) {
             client_note(c, "lost the server; watching goes on when it is back");

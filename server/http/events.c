@@ -6,6 +6,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/http/field.h"
@@ -190,7 +191,7 @@ static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
         bool is_dirty = s->is_dirty, is_due = s->is_due;
         s->is_dirty = s->is_due = false;
         if (is_due)
-            s->last_sec = guard_now();
+            s->last_sec = clock_sec();
         pthread_mutex_unlock(&hub->mutex);
         if (is_dirty && !s->has_ended)
             fetch(s);
@@ -208,7 +209,7 @@ static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
     memcpy(to, s->text.data + s->text_read, count);
     s->text_read += count;
     pthread_mutex_lock(&hub->mutex);
-    s->last_sec = guard_now();
+    s->last_sec = clock_sec();
     pthread_mutex_unlock(&hub->mutex);
     return (ssize_t)count;
 }
@@ -232,7 +233,7 @@ static struct stream *subscribe(struct api *api, const struct job *job, int64_t 
     s->is_past = is_past;
     s->sent_id = after;
     s->is_dirty = true;
-    s->last_sec = guard_now();
+    s->last_sec = clock_sec();
     buf_init(&s->text, BATCH_BYTES);
     render_snapshot(s, job);
     return &s->base;

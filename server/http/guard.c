@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <time.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
 
 struct guarded {
@@ -29,12 +30,6 @@ struct guard {
     uint64_t shut_count;
     pthread_t thread;
 };
-
-double guard_now(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 static bool is_late(const struct guard *g, struct guarded *c, double now_sec) {
     double age = now_sec - c->since_sec;
@@ -78,7 +73,7 @@ static void *run(void *user) {
         while (!g->stopping && pthread_cond_timedwait(&g->changed, &g->mutex, &until) == 0)
             ; /* another connection came or went: the second still runs */
         pthread_mutex_unlock(&g->mutex);
-        guard_look(g, guard_now());
+        guard_look(g, clock_sec());
         if (g->tick)
             g->tick(g->user);
         pthread_mutex_lock(&g->mutex);
@@ -127,7 +122,7 @@ struct guarded *guard_add(struct guard *g, int fd) {
     struct guarded *c = mem_calloc(1, sizeof *c);
     c->fd = fd;
     c->phase = GUARD_HEAD;
-    c->since_sec = guard_now();
+    c->since_sec = clock_sec();
     pthread_mutex_lock(&g->mutex);
     c->next = g->first;
     if (g->first)
@@ -155,7 +150,7 @@ void guard_remove(struct guard *g, struct guarded *c) {
 void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase) {
     pthread_mutex_lock(&g->mutex);
     c->phase = phase;
-    c->since_sec = guard_now();
+    c->since_sec = clock_sec();
     c->window_bytes = 0;
     pthread_mutex_unlock(&g->mutex);
 }

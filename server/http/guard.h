@@ -43,6 +43,5 @@ uint64_t guard_shut_count(struct guard *g);  /* shut down for being late, ever *
 
 /* One look at all connections as of `now_sec` (CLOCK_MONOTONIC); the thread's step, for tests. */
 void guard_look(struct guard *g, double now_sec);
-double guard_now(void);
 
 #endif

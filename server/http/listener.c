@@ -12,6 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/events.h"
@@ -391,7 +392,7 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 
 static void on_tick(void *user) {
     struct listener *l = user;
-    hub_tick(l->api->hub, guard_now());
+    hub_tick(l->api->hub, clock_sec());
 }
 
 __attribute__((format(printf, 2, 0)))

@@ -6,8 +6,8 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <time.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -17,7 +17,7 @@
 #define EVENTS_MAX 500000   /* of one attempt: an honest one stays far below */
 #define PROBLEMS_MAX 1000   /* of one scene */
 #define LAST_WORDS_MAX 400  /* bytes */
-#define CHECK_LIMIT_MS (3600 * 1000) /* a scene's check that takes longer is taken for stuck */
+#define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
 
 /* --- starting -------------------------------------------------------------------------------- */
 
@@ -160,9 +160,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
         status = supervisor_start(&a->worker, config->worker_binary, a->dir, &why);
     cJSON_Delete(order);
     if (status == STATUS_OK) {
-        struct timespec now;
-        clock_gettime(CLOCK_MONOTONIC, &now);
-        a->kill_at_ms = (int64_t)now.tv_sec * 1000 + CHECK_LIMIT_MS;
+        a->kill_at_sec = clock_sec() + CHECK_LIMIT_SEC;
         a->phase = ATTEMPT_ALIVE;
         log_info("scene %.12s: checked by process %d", scene_id, (int)a->worker.pid);
         return STATUS_OK;

@@ -26,7 +26,7 @@ struct attempt {
     int wait_status;              /* when ended */
     bool stopping;                /* it was asked to stop */
     bool killed;                  /* by us */
-    int64_t kill_at_ms;           /* monotonic; 0: never */
+    double kill_at_sec;           /* as clock_sec; 0: never */
     long event_count;             /* what it has reported */
     bool complained;              /* a report could not be entered, and the log says so */
     /* What it said of itself. */

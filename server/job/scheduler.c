@@ -9,20 +9,21 @@
 #include "server/job/scheduler.h"
 
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <sys/eventfd.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
 
-#define RETRY_MS 5000        /* after the store or a start failed */
-#define NO_PIDFD_POLL_MS 200 /* where the kernel cannot tell us that a process has ended */
+#define RETRY_SEC 5.0         /* after the store or a start failed */
+#define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
 
 struct scheduler {
     struct scheduler_config config;
@@ -35,12 +36,6 @@ struct scheduler {
     bool must_retry;      /* something failed that may work later */
     struct pollfd *poll;  /* [1 + 2 * slot_count] */
 };
-
-static int64_t now_ms(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config,
                           struct store *store, struct error *err) {
@@ -147,13 +142,13 @@ static void ask_to_stop(struct scheduler *s, struct attempt *a) {
     if (a->phase != ATTEMPT_ALIVE || a->stopping)
         return;
     a->stopping = true;
-    a->kill_at_ms = now_ms() + (int64_t)(s->config.stop_grace_sec * 1000.0);
+    a->kill_at_sec = clock_sec() + s->config.stop_grace_sec;
     supervisor_signal(&a->worker, SIGTERM);
 }
 
 static void kill_now(struct attempt *a) {
     a->killed = true;
-    a->kill_at_ms = 0;
+    a->kill_at_sec = 0.0;
     supervisor_signal(&a->worker, SIGKILL);
 }
 
@@ -201,21 +196,21 @@ static void follow_wishes(struct scheduler *s) {
     mem_free(ids);
 }
 
-/* Kills whose time is up; returns how long poll may sleep. */
+/* Kills whose time is up; returns how long poll may sleep, in ms. */
 static int keep_deadlines(struct scheduler *s) {
-    int64_t now = now_ms(), sleep = s->must_retry ? RETRY_MS : INT32_MAX;
+    double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         if (a->phase != ATTEMPT_ALIVE)
             continue;
-        if (a->kill_at_ms && a->kill_at_ms <= now)
+        if (a->kill_at_sec > 0.0 && a->kill_at_sec <= now)
             kill_now(a);
-        if (a->kill_at_ms && a->kill_at_ms - now < sleep)
-            sleep = a->kill_at_ms - now;
-        if (a->worker.pid_fd < 0 && sleep > NO_PIDFD_POLL_MS)
-            sleep = NO_PIDFD_POLL_MS;
+        if (a->kill_at_sec > 0.0)
+            sleep = fmin(sleep, a->kill_at_sec - now);
+        if (a->worker.pid_fd < 0)
+            sleep = fmin(sleep, NO_PIDFD_POLL_SEC);
     }
-    return sleep == INT32_MAX ? -1 : (int)sleep;
+    return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded down it would spin */
 }
 
 static void wait_for_something(struct scheduler *s, int timeout_ms) {

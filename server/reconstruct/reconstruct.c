@@ -3,8 +3,8 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/reconstruct/exposure.h"
@@ -24,21 +24,15 @@ struct run {
     cJSON *stages; /* owned by the report */
 };
 
-static double now_sec(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* Announces a stage, runs it, notes its time. */
 static enum status run_stage(struct run *run, const char *name,
                              enum status (*stage)(struct run *, struct error *), struct error *err) {
-    double begin = now_sec();
+    double begin = clock_sec();
     run->hooks->stage(run->hooks->user, name);
     enum status status = stage(run, err);
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", name);
-    json_add_number(entry, "seconds", now_sec() - begin);
+    json_add_number(entry, "seconds", clock_sec() - begin);
     cJSON_AddItemToArray(run->stages, entry);
     if (status == STATUS_OK && run->hooks->stop_requested(run->hooks->user))
         status = error_set(err, STATUS_CANCELLED, "stopped after stage %s", name);

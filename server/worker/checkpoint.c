@@ -6,9 +6,9 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/protocol.h"
@@ -342,16 +342,10 @@ static enum status write_heads(struct checkpoint *c, long iteration,
     return status;
 }
 
-static double now_sec(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
-
 enum status checkpoint_save(struct checkpoint *c, long iteration, const struct state_array *array,
                             size_t count, struct checkpoint_cost *cost, struct error *err) {
     struct checkpoint_cost spent = {0};
-    double start = now_sec();
+    double start = clock_sec();
     enum status status = sql_begin(&c->sql, err);
     if (status != STATUS_OK)
         return status;
@@ -375,7 +369,7 @@ enum status checkpoint_save(struct checkpoint *c, long iteration, const struct s
     c->next_row = row;
     c->iteration = iteration;
     c->complete = true;
-    spent.seconds = now_sec() - start;
+    spent.seconds = clock_sec() - start;
     if (cost)
         *cost = spent;
     return STATUS_OK;

@@ -18,6 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/parallel.h"
@@ -56,12 +57,6 @@ struct run {
     } series[SERIES_MAX];
 };
 
-static double now_sec(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
-
 /* --- what the engine asks ------------------------------------------------------------------- */
 
 static void signals_of_ours(sigset_t *set) {
@@ -72,7 +67,7 @@ static void signals_of_ours(sigset_t *set) {
 
 /* Whether nobody reads the pipe any more: the daemon has died without taking us with it. */
 static bool hung_up(struct run *run) {
-    double now = now_sec();
+    double now = clock_sec();
     if (run->progress->fd < 0 || now < run->next_hang_up_test)
         return false;
     run->next_hang_up_test = now + HANG_UP_INTERVAL_SEC;
@@ -99,12 +94,12 @@ static bool stop_requested(void *user) {
 
 static bool checkpoint_due(void *user) {
     const struct run *run = user;
-    return now_sec() >= run->next_checkpoint;
+    return clock_sec() >= run->next_checkpoint;
 }
 
 static bool preview_due(void *user) {
     const struct run *run = user;
-    return run->preview_asked || now_sec() >= run->next_preview;
+    return run->preview_asked || clock_sec() >= run->next_preview;
 }
 
 /* --- what it tells --------------------------------------------------------------------------- */
@@ -127,7 +122,7 @@ static void tell_stage(void *user, const char *stage) {
 static void tell_progress(void *user, const char *stage, double done, double total,
                           double eta_sec) {
     struct run *run = user;
-    double now = now_sec();
+    double now = clock_sec();
     if (now < run->next_progress && done < total)
         return;
     run->next_progress = now + PROGRESS_INTERVAL_SEC;
@@ -136,7 +131,7 @@ static void tell_progress(void *user, const char *stage, double done, double tot
 
 static void tell_metric(void *user, const char *series, long step, double value) {
     struct run *run = user;
-    double now = now_sec();
+    double now = clock_sec();
     size_t i = 0;
     while (i < run->series_count && strcmp(run->series[i].name, series) != 0)
         i++;
@@ -172,7 +167,7 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
     double interval = run->order->checkpoint_interval_sec;
     double wait = fmin(fmax(cost.seconds / CHECKPOINT_SHARE, interval),
                        interval * CHECKPOINT_STRETCH);
-    run->next_checkpoint = now_sec() + wait;
+    run->next_checkpoint = clock_sec() + wait;
     progress_checkpoint(run->progress, iteration, cost.written_bytes, cost.seconds);
     return STATUS_OK;
 }
@@ -236,10 +231,10 @@ static struct export_input input_of(const struct reconstruction *r) {
 
 static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
     struct run *run = user;
-    double start = now_sec();
+    double start = clock_sec();
     struct export_input input = input_of(r);
     enum status status = export_preview(run->out_dir, &input, announce, run, err);
-    double end = now_sec(), wait = (end - start) / PREVIEW_SHARE;
+    double end = clock_sec(), wait = (end - start) / PREVIEW_SHARE;
     if (wait < run->preview_interval_sec)
         wait = run->preview_interval_sec;
     run->next_preview = end + wait;
@@ -318,7 +313,7 @@ static enum status reconstruct(struct run *run, const struct settings *settings,
     enum status status = load_scene(run, settings, pool, &scene, err);
     if (status != STATUS_OK)
         return status;
-    double now = now_sec();
+    double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;
     run->next_preview = now; /* the first one shows that something happens */
     status = stop_requested(run) ? error_set(err, STATUS_CANCELLED, "stopped after stage load")
