@@ -59,19 +59,17 @@ struct vertex_block {
 struct shade_block {
     /* The ray and its hit. */
     struct lanes3 origin, direction;
-    float distance_m[LANES], b1[LANES], b2[LANES];
+    float distance_m[LANES];
     float pdf[LANES];                /* of the direction by solid angle; 0: a camera ray */
     float area_density[LANES];       /* of light samples on this segment */
     /* The triangle. */
     struct lanes3 normal;            /* geometric */
     float plane[LANES];
-    float corner_x[3][LANES], corner_y[3][LANES];
-    struct lanes3 shading[3];
-    float flat[LANES];               /* 1: shading normal is the geometric one */
+    struct lanes3 shading;           /* interpolated normal, not normalised; 0: none */
+    float column[LANES], row[LANES]; /* place between the centres of the four texels */
     /* Derived. */
     struct lanes3 point;
     struct lanes3 frame_normal;      /* shading normal on the viewer's side */
-    float column[LANES], row[LANES]; /* place between the four texels */
     float filter[4][LANES];          /* weights of valid texels, not normalised */
     float filter_sum[LANES];
     /* Random numbers. */
@@ -86,12 +84,12 @@ struct shade_block {
     /* Results: rays to trace. */
     struct lanes3 shadow_origin, shadow_direction;
     float shadow_far[LANES];
-    float shadow_wanted[LANES];      /* 1: the shadow ray decides */
+    uint32_t shadow_wanted[LANES];   /* 1: the shadow ray decides */
     struct lanes3 gain;              /* radiance that it would bring */
     struct lanes3 way_origin, way;
     struct lanes3 way_beta;
     float way_pdf[LANES];
-    float way_open[LANES];           /* 1: the path goes on */
+    uint32_t way_open[LANES];        /* 1: the path goes on */
 };
 
 /* Derivatives of one block, out of the backward kernel. */

@@ -126,6 +126,29 @@ static void meet_nothing(struct path_batch *b, const struct world *world, int de
     add(&radiance[f->path], rgb_mul(f->beta, value));
 }
 
+typedef float float4 __attribute__((vector_size(16)));
+typedef int16_t short4 __attribute__((vector_size(8)));
+
+static float4 corner_normal(const struct world_triangle *t, int corner) {
+    short4 n;
+    memcpy(&n, t->shading[corner], sizeof n); /* the fourth is whatever follows, and not used */
+    return __builtin_convertvector(n, float4);
+}
+
+/* Finds the four texels of a hit, as texture_taps does, and has them fetched. */
+static void place_lane(struct vertex_block *v, struct shade_block *s, int lane,
+                       const struct texture *texture, float x, float y) {
+    float cx = clampf(x - 0.5f, 0.0f, (float)texture->width - 1.0f);
+    float cy = clampf(y - 0.5f, 0.0f, (float)texture->height - 1.0f);
+    int column = (int)cx, row = (int)cy;
+    s->column[lane] = cx - (float)column;
+    s->row[lane] = cy - (float)row;
+    uint32_t first = (uint32_t)row * texture->width + (uint32_t)column;
+    v->first_texel[lane] = first;
+    __builtin_prefetch(texture->texel + first);
+    __builtin_prefetch(texture->texel + first + texture->width);
+}
+
 /* Puts the vertex that a ray hit into a lane. */
 static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
                       size_t flight) {
@@ -135,6 +158,10 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const struct materials *m = world->materials;
     struct shade_block *s = b->shade;
+    float b1 = hit->b1, b2 = hit->b2, b0 = 1.0f - b1 - b2;
+    const vec2 *c = t->corner;
+    place_lane(v, s, lane, &m->base_color, b0 * c[0].x + b1 * c[1].x + b2 * c[2].x,
+               b0 * c[0].y + b1 * c[1].y + b2 * c[2].y);
     v->path[lane] = f->path;
     v->parent[lane] = f->parent;
     lanes3_set_rgb(&v->beta, lane, f->beta);
@@ -144,18 +171,10 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     lanes3_set(&s->origin, lane, ray->origin);
     lanes3_set(&s->direction, lane, ray->direction);
     s->distance_m[lane] = hit->distance_m;
-    s->b1[lane] = hit->b1;
-    s->b2[lane] = hit->b2;
     lanes3_set(&s->normal, lane, t->normal);
     s->plane[lane] = t->plane;
-    for (int k = 0; k < 3; k++) {
-        s->corner_x[k][lane] = t->corner[k].x;
-        s->corner_y[k][lane] = t->corner[k].y;
-        s->shading[k].x[lane] = (float)t->shading[k][0];
-        s->shading[k].y[lane] = (float)t->shading[k][1];
-        s->shading[k].z[lane] = (float)t->shading[k][2];
-    }
-    s->flat[lane] = (float)t->flat;
+    float4 n = b0 * corner_normal(t, 0) + b1 * corner_normal(t, 1) + b2 * corner_normal(t, 2);
+    lanes3_set(&s->shading, lane, (vec3){n[0], n[1], n[2]});
     uint32_t segment = t->segment;
     v->segment[lane] = segment;
     v->roughness[lane] = m->roughness[segment];
@@ -212,16 +231,6 @@ static void sample_environment(struct shade_block *s, struct vertex_block *v, co
     }
 }
 
-static void prefetch_texels(const struct vertex_block *v, const struct texture *texture, int count) {
-    for (int i = 0; i < count; i++) {
-        const float(*texel)[4] = (const float(*)[4])texture->texel + v->first_texel[i];
-        __builtin_prefetch(texel);
-        __builtin_prefetch(texel + texture->width);
-    }
-}
-
-typedef float float4 __attribute__((vector_size(16)));
-
 /* The sums over the four texels, r g b and weight at once: a texel's fourth value is 1 where it
  * is valid and 0 elsewhere. As texture_taps and texture_gather. */
 static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
@@ -248,26 +257,26 @@ static void gather_texels(struct vertex_block *v, struct shade_block *s, const s
     }
 }
 
-/* Appends the rays that the block's vertices send out. */
+/* Appends the rays that the block's vertices send out. Each lane writes its rays behind the last
+ * ones and then counts them or not: which lanes send is too random to branch on. */
 static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32_t first, int count) {
     const struct shade_block *s = b->shade;
+    size_t shadows = b->shadow_count, flights = b->flight_count;
     for (int i = 0; i < count; i++) {
-        if (s->shadow_wanted[i] == 0.0f)
-            continue;
-        b->shadow_ray[b->shadow_count] =
-            (struct accel_ray){lanes3_get(&s->shadow_origin, i), 0.0f,
-                               lanes3_get(&s->shadow_direction, i), s->shadow_far[i]};
-        b->shadow[b->shadow_count++] =
-            (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->gain, i)};
+        b->shadow_ray[shadows] = (struct accel_ray){lanes3_get(&s->shadow_origin, i), 0.0f,
+                                                    lanes3_get(&s->shadow_direction, i), s->shadow_far[i]};
+        b->shadow[shadows] = (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->gain, i)};
+        shadows += s->shadow_wanted[i];
     }
     for (int i = 0; i < count; i++) {
-        if (s->way_open[i] == 0.0f)
-            continue;
-        b->ray[b->flight_count] = (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f,
-                                                     lanes3_get(&s->way, i), INFINITY};
-        b->flight[b->flight_count++] = (struct flight){v->path[i], first + (uint32_t)i,
-                                                       lanes3_rgb(&s->way_beta, i), s->way_pdf[i]};
+        b->ray[flights] =
+            (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f, lanes3_get(&s->way, i), INFINITY};
+        b->flight[flights] = (struct flight){v->path[i], first + (uint32_t)i,
+                                             lanes3_rgb(&s->way_beta, i), s->way_pdf[i]};
+        flights += s->way_open[i];
     }
+    b->shadow_count = shadows;
+    b->flight_count = flights;
 }
 
 /* Shades the `count` vertices loaded into a block of this depth. */
@@ -276,11 +285,10 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     struct vertex_block *v = &b->vertex[depth][block];
     struct shade_block *s = b->shade;
     const struct texture *texture = &world->materials->base_color;
-    shade_surface(v, s, texture->width, texture->height);
+    shade_surface(v, s);
     add_emission(v, count, radiance);
     if (depth + 1 == settings->max_depth)
         return;
-    prefetch_texels(v, texture, count);
     memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);
     if (pick_lights(s, v, world->lights, count))

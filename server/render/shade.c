@@ -40,15 +40,12 @@ static inline vec3 offset(vec3 p, vec3 normal, vec3 direction) {
     return vec3_mad(p, side, normal);
 }
 
-KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s,
-                          uint32_t width, uint32_t height) {
-    float right = (float)width - 1.0f, bottom = (float)height - 1.0f;
-    int stride = (int)width;
+KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s) {
     FOR_LANES {
         vec3 direction = lanes3_get(&s->direction, i), normal = lanes3_get(&s->normal, i);
         vec3 viewer = vec3_neg(direction);
         float facing = vec3_dot(normal, viewer);
-        float distance = s->distance_m[i], flat = s->flat[i], pdf = s->pdf[i];
+        float distance = s->distance_m[i], pdf = s->pdf[i];
         float light_pdf = s->area_density[i] * distance * distance / bsdf_max(facing, 1e-6f);
         float weight = power_heuristic(pdf, light_pdf);
         weight = pdf > 0.0f ? weight : 1.0f;
@@ -59,13 +56,10 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
         lanes3_set(&s->point, i, vec3_mad(p, s->plane[i] - vec3_dot(normal, p), normal));
 
         /* The interpolated normal, turned to the viewer's side (materials are two-sided). */
-        float b1 = s->b1[i], b2 = s->b2[i], b0 = 1.0f - b1 - b2;
-        vec3 n = vec3_scale(lanes3_get(&s->shading[0], i), b0);
-        n = vec3_mad(n, b1, lanes3_get(&s->shading[1], i));
-        n = vec3_mad(n, b2, lanes3_get(&s->shading[2], i));
+        vec3 n = lanes3_get(&s->shading, i);
         float length2 = vec3_dot(n, n);
         float over = 1.0f / sqrtf(bsdf_max(length2, 1e-12f));
-        bool smooth = length2 > 1e-6f && flat == 0.0f;
+        bool smooth = length2 > 1.0f;
         n = (vec3){smooth ? n.x * over : normal.x, smooth ? n.y * over : normal.y,
                    smooth ? n.z * over : normal.z};
         float side = vec3_dot(n, viewer) < 0.0f ? -1.0f : 1.0f;
@@ -75,16 +69,6 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
         vec3_frame(n, &a, &b);
         vec3 wo = {vec3_dot(a, viewer), vec3_dot(b, viewer), bsdf_max(vec3_dot(n, viewer), 1e-6f)};
         lanes3_set(&v->wo, i, wo);
-
-        /* As in texture_taps. */
-        float x = b0 * s->corner_x[0][i] + b1 * s->corner_x[1][i] + b2 * s->corner_x[2][i];
-        float y = b0 * s->corner_y[0][i] + b1 * s->corner_y[1][i] + b2 * s->corner_y[2][i];
-        x = clamp_flat(x - 0.5f, 0.0f, right);
-        y = clamp_flat(y - 0.5f, 0.0f, bottom);
-        int column = (int)x, row = (int)y;
-        s->column[i] = x - (float)column;
-        s->row[i] = y - (float)row;
-        v->first_texel[i] = (uint32_t)(row * stride + column);
     }
 }
 
@@ -169,7 +153,7 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         lanes3_set_rgb(&v->incident, i, incident);
         v->light_factor[i] = factor;
         lanes3_set_rgb(&s->gain, i, rgb_mul(beta, reflect(f, base_color, incident)));
-        s->shadow_wanted[i] = wanted ? 1.0f : 0.0f;
+        s->shadow_wanted[i] = wanted ? 1 : 0;
 
         vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->way_u[i], s->way_v[i]);
         f = bsdf_eval(&bsdf, wo, wi);
@@ -185,7 +169,7 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         lanes3_set(&s->way_origin, i, offset(lanes3_get(&s->point, i), lanes3_get(&s->normal, i), way));
         lanes3_set_rgb(&s->way_beta, i, rgb_scale(onward, over));
         s->way_pdf[i] = f.pdf;
-        s->way_open[i] = open ? 1.0f : 0.0f;
+        s->way_open[i] = open ? 1 : 0;
     }
 }
 

@@ -8,10 +8,8 @@
 
 #include "server/render/lanes.h"
 
-/* From the hit and the triangle: point, frame, wo, weight of the emission, place in the texture of
- * width x height texels. */
-void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
-                   uint32_t height);
+/* From the hit and the triangle: point, frame, wo, weight of the emission. */
+void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s);
 
 /* Random numbers of the vertex that ends segment number `depth` (0: the camera's). */
 void shade_numbers(struct shade_block *restrict s, int depth);

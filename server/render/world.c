@@ -18,10 +18,9 @@ static void bake_triangle(struct world_triangle *t, const struct world *w, size_
                                           vec3_sub(mesh->position[v[2]], a)));
     t->plane = vec3_dot(t->normal, a);
     t->segment = w->segments->of_triangle[index];
-    t->flat = mesh->normal == NULL;
     for (int k = 0; k < 3; k++) {
         t->corner[k] = w->atlas->corner[index][k];
-        vec3 n = mesh->normal ? mesh->normal[v[k]] : t->normal;
+        vec3 n = mesh->normal ? mesh->normal[v[k]] : (vec3){0.0f, 0.0f, 0.0f};
         t->shading[k][0] = to_snorm(n.x);
         t->shading[k][1] = to_snorm(n.y);
         t->shading[k][2] = to_snorm(n.z);

@@ -21,8 +21,8 @@ struct world_triangle {
     vec3 normal;               /* unit, geometric */
     float plane;               /* normal . p for points p of the triangle */
     vec2 corner[3];            /* atlas coordinates, texels */
-    int16_t shading[3][3];     /* unit normals of the corners, times 32767 */
-    int16_t flat;              /* 1: the mesh has no shading normals */
+    int16_t shading[3][3];     /* unit normals of the corners, times 32767; 0: the mesh has none */
+    int16_t pad;               /* read with the last normal */
     uint32_t segment;
 };
 
