@@ -17,6 +17,15 @@
 
 #define MIN_TILE_SHIFT 5
 #define MAX_TILES_ACROSS 64
+#define AHEAD 32 /* entries under way to the cache */
+
+typedef float float4 __attribute__((vector_size(16)));
+
+/* Dense sums of one tile, all zero between uses. */
+struct tile {
+    float4 *sum;       /* [side * side] r g b weight; owned */
+    uint64_t *touched; /* [side * side / 64] a bit per texel; owned */
+};
 
 /* A log in order of tiles. */
 struct sorted_log {
@@ -34,8 +43,18 @@ struct gradient_scratch {
     size_t *place;             /* [tile_count + 1] where a tile writes; owned */
     size_t *touched;           /* [tile_count] owned */
     int thread_count;
-    float (**sum)[4];          /* [thread_count] scratch tiles, r g b weight; owned */
+    struct tile *tile;         /* [thread_count] owned */
 };
+
+static void tile_init(struct tile *tile, size_t texels) {
+    tile->sum = mem_calloc_large(texels, sizeof *tile->sum);
+    tile->touched = mem_calloc(texels / 64, sizeof *tile->touched);
+}
+
+static void tile_release(struct tile *tile) {
+    mem_free(tile->sum);
+    mem_free(tile->touched);
+}
 
 struct gradient_log *gradient_log_new(size_t segment_count) {
     struct gradient_log *log = mem_calloc(1, sizeof *log);
@@ -97,8 +116,8 @@ void gradient_free(struct gradient *g) {
         mem_free(s->sorted[i].start);
     }
     for (int i = 0; i < s->thread_count; i++)
-        mem_free(s->sum[i]);
-    mem_free(s->sum);
+        tile_release(&s->tile[i]);
+    mem_free(s->tile);
     mem_free(s->sorted);
     mem_free(s->place);
     mem_free(s->touched);
@@ -115,7 +134,7 @@ void gradient_free(struct gradient *g) {
 /* The distinct tiles in which an entry has weight; returns how many. */
 static int entry_tiles(const struct gradient *g, const struct gradient_entry *e, uint32_t tile[4]) {
     const struct gradient_scratch *s = g->scratch;
-    uint32_t y = e->first / g->width, x = e->first - y * g->width;
+    uint32_t x = e->x, y = e->y;
     uint32_t mask = (1u << s->tile_shift) - 1;
     uint32_t home = (y >> s->tile_shift) * s->tiles_x + (x >> s->tile_shift);
     bool right = (x & mask) == mask, below = (y & mask) == mask;
@@ -165,23 +184,20 @@ static void sort_log(void *user, size_t index, int thread) {
     start[0] = 0;
 }
 
-static void add_entry(const struct gradient *g, const struct gradient_entry *e, uint32_t tile_x,
-                      uint32_t tile_y, float (*sum)[4]) {
-    unsigned shift = g->scratch->tile_shift;
+static void add_entry(const struct gradient_entry *e, unsigned shift, uint32_t tile_x, uint32_t tile_y,
+                      struct tile *tile) {
     uint32_t side = 1u << shift;
-    uint32_t y = e->first / g->width, x = e->first - y * g->width;
     /* Unsigned: places left of or above the tile become large. */
-    uint32_t left = x - (tile_x << shift), top = y - (tile_y << shift);
+    uint32_t left = e->x - (tile_x << shift), top = e->y - (tile_y << shift);
+    float4 d = {e->d.r, e->d.g, e->d.b, 1.0f};
     for (uint32_t k = 0; k < 4; k++) {
         uint32_t u = left + (k & 1), v = top + (k >> 1);
         float w = e->weight[k];
         if (u >= side || v >= side || w == 0.0f)
             continue;
-        float *at = sum[(v << shift) + u];
-        at[0] += w * e->d.r;
-        at[1] += w * e->d.g;
-        at[2] += w * e->d.b;
-        at[3] += w;
+        uint32_t at = (v << shift) + u;
+        tile->sum[at] += w * d;
+        tile->touched[at / 64] |= UINT64_C(1) << at % 64;
     }
 }
 
@@ -192,25 +208,35 @@ static void sum_tile(void *user, size_t index, int thread) {
     s->touched[index] = 0;
     if (s->place[index] == s->place[index + 1])
         return;
-    float(*sum)[4] = s->sum[thread];
-    uint32_t side = 1u << s->tile_shift;
+    struct tile *tile = &s->tile[thread];
     uint32_t tile_y = (uint32_t)index / s->tiles_x, tile_x = (uint32_t)index - tile_y * s->tiles_x;
+    /* Entries are listed, and fetched, well before they are added. */
+    const struct gradient_entry *ahead[AHEAD];
+    size_t listed = 0;
     for (size_t l = 0; l < r->log_count; l++) {
         const struct sorted_log *sorted = &s->sorted[l];
-        for (uint32_t i = sorted->start[index]; i < sorted->start[index + 1]; i++)
-            add_entry(g, &r->log[l]->entry[sorted->entry[i]], tile_x, tile_y, sum);
-    }
-    size_t at = s->place[index];
-    for (uint32_t v = 0; v < side; v++) {
-        for (uint32_t u = 0; u < side; u++) {
-            float *from = sum[(v << s->tile_shift) + u];
-            if (from[3] == 0.0f)
-                continue;
-            g->texel[at] = ((tile_y << s->tile_shift) + v) * g->width + (tile_x << s->tile_shift) + u;
-            g->d_base_color[at] = (rgb){from[0], from[1], from[2]};
-            g->weight[at++] = from[3];
-            memset(from, 0, sizeof *sum);
+        for (uint32_t i = sorted->start[index]; i < sorted->start[index + 1]; i++, listed++) {
+            if (listed >= AHEAD)
+                add_entry(ahead[listed % AHEAD], s->tile_shift, tile_x, tile_y, tile);
+            ahead[listed % AHEAD] = &r->log[l]->entry[sorted->entry[i]];
+            __builtin_prefetch(ahead[listed % AHEAD]);
         }
+    }
+    for (size_t i = listed > AHEAD ? listed - AHEAD : 0; i < listed; i++)
+        add_entry(ahead[i % AHEAD], s->tile_shift, tile_x, tile_y, tile);
+    size_t at = s->place[index];
+    uint32_t left = tile_x << s->tile_shift, top = tile_y << s->tile_shift;
+    uint32_t mask = (1u << s->tile_shift) - 1;
+    for (uint32_t word = 0; word < 1u << (2 * s->tile_shift - 6); word++) {
+        for (uint64_t bits = tile->touched[word]; bits != 0; bits &= bits - 1) {
+            uint32_t place = word * 64 + (uint32_t)__builtin_ctzll(bits);
+            float4 *from = &tile->sum[place];
+            g->texel[at] = (top + (place >> s->tile_shift)) * g->width + left + (place & mask);
+            g->d_base_color[at] = (rgb){(*from)[0], (*from)[1], (*from)[2]};
+            g->weight[at++] = (*from)[3];
+            *from = (float4){0.0f, 0.0f, 0.0f, 0.0f};
+        }
+        tile->touched[word] = 0;
     }
     s->touched[index] = at - s->place[index];
 }
@@ -226,9 +252,9 @@ static void grow_scratch(struct gradient_scratch *s, size_t log_count, int threa
         s->log_capacity = log_count;
     }
     if (thread_count > s->thread_count) {
-        s->sum = mem_realloc_array(s->sum, (size_t)thread_count, sizeof *s->sum);
+        s->tile = mem_realloc_array(s->tile, (size_t)thread_count, sizeof *s->tile);
         for (int i = s->thread_count; i < thread_count; i++)
-            s->sum[i] = mem_calloc((size_t)1 << 2 * s->tile_shift, sizeof **s->sum);
+            tile_init(&s->tile[i], (size_t)1 << 2 * s->tile_shift);
         s->thread_count = thread_count;
     }
 }

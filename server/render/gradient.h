@@ -14,10 +14,10 @@
 #include "common/parallel.h"
 #include "common/vec.h"
 
-/* One look-up's derivative: texels first + {0, 1, width, width + 1} get weight[k] * d. A texel
- * with weight 0 may lie outside the texture. */
+/* One look-up's derivative: texels (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1) get weight[k] * d.
+ * A texel with weight 0 may lie outside the texture. */
 struct gradient_entry {
-    uint32_t first;
+    uint16_t x, y;
     float weight[4];
     rgb d;
 };

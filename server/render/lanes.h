@@ -45,7 +45,7 @@ struct vertex_block {
     struct lanes3 emission;          /* of the segment */
     struct lanes3 beta;              /* from the camera to here */
     float emission_weight[LANES];    /* 0 on the back */
-    uint32_t first_texel[LANES];     /* as in struct gradient_entry */
+    uint16_t x[LANES], y[LANES];     /* as in struct gradient_entry */
     float weight[4][LANES];
     struct lanes3 base_color;
     struct lanes3 wo, light, wi;     /* in the shading frame */

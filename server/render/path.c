@@ -144,7 +144,8 @@ static void place_lane(struct vertex_block *v, struct shade_block *s, int lane,
     s->column[lane] = cx - (float)column;
     s->row[lane] = cy - (float)row;
     uint32_t first = (uint32_t)row * texture->width + (uint32_t)column;
-    v->first_texel[lane] = first;
+    v->x[lane] = (uint16_t)column;
+    v->y[lane] = (uint16_t)row;
     __builtin_prefetch(texture->texel + first);
     __builtin_prefetch(texture->texel + first + texture->width);
 }
@@ -235,12 +236,11 @@ static void sample_environment(struct shade_block *s, struct vertex_block *v, co
  * is valid and 0 elsewhere. As texture_taps and texture_gather. */
 static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
                           int count) {
-    size_t last_row = (size_t)(texture->height - 1) * texture->width;
     for (int i = 0; i < count; i++) {
-        size_t first = v->first_texel[i];
-        size_t down = first < last_row ? texture->width : 0;
-        size_t right = (first + 1) % texture->width != 0 ? 1 : 0;
-        const float(*texel)[4] = (const float(*)[4])texture->texel + first;
+        size_t down = v->y[i] + 1u < texture->height ? texture->width : 0;
+        size_t right = v->x[i] + 1u < texture->width ? 1 : 0;
+        const float(*texel)[4] =
+            (const float(*)[4])texture->texel + (size_t)v->y[i] * texture->width + v->x[i];
         const float *at[4] = {texel[0], texel[right], texel[down], texel[down + right]};
         float x = s->column[i], y = s->row[i];
         const float weight[4] = {(1.0f - x) * (1.0f - y), x * (1.0f - y), (1.0f - x) * y, x * y};
@@ -409,7 +409,8 @@ static void log_lane(const struct vertex_block *v, const struct shade_derivative
     if (rgb_is_black(d_base_color))
         return;
     log->entry[log->entry_count++] = (struct gradient_entry){
-        v->first_texel[lane],
+        v->x[lane],
+        v->y[lane],
         {v->weight[0][lane], v->weight[1][lane], v->weight[2][lane], v->weight[3][lane]},
         d_base_color};
 }

@@ -43,10 +43,12 @@ struct work {
     struct gradient_log **log; /* [chunk_count] */
     struct gradient *gradient;
     bool backward;
+    size_t first; /* chunk of this iteration */
 };
 
 static void trace_chunk(void *user, size_t index, int thread) {
     struct work *w = user;
+    index += w->first;
     size_t first = index * BATCH, count = w->path_count - first < BATCH ? w->path_count - first : BATCH;
     path_batch_trace(w->batch[thread], &w->room->world, &w->settings, count, w->ray + first,
                      w->key + first, w->radiance + first);
@@ -56,15 +58,16 @@ static void trace_chunk(void *user, size_t index, int thread) {
     }
 }
 
-/* Seconds for all paths. Gradients are reduced every 32 chunks, as an optimiser's iteration would. */
+/* Seconds for all paths, in iterations of 32 chunks as an optimiser's; each reduces its gradients. */
 static double run(struct work *w, bool backward) {
     double start = now_sec();
     w->backward = backward;
-    parallel_for(w->pool, w->chunk_count, trace_chunk, w);
-    if (backward)
-        for (size_t c = 0; c < w->chunk_count; c += 32)
-            gradient_reduce(w->gradient, w->log + c, w->chunk_count - c < 32 ? w->chunk_count - c : 32,
-                            w->pool);
+    for (w->first = 0; w->first < w->chunk_count; w->first += 32) {
+        size_t count = w->chunk_count - w->first < 32 ? w->chunk_count - w->first : 32;
+        parallel_for(w->pool, count, trace_chunk, w);
+        if (backward)
+            gradient_reduce(w->gradient, w->log + w->first, count, w->pool);
+    }
     return now_sec() - start;
 }
 

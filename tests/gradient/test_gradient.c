@@ -19,7 +19,8 @@ static struct gradient_log *random_log(int number, uint32_t width, uint32_t heig
         if (i % 4 == 0)
             y = (y | 31) < height ? y | 31 : y;
         struct gradient_entry *e = gradient_log_reserve(log, 1);
-        e->first = y * width + x;
+        e->x = (uint16_t)x;
+        e->y = (uint16_t)y;
         float sum = 0.0f;
         for (uint32_t k = 0; k < 4; k++) {
             bool inside = x + k % 2 < width && y + k / 2 < height;
@@ -47,7 +48,7 @@ static void check_sums(const struct gradient *g, struct gradient_log *const *log
             for (uint32_t k = 0; k < 4; k++) {
                 if (e->weight[k] == 0.0f)
                     continue;
-                double *to = sum[e->first + k % 2 + k / 2 * g->width];
+                double *to = sum[e->x + k % 2 + (e->y + k / 2) * g->width];
                 to[0] += (double)(e->weight[k] * e->d.r);
                 to[1] += (double)(e->weight[k] * e->d.g);
                 to[2] += (double)(e->weight[k] * e->d.b);

@@ -62,7 +62,7 @@ static double read_log(const struct gradient_log *log, const struct parameter *p
         for (uint32_t k = 0; k < 4; k++) {
             if (e->weight[k] == 0.0f)
                 continue;
-            uint32_t texel = e->first + k % 2 + k / 2 * BOX_SIDE;
+            uint32_t texel = e->x + k % 2 + (e->y + k / 2) * BOX_SIDE;
             if (p->kind == TEXEL && texel == p->which)
                 sum += (double)(e->weight[k] * e->d.g);
             else if (p->kind == SEGMENT_COLOR && texel_of_segment(texel, p->which))

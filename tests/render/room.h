@@ -51,8 +51,7 @@ static inline void room_set_base_color(struct room *room, size_t segment, rgb va
                    sizeof *t->texel);
 }
 
-static inline uint32_t room_segment_of_texel(const struct room *room, uint32_t texel) {
-    uint32_t y = texel / room->atlas.width, x = texel % room->atlas.width;
+static inline uint32_t room_segment_of_texel(uint32_t x, uint32_t y) {
     return y / ROOM_BLOCK * ROOM_BLOCKS_ACROSS + x / ROOM_BLOCK;
 }
 

@@ -26,7 +26,7 @@ struct estimate {
 };
 
 /* One group's derivatives of a pixel's channel by every parameter, out of its log. */
-static void read_log(const struct room *room, const struct gradient_log *log, int channel,
+static void read_log(const struct gradient_log *log, int channel,
                      double value[PICTURES][3]) {
     double base[SEGMENTS] = {0};
     for (size_t i = 0; i < log->entry_count; i++) {
@@ -34,7 +34,7 @@ static void read_log(const struct room *room, const struct gradient_log *log, in
         double d = (double)(channel == 0 ? e->d.r : channel == 1 ? e->d.g : e->d.b);
         for (uint32_t k = 0; k < 4; k++)
             if (e->weight[k] > 0.0f)
-                base[room_segment_of_texel(room, e->first + k % 2 + k / 2 * room->atlas.width)] +=
+                base[room_segment_of_texel(e->x + k % 2, e->y + k / 2)] +=
                     (double)e->weight[k] * d;
     }
     value[BASE_LEFT][channel] = base[LEFT];
@@ -76,7 +76,7 @@ static void estimate_pixel(void *user, size_t pixel, int thread) {
                 adjoint[i] = (rgb){channel == 0, channel == 1, channel == 2};
             gradient_log_clear(log);
             path_batch_backward(batch, &e->room->world, adjoint, log);
-            read_log(e->room, log, channel, value);
+            read_log(log, channel, value);
         }
         for (int p = 0; p < PICTURES; p++) {
             for (int c = 0; c < 3; c++) {
