@@ -146,8 +146,8 @@ static void place_lane(struct vertex_block *v, struct shade_block *s, int lane,
     uint32_t first = (uint32_t)row * texture->width + (uint32_t)column;
     v->x[lane] = (uint16_t)column;
     v->y[lane] = (uint16_t)row;
-    __builtin_prefetch(texture->texel + first);
-    __builtin_prefetch(texture->texel + first + texture->width);
+    __builtin_prefetch(texture->texel + first, 0, 2);
+    __builtin_prefetch(texture->texel + first + texture->width, 0, 2);
 }
 
 /* Puts the vertex that a ray hit into a lane. */
@@ -311,8 +311,8 @@ static void shade_hits(struct path_batch *b, const struct world *world,
     int lane = 0;
     b->flight_count = b->shadow_count = 0;
     for (size_t i = 0; i < arrived; i++) {
-        if (i + 8 < arrived && b->hit[i + 8].triangle != ACCEL_NONE)
-            __builtin_prefetch(&world->triangle[b->hit[i + 8].triangle]);
+        if (i + 24 < arrived && b->hit[i + 24].triangle != ACCEL_NONE)
+            __builtin_prefetch(&world->triangle[b->hit[i + 24].triangle]);
         if (b->hit[i].triangle == ACCEL_NONE) {
             meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
             continue;
