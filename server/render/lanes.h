@@ -77,7 +77,7 @@ struct shade_block {
     float pick[LANES], lobe[LANES];
     float light_u[LANES], light_v[LANES], way_u[LANES], way_v[LANES], roulette[LANES];
     /* The light sample: a place on a triangle, or a direction already (distance INFINITY). */
-    struct lanes3 light_corner, light_edge1, light_edge2, light_normal, radiance;
+    struct lanes3 light_corner, light_edge1, light_edge2, radiance;
     float light_density[LANES];      /* by area */
     struct lanes3 light_direction;   /* world */
     float light_distance[LANES], light_pdf[LANES];

@@ -8,13 +8,15 @@
 #include "common/mem.h"
 
 #define PI 3.14159265358979323846
+#define GUIDE_DENSITY 4 /* entries of a table's guide per entry */
 
 /* weight[count] >= 0, not all 0. */
 static void table_make(struct light_table *t, size_t count, const float *weight) {
     t->count = count;
     t->total = 0.0;
     t->cumulative = mem_array(count + 1, sizeof *t->cumulative);
-    t->guide = mem_array(count + 1, sizeof *t->guide);
+    t->guide_count = count * GUIDE_DENSITY;
+    t->guide = mem_array(t->guide_count, sizeof *t->guide);
     for (size_t i = 0; i < count; i++)
         t->total += weight[i];
     double sum = 0.0;
@@ -27,8 +29,8 @@ static void table_make(struct light_table *t, size_t count, const float *weight)
     for (size_t i = count; i-- > 0 && weight[i] == 0.0f;)
         t->cumulative[i] = 1.0f;
     size_t entry = 0;
-    for (size_t i = 0; i <= count; i++) {
-        while (entry + 1 < count && (double)t->cumulative[entry + 1] * (double)count <= (double)i)
+    for (size_t i = 0; i < t->guide_count; i++) {
+        while (entry + 1 < count && (double)t->cumulative[entry + 1] * (double)t->guide_count <= (double)i)
             entry++;
         t->guide[i] = (uint32_t)entry;
     }
@@ -112,7 +114,7 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
     for (size_t i = 0; i < mesh->triangle_count; i++)
         l->triangle_count += rgb_luminance(l->emission[segments->of_triangle[i]]) > 0.0f;
     float *power = mem_array(l->triangle_count, sizeof *power);
-    l->triangle = mem_array(l->triangle_count, sizeof *l->triangle);
+    l->triangle = mem_calloc_large(l->triangle_count, sizeof *l->triangle);
     size_t at = 0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         uint32_t segment = segments->of_triangle[i];
@@ -124,7 +126,8 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
         vec3 edge2 = vec3_sub(mesh->position[mesh->index[i][2]], a);
         vec3 cross = vec3_cross(edge1, edge2);
         power[at] = 0.5f * vec3_length(cross) * luminance;
-        l->triangle[at++] = (struct light_triangle){a, edge1, edge2, vec3_normalize(cross), segment};
+        l->triangle[at++] = (struct light_triangle){
+            .corner = a, .edge1 = edge1, .edge2 = edge2, .radiance = l->emission[segment], .segment = segment};
     }
     double total = 0.0;
     for (size_t i = 0; i < l->triangle_count; i++)
@@ -135,6 +138,8 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
         for (size_t s = 0; s < segments->count; s++)
             l->area_density[s] = (float)((1.0 - (double)l->environment_chance) *
                                          fmax(0.0, (double)rgb_luminance(l->emission[s])) / total);
+        for (size_t i = 0; i < l->triangle_count; i++)
+            l->triangle[i].density = l->area_density[l->triangle[i].segment];
     }
     mem_free(power);
 }
@@ -167,14 +172,14 @@ void lights_sample(const struct lights *l, vec3 point, float pick, float u, floa
     const struct light_triangle *t = lights_pick(l, pick);
     float root = sqrtf(u);
     s->point = vec3_mad(vec3_mad(t->corner, root * (1.0f - v), t->edge1), root * v, t->edge2);
-    s->normal = t->normal;
+    s->normal = vec3_normalize(vec3_cross(t->edge1, t->edge2));
     vec3 to = vec3_sub(s->point, point);
     float distance2 = vec3_dot(to, to);
     s->distance_m = sqrtf(distance2);
     s->direction = vec3_scale(to, 1.0f / fmaxf(s->distance_m, 1e-20f));
     s->segment = t->segment;
-    s->radiance = l->emission[t->segment];
-    float cosine = -vec3_dot(s->direction, t->normal);
+    s->radiance = t->radiance;
+    float cosine = -vec3_dot(s->direction, s->normal);
     if (cosine > 0.0f && distance2 > 0.0f)
         s->pdf = lights_pdf_segment(l, t->segment, s->distance_m, cosine);
 }

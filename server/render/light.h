@@ -19,10 +19,13 @@
 
 #define LIGHT_ENVIRONMENT UINT32_MAX /* in the place of an emitter's segment */
 
+/* One cache line. The front side is that of edge1 x edge2. */
 struct light_triangle {
     vec3 corner, edge1, edge2;
-    vec3 normal; /* unit, geometric, front side */
+    rgb radiance;
+    float density; /* by area, with which its points are picked */
     uint32_t segment;
+    uint32_t pad[2];
 };
 
 /* A distribution over [0, count): monotone inversion of the cumulative sum, by a table that
@@ -31,7 +34,8 @@ struct light_table {
     size_t count;
     double total;
     float *cumulative; /* [count + 1], 0 to 1; owned */
-    uint32_t *guide;   /* [count + 1]: first entry whose range reaches i / count; owned */
+    size_t guide_count;
+    uint32_t *guide;   /* [guide_count]: entry whose range holds i / guide_count; owned */
 };
 
 struct lights {
@@ -48,11 +52,11 @@ struct lights {
     struct light_table cells; /* (height - 1) rows of `width` cells */
 };
 
-/* The entry whose range holds u in [0, 1): a linear search from the guide's entry, of about one
- * step on average. */
+/* The entry whose range holds u in [0, 1): a linear search from the guide's entry, mostly
+ * of no step. */
 static inline uint32_t light_table_pick(const struct light_table *t, float u) {
-    size_t at = (size_t)(u * (float)t->count);
-    at = at < t->count ? at : t->count - 1;
+    size_t at = (size_t)(u * (float)t->guide_count);
+    at = at < t->guide_count ? at : t->guide_count - 1;
     uint32_t entry = t->guide[at];
     /* Rounding of u * count may have passed a boundary. */
     while (entry > 0 && t->cumulative[entry] > u)

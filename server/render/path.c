@@ -205,9 +205,8 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
         lanes3_set(&s->light_corner, i, t->corner);
         lanes3_set(&s->light_edge1, i, t->edge1);
         lanes3_set(&s->light_edge2, i, t->edge2);
-        lanes3_set(&s->light_normal, i, t->normal);
-        lanes3_set_rgb(&s->radiance, i, lights->emission[t->segment]);
-        s->light_density[i] = lights->area_density[t->segment];
+        lanes3_set_rgb(&s->radiance, i, t->radiance);
+        s->light_density[i] = t->density;
         v->light_segment[i] = t->segment;
     }
     return true;

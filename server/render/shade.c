@@ -106,9 +106,11 @@ KERNEL void shade_texture(struct vertex_block *restrict v, struct shade_block *r
 KERNEL void shade_light(struct shade_block *restrict s) {
     FOR_LANES {
         float u = sqrtf(s->light_u[i]), w = s->light_v[i];
-        vec3 normal = lanes3_get(&s->light_normal, i), point = lanes3_get(&s->point, i);
-        vec3 on = vec3_mad(lanes3_get(&s->light_corner, i), u * (1.0f - w), lanes3_get(&s->light_edge1, i));
-        on = vec3_mad(on, u * w, lanes3_get(&s->light_edge2, i));
+        vec3 edge1 = lanes3_get(&s->light_edge1, i), edge2 = lanes3_get(&s->light_edge2, i);
+        vec3 normal = vec3_cross(edge1, edge2), point = lanes3_get(&s->point, i);
+        normal = vec3_scale(normal, 1.0f / sqrtf(bsdf_max(vec3_dot(normal, normal), 1e-30f)));
+        vec3 on = vec3_mad(lanes3_get(&s->light_corner, i), u * (1.0f - w), edge1);
+        on = vec3_mad(on, u * w, edge2);
         vec3 to = vec3_sub(on, point);
         float distance2 = vec3_dot(to, to);
         float over = 1.0f / sqrtf(bsdf_max(distance2, 1e-30f));
