@@ -1,0 +1,56 @@
+#!/bin/bash
+# Runs the benches that were built under $1. What a bench prints as "name<TAB>value<TAB>goal<TAB>better"
+# becomes a row of the table and of $1/bench.json; all else it prints is shown as it comes.
+#
+# Mitsuba 3 is taken from PyPI into $1/mitsuba; its llvm mode needs Debian's libllvm19. Where either
+# is not to be had, or the test data is not, the lines that need it are left out, and that is said.
+set -u
+build=$1
+export UNBAKE_BUILD=$build
+rows=$build/bench.tsv
+: >"$rows"
+
+collect() {
+    "$@" | while IFS= read -r line; do
+        case $line in
+        *$'\t'*$'\t'*$'\t'*) printf '%s\n' "$line" >>"$rows" ;;
+        *) printf '%s\n' "$line" >&2 ;;
+        esac
+    done
+}
+
+mitsuba_ready() {
+    local llvm
+    llvm=$(ls /usr/lib/*/libLLVM.so.19* /usr/lib/*/libLLVM-19.so* 2>/dev/null | head -n 1)
+    if [ -z "$llvm" ]; then
+        echo "no libllvm19: the lines against Mitsuba 3 are left out" >&2
+        return 1
+    fi
+    export DRJIT_LIBLLVM_PATH=$llvm
+    [ -x "$build/mitsuba/bin/python" ] || python3 -m venv "$build/mitsuba" >&2 || return 1
+    "$build/mitsuba/bin/python" -c 'import mitsuba, numpy' 2>/dev/null ||
+        "$build/mitsuba/bin/pip" install -q mitsuba numpy >&2 || {
+        echo "Mitsuba 3 cannot be installed: its lines are left out" >&2
+        return 1
+    }
+}
+
+for bench in "$build"/tests/bench/bench_*; do
+    [ -x "$bench" ] && [ -f "$bench" ] || continue
+    echo "== ${bench##*/}" >&2
+    case $bench in
+    */bench_mitsuba) mitsuba_ready && collect "$bench" "$build/mitsuba/bin/python" ;;
+    *) collect "$bench" ;;
+    esac
+done
+
+awk -F '\t' '
+    BEGIN { print "[" }
+    { printf "%s{\"name\": \"%s\", \"value\": %s, \"goal\": %s, \"better\": \"%s\"}", NR > 1 ? ",\n" : "", $1, $2, $3, $4 }
+    END { print "\n]" }' "$rows" >"$build/bench.json"
+printf '\n%-72s %10s %10s\n' what value goal
+awk -F '\t' '{
+    met = $4 == "higher" ? $2 >= $3 : $2 <= $3
+    printf "%-72s %10.3f %7s %-2s %s\n", $1, $2, $3, $4 == "higher" ? "+" : "-", met ? "" : "not met"
+}' "$rows"
+rm -f "$rows"
