@@ -7,15 +7,63 @@
 
 #define TEXELS_PER_SEGMENT 256
 #define VIEWS_PER_TEXEL 4
-/* Share of the observed radiance that an emitter's emission explains, at least. */
-#define EMITTER_SHARE 0.5f
+/* Part of the shown radiance that must be beyond reflection. Specular reflection and noise stay
+ * below it on all but mirrors; a lamp whose own light is less than half of what falls on it is
+ * missed. */
+#define EMITTER_SHARE 0.4f
+/* Base colour of an emitter, which its own light hides. */
+#define NEUTRAL_BASE_COLOR 0.5f
+/* A base colour below this tells too little of the light that fell on it. */
+#define DARKEST_BASE_COLOR 0.02f
+/* Iteration number that keeps the decision's random numbers apart from the optimiser's. */
+#define DECISION_ITERATION UINT64_C(0x7fff0000)
 
-struct observe_job {
-    const struct reconstruction *r;
+/* The valid texels, sorted by segment. */
+struct texels_by_segment {
+    uint32_t *first; /* [segment_count + 1]; owned */
+    uint32_t *texel; /* owned */
+};
+
+static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
+    return r->segments.of_triangle[r->inverse.triangle[texel]];
+}
+
+static void sort_by_segment(struct texels_by_segment *t, const struct reconstruction *r) {
+    size_t segments = r->segments.count, valid = r->inverse.valid_count;
+    uint32_t *count = mem_calloc(segments + 2, sizeof *count);
+    t->texel = mem_array(valid + 1, sizeof *t->texel);
+    /* A counting sort; count[] is shifted by two while it counts and by one while it places. */
+    for (size_t i = 0; i < valid; i++)
+        count[segment_of(r, r->inverse.valid[i]) + 2]++;
+    for (size_t s = 2; s < segments + 2; s++)
+        count[s] += count[s - 1];
+    for (size_t i = 0; i < valid; i++)
+        t->texel[count[segment_of(r, r->inverse.valid[i]) + 1]++] = r->inverse.valid[i];
+    t->first = count;
+}
+
+static void release_texels(struct texels_by_segment *t) {
+    mem_free(t->first);
+    mem_free(t->texel);
+}
+
+/* The i-th of `wanted` evenly spaced texels of a segment. */
+static uint32_t spaced_texel(const struct texels_by_segment *t, size_t segment, size_t i, size_t wanted) {
+    size_t count = t->first[segment + 1] - t->first[segment];
+    return t->texel[t->first[segment] + i * count / wanted];
+}
+
+static size_t texel_count(const struct texels_by_segment *t, size_t segment, size_t most) {
+    size_t count = t->first[segment + 1] - t->first[segment];
+    return count < most ? count : most;
+}
+
+struct evidence_job {
+    struct reconstruction *r;
     const struct views *views;
-    const uint32_t *first; /* [segment_count + 1] into texel */
-    const uint32_t *texel; /* valid texels by segment */
-    rgb *radiance;
+    struct texels_by_segment texels;
+    struct look_batch *batch; /* [threads] */
+    struct emitter_evidence *evidence;
 };
 
 static int compare_floats(const void *a, const void *b) {
@@ -25,13 +73,12 @@ static int compare_floats(const void *a, const void *b) {
 
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
-    struct observe_job *job = user;
+    struct evidence_job *job = user;
     const struct reconstruction *r = job->r;
     float value[3][TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
-    size_t count = 0, texels = job->first[segment + 1] - job->first[segment];
-    size_t wanted = texels < TEXELS_PER_SEGMENT ? texels : TEXELS_PER_SEGMENT;
+    size_t count = 0, wanted = texel_count(&job->texels, segment, TEXELS_PER_SEGMENT);
     for (size_t i = 0; i < wanted; i++) {
-        uint32_t texel = job->texel[job->first[segment] + i * texels / wanted], triangle;
+        uint32_t texel = spaced_texel(&job->texels, segment, i, wanted), triangle;
         float b1, b2;
         if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)(texel % r->atlas.width) + 0.5f,
                                (float)(texel / r->atlas.width) + 0.5f, &triangle, &b1, &b2))
@@ -51,39 +98,66 @@ static void observe_segment(void *user, size_t segment, int thread) {
             value[2][count++] = sample.radiance.b;
         }
     }
-    job->radiance[segment] = rgb_gray(0.0f);
     if (count == 0)
         return;
     for (int c = 0; c < 3; c++)
         qsort(value[c], count, sizeof value[c][0], compare_floats);
-    job->radiance[segment] = rgb_make(value[0][count / 2], value[1][count / 2], value[2][count / 2]);
+    job->evidence[segment].shown =
+        rgb_make(value[0][count / 2], value[1][count / 2], value[2][count / 2]);
 }
 
-void emitters_observe(const struct reconstruction *r, const struct views *views, rgb *radiance) {
-    size_t segments = r->segments.count, valid = r->inverse.valid_count;
-    uint32_t *first = mem_calloc(segments + 2, sizeof *first);
-    uint32_t *texel = mem_array(valid + 1, sizeof *texel);
-    /* A counting sort by segment; first[] is shifted by one while it counts. */
-    for (size_t i = 0; i < valid; i++)
-        first[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]] + 2]++;
-    for (size_t s = 2; s < segments + 2; s++)
-        first[s] += first[s - 1];
-    for (size_t i = 0; i < valid; i++) {
-        uint32_t segment = r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]];
-        texel[first[segment + 1]++] = r->inverse.valid[i];
+void emitters_observe(const struct reconstruction *r, const struct views *views,
+                      struct emitter_evidence *evidence) {
+    struct evidence_job job = {.r = (struct reconstruction *)r, .views = views, .evidence = evidence};
+    sort_by_segment(&job.texels, r);
+    parallel_for(r->pool, r->segments.count, observe_segment, &job);
+    release_texels(&job.texels);
+}
+
+/* Base colours of a segment that were looked at and the radiance reflected there, added up: their
+ * ratio is what a white surface would reflect. */
+static void gather_light(void *user, size_t segment, int thread) {
+    struct evidence_job *job = user;
+    struct reconstruction *r = job->r;
+    struct look_batch *b = &job->batch[thread];
+    size_t wanted = texel_count(&job->texels, segment, EMITTERS_TEXELS);
+    look_batch_clear(b);
+    for (size_t i = 0; i < wanted; i++)
+        look_add(b, spaced_texel(&job->texels, segment, i, wanted), DECISION_ITERATION);
+    look_trace(b);
+    const rgb *own = &r->materials.emission[segment];
+    double reflected[3] = {0}, base[3] = {0};
+    for (size_t k = 0; k < b->look_count; k++) {
+        const float *texel = r->materials.base_color.texel[b->look[k].texel];
+        for (int s = 0; s < b->samples; s++) {
+            const rgb *radiance = &b->radiance[k * (size_t)b->samples + (size_t)s];
+            reflected[0] += (double)(radiance->r - own->r);
+            reflected[1] += (double)(radiance->g - own->g);
+            reflected[2] += (double)(radiance->b - own->b);
+            for (int c = 0; c < 3; c++)
+                base[c] += (double)fmaxf(texel[c], DARKEST_BASE_COLOR);
+        }
     }
-    struct observe_job job = {r, views, first, texel, radiance};
-    parallel_for(r->pool, segments, observe_segment, &job);
-    mem_free(texel);
-    mem_free(first);
+    float arrived[3] = {0};
+    for (int c = 0; c < 3; c++)
+        arrived[c] = base[c] > 0.0 ? (float)fmax(reflected[c] / base[c], 0.0) : 0.0f;
+    job->evidence[segment].arrived = rgb_make(arrived[0], arrived[1], arrived[2]);
 }
 
-void emitters_decide(const struct materials *materials, const rgb *observed, bool *is_emitter,
-                     float *share) {
-    for (size_t s = 0; s < materials->segment_count; s++) {
-        float emission = rgb_mean(materials->emission[s]);
-        float seen = rgb_mean(observed[s]);
-        share[s] = seen > 0.0f ? emission / seen : 0.0f;
-        is_emitter[s] = share[s] >= EMITTER_SHARE;
+void emitters_decide(struct reconstruction *r, const struct views *views, struct look_batch *batch,
+                     struct emitter_evidence *evidence) {
+    struct evidence_job job = {.r = r, .views = views, .batch = batch, .evidence = evidence};
+    sort_by_segment(&job.texels, r);
+    parallel_for(r->pool, r->segments.count, gather_light, &job);
+    release_texels(&job.texels);
+    for (size_t s = 0; s < r->segments.count; s++) {
+        struct emitter_evidence *e = &evidence[s];
+        float shown = rgb_mean(e->shown);
+        e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
+        r->is_emitter[s] = e->share >= EMITTER_SHARE;
+        rgb own = rgb_sub(e->shown, rgb_scale(e->arrived, NEUTRAL_BASE_COLOR));
+        r->materials.emission[s] =
+            r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))
+                             : rgb_gray(0.0f);
     }
 }

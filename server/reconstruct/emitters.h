@@ -1,23 +1,33 @@
 /* emitters.h -- the decision which segments emit.
  *
- * While the optimiser runs from a neutral start every segment may emit, and a push downwards makes
- * emission fade where reflected light explains the photographs as well. A segment is an emitter
- * when, at the time of the decision, its emission explains most of what the photographs show of
- * it: a reflecting surface keeps a small rest at most, a lamp nearly all of it. */
+ * Until the decision every segment that photographs show emits half of what they show of it and
+ * base colour makes up the rest, so that each surface sends out about the light that the
+ * photographs measured, whatever part of it is its own. The light that arrives at a segment is
+ * then right too, and tells what the segment could reflect: base colour 1 at most. A segment
+ * whose photographs show clearly more than that is an emitter (the residual of FIPT, Wu et al.
+ * 2023, taken by segment). */
 #ifndef UNBAKE_RECONSTRUCT_EMITTERS_H
 #define UNBAKE_RECONSTRUCT_EMITTERS_H
 
+#include "server/reconstruct/look.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/reconstruct/views.h"
 
-/* Median radiance, by channel, that the photographs show of each segment, from up to a few hundred
- * texels of it; saturated values count as the clip. 0 where nothing was seen.
- * radiance[segment_count] out. */
-void emitters_observe(const struct reconstruction *r, const struct views *views, rgb *radiance);
+/* What is known of a segment's light. */
+struct emitter_evidence {
+    rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
+    rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
+    float share; /* part of `shown` that base colour 1 could not reflect */
+};
 
-/* Fills is_emitter[segment_count] and share[segment_count], the part of the observed radiance that
- * the present emission explains: the evidence. */
-void emitters_decide(const struct materials *materials, const rgb *observed_radiance,
-                     bool *is_emitter, float *share);
+/* Fills `shown` of evidence[segment_count] from up to a few hundred texels of each. */
+void emitters_observe(const struct reconstruction *r, const struct views *views,
+                      struct emitter_evidence *evidence);
+
+/* Fills `arrived` by looks at the present state of the materials, decides, and gives every emitter
+ * in r->materials its radiance: what is shown less what a neutral base colour would reflect. batch[threads] is scratch for EMITTERS_TEXELS texels. */
+#define EMITTERS_TEXELS 32
+void emitters_decide(struct reconstruction *r, const struct views *views, struct look_batch *batch,
+                     struct emitter_evidence *evidence);
 
 #endif

@@ -22,4 +22,13 @@ float loss_weight(const struct photograph *photo, const struct photograph_sample
 float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
                 const rgb *radiance, int sample_count, float median_radiance, rgb *d_radiance);
 
+/* The same look as a ratio: relative to the photograph, what it shows and what the render shows,
+ * by channel. Saturated channels that the render exceeds too count as equal. */
+struct loss_match {
+    float shown[3];    /* R / (R + a share of the median) */
+    float rendered[3]; /* I / (R + the same) */
+};
+struct loss_match loss_match_pair(const struct photograph_sample *reference, const rgb *radiance,
+                                  int sample_count, float median_radiance);
+
 #endif

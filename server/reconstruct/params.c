@@ -198,11 +198,11 @@ static void step_segments(struct params *p, const struct gradient *gradient,
         float d_log[3]; /* d loss / d log e = e d loss / d e */
         for (int c = 0; c < 3; c++)
             d_log[c] = emission[c] * (float)gradient->d_emission[s][c];
-        step[0] = step[1] = step[2] = 0.0f;
-        if (d_log[0] != 0.0f || d_log[1] != 0.0f || d_log[2] != 0.0f)
-            adam_touch(&p->emission, s, d_log, step);
+        if (d_log[0] == 0.0f && d_log[1] == 0.0f && d_log[2] == 0.0f)
+            continue;
+        adam_touch(&p->emission, s, d_log, step);
         for (int c = 0; c < 3; c++) {
-            float moved = p->log_emission[s][c] + rates->emission * (step[c] - rates->emission_decay);
+            float moved = p->log_emission[s][c] + rates->emission * step[c];
             p->log_emission[s][c] = clampf(moved, LOG_EMISSION_MIN, LOG_EMISSION_MAX);
             emission[c] = expf(p->log_emission[s][c]);
         }
@@ -212,11 +212,36 @@ static void step_segments(struct params *p, const struct gradient *gradient,
 
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool) {
+    if (p->is_emitter)
+        step_segments(p, gradient, rates);
+    if (rates->skip_base_color)
+        return;
     struct step_job job = {.p = p, .gradient = gradient, .rate = rates->base_color};
     job.count = p->level > 0 ? sum_blocks(p, gradient) : gradient->texel_count;
     parallel_for(pool, (job.count + CHUNK - 1) / CHUNK, p->level > 0 ? step_blocks : step_texels,
                  &job);
-    step_segments(p, gradient, rates);
+}
+
+void params_match(struct params *p, uint32_t texel, const struct loss_match *match, float trust) {
+    struct texture *texture = &p->materials->base_color;
+    size_t across = blocks_across(texture->width, p->level);
+    size_t bx = texel % texture->width >> p->level, by = texel / texture->width >> p->level;
+    uint16_t *looks = &p->base_color.touch_count[by * across + bx];
+    float step = 2.0f * trust / ((float)*looks + PARAMS_MATCH_PRIOR);
+    if (*looks < UINT16_MAX)
+        ++*looks;
+    step *= slowdown(p, texel);
+    float factor[3];
+    for (int c = 0; c < 3; c++)
+        factor[c] = (1.0f + step * (match->shown[c] - 1.0f)) / (1.0f + step * (match->rendered[c] - 1.0f));
+    size_t side = (size_t)1 << p->level, x0 = bx << p->level, y0 = by << p->level;
+    for (size_t y = y0; y < y0 + side && y < texture->height; y++) {
+        for (size_t x = x0; x < x0 + side && x < texture->width; x++) {
+            float *value = texture->texel[y * texture->width + x];
+            for (int c = 0; c < 3 && value[3] != 0.0f; c++)
+                value[c] = clampf(value[c] * factor[c], BLOCK_MIN, 1.0f);
+        }
+    }
 }
 
 void params_fix_emitters(struct params *p, const bool *is_emitter) {

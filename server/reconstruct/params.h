@@ -12,12 +12,14 @@
 
 #include "common/parallel.h"
 #include "server/reconstruct/adam.h"
+#include "server/reconstruct/loss.h"
 #include "server/render/gradient.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/segment.h"
 
 #define PARAMS_ROUGHNESS_MIN 0.05f
+#define PARAMS_MATCH_PRIOR 12.0f
 
 /* Step sizes of one iteration. */
 struct params_rates {
@@ -25,7 +27,7 @@ struct params_rates {
     float roughness;
     float specular;
     float emission;       /* in logarithms */
-    float emission_decay; /* added downward push, in Adam steps: light that nothing asks for fades */
+    bool skip_base_color; /* it moves by params_match instead */
 };
 
 struct params {
@@ -55,9 +57,19 @@ void params_refine(struct params *p, int level);
 /* Says at which level the moments are that were restored from a checkpoint. */
 void params_set_level(struct params *p, int level);
 
-/* One step against the gradient. */
+/* One step against the gradient; segments' parameters keep still until the emitters are known. */
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool);
+
+/* The guided step of base colour, after one look at a texel: scales the texel's block, by channel,
+ * by the ratio of what was shown to what was rendered, averaged over the block's past looks.
+ *
+ * Stochastic approximation (Robbins & Monro 1951) of the fixed point rendered = shown with a step of
+ * 2 / (looks + PARAMS_MATCH_PRIOR). To first order a surface's radiance is its base colour times
+ * its light, so the ratio is the Newton step; its noise is that of one estimate, where the
+ * gradient's is that of a product of two. The prior keeps interreflection (all blocks that scale
+ * together change the light as well) from overshooting. */
+void params_match(struct params *p, uint32_t texel, const struct loss_match *match, float trust);
 
 /* Tells the emitters from now on (borrowed): all other segments emit exactly 0, for good, and the
  * reflectance of an emitter, which its own light hides, moves slowly. */
