@@ -345,6 +345,8 @@ static enum status loop(struct refine *f, struct error *err) {
                 return status;
         }
     }
+    if (f->guided)
+        params_fill_unseen(&f->params, f->r->observed.count);
     return save(f, err);
 }
 

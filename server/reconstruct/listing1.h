@@ -6,9 +6,15 @@
  * with the photograph; walk the paths backwards; move every parameter that was touched by Adam.
  *
  * From a neutral start: grey base colour, of all light that is seen of a segment half its own, half
- * reflected. Base colour is solved coarse to fine: at level L all texels of a block of 2^L x 2^L move together. After a first part
- * of the run each segment is declared an emitter or not (emitters.h); from then on the emission
- * of all others is exactly 0. */
+ * reflected. After a first part of the run each segment is declared an emitter or not (emitters.h);
+ * from then on the emission of all others is exactly 0. Base colour is solved coarse to fine: at
+ * level L all texels of a block of 2^L x 2^L move by a common factor, at level 0 each by itself.
+ *
+ * With guided=false that is all. With guided=true (the default) blocks start with the detail that
+ * the photographs show (observe.h) and keep it, base colour moves by the ratio of what was shown
+ * to what was rendered (params_match) and not by its noisier gradient, and the finest level is
+ * blocks of 4 x 4: more base colour for the same paths, by far. Roughness, specular and emission
+ * move by Adam on the derivatives in both. */
 #ifndef UNBAKE_RECONSTRUCT_LISTING1_H
 #define UNBAKE_RECONSTRUCT_LISTING1_H
 
