@@ -25,6 +25,8 @@ static const struct setting table[] = {
      "first step size of emission, in logarithms of radiance"},
     {"guided", SETTING_BOOL, "", 0, 0, NULL, "true",
      "coarse levels keep the detail that the photographs show; false: the published algorithm"},
+    {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10",
+     "where the capture holds out no frame, every how many-th is; 0: none"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0",
      "optimiser steps; 0: as many as time_limit_sec holds"},
     {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "8",

@@ -17,6 +17,8 @@
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 
+#define HOLD_OUT_LEAST 16
+
 struct run {
     struct reconstruction *r;
     const struct reconstruct_hooks *hooks;
@@ -39,6 +41,21 @@ static enum status run_stage(struct run *run, const char *name,
     return status;
 }
 
+/* Holds frames out for the report where the capture itself holds out none; never so many that
+ * fewer than HOLD_OUT_LEAST train. */
+static void hold_out(struct reconstruction *r) {
+    struct scene *scene = r->scene;
+    size_t every = (size_t)settings_number(r->settings, "hold_out_every");
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        if (scene->photograph[i].is_test)
+            return;
+    }
+    if (every == 0 || scene->photograph_count - scene->photograph_count / every < HOLD_OUT_LEAST)
+        return;
+    for (size_t i = every - 1; i < scene->photograph_count; i += every)
+        scene->photograph[i].is_test = true;
+}
+
 static void make_segments(struct reconstruction *r) {
     const struct mesh *mesh = &r->scene->mesh;
     bool given = mesh->object_id && !settings_is(r->settings, "segmentation", "automatic");
@@ -55,6 +72,7 @@ static enum status prepare(struct run *run, struct error *err) {
     if (settings_is(r->settings, "segmentation", "given") && !mesh->object_id)
         return error_set(err, STATUS_INPUT,
                          "segmentation=given, but the mesh has no object_id per face");
+    hold_out(r);
     make_segments(r);
     enum status status =
         atlas_make(&r->atlas, mesh, &r->segments, (uint32_t)settings_number(r->settings, "texture_size"),
