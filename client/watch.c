@@ -36,6 +36,7 @@ struct watch {
     struct sse sse;
     bool only_log;      /* `logs` */
     bool only_past;     /* ends with what is stored by now: `logs` without --follow */
+    bool printed;       /* a line of the log */
     bool connected;     /* something came over the present connection */
     double heard_at;    /* when the last event came */
     double progress_at; /* when the last progress came */
@@ -85,6 +86,7 @@ static void show(struct watch *w, bool urgent) {
 static void print_log(struct watch *w, const cJSON *data) {
     struct client *c = w->client;
     const char *level = member_text(data, "level");
+    w->printed = true;
     bool important = strcmp(level, "warning") == 0 || strcmp(level, "error") == 0;
     if (!w->only_log && (c->quiet || !important))
         return;
@@ -345,6 +347,8 @@ int logs_run(struct client *c, const struct options *o) {
     int code = status == STATUS_OK ? watch_events(&w, c, job, true) : client_fail(c, &reply, &err);
     if (code == CLIENT_OK && print_stderr(c, job, &reply, &err) != STATUS_OK)
         code = client_fail(c, &reply, &err);
+    else if (code == CLIENT_OK && !w.printed && !*buf_text(&reply.body))
+        client_note(c, "the log of job %lld is empty", (long long)job);
     reply_release(&reply);
     return code;
 }

@@ -34,7 +34,7 @@ static const struct option table[] = {
     INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
     INT(queue_limit, "jobs", 1, 1000000, "1000", "Jobs that may wait; more are refused with 429."),
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
-    REAL(checkpoint_interval_sec, "s", 1, 86400, "60",
+    REAL(checkpoint_interval_sec, "s", 0.1, 86400, "60",
          "Time between a job's checkpoints; up to five times as long on a slow disk."),
     REAL(stop_grace_sec, "s", 1, 3600, "30",
          "Time that a job has to write its checkpoint when it is stopped."),
@@ -80,7 +80,7 @@ static void set_number(struct config *c, const struct option *option, const char
     double number = read_number(value);
     bool is_whole = option->type == OPTION_INT;
     if (!(number >= option->minimum && number <= option->maximum) || (is_whole && number != floor(number)))
-        buf_printf(problems, "%s: %s must be a %snumber from %.0f to %.0f%s%s, not \"%s\"\n", where,
+        buf_printf(problems, "%s: %s must be a %snumber from %.15g to %.15g%s%s, not \"%s\"\n", where,
                    option->name, is_whole ? "whole " : "", option->minimum, option->maximum,
                    *option->unit ? " " : "", option->unit, value);
     else if (is_whole)

@@ -420,9 +420,10 @@ static enum status open_socket(struct listener *l, const struct listener_config 
     l->socket_fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (l->socket_fd < 0 || setsockopt(l->socket_fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one) != 0 ||
         bind(l->socket_fd, found->ai_addr, found->ai_addrlen) != 0 || listen(l->socket_fd, 512) != 0 ||
-        getsockname(l->socket_fd, (struct sockaddr *)&bound, &size) != 0)
-        status = error_set_errno(err, errno, "cannot listen on %s port %s", config->address, port);
-    else if (getnameinfo((struct sockaddr *)&bound, size, NULL, 0, port, sizeof port, NI_NUMERICSERV) == 0)
+        getsockname(l->socket_fd, (struct sockaddr *)&bound, &size) != 0) {
+        error_set_errno(err, errno, "cannot listen on %s port %s", config->address, port);
+        status = error_hint(err, "--listen takes another address");
+    } else if (getnameinfo((struct sockaddr *)&bound, size, NULL, 0, port, sizeof port, NI_NUMERICSERV) == 0)
         l->port = (uint16_t)strtoul(port, NULL, 10);
     freeaddrinfo(found);
     return status;

@@ -60,7 +60,8 @@ static la_ssize_t read_gzip(struct archive *a, void *user, const void **block) {
     int got = gzread(u->gzip, u->gzip_block, (unsigned)BLOCK_BYTES), fault = Z_OK;
     const char *text = gzerror(u->gzip, &fault);
     if (got < 0 || (got == 0 && fault != Z_OK && fault != Z_STREAM_END)) {
-        archive_set_error(a, fault == Z_ERRNO ? errno : EINVAL, "gzip: %s", text);
+        const char *fact = strstr(text, ">: "); /* after "<fd:6>", which is zlib's name for it */
+        archive_set_error(a, fault == Z_ERRNO ? errno : EINVAL, "gzip: %s", fact ? fact + 3 : text);
         return -1;
     }
     *block = u->gzip_block;

@@ -264,6 +264,7 @@ static void take_warnings(struct findings *f, struct scene *scene) {
 static enum status sum_up(const struct findings *f, struct error *err) {
     const cJSON *first = cJSON_GetArrayItem(f->problems, 0);
     const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(first, "reason"));
+    const char *file = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(first, "file"));
     if (f->problem_count > FINDINGS_MAX) {
         cJSON *more = cJSON_CreateObject();
         json_add_string(more, "file", "");
@@ -272,10 +273,11 @@ static enum status sum_up(const struct findings *f, struct error *err) {
         cJSON_AddItemToArray(f->problems, more);
         mem_free(text);
     }
+    const char *gap = file && *file ? ": " : "";
     if (f->problem_count == 1)
-        return error_set(err, STATUS_INPUT, "%s", reason ? reason : "");
-    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s", f->problem_count,
-                     reason ? reason : "");
+        return error_set(err, STATUS_INPUT, "%s%s%s", file ? file : "", gap, reason ? reason : "");
+    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s%s%s", f->problem_count,
+                     file ? file : "", gap, reason ? reason : "");
 }
 
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,

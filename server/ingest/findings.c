@@ -3,6 +3,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "common/mem.h"
 
@@ -13,12 +14,21 @@ void findings_release(struct findings *f) {
     *f = (struct findings){0};
 }
 
+/* Readers begin their messages with the file's name, which has a member of its own here. */
+static const char *without_name(const char *reason, const char *file) {
+    size_t length = strlen(file);
+    if (length == 0 || strncmp(reason, file, length) != 0)
+        return reason;
+    const char *rest = reason + length + strspn(reason + length, ": ");
+    return reason[length] == ':' || reason[length] == ' ' ? rest : reason;
+}
+
 static void add_problem(struct findings *f, const char *file, const char *reason, const char *hint) {
     if (f->problem_count++ >= FINDINGS_MAX)
         return;
     cJSON *problem = cJSON_CreateObject();
     json_add_string(problem, "file", file);
-    json_add_string(problem, "reason", reason);
+    json_add_string(problem, "reason", without_name(reason, file));
     if (hint[0] != '\0')
         json_add_string(problem, "hint", hint);
     cJSON_AddItemToArray(f->problems, problem);

@@ -85,7 +85,7 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
     enum status status = store_scene_get(store, scene_id, &row, err);
     if (status == STATUS_OK && row.state != SCENE_READY) {
         error_set(err, STATUS_INPUT, "the scene %.12s was rejected", scene_id);
-        status = error_hint(err, "The scene's page lists its problems.");
+        status = error_hint(err, "GET /v1/scenes/%.12s lists its problems.", scene_id);
     }
     scene_row_release(&row);
     return status;

@@ -24,7 +24,7 @@ trap clean_up EXIT
 start() {
     rm -f "$dir/port"
     "$build/unbaked" --data "$dir/$1" --listen 127.0.0.1:0 --port-file "$dir/port" \
-        --set "threads=$2" --set max_attempts=100 --set checkpoint_interval_sec=1 \
+        --set "threads=$2" --set max_attempts=100 --set checkpoint_interval_sec=0.2 \
         --set min_free_mib=0 >>"$dir/$1.log" 2>&1 &
     daemon=$!
     for _ in $(seq 500); do
@@ -39,7 +39,7 @@ stop() {
     daemon=
 }
 submit() {
-    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=80 \
+    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=120 \
         --set texels_per_iteration=2048 --set coarse_levels=1 --set report_samples=4 >/dev/null 2>&1 ||
         fail "submit"
 }
@@ -47,6 +47,9 @@ submit() {
 textures() {
     (cd "$dir/$1/jobs/1/out" && sha256sum base_color.exr roughness.exr specular.exr emission.exr \
         confidence.exr scene.ply) || fail "no textures in $1"
+}
+checkpoints() {
+    "$build/unbake" logs 1 2>/dev/null | grep -c "checkpoint at iteration"
 }
 state() {
     "$build/unbake" show 1 2>/dev/null | awk '$1 == "state" { print $2 }'
@@ -68,7 +71,12 @@ RANDOM=11
 start war 2
 submit
 for ((i = 0; i < kills; i++)); do
-    sleep "$((RANDOM % 2)).$((RANDOM % 90 + 10))"
+    # Every other time there is something new to go on from; else at any moment.
+    before=$(checkpoints)
+    while ((i % 2 == 0)) && [ "$(checkpoints)" -le "$before" ] && [ "$(state)" != succeeded ]; do
+        sleep 0.05
+    done
+    sleep "0.$((RANDOM % 40 + 10))"
     worker=$(awk '/runs as process/ { for (i = 1; i < NF; i++) if ($i == "process") p = $(i + 1) }
                   END { print p }' "$dir/war.log")
     # The kernel kills the daemon's children with it: "both" is the daemon.

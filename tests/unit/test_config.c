@@ -72,7 +72,7 @@ static void check_documented(void) {
             snprintf(wanted, sizeof wanted, "%s =%s%s", o->name, *o->default_text ? " " : "", o->default_text);
             CHECK_STRING(line, wanted);
             if (o->type == OPTION_INT || o->type == OPTION_REAL) {
-                snprintf(value, sizeof value, "(%s, %.0f to %.0f", o->unit, o->minimum, o->maximum);
+                snprintf(value, sizeof value, "(%s, %.15g to %.15g", o->unit, o->minimum, o->maximum);
                 /* The comment may break the range over two lines. */
                 char *high = strrchr(value, ' ');
                 CHECK_THAT(strstr(comment, high + 1), "%s: its comment has no \"%s\"", o->name, high + 1);
