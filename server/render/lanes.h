@@ -61,6 +61,7 @@ struct shade_block {
     struct lanes3 origin, direction;
     float distance_m[LANES];
     float pdf[LANES];                /* of the direction by solid angle; 0: a camera ray */
+    float brought[LANES];            /* greatest channel of what the path has brought so far */
     float area_density[LANES];       /* of light samples on this segment */
     /* The triangle. */
     struct lanes3 normal;            /* geometric */
@@ -75,7 +76,8 @@ struct shade_block {
     /* Random numbers. */
     uint32_t key[LANES], sample[LANES];
     float pick[LANES], lobe[LANES];
-    float light_u[LANES], light_v[LANES], way_u[LANES], way_v[LANES], roulette[LANES];
+    float light_u[LANES], light_v[LANES], way_u[LANES], way_v[LANES];
+    float roulette[LANES], light_roulette[LANES];
     /* The light sample: a place on a triangle, or a direction already (distance INFINITY). */
     struct lanes3 light_corner, light_edge1, light_edge2, radiance;
     float light_density[LANES];      /* by area */

@@ -16,7 +16,8 @@
  *      which order, does not depend on timing;
  *   2. weights and densities are constants of the derivative (detached sampling). No path ends
  *      because its throughput is 0, only because the sampled direction is below the horizon or
- *      by roulette with a chance that is never 0: where a base colour is 0 its derivative is not;
+ *      by roulette with a chance that is never 0, as do light samples: where a base colour is 0 its
+ *      derivative is not;
  *   3. multiple importance sampling by the power heuristic (Veach 1997, section 9.2.4). */
 #include "server/render/path.h"
 
@@ -152,7 +153,7 @@ static void place_lane(struct vertex_block *v, struct shade_block *s, int lane,
 
 /* Puts the vertex that a ray hit into a lane. */
 static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
-                      size_t flight) {
+                      size_t flight, const rgb *radiance) {
     const struct flight *f = &b->flight[flight];
     const struct accel_ray *ray = &b->ray[flight];
     const struct accel_hit *hit = &b->hit[flight];
@@ -167,6 +168,7 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->parent[lane] = f->parent;
     lanes3_set_rgb(&v->beta, lane, f->beta);
     s->pdf[lane] = f->pdf;
+    s->brought[lane] = rgb_max(radiance[f->path]);
     s->key[lane] = b->key[f->path];
     s->sample[lane] = b->sample[f->path];
     lanes3_set(&s->origin, lane, ray->origin);
@@ -298,7 +300,8 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
         sample_environment(s, v, world->lights, count);
     gather_texels(v, s, texture, count);
     shade_texture(v, s);
-    shade_scatter(v, s, depth + 2 >= settings->roulette_depth);
+    shade_scatter(v, s, depth + 2 >= settings->roulette_depth,
+                  settings->roulette_depth <= settings->max_depth);
     send_rays(b, v, (uint32_t)block * LANES, count);
 }
 
@@ -316,7 +319,7 @@ static void shade_hits(struct path_batch *b, const struct world *world,
             meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
             continue;
         }
-        load_lane(b, world, &b->vertex[depth][block], lane++, i);
+        load_lane(b, world, &b->vertex[depth][block], lane++, i, radiance);
         if (lane == LANES) {
             shade(b, world, settings, depth, block++, LANES, radiance);
             lane = 0;

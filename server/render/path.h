@@ -19,7 +19,9 @@
 
 struct path_settings {
     int max_depth;      /* segments from the camera: 1 emission only, 2 direct light, ... <= 32 */
-    int roulette_depth; /* Russian roulette from this segment on */
+    int roulette_depth; /* Russian roulette decides on this segment and those after it. Where it is
+                         * at most max_depth, light samples that can bring only little play too;
+                         * otherwise nothing is left to chance */
     uint64_t seed;
 };
 

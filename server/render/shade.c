@@ -7,6 +7,8 @@
 
 #define MIN_CHANCE 0.05f
 #define MAX_CHANCE 0.95f
+#define MIN_LIGHT_CHANCE 0.1f
+#define LIGHT_SHARE 0.1f /* of the path's radiance so far: smaller gains are a gamble */
 
 /* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
 enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX };
@@ -86,6 +88,7 @@ KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
         s->way_u[i] = way.x;
         s->way_v[i] = way.y;
         s->roulette[i] = sampler_number(key, sample, pair + PAIR_ROULETTE);
+        s->light_roulette[i] = sampler_number(~key, sample, pair + PAIR_ROULETTE);
     }
 }
 
@@ -135,8 +138,10 @@ static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
                  (base_color.b * f.diffuse + f.specular) * light.b};
 }
 
-KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool roulette) {
-    float least = roulette ? MIN_CHANCE : 1.0f, most = roulette ? MAX_CHANCE : 1.0f;
+KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
+                          bool path_roulette, bool light_roulette) {
+    float least = path_roulette ? MIN_CHANCE : 1.0f, most = path_roulette ? MAX_CHANCE : 1.0f;
+    float least_worth = light_roulette ? MIN_LIGHT_CHANCE : 1.0f;
     FOR_LANES {
         vec3 n = lanes3_get(&s->frame_normal, i), a, b;
         vec3_frame(n, &a, &b);
@@ -148,13 +153,21 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         vec3 light = {vec3_dot(a, to), vec3_dot(b, to), vec3_dot(n, to)};
         struct bsdf_value f = bsdf_eval(&bsdf, wo, light);
         float light_pdf = s->light_pdf[i];
-        bool wanted = light_pdf > 0.0f && f.pdf > 0.0f;
-        float factor = wanted ? power_heuristic(light_pdf, f.pdf) / bsdf_max(light_pdf, 1e-30f) : 0.0f;
-        rgb incident = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
+        bool lit = light_pdf > 0.0f && f.pdf > 0.0f;
+        float factor = lit ? power_heuristic(light_pdf, f.pdf) / bsdf_max(light_pdf, 1e-30f) : 0.0f;
+        rgb possible = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
+        rgb gain = rgb_mul(beta, reflect(f, base_color, possible));
+        /* A light sample that can bring only a little, by what the path has brought already, is
+         * seldom worth a shadow ray: roulette (Veach 1997, section 10.4.1). */
+        float most_gain = bsdf_max(gain.r, bsdf_max(gain.g, gain.b));
+        float worth = most_gain / bsdf_max(LIGHT_SHARE * s->brought[i], 1e-30f);
+        worth = clamp_flat(worth, least_worth, 1.0f);
+        bool wanted = lit && s->light_roulette[i] < worth;
+        float kept = wanted ? 1.0f / worth : 0.0f;
         lanes3_set(&v->light, i, light);
-        lanes3_set_rgb(&v->incident, i, incident);
-        v->light_factor[i] = factor;
-        lanes3_set_rgb(&s->gain, i, rgb_mul(beta, reflect(f, base_color, incident)));
+        lanes3_set_rgb(&v->incident, i, rgb_scale(possible, kept));
+        v->light_factor[i] = factor * kept;
+        lanes3_set_rgb(&s->gain, i, rgb_scale(gain, kept));
         s->shadow_wanted[i] = wanted ? 1 : 0;
 
         vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->way_u[i], s->way_v[i]);

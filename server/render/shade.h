@@ -21,7 +21,8 @@ void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict
 void shade_light(struct shade_block *restrict s);
 
 /* Reflection towards the light samples and on along the path. */
-void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool roulette);
+void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool path_roulette,
+                   bool light_roulette);
 
 /* Derivatives of everything at a vertex, and the radiance that leaves it. */
 void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d);
