@@ -6,7 +6,7 @@
  *   2. each tile adds its entries, log by log, into a dense scratch tile, then writes the touched
  *      texels to a place of its own in the output arrays, tiles in parallel;
  *   3. the places are closed up.
- * Tiles are as small as keeps their number at 64 x 64 or below, and at least 32 x 32 texels, so
+ * Tiles are as small as keeps their number at 32 x 32 or below, and at least 64 x 64 texels, so
  * that the counters stay small and a scratch tile stays in the second-level cache. */
 #include "server/render/gradient.h"
 
@@ -15,8 +15,8 @@
 
 #include "common/mem.h"
 
-#define MIN_TILE_SHIFT 5
-#define MAX_TILES_ACROSS 64
+#define MIN_TILE_SHIFT 6
+#define MAX_TILES_ACROSS 32
 #define AHEAD 32 /* entries under way to the cache */
 
 typedef float float4 __attribute__((vector_size(16)));

@@ -113,6 +113,6 @@ static void check_size(uint32_t width, uint32_t height) {
 int main(void) {
     check_size(100, 70);
     check_size(32, 32);
-    check_size(2500, 2100); /* tiles of 64 x 64 */
+    check_size(2500, 2100); /* tiles of 128 x 128 */
     return check_result();
 }
