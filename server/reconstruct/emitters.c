@@ -1,12 +1,15 @@
 /* emitters.c -- see emitters.h. */
 #include "server/reconstruct/emitters.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "common/mem.h"
 
 #define TEXELS_PER_SEGMENT 256
 #define VIEWS_PER_TEXEL 4
+/* Part of the looks that must have measured something for their median to count. */
+#define MEASURED_PART 0.1f
 /* Part of the shown radiance that must be beyond reflection. Specular reflection and noise stay
  * below it on all but mirrors; a lamp whose own light is less than half of what falls on it is
  * missed. */
@@ -14,7 +17,7 @@
 /* Base colour of an emitter, which its own light hides. */
 #define NEUTRAL_BASE_COLOR 0.5f
 /* A base colour below this tells too little of the light that fell on it. */
-#define DARKEST_BASE_COLOR 0.02f
+#define DARKEST_BASE_COLOR 0.05f
 /* Iteration number that keeps the decision's random numbers apart from the optimiser's. */
 #define DECISION_ITERATION UINT64_C(0x7fff0000)
 
@@ -71,12 +74,38 @@ static int compare_floats(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+/* Values of one channel: those that were measured, and of the saturated ones, which are lower
+ * bounds, the largest. */
+struct channel_values {
+    float value[TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
+    size_t count, saturated_count;
+    float bound;
+};
+
+static void add_value(struct channel_values *v, float radiance, bool saturated) {
+    if (!saturated) {
+        v->value[v->count++] = radiance;
+        return;
+    }
+    v->saturated_count++;
+    v->bound = fmaxf(v->bound, radiance);
+}
+
+/* The median of what was measured; where nearly everything is saturated, the bound. (With cycling
+ * exposures a lamp is measured by a third of the frames, a wall's highlight saturates in a few.) */
+static float median(struct channel_values *v) {
+    if ((float)v->count < MEASURED_PART * (float)(v->count + v->saturated_count))
+        return v->bound;
+    qsort(v->value, v->count, sizeof v->value[0], compare_floats);
+    return v->count ? v->value[v->count / 2] : 0.0f;
+}
+
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
     const struct reconstruction *r = job->r;
-    float value[3][TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
-    size_t count = 0, wanted = texel_count(&job->texels, segment, TEXELS_PER_SEGMENT);
+    struct channel_values red = {.count = 0}, green = {.count = 0}, blue = {.count = 0};
+    size_t wanted = texel_count(&job->texels, segment, TEXELS_PER_SEGMENT);
     for (size_t i = 0; i < wanted; i++) {
         uint32_t texel = spaced_texel(&job->texels, segment, i, wanted), triangle;
         float b1, b2;
@@ -93,17 +122,12 @@ static void observe_segment(void *user, size_t segment, int thread) {
                 &r->scene->photograph[job->views->train[view[k].train]];
             if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
                 continue;
-            value[0][count] = sample.radiance.r;
-            value[1][count] = sample.radiance.g;
-            value[2][count++] = sample.radiance.b;
+            add_value(&red, sample.radiance.r, sample.saturated[0]);
+            add_value(&green, sample.radiance.g, sample.saturated[1]);
+            add_value(&blue, sample.radiance.b, sample.saturated[2]);
         }
     }
-    if (count == 0)
-        return;
-    for (int c = 0; c < 3; c++)
-        qsort(value[c], count, sizeof value[c][0], compare_floats);
-    job->evidence[segment].shown =
-        rgb_make(value[0][count / 2], value[1][count / 2], value[2][count / 2]);
+    job->evidence[segment].shown = rgb_make(median(&red), median(&green), median(&blue));
 }
 
 void emitters_observe(const struct reconstruction *r, const struct views *views,
@@ -129,13 +153,15 @@ static void gather_light(void *user, size_t segment, int thread) {
     double reflected[3] = {0}, base[3] = {0};
     for (size_t k = 0; k < b->look_count; k++) {
         const float *texel = r->materials.base_color.texel[b->look[k].texel];
+        if (texel[0] + texel[1] + texel[2] < 3.0f * DARKEST_BASE_COLOR)
+            continue;
         for (int s = 0; s < b->samples; s++) {
             const rgb *radiance = &b->radiance[k * (size_t)b->samples + (size_t)s];
             reflected[0] += (double)(radiance->r - own->r);
             reflected[1] += (double)(radiance->g - own->g);
             reflected[2] += (double)(radiance->b - own->b);
             for (int c = 0; c < 3; c++)
-                base[c] += (double)fmaxf(texel[c], DARKEST_BASE_COLOR);
+                base[c] += (double)texel[c];
         }
     }
     float arrived[3] = {0};

@@ -1,7 +1,7 @@
 /* emitters.h -- the decision which segments emit.
  *
- * Until the decision every segment that photographs show emits half of what they show of it and
- * base colour makes up the rest, so that each surface sends out about the light that the
+ * Until the decision every segment that photographs show emits a part of what they show of it (the
+ * larger the brighter it is) and base colour makes up the rest, so that each surface sends out about the light that the
  * photographs measured, whatever part of it is its own. The light that arrives at a segment is
  * then right too, and tells what the segment could reflect: base colour 1 at most. A segment
  * whose photographs show clearly more than that is an emitter (the residual of FIPT, Wu et al.

@@ -30,9 +30,10 @@
  * can, whose noise at single texels is far above the detail. */
 #define GUIDED_FINEST 2
 
-/* The neutral start of emission: this share of what the photographs show of a segment is its own
- * light, the rest is reflected. A segment that no photograph shows does not emit. */
-#define NEUTRAL_EMISSION_SHARE 0.5f
+/* The neutral start of emission. Of what the photographs show of a segment the part
+ * q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) is its own light, q being how many times brighter it is than
+ * the median of the room; the rest is reflected. A segment that no photograph shows does not emit. */
+#define NEUTRAL_BRIGHTNESS 3.0f
 #define NEUTRAL_BASE_COLOR 0.5f
 /* From the decision on step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. */
 #define RATE_FALL 15.0
@@ -199,7 +200,7 @@ static void start_base_color(struct refine *f) {
 static void decide_emitters(struct refine *f) {
     struct reconstruction *r = f->r;
     emitters_decide(r, f->views, f->batch, f->evidence);
-    /* Half of a segment's mean light may have been more than all of its dark parts': what base
+    /* A part of a segment's median light may have been more than all of its dark parts': what base
      * colour did about that is worth nothing. */
     start_base_color(f);
     params_refine(&f->params, f->counters.level);
@@ -401,6 +402,11 @@ static void report(struct refine *f) {
     }
 }
 
+static float neutral_share(rgb shown, float median) {
+    float q = rgb_mean(shown) / median;
+    return q * q / (q * q + NEUTRAL_BRIGHTNESS * NEUTRAL_BRIGHTNESS);
+}
+
 static void refine_init(struct refine *f, struct reconstruction *r, const struct views *views,
                         const struct reconstruct_hooks *hooks) {
     const struct settings *set = r->settings;
@@ -419,7 +425,8 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
     f->evidence = mem_calloc(r->segments.count, sizeof *f->evidence);
     emitters_observe(r, views, f->evidence);
     for (size_t s = 0; s < r->segments.count; s++)
-        r->materials.emission[s] = rgb_scale(f->evidence[s].shown, NEUTRAL_EMISSION_SHARE);
+        r->materials.emission[s] =
+            rgb_scale(f->evidence[s].shown, neutral_share(f->evidence[s].shown, views->median_radiance));
     params_init(&f->params, &r->materials, &r->inverse, &r->segments, f->coarse_levels);
     chooser_init(&f->chooser, r->inverse.valid_count,
                  (size_t)settings_number(set, "texels_per_iteration"), f->path.seed);

@@ -5,8 +5,8 @@
  * look up the photograph there; trace with derivatives; compare two independent half-estimates
  * with the photograph; walk the paths backwards; move every parameter that was touched by Adam.
  *
- * From a neutral start: grey base colour, of all light that is seen of a segment half its own, half
- * reflected. After a first part of the run each segment is declared an emitter or not (emitters.h);
+ * From a neutral start: grey base colour, and of the light that is seen of a segment a part its own
+ * that is near 1 for what outshines the room and near 0 for what is darker than most. After a first part of the run each segment is declared an emitter or not (emitters.h);
  * from then on the emission of all others is exactly 0. Base colour is solved coarse to fine: at
  * level L all texels of a block of 2^L x 2^L move by a common factor, at level 0 each by itself.
  *

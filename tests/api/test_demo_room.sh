@@ -1,0 +1,50 @@
+#!/bin/bash
+# The whole way on a small demo room, as `make demo` goes it: photographs of known materials, the
+# daemon, the client, the outputs, the comparison with the truth. A fixed number of iterations, so
+# the figures are the same on every machine; the limits leave room for changes of the optimiser, not
+# for a broken one. HDR frames, then ordinary ones at cycling exposures.
+set -u
+# shellcheck source=tests/api/lib.sh
+. tests/api/lib.sh "$1"
+
+start_daemon
+export UNBAKE_SERVER=$url
+
+# at_least NAME FOUND LEAST / at_most NAME FOUND MOST
+at_least() { awk "BEGIN{exit !($2 >= $3)}" || fail "$1 is $2, wanted $3 at least"; }
+at_most() { awk "BEGIN{exit !($2 <= $3)}" || fail "$1 is $2, wanted $3 at most"; }
+
+# try NAME LEAST-PSNR MOST-MSRE DEMO-ROOM-FLAG...
+try() {
+    local name=$1 psnr=$2 msre=$3
+    shift 3
+    "$build/unbaked" demo-room "$work/$name" --width 96 --height 72 --frames 32 --test-frames 4 \
+        --spp 24 --test-spp 64 --texture-size 512 "$@" >"$work/$name.log" 2>&1 ||
+        fail "demo-room: $(tail -n 3 "$work/$name.log")"
+    tar -C "$work/$name" --exclude=./truth -cf "$work/$name.tar" .
+    "$build/unbake" submit "$work/$name.tar" --watch --set texture_size=256 --set iterations=160 \
+        --set texels_per_iteration=1024 --set report_samples=32 >"$work/$name.watch" 2>&1 ||
+        fail "the job failed: $(tail -n 3 "$work/$name.watch")"
+    "$build/unbake" get last -o "$work/$name.out" >/dev/null 2>&1 || fail "get"
+    "$build/unbaked" evaluate "$work/$name" "$work/$name.out" --json >"$work/$name.json" ||
+        fail "evaluate"
+    cat "$work/$name.json"
+    at_least "$name: base-colour PSNR over seen surface" "$(jq "$base_color" "$work/$name.json")" "$psnr"
+    at_most "$name: MSRE" "$(jq "$msre_of" "$work/$name.json")" "$msre"
+    equal "$(jq "$found" "$work/$name.json")" 2 "$name: emitters found"
+    equal "$(jq "$false_found" "$work/$name.json")" 0 "$name: emitters that are none"
+    for file in base_color.exr roughness.exr specular.exr emission.exr confidence.exr scene.ply \
+        report.json report.html preview/base_color.png; do
+        [ -s "$work/$name.out/$file" ] || fail "$name: $file is missing"
+    done
+}
+
+base_color=.base_color_psnr_db
+msre_of=.msre
+found=.emitters_found
+false_found=.emitters_false
+try hdr 19.5 0.3
+try sdr 19.5 0.3 --sdr
+stop_daemon
+equal "$daemon_status" 0 "the daemon's exit status"
+finish
