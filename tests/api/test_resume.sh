@@ -39,7 +39,7 @@ stop() {
     daemon=
 }
 submit() {
-    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=120 \
+    "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=60 \
         --set texels_per_iteration=2048 --set coarse_levels=1 --set report_samples=4 >/dev/null 2>&1 ||
         fail "submit"
 }
