@@ -7,7 +7,7 @@
 
 #define POINT_COUNT 20000
 #define VIEWS_PER_POINT 16
-#define SWEEP_COUNT 200
+#define SWEEP_COUNT 1000
 /* Log-radiance difference at which a measurement has half its weight. */
 #define OUTLIER_SCALE 0.15
 
@@ -41,7 +41,7 @@ static size_t gather(const struct views *views, const struct atlas *atlas,
                 continue;
             /* Values near black are mostly noise and quantisation. */
             double value = (double)rgb_mean(sample.radiance);
-            if (value * (double)photo->exposure < 0.01)
+            if (!(value > 0.0) || (!photo->is_hdr && value * (double)photo->exposure < 0.01))
                 continue;
             overlap[count++] = (struct overlap){(uint32_t)*point_count, view[k].train, log(value)};
         }

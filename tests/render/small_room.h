@@ -1,0 +1,123 @@
+/* small_room.h -- a closed room of six plain walls and a lamp, photographed by our own path tracer:
+ * a scene for tests that need photographs and no data. */
+#ifndef UNBAKE_TESTS_RENDER_SMALL_ROOM_H
+#define UNBAKE_TESTS_RENDER_SMALL_ROOM_H
+
+#include "common/mem.h"
+#include "server/render/film.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/scene.h"
+#include "tests/check.h"
+
+#define OBJECTS 7 /* six walls and a lamp */
+#define LAMP 6
+#define FRAMES 20
+#define WIDTH 48
+#define HEIGHT 36
+
+static const rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f},
+                                        {0.2f, 0.6f, 0.3f}, {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f},
+                                        {0.4f, 0.4f, 0.4f}};
+static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
+
+static inline void add_quad(struct mesh *m, int64_t object, vec3 corner, vec3 u, vec3 v) {
+    uint32_t first = (uint32_t)m->vertex_count;
+    m->position[m->vertex_count++] = corner;
+    m->position[m->vertex_count++] = vec3_add(corner, u);
+    m->position[m->vertex_count++] = vec3_add(vec3_add(corner, u), v);
+    m->position[m->vertex_count++] = vec3_add(corner, v);
+    for (uint32_t t = 0; t < 2; t++) {
+        size_t i = m->triangle_count++;
+        m->index[i][0] = first;
+        m->index[i][1] = first + 1 + t;
+        m->index[i][2] = first + 2 + t;
+        m->face[i] = (uint32_t)i;
+        m->object_id[i] = object;
+    }
+    m->face_count = m->triangle_count;
+}
+
+/* A room of 4 x 3 x 3 m, normals inward, a lamp of 1 m^2 under the ceiling. y is up. */
+static inline void make_mesh(struct mesh *m) {
+    *m = (struct mesh){0};
+    m->position = mem_array(4 * OBJECTS, sizeof *m->position);
+    m->index = mem_array(2 * OBJECTS, sizeof *m->index);
+    m->face = mem_array(2 * OBJECTS, sizeof *m->face);
+    m->object_id = mem_array(2 * OBJECTS, sizeof *m->object_id);
+    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
+    add_quad(m, 0, (vec3){0, 0, 0}, z, x);
+    add_quad(m, 1, (vec3){0, 3, 0}, x, z);
+    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
+    add_quad(m, 3, (vec3){4, 0, 0}, z, y);
+    add_quad(m, 4, (vec3){0, 0, 0}, x, y);
+    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
+    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
+}
+
+/* A camera at `from` that looks at `to`. */
+static inline struct camera look(vec3 from, vec3 to) {
+    struct camera c = {.width = WIDTH, .height = HEIGHT, .fx = 30, .fy = 30, .cx = WIDTH / 2.0f,
+                       .cy = HEIGHT / 2.0f};
+    vec3 z = vec3_normalize(vec3_sub(to, from));
+    vec3 x = vec3_normalize(vec3_cross(z, (vec3){0.01f, 1.0f, 0.02f}));
+    vec3 y = vec3_cross(z, x);
+    struct rigid w = {{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}, from};
+    c.world_from_camera = w;
+    c.camera_from_world = rigid_inverse(&w);
+    return c;
+}
+
+static inline vec3 spread(int i, float margin) {
+    float a = fmodf((float)i * 0.618f, 1.0f), b = fmodf((float)i * 0.755f, 1.0f);
+    float c = fmodf((float)i * 0.570f, 1.0f);
+    return (vec3){margin + a * (4 - 2 * margin), margin + b * (2.6f - 2 * margin),
+                  margin + c * (3 - 2 * margin)};
+}
+
+/* The truth, seen by FRAMES cameras, every fifth of them held out. */
+static inline void make_scene(struct scene *scene, struct parallel *pool) {
+    *scene = (struct scene){0};
+    make_mesh(&scene->mesh);
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials truth;
+    struct world world;
+    struct error err = {0};
+    segments_from_object_id(&segments, &scene->mesh);
+    CHECK(atlas_make(&atlas, &scene->mesh, &segments, 128, 0.0f, &err) == STATUS_OK);
+    inverse_uv_make(&inverse, &atlas, scene->mesh.triangle_count, pool);
+    materials_init(&truth, &inverse, OBJECTS, rgb_gray(0.5f), 1.0f, 0.0f);
+    for (size_t i = 0; i < inverse.valid_count; i++) {
+        uint32_t texel = inverse.valid[i];
+        rgb color = wall_color[segments.of_triangle[inverse.triangle[texel]]];
+        memcpy(truth.base_color.texel[texel], &color, sizeof color);
+    }
+    truth.emission[LAMP] = lamp_radiance;
+    CHECK(world_init(&world, &scene->mesh, &segments, &atlas, &truth, NULL, pool, &err) == STATUS_OK);
+    struct path_settings path = {.max_depth = 8, .roulette_depth = 5, .seed = 99};
+    scene->photograph = mem_calloc(FRAMES, sizeof *scene->photograph);
+    scene->photograph_count = FRAMES;
+    for (int f = 0; f < FRAMES; f++) {
+        struct photograph *photo = &scene->photograph[f];
+        *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f,
+                                     .gain = {1, 1, 1}, .clip = INFINITY, .is_test = f % 5 == 4};
+        photo->name = mem_printf("frame %d", f);
+        photo->camera = look(spread(f, 0.4f), spread(f * 7 + 3, 0.0f));
+        struct image image;
+        film_render(&world, &photo->camera, 64, &path, (uint32_t)f, pool, &image);
+        photo->pixel = mem_array(WIDTH * HEIGHT, sizeof *photo->pixel);
+        for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+            for (size_t c = 0; c < 3; c++)
+                photo->pixel[i][c] = image_half_from_float(image.pixel[image.channel_count * i + c]);
+        }
+        image_release(&image);
+    }
+    world_release(&world);
+    materials_release(&truth);
+    inverse_uv_release(&inverse);
+    atlas_release(&atlas);
+    segments_release(&segments);
+}
+
+#endif
