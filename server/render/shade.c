@@ -20,7 +20,11 @@ enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX
 #define KERNEL
 #endif
 
+#ifdef __clang__ /* which does not know the pragma */
+#define FOR_LANES for (int i = 0; i < LANES; i++)
+#else
 #define FOR_LANES _Pragma("GCC ivdep") for (int i = 0; i < LANES; i++)
+#endif
 
 static inline float power_heuristic(float a, float b) {
     return a * a / (a * a + b * b);

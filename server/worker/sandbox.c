@@ -91,11 +91,11 @@ static bool restrict_system_calls(void) {
     scmp_datum_t self = (scmp_datum_t)getpid();
     ok = ok &&
          seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(kill), 1,
-                          SCMP_A0(SCMP_CMP_NE, self)) == 0 &&
+                          SCMP_A0(SCMP_CMP_NE, self, 0)) == 0 &&
          seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(tgkill), 1,
-                          SCMP_A0(SCMP_CMP_NE, self)) == 0 &&
+                          SCMP_A0(SCMP_CMP_NE, self, 0)) == 0 &&
          seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(prlimit64), 1,
-                          SCMP_A0(SCMP_CMP_NE, 0)) == 0;
+                          SCMP_A0(SCMP_CMP_NE, 0, 0)) == 0;
     ok = ok && seccomp_load(filter) == 0;
     seccomp_release(filter);
     return ok;
