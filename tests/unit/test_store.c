@@ -1,4 +1,4 @@
-/* test_store.c -- state.db: transitions against the table, fencing, keys, events, migration. */
+/* test_store.c -- state.db: transitions against the table, fencing, the queue, keys, migration. */
 #include "server/store/store.h"
 
 #include <fcntl.h>
@@ -7,47 +7,8 @@
 #include <sqlite3.h>
 
 #include "common/buf.h"
-#include "common/file.h"
-#include "common/mem.h"
 #include "common/protocol.h"
-#include "tests/check.h"
-
-#define SCENE_A "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
-#define SCENE_B "abbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
-#define SCENE_C "aaaacccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
-
-static struct error err;
-
-#define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
-#define IS(call, wanted) CHECK_THAT((call) == (wanted), "%s", err.message)
-
-static char *fresh_dir(void) {
-    char *dir = mem_strdup("/tmp/unbake-test-store-XXXXXX");
-    if (!mkdtemp(dir))
-        exit(1);
-    return dir;
-}
-
-static void drop_dir(char *dir) {
-    OK(file_remove_tree(dir, &err));
-    mem_free(dir);
-}
-
-static void add_ready_scene(struct store *store, const char *id) {
-    bool existed;
-    OK(store_scene_add(store, id, "room", 10, &existed, &err));
-    OK(store_scene_ready(store, id, "{}", &err));
-}
-
-static int64_t add_job(struct store *store, const char *scene, int priority) {
-    struct job_new new = {.scene_id = scene, .name = "n", .labels = "{}", .settings = "{}",
-                          .priority = priority, .max_attempts = 2};
-    int64_t id = 0;
-    bool replayed;
-    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
-    CHECK(!replayed);
-    return id;
-}
+#include "tests/unit/store_rig.h"
 
 /* --- transitions ----------------------------------------------------------------------------- */
 
@@ -88,21 +49,6 @@ static enum condition condition_of(struct store *store, int64_t id) {
     }
     job_release(&job);
     return found;
-}
-
-static int64_t event_count;
-static char last_event[256];
-static void count_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
-                        const char *data) {
-    (void)user, (void)id, (void)at_ms, (void)attempt, (void)type;
-    event_count++;
-    snprintf(last_event, sizeof last_event, "%s", data);
-}
-
-static int64_t events_of(struct store *store, int64_t id) {
-    event_count = 0;
-    OK(store_event_list(store, id, 0, 1000, count_event, NULL, &err));
-    return event_count;
 }
 
 /* For each action, the condition it leads to from each condition; '-' is STATUS_CONFLICT and
@@ -331,170 +277,6 @@ static void test_queue(void) {
     drop_dir(dir);
 }
 
-/* --- scenes ------------------------------------------------------------------------------------ */
-
-static void test_scenes(void) {
-    char *dir = fresh_dir();
-    struct store *store;
-    struct scene_row row, rows[2];
-    bool existed;
-    char id[SCENE_ID_SIZE], cursor[128];
-    size_t count;
-    OK(store_open(&store, dir, &err));
-    IS(store_scene_next_unchecked(store, id, &err), STATUS_NOT_FOUND);
-    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err));
-    CHECK(!existed);
-    OK(store_scene_next_unchecked(store, id, &err));
-    CHECK_STRING(id, SCENE_A);
-    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
-    OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
-    IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
-    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err)); /* checked again */
-    CHECK(existed);
-    OK(store_scene_get(store, SCENE_A, &row, &err));
-    CHECK(row.state == SCENE_CHECKING && row.bytes == 10);
-    CHECK_STRING(row.problems, "[]");
-    scene_row_release(&row);
-    OK(store_scene_ready(store, SCENE_A, "{\"n\":1}", &err));
-    OK(store_scene_add(store, SCENE_A, "other name", 10, &existed, &err));
-    OK(store_scene_get(store, SCENE_A, &row, &err));
-    CHECK(row.state == SCENE_READY);
-    CHECK_STRING(row.name, "one");
-    CHECK_STRING(row.facts, "{\"n\":1}");
-    scene_row_release(&row);
-
-    OK(store_scene_find(store, "aaaa", &row, &err));
-    scene_row_release(&row);
-    IS(store_scene_find(store, "aaa", &row, &err), STATUS_NOT_FOUND);
-    IS(store_scene_find(store, "bbbb", &row, &err), STATUS_NOT_FOUND);
-    IS(store_scene_find(store, "aaaa%", &row, &err), STATUS_NOT_FOUND);
-    OK(store_scene_add(store, SCENE_C, "odd", 1, &existed, &err));
-    IS(store_scene_find(store, "aaaa", &row, &err), STATUS_CONFLICT);
-    OK(store_scene_reject(store, SCENE_C, "[]", &err));
-    OK(store_scene_delete(store, SCENE_C, &err));
-
-    OK(store_scene_add(store, SCENE_B, "two", 1, &existed, &err));
-    cursor[0] = '\0';
-    size_t seen = 0;
-    do {
-        char at[128];
-        memcpy(at, cursor, sizeof at);
-        OK(store_scene_list(store, at, 1, rows, &count, cursor, &err));
-        seen += count;
-        for (size_t i = 0; i < count; i++)
-            scene_row_release(&rows[i]);
-    } while (cursor[0] && seen < 10);
-    CHECK(seen == 2);
-    IS(store_scene_list(store, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
-
-    int64_t job = add_job(store, SCENE_A, 0);
-    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
-    OK(store_job_cancel(store, job, &err));
-    OK(store_scene_delete(store, SCENE_A, &err));
-    IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
-    IS(store_job_retry(store, job, 3, &err), STATUS_CONFLICT); /* nothing to work on */
-    store_close(store);
-    drop_dir(dir);
-}
-
-/* --- events and outputs ------------------------------------------------------------------------ */
-
-struct replay {
-    int64_t last;
-    size_t count, progress_count;
-};
-
-static void replay_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
-                       const char *data) {
-    struct replay *replay = user;
-    (void)data;
-    CHECK(id > replay->last && at_ms > 0 && attempt >= 0);
-    replay->last = id;
-    replay->count++;
-    replay->progress_count += strcmp(type, EVENT_PROGRESS) == 0;
-}
-
-static int64_t changed_job;
-static int changed_count;
-static void on_change(void *user, int64_t job_id) {
-    (void)user;
-    changed_job = job_id;
-    changed_count++;
-}
-
-static void test_events(void) {
-    char *dir = fresh_dir();
-    struct store *store;
-    int attempt;
-    OK(store_open(&store, dir, &err));
-    store_on_change(store, on_change, NULL);
-    add_ready_scene(store, SCENE_A);
-    CHECK(changed_job == 0 && changed_count == 2);
-    int64_t id = add_job(store, SCENE_A, 0), other = add_job(store, SCENE_A, 0);
-    OK(store_job_start(store, id, &attempt, &err));
-    CHECK(changed_job == id);
-    for (int i = 0; i < 20; i++) {
-        char text[128];
-        snprintf(text, sizeof text, "{\"stage\":\"refine\",\"done\":%d,\"total\":20,\"eta_sec\":3}", i);
-        OK(store_event_add(store, id, attempt, EVENT_PROGRESS, text, &err));
-        OK(store_event_add(store, id, attempt, EVENT_METRIC, "{\"step\":1}", &err));
-    }
-    IS(store_event_add(store, id, attempt, EVENT_PROGRESS, "{\"done\":", &err), STATUS_INPUT);
-    struct job job;
-    OK(store_job_get(store, id, &job, &err));
-    CHECK_STRING(job.stage, "refine");
-    CHECK_NEAR(job.progress, 0.95, 1e-9);
-    CHECK_NEAR(job.eta_sec, 3.0, 0);
-    job_release(&job);
-
-    /* Replay in pieces sees each event once and in order, and only the newest progress. */
-    struct replay whole = {0}, pieces = {0};
-    OK(store_event_list(store, id, 0, 1000, replay_one, &whole, &err));
-    CHECK(whole.count == 2 + 20 + 1 && whole.progress_count == 1);
-    size_t before;
-    do {
-        before = pieces.count;
-        OK(store_event_list(store, id, pieces.last, 7, replay_one, &pieces, &err));
-    } while (pieces.count > before);
-    CHECK(pieces.count == whole.count && pieces.last == whole.last);
-    int64_t last = -1;
-    OK(store_event_last(store, id, &last, &err));
-    CHECK(last == whole.last);
-    OK(store_event_last(store, 12345, &last, &err));
-    CHECK(last == 0);
-    CHECK(events_of(store, other) == 1);
-
-    /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
-    static const char *const bad[] = {"", "/etc/passwd", "../x", "a/../b", "a//b", ".hidden",
-                                      "a/.b", "a b", "x/", "caf\xc3\xa9"};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err),
-           STATUS_INPUT);
-    IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png",
-                        &err));
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png",
-                        &err));
-    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A,
-                        "image/x-exr", &err));
-    struct output_row row, *rows;
-    size_t count;
-    OK(store_output_get(store, id, "preview/a.png", &row, &err));
-    CHECK(row.bytes == 2 && row.attempt == attempt);
-    CHECK_STRING(row.sha256, SCENE_B);
-    output_row_release(&row);
-    IS(store_output_get(store, id, "nothing", &row, &err), STATUS_NOT_FOUND);
-    OK(store_output_list(store, id, &rows, &count, &err));
-    CHECK(count == 2);
-    CHECK_STRING(rows[0].name, "base_color.exr");
-    for (size_t i = 0; i < count; i++)
-        output_row_release(&rows[i]);
-    mem_free(rows);
-    CHECK(events_of(store, id) == (int64_t)whole.count + 3);
-    store_close(store);
-    drop_dir(dir);
-}
-
 /* --- opening ----------------------------------------------------------------------------------- */
 
 static void run_sql(const char *dir, const char *sql) {
@@ -616,8 +398,6 @@ int main(void) {
     test_attempts();
     test_reconcile();
     test_queue();
-    test_scenes();
-    test_events();
     test_opening();
     test_threads();
     return check_result();

@@ -1,0 +1,158 @@
+/* test_store_content.c -- what state.db holds besides jobs: scenes, events, outputs. */
+#include "common/protocol.h"
+#include "tests/unit/store_rig.h"
+
+/* --- scenes ------------------------------------------------------------------------------------ */
+
+static void test_scenes(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    struct scene_row row, rows[2];
+    bool existed;
+    char id[SCENE_ID_SIZE], cursor[128];
+    size_t count;
+    OK(store_open(&store, dir, &err));
+    IS(store_scene_next_unchecked(store, id, &err), STATUS_NOT_FOUND);
+    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err));
+    CHECK(!existed);
+    OK(store_scene_next_unchecked(store, id, &err));
+    CHECK_STRING(id, SCENE_A);
+    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
+    IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
+    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err)); /* checked again */
+    CHECK(existed);
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(row.state == SCENE_CHECKING && row.bytes == 10);
+    CHECK_STRING(row.problems, "[]");
+    scene_row_release(&row);
+    OK(store_scene_ready(store, SCENE_A, "{\"n\":1}", &err));
+    OK(store_scene_add(store, SCENE_A, "other name", 10, &existed, &err));
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(row.state == SCENE_READY);
+    CHECK_STRING(row.name, "one");
+    CHECK_STRING(row.facts, "{\"n\":1}");
+    scene_row_release(&row);
+
+    OK(store_scene_find(store, "aaaa", &row, &err));
+    scene_row_release(&row);
+    IS(store_scene_find(store, "aaa", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, "bbbb", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, "aaaa%", &row, &err), STATUS_NOT_FOUND);
+    OK(store_scene_add(store, SCENE_C, "odd", 1, &existed, &err));
+    IS(store_scene_find(store, "aaaa", &row, &err), STATUS_CONFLICT);
+    OK(store_scene_reject(store, SCENE_C, "[]", &err));
+    OK(store_scene_delete(store, SCENE_C, &err));
+
+    OK(store_scene_add(store, SCENE_B, "two", 1, &existed, &err));
+    cursor[0] = '\0';
+    size_t seen = 0;
+    do {
+        char at[128];
+        memcpy(at, cursor, sizeof at);
+        OK(store_scene_list(store, at, 1, rows, &count, cursor, &err));
+        seen += count;
+        for (size_t i = 0; i < count; i++)
+            scene_row_release(&rows[i]);
+    } while (cursor[0] && seen < 10);
+    CHECK(seen == 2);
+    IS(store_scene_list(store, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
+
+    int64_t job = add_job(store, SCENE_A, 0);
+    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    OK(store_job_cancel(store, job, &err));
+    OK(store_scene_delete(store, SCENE_A, &err));
+    IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
+    IS(store_job_retry(store, job, 3, &err), STATUS_CONFLICT); /* nothing to work on */
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- events and outputs ------------------------------------------------------------------------ */
+
+static int64_t changed_job;
+static int changed_count;
+static void on_change(void *user, int64_t job_id) {
+    (void)user;
+    changed_job = job_id;
+    changed_count++;
+}
+
+static void test_events(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    store_on_change(store, on_change, NULL);
+    add_ready_scene(store, SCENE_A);
+    CHECK(changed_job == 0 && changed_count == 2);
+    int64_t id = add_job(store, SCENE_A, 0), other = add_job(store, SCENE_A, 0);
+    OK(store_job_start(store, id, &attempt, &err));
+    CHECK(changed_job == id);
+    for (int i = 0; i < 20; i++) {
+        char text[128];
+        snprintf(text, sizeof text, "{\"stage\":\"refine\",\"done\":%d,\"total\":20,\"eta_sec\":3}", i);
+        OK(store_event_add(store, id, attempt, EVENT_PROGRESS, text, &err));
+        OK(store_event_add(store, id, attempt, EVENT_METRIC, "{\"step\":1}", &err));
+    }
+    IS(store_event_add(store, id, attempt, EVENT_PROGRESS, "{\"done\":", &err), STATUS_INPUT);
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    CHECK_STRING(job.stage, "refine");
+    CHECK_NEAR(job.progress, 0.95, 1e-9);
+    CHECK_NEAR(job.eta_sec, 3.0, 0);
+    job_release(&job);
+
+    /* Replay in pieces sees each event once and in order, and only the newest progress. */
+    struct replay whole = {0}, pieces = {0};
+    OK(store_event_list(store, id, 0, 1000, replay_one, &whole, &err));
+    CHECK(whole.count == 2 + 20 + 1 && whole.progress_count == 1);
+    size_t before;
+    do {
+        before = pieces.count;
+        OK(store_event_list(store, id, pieces.last, 7, replay_one, &pieces, &err));
+    } while (pieces.count > before);
+    CHECK(pieces.count == whole.count && pieces.last == whole.last);
+    int64_t last = -1;
+    OK(store_event_last(store, id, &last, &err));
+    CHECK(last == whole.last);
+    OK(store_event_last(store, 12345, &last, &err));
+    CHECK(last == 0);
+    CHECK(events_of(store, other) == 1);
+
+    /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
+    static const char *const bad[] = {"", "/etc/passwd", "../x", "a/../b", "a//b", ".hidden",
+                                      "a/.b", "a b", "x/", "caf\xc3\xa9"};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
+        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err),
+           STATUS_INPUT);
+    IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png",
+                        &err));
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png",
+                        &err));
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A,
+                        "image/x-exr", &err));
+    struct output_row row, *rows;
+    size_t count;
+    OK(store_output_get(store, id, "preview/a.png", &row, &err));
+    CHECK(row.bytes == 2 && row.attempt == attempt);
+    CHECK_STRING(row.sha256, SCENE_B);
+    output_row_release(&row);
+    IS(store_output_get(store, id, "nothing", &row, &err), STATUS_NOT_FOUND);
+    OK(store_output_list(store, id, &rows, &count, &err));
+    CHECK(count == 2);
+    CHECK_STRING(rows[0].name, "base_color.exr");
+    for (size_t i = 0; i < count; i++)
+        output_row_release(&rows[i]);
+    mem_free(rows);
+    CHECK(events_of(store, id) == (int64_t)whole.count + 3);
+    store_close(store);
+    drop_dir(dir);
+}
+
+int main(void) {
+    test_scenes();
+    test_events();
+    return check_result();
+}
