@@ -46,11 +46,11 @@ done
 
 awk -F '\t' '
     BEGIN { print "[" }
-    { printf "%s{\"name\": \"%s\", \"value\": %s, \"goal\": %s, \"better\": \"%s\"}", NR > 1 ? ",\n" : "", $1, $2, $3, $4 }
+    { printf "%s{\"name\": \"%s\", \"value\": %s, \"goal\": %s, \"better\": \"%s\"}", (NR > 1 ? ",\n" : ""), $1, $2, $3, $4 }
     END { print "\n]" }' "$rows" >"$build/bench.json"
 printf '\n%-72s %10s %10s\n' what value goal
 awk -F '\t' '{
-    met = $4 == "higher" ? $2 >= $3 : $2 <= $3
-    printf "%-72s %10.3f %7s %-2s %s\n", $1, $2, $3, $4 == "higher" ? "+" : "-", met ? "" : "not met"
+    met = ($4 == "higher") ? ($2 + 0 >= $3 + 0) : ($2 + 0 <= $3 + 0)
+    printf "%-72s %10.3f %7s %-2s %s\n", $1, $2, $3, ($4 == "higher" ? "+" : "-"), (met ? "" : "not met")
 }' "$rows"
 rm -f "$rows"
