@@ -29,7 +29,7 @@ static const struct setting table[] = {
      "where the capture holds out no frame, every how many-th is; 0: none"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0",
      "optimiser steps; 0: as many as time_limit_sec holds"},
-    {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "8",
+    {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16",
      "length of a path from the camera, in segments"},
     {"method", SETTING_CHOICE, "", 0, 0, "listing1", "listing1",
      "how materials are found: the published algorithm from a neutral start"},
