@@ -55,6 +55,7 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
     cJSON *order = new_order("reconstruct", config, thread_count);
     json_add_string(order, "scene_id", job->scene_id);
     json_add_string(order, "scene", files);
+    json_add_string(order, "name", job->name);
     json_add_int(order, "job_id", job->id);
     json_add_int(order, "attempt", a->number);
     json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);

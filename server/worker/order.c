@@ -12,6 +12,8 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
     double job_id, attempt;
     enum status status = json_string(o->json, "scene", WHAT, "", &o->scene, err);
     if (status == STATUS_OK)
+        status = json_string(o->json, "name", WHAT, "", &o->name, err);
+    if (status == STATUS_OK)
         status = json_number(o->json, "job_id", WHAT, 0.0, &job_id, err);
     if (status == STATUS_OK)
         status = json_number(o->json, "attempt", WHAT, 0.0, &attempt, err);

@@ -1,7 +1,7 @@
 /* order.h -- job.json: what the daemon tells a worker to do; written by server/job/attempt.c.
  *
  *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","settings":{…},
- *    "job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
+ *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
  *    "checkpoint_interval_sec":60}
  *   {"kind":"check","scene_id":"…","thread_count":4,"memory_bytes":0,"sandbox":true}
  *
@@ -24,6 +24,7 @@ struct order {
     bool sandbox;
     /* kind "reconstruct" */
     const char *scene;      /* folder of the unpacked bundle */
+    const char *name;       /* of the job, for the report's title; may be "" */
     const cJSON *settings;  /* object */
     int64_t job_id;
     int attempt;

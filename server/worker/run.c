@@ -214,9 +214,9 @@ static enum status announce(void *user, const char *type, const char *name,
 }
 
 /* The part of an export's input that stands from the first iteration on. */
-static struct export_input input_of(const struct reconstruction *r) {
+static struct export_input input_of(const struct run *run, const struct reconstruction *r) {
     return (struct export_input){
-        .title = "unbake",
+        .title = *run->order->name ? run->order->name : "unbake",
         .mesh = &r->scene->mesh,
         .segments = &r->segments,
         .atlas = &r->atlas,
@@ -232,7 +232,7 @@ static struct export_input input_of(const struct reconstruction *r) {
 static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
     struct run *run = user;
     double start = clock_sec();
-    struct export_input input = input_of(r);
+    struct export_input input = input_of(run, r);
     enum status status = export_preview(run->out_dir, &input, announce, run, err);
     double end = clock_sec(), wait = (end - start) / PREVIEW_SHARE;
     if (wait < run->preview_interval_sec)
@@ -250,7 +250,7 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
         comparison[i] = (struct export_comparison){.name = r->held_out[i].name,
                                                    .photograph = &r->held_out[i].photograph,
                                                    .render = &r->held_out[i].render};
-    struct export_input input = input_of(r);
+    struct export_input input = input_of(run, r);
     input.comparison = comparison;
     input.comparison_count = r->held_out_count;
     tell_stage(run, "export");
