@@ -207,6 +207,7 @@ static void decide_emitters(struct refine *f) {
     params_fix_emitters(&f->params, r->is_emitter);
     for (size_t s = 0; s < r->segments.count; s++)
         params_set_emission(&f->params, s, r->materials.emission[s]);
+    world_update_lights(&r->world);
     f->counters.decided = 1;
 }
 
@@ -236,13 +237,14 @@ static void match_blocks(struct refine *f) {
 
 /* One pass of Listing 1; returns the mean loss of its looks. */
 static double iterate(struct refine *f, double fraction) {
+    /* First, since after a resume the lights are not yet those of the materials. */
+    world_update_lights(&f->r->world);
     if (!f->counters.decided && fraction >= DECISION_AT)
         decide_emitters(f);
     if (f->counters.level != level_at(f, fraction)) {
         f->counters.level = level_at(f, fraction);
         params_refine(&f->params, f->counters.level);
     }
-    world_update_lights(&f->r->world);
     parallel_for(f->r->pool, f->chunk_count, run_chunk, f);
     gradient_reduce(f->gradient, f->log, f->chunk_count, f->r->pool);
     reduce_seen_emission(f);

@@ -100,6 +100,8 @@ static struct settings make_settings(const char *json) {
     return s;
 }
 
+#define ITERATIONS 30 /* as the settings below have it */
+
 static void test_same_bytes(struct scene *scene, const char *json) {
     struct settings s = make_settings(json);
     char first[SHA256_HEX_SIZE], hex[SHA256_HEX_SIZE];
@@ -114,20 +116,21 @@ static void test_same_bytes(struct scene *scene, const char *json) {
         reconstruct_release(&r);
         shell_release(&shell);
     }
-    /* Stopped every few iterations, at every level and on both sides of the emitter decision. */
-    struct shell shell = {.polls_until_stop = 3};
+    /* Stopped after every single iteration: at every level, on both sides of the emitter decision. */
+    struct shell shell = {.polls_until_stop = -1};
     enum status status = STATUS_CANCELLED;
     int stops = 0;
     for (; status == STATUS_CANCELLED && stops < 60; stops++) {
         struct reconstruction r;
-        shell.polls_until_stop = 3 + stops % 9; /* the stages after the loop ask too */
+        /* The stages before the loop ask twice, those after it as well. */
+        shell.polls_until_stop = stops < ITERATIONS ? 2 : -1;
         status = run(scene, &s, 1 + stops % 3, &shell, &r);
         if (status == STATUS_OK)
             digest(&r, hex);
         reconstruct_release(&r);
     }
     CHECK(status == STATUS_OK);
-    CHECK_THAT(stops > 8, "only %d stops", stops);
+    CHECK_THAT(stops == ITERATIONS + 1, "%d stops", stops);
     CHECK_STRING(hex, first);
     shell_release(&shell);
     settings_release(&s);
@@ -183,9 +186,9 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     make_scene(&scene, pool);
     parallel_free(pool);
-    test_same_bytes(&scene, "{\"texture_size\":64,\"iterations\":40,\"report_samples\":2,"
+    test_same_bytes(&scene, "{\"texture_size\":64,\"iterations\":30,\"report_samples\":2,"
                             "\"texels_per_iteration\":256,\"coarse_levels\":3}");
-    test_same_bytes(&scene, "{\"texture_size\":64,\"iterations\":40,\"report_samples\":2,\"guided\":false,"
+    test_same_bytes(&scene, "{\"texture_size\":64,\"iterations\":30,\"report_samples\":2,\"guided\":false,"
                             "\"texels_per_iteration\":256,\"coarse_levels\":3}");
     test_recovers(&scene);
     scene_release(&scene);
