@@ -17,7 +17,7 @@
 /* Base colour of an emitter, which its own light hides. */
 #define NEUTRAL_BASE_COLOR 0.5f
 /* A base colour below this tells too little of the light that fell on it. */
-#define DARKEST_BASE_COLOR 0.05f
+#define DARKEST_BASE_COLOR 0.02f
 /* Iteration number that keeps the decision's random numbers apart from the optimiser's. */
 #define DECISION_ITERATION UINT64_C(0x7fff0000)
 
@@ -164,10 +164,13 @@ static void gather_light(void *user, size_t segment, int thread) {
                 base[c] += (double)texel[c];
         }
     }
-    float arrived[3] = {0};
-    for (int c = 0; c < 3; c++)
-        arrived[c] = base[c] > 0.0 ? (float)fmax(reflected[c] / base[c], 0.0) : 0.0f;
-    job->evidence[segment].arrived = rgb_make(arrived[0], arrived[1], arrived[2]);
+    struct emitter_evidence *e = &job->evidence[segment];
+    e->arrived = e->shown; /* without evidence a segment reflects what it shows */
+    if (!(base[0] > 0.0) || !(base[1] > 0.0) || !(base[2] > 0.0))
+        return;
+    e->arrived = rgb_make((float)fmax(reflected[0] / base[0], 0.0),
+                          (float)fmax(reflected[1] / base[1], 0.0),
+                          (float)fmax(reflected[2] / base[2], 0.0));
 }
 
 void emitters_decide(struct reconstruction *r, const struct views *views, struct look_batch *batch,
