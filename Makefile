@@ -33,7 +33,8 @@ SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
 EMBEDDED = server/http/openapi.json
 CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
-TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c)
+TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c tests/chaos/*.c \
+                      tests/soak/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
 FUZZ_SRC = $(wildcard tests/fuzz/*.c)
 
@@ -45,7 +46,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps demo test tests bench asan tsan asan-build tsan-build fuzz install clean
+.PHONY: all help deps demo test tests bench chaos soak asan tsan asan-build tsan-build fuzz install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -122,6 +123,14 @@ asan-build:
 	    SANITIZE="-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer" tests
 tsan-build:
 	@$(MAKE) --no-print-directory B=build/tsan CFLAGS="-O1 -g" SANITIZE="-fsanitize=thread" tests
+
+chaos: deps ## kill, cut off and mislead the daemon at length; writes build/chaos.json; T=name runs one
+	@+$(BUILD) tests
+	@tests/long.sh chaos $(B) "$(T)"
+
+soak: deps ## many clients for a long time; writes build/soak.json; T=name runs one
+	@+$(BUILD) tests
+	@tests/long.sh soak $(B) "$(T)"
 
 FUZZ_SECONDS ?= 60
 fuzz: deps ## search for crashes for FUZZ_SECONDS (60) with each fuzz program, under the sanitizers

@@ -43,7 +43,8 @@ for build in "$@"; do
     */tsan) prefix=tsan/ slow=$slow_tsan ;;
     esac
     for source in tests/unit/test_*.c tests/gradient/test_*.c tests/render/test_*.c \
-        tests/api/test_*.c tests/api/test_*.sh tests/fuzz/test_*.c tests/fuzz/test_*.sh; do
+        tests/api/test_*.c tests/api/test_*.sh tests/chaos/test_*.c tests/chaos/test_*.sh \
+        tests/soak/test_*.c tests/soak/test_*.sh tests/fuzz/test_*.c tests/fuzz/test_*.sh; do
         [ -e "$source" ] || continue
         name=${source#tests/}
         name=${name%.*}
