@@ -134,3 +134,13 @@ enum status sha256_of_file(const char *path, char hex[SHA256_HEX_SIZE], struct e
     close(fd);
     return status;
 }
+
+bool sha256_equal(const char *a, const char *b) {
+    unsigned char left[SHA256_HEX_SIZE] = {0}, right[SHA256_HEX_SIZE] = {0};
+    strncpy((char *)left, a, SHA256_HEX_SIZE - 1);
+    strncpy((char *)right, b, SHA256_HEX_SIZE - 1);
+    volatile unsigned char different = left[SHA256_HEX_SIZE - 2] == '\0';
+    for (size_t i = 0; i < SHA256_HEX_SIZE; i++)
+        different = (unsigned char)(different | (left[i] ^ right[i]));
+    return different == 0;
+}

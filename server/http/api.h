@@ -13,6 +13,12 @@ struct api_library {
     const char *name, *version;
 };
 
+enum api_access {
+    API_ACCESS_AUTO,   /* tokens, once there is one; before, anybody who reaches the daemon */
+    API_ACCESS_TOKENS, /* tokens only */
+    API_ACCESS_OPEN    /* anybody, as an admin */
+};
+
 struct api_config {
     const char *data_dir;
     int max_attempts;
@@ -21,6 +27,8 @@ struct api_config {
     uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */
     size_t max_streams;        /* event streams at once */
     double keepalive_sec;
+    enum api_access access;
+    bool is_tls;               /* connections are encrypted by this daemon */
     const char *server_names;  /* besides loopback; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;

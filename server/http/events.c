@@ -9,6 +9,7 @@
 #include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/guard.h"
 #include "server/http/handlers.h"
@@ -29,6 +30,7 @@ struct subscriber {
     struct stream base;
     struct api *api;
     int64_t job_id;
+    struct caller caller;
     bool is_ndjson;
     bool is_past;         /* only what is stored by now: ?follow=0 */
     int64_t sent_id;      /* events up to here were rendered */
@@ -40,6 +42,7 @@ struct subscriber {
     struct subscriber *next, *previous;
     bool is_dirty;        /* the database may hold more */
     bool is_due;          /* for a keep-alive */
+    bool is_suspect;      /* its token may have been revoked */
     double last_sec;      /* something was last handed over */
 };
 
@@ -80,6 +83,15 @@ void hub_tick(struct hub *hub, double now_sec) {
         if (s->is_due || now_sec - s->last_sec < hub->keepalive_sec)
             continue;
         s->is_due = true;
+        s->base.wake(s->base.waker);
+    }
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+void hub_recheck(struct hub *hub) {
+    pthread_mutex_lock(&hub->mutex);
+    for (struct subscriber *s = hub->first; s; s = s->next) {
+        s->is_suspect = true;
         s->base.wake(s->base.waker);
     }
     pthread_mutex_unlock(&hub->mutex);
@@ -142,7 +154,12 @@ static void fetch(struct subscriber *s) {
         return;
     }
     bool is_terminal = job_is_terminal(job.state);
+    bool may_read = caller_access_job(&s->caller, &job) >= ACCESS_READ;
     job_release(&job);
+    if (!may_read) { /* it is no longer shared */
+        s->has_ended = true;
+        return;
+    }
     if (store_event_list(store, s->job_id, s->sent_id, BATCH_EVENTS, render_row, &batch, NULL) != STATUS_OK)
         s->has_ended = true; /* the client comes back and asks again */
     if (batch.count == BATCH_EVENTS) {
@@ -179,11 +196,22 @@ static void delist(struct subscriber *s) {
     pthread_mutex_unlock(&hub->mutex);
 }
 
+/* Whether the stream's token was revoked after the stream was opened. */
+static bool is_revoked(struct subscriber *s) {
+    pthread_mutex_lock(&s->api->hub->mutex);
+    bool is_suspect = s->is_suspect;
+    s->is_suspect = false;
+    pthread_mutex_unlock(&s->api->hub->mutex);
+    return is_suspect && s->caller.token_id && !store_token_is_valid(s->api->store, s->caller.token_id);
+}
+
 static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
     struct subscriber *s = (struct subscriber *)base;
     struct hub *hub = s->api->hub;
     if (!s->is_listed)
         enlist(s);
+    if (is_revoked(s))
+        return -1;
     if (s->text_read == s->text.length) {
         buf_clear(&s->text);
         s->text_read = 0;
@@ -222,17 +250,19 @@ static void subscriber_close(struct stream *base) {
     mem_free(s);
 }
 
-static struct stream *subscribe(struct api *api, const struct job *job, int64_t after, bool is_ndjson,
-                                bool is_past) {
+static struct stream *subscribe(struct api *api, const struct caller *caller, const struct job *job,
+                                int64_t after, bool is_ndjson, bool is_past) {
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
     s->base.close = subscriber_close;
     s->api = api;
     s->job_id = job->id;
+    s->caller = *caller;
     s->is_ndjson = is_ndjson;
     s->is_past = is_past;
     s->sent_id = after;
     s->is_dirty = true;
+    s->is_suspect = true; /* revoked between the check of the head and the first read? */
     s->last_sec = clock_sec();
     buf_init(&s->text, BATCH_BYTES);
     render_snapshot(s, job);
@@ -266,23 +296,21 @@ struct response *events_get(struct api *api, struct request *r) {
     const char *accept = request_field(r, "Accept"), *follow = target_query(&r->target, "follow");
     int64_t follows = 1;
     bool is_ndjson = accept && field_accepts(accept, MIME_NDJSON), is_resumed, has_more = false;
-    int64_t id, after = 0;
+    int64_t after = 0;
     struct error err;
     struct job job;
-    if (!field_number(r->target.segments[2], 1, INT64_MAX, &id))
-        return problem(r, 404, "\"%.80s\" is no job's number", r->target.segments[2]);
+    struct response *reply = NULL;
     if (follow && !field_number(follow, 0, 1, &follows))
         return problem(r, 400, "follow must be 0 or 1");
-    enum status status = start_id(api, r, id, &after, &is_resumed, &err);
-    if (status == STATUS_INPUT)
-        return problem(r, 400, "%s", err.message);
-    if (status == STATUS_OK)
-        status = store_job_get(api->store, id, &job, &err);
-    if (status != STATUS_OK)
-        return problem_from(r, &err);
-    struct response *reply = NULL;
+    if (!auth_job(api, r, ACCESS_READ, &job, &reply))
+        return reply;
+    enum status status = start_id(api, r, job.id, &after, &is_resumed, &err);
+    if (status != STATUS_OK) {
+        job_release(&job);
+        return status == STATUS_INPUT ? problem(r, 400, "%s", err.message) : problem_from(r, &err);
+    }
     if (is_resumed && job_is_terminal(job.state)) {
-        status = store_event_list(api->store, id, after, 1, note_any, &has_more, &err);
+        status = store_event_list(api->store, job.id, after, 1, note_any, &has_more, &err);
         if (status != STATUS_OK)
             reply = problem_from(r, &err);
         else if (!has_more)
@@ -296,7 +324,7 @@ struct response *events_get(struct api *api, struct request *r) {
         response_field(reply, "Cache-Control", "no-store");
         response_field(reply, "X-Accel-Buffering", "no"); /* nginx: pass it on at once */
         if (!r->is_head)
-            reply->stream = subscribe(api, &job, after, is_ndjson, !follows);
+            reply->stream = subscribe(api, &r->caller, &job, after, is_ndjson, !follows);
     }
     job_release(&job);
     return reply;

@@ -18,6 +18,8 @@ void hub_free(struct hub *hub); /* all streams must be closed */
 
 void hub_changed(void *hub, int64_t job_id); /* for store_on_change */
 void hub_tick(struct hub *hub, double now_sec); /* about once a second: keep-alives */
+/* A token was revoked: the streams that were opened with it end. */
+void hub_recheck(struct hub *hub);
 size_t hub_count(struct hub *hub);
 
 #endif

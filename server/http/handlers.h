@@ -14,6 +14,11 @@ struct response *system_openapi(struct api *api, struct request *r);
 struct response *system_version(struct api *api, struct request *r);
 struct response *system_settings(struct api *api, struct request *r);
 
+/* auth.c */
+struct response *session_get(struct api *api, struct request *r);
+struct response *session_add(struct api *api, struct request *r);
+struct response *session_delete(struct api *api, struct request *r);
+
 /* scenes.c */
 struct response *scenes_list(struct api *api, struct request *r);
 struct response *scenes_add(struct api *api, struct request *r);

@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
+#include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
@@ -17,37 +18,43 @@
 #define LABELS_MAX 32
 #define LABEL_MAX_BYTES 100
 
-/* The job's number in the path; or *refusal. */
-static int64_t job_id(const struct request *r, struct response **refusal) {
-    int64_t id = 0;
-    if (!field_number(r->target.segments[2], 1, INT64_MAX, &id))
-        *refusal = problem(r, 404, "\"%.80s\" is no job's number", r->target.segments[2]);
+/* The number of the job in the path, which the caller may change; or *refusal. */
+static int64_t own_job(struct api *api, const struct request *r, struct response **refusal) {
+    struct job job;
+    if (!auth_job(api, r, ACCESS_CHANGE, &job, refusal))
+        return 0;
+    int64_t id = job.id;
+    job_release(&job);
     return id;
 }
 
-/* The reply that shows a job as it is now. */
+/* The reply that shows a job as it is now; takes it. */
+static struct response *show_job(const struct request *r, struct job *job, int status) {
+    char etag[48];
+    snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job->revision);
+    struct response *reply;
+    if (status == 200 && r->method == METHOD_GET) {
+        reply = view_tagged(r, view_job(job), etag);
+    } else {
+        reply = response_json(status, view_job(job));
+        response_field(reply, "ETag", "%s", etag);
+    }
+    job_release(job);
+    return reply;
+}
+
 static struct response *show(struct api *api, const struct request *r, int64_t id, int status) {
     struct job job;
     struct error err;
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
-    char etag[48];
-    snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job.revision);
-    struct response *reply;
-    if (status == 200 && r->method == METHOD_GET) {
-        reply = view_tagged(r, view_job(&job), etag);
-    } else {
-        reply = response_json(status, view_job(&job));
-        response_field(reply, "ETag", "%s", etag);
-    }
-    job_release(&job);
-    return reply;
+    return show_job(r, &job, status);
 }
 
 struct response *jobs_get(struct api *api, struct request *r) {
     struct response *refusal = NULL;
-    int64_t id = job_id(r, &refusal);
-    return refusal ? refusal : show(api, r, id, 200);
+    struct job job;
+    return auth_job(api, r, ACCESS_READ, &job, &refusal) ? show_job(r, &job, 200) : refusal;
 }
 
 struct response *jobs_list(struct api *api, struct request *r) {
@@ -67,7 +74,7 @@ struct response *jobs_list(struct api *api, struct request *r) {
     struct job *jobs = mem_calloc(limit + 1, sizeof *jobs);
     struct error err;
     /* One more than asked for tells whether there is another page. */
-    if (store_job_list(api->store, state_name ? (int)state : -1, before, limit + 1, jobs, &count, &err) !=
+    if (store_job_list(api->store, &r->caller, state_name ? (int)state : -1, before, limit + 1, jobs, &count, &err) !=
         STATUS_OK) {
         mem_free(jobs);
         return problem_from(r, &err);
@@ -95,6 +102,7 @@ struct wish {
     const cJSON *settings;
     char *labels; /* JSON text; owned; NULL: not given */
     int priority; /* INT_MIN: not given */
+    int shared;   /* -1: not given */
 };
 
 static void wish_release(struct wish *w) {
@@ -153,6 +161,7 @@ static void check_settings(const cJSON *member, struct settings *settings, cJSON
 static struct response *read_wish(const struct request *r, struct wish *w, bool is_new, cJSON *params) {
     memset(w, 0, sizeof *w);
     w->priority = INT_MIN;
+    w->shared = -1;
     struct error err;
     if (json_parse(buf_text(&r->body), r->body.length, "the request body", &w->body, &err) != STATUS_OK)
         return problem(r, 400, "%s", err.message);
@@ -166,13 +175,17 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
             read_labels(w, member, params);
         else if (strcmp(name, "priority") == 0)
             read_priority(w, member, params);
+        else if (strcmp(name, "shared") == 0 && cJSON_IsBool(member))
+            w->shared = cJSON_IsTrue(member);
+        else if (strcmp(name, "shared") == 0)
+            problem_param(params, name, NULL, "must be true or false");
         else if (is_new && strcmp(name, "scene") == 0)
             w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
-            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels"
-                                               : "there are name, priority, labels", "is not known here");
+            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, shared"
+                                               : "there are name, priority, labels, shared", "is not known here");
     }
     if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
         problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
@@ -182,16 +195,15 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
 /* --- submitting -------------------------------------------------------------------------- */
 
 /* The scene that the wish names, if a job may use it; else an entry in params. */
-static bool find_scene(struct api *api, const char *id, struct scene_row *row, cJSON *params) {
+static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
+                       cJSON *params) {
     size_t digits = strspn(id, "0123456789abcdef");
     struct error err;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
         problem_param(params, "scene", NULL, "is no scene's id: 8 to 64 lower-case hex digits");
         return false;
     }
-    enum status status = digits == 64 ? store_scene_get(api->store, id, row, &err)
-                                      : store_scene_find(api->store, id, row, &err);
-    if (status != STATUS_OK) {
+    if (auth_find_scene(api, r, id, row, &err) != STATUS_OK) {
         problem_param(params, "scene", NULL, "%s", err.message);
         return false;
     }
@@ -219,6 +231,8 @@ static struct response *add_job(struct api *api, const struct request *r, const 
     sha256_of(buf_text(&r->body), r->body.length, digest);
     struct job_new job = {
         .scene_id = scene->id,
+        .owner_id = r->caller.user_id,
+        .is_shared = w->shared == 1,
         .name = w->name ? w->name : scene->name,
         .labels = w->labels ? w->labels : "{}",
         .settings = settings,
@@ -275,7 +289,7 @@ struct response *jobs_add(struct api *api, struct request *r) {
     if (!reply && w.settings)
         check_settings(w.settings, &settings, params);
     if (!reply && w.scene)
-        has_scene = find_scene(api, w.scene, &scene, params);
+        has_scene = find_scene(api, r, w.scene, &scene, params);
     if (!reply && cJSON_GetArraySize(params) > 0) {
         reply = problem_invalid(r, "the job cannot be taken as it is", params);
         params = NULL;
@@ -312,7 +326,7 @@ static int64_t expected_revision(const struct request *r, struct response **refu
 
 struct response *jobs_patch(struct api *api, struct request *r) {
     struct response *reply = NULL;
-    int64_t id = job_id(r, &reply);
+    int64_t id = own_job(api, r, &reply);
     int64_t revision = reply ? -1 : expected_revision(r, &reply);
     if (reply)
         return reply;
@@ -325,7 +339,8 @@ struct response *jobs_patch(struct api *api, struct request *r) {
         params = NULL;
     }
     if (!reply) {
-        enum status status = store_job_patch(api->store, id, revision, w.name, w.labels, w.priority, &err);
+        enum status status = store_job_patch(api->store, id, revision, w.name, w.labels, w.priority, w.shared,
+                                             &err);
         if (status == STATUS_CONFLICT)
             reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
         else if (status != STATUS_OK)
@@ -341,7 +356,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
 
 struct response *jobs_delete(struct api *api, struct request *r) {
     struct response *refusal = NULL;
-    int64_t id = job_id(r, &refusal);
+    int64_t id = own_job(api, r, &refusal);
     if (refusal)
         return refusal;
     struct error err;
@@ -357,7 +372,7 @@ struct response *jobs_delete(struct api *api, struct request *r) {
 static struct response *act(struct api *api, const struct request *r,
                             enum status (*action)(struct api *api, int64_t id, struct error *err)) {
     struct response *refusal = NULL;
-    int64_t id = job_id(r, &refusal);
+    int64_t id = own_job(api, r, &refusal);
     if (refusal)
         return refusal;
     struct error err;

@@ -15,6 +15,7 @@
 #include "common/error.h"
 #include "common/json.h"
 #include "server/http/target.h"
+#include "server/store/users.h"
 
 enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_COUNT };
 
@@ -38,6 +39,7 @@ struct request {
     int64_t content_length;   /* -1: not known (chunked) */
     char id[REQUEST_ID_SIZE]; /* for X-Request-Id and logs */
     const struct route *route; /* set by routes_begin; static storage */
+    struct caller caller;      /* who asks; set by routes_begin */
     struct buf body;           /* what was collected of it, for routes that take JSON */
     struct upload *upload;     /* a body that goes to disk; owned */
 };

@@ -12,6 +12,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/http/auth.h"
 #include "server/http/digests.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
@@ -21,18 +22,13 @@
 #define LOG_BYTES_DEFAULT 65536
 #define LOG_BYTES_MAX (1 << 20)
 
-/* The job's number in the path, if there is such a job; or *refusal. */
+/* The number of the job in the path, which the caller may read; or *refusal. */
 static int64_t known_job(struct api *api, const struct request *r, struct response **refusal) {
-    int64_t id = 0;
     struct job job;
-    struct error err;
-    if (!field_number(r->target.segments[2], 1, INT64_MAX, &id)) {
-        *refusal = problem(r, 404, "\"%.80s\" is no job's number", r->target.segments[2]);
-    } else if (store_job_get(api->store, id, &job, &err) != STATUS_OK) {
-        *refusal = problem_from(r, &err);
-    } else {
-        job_release(&job);
-    }
+    if (!auth_job(api, r, ACCESS_READ, &job, refusal))
+        return 0;
+    int64_t id = job.id;
+    job_release(&job);
     return id;
 }
 

@@ -15,7 +15,8 @@ static const struct kind {
     const char *word, *title;
 } kinds[] = {
     {400, "bad-request", "The request cannot be understood"},
-    {403, "forbidden", "The request comes from where it must not"},
+    {401, "unauthorized", "A token is needed"},
+    {403, "forbidden", "It is not for this caller"},
     {404, "not-found", "There is no such thing"},
     {405, "method-not-allowed", "That cannot be done here"},
     {409, "conflict", "Its present state forbids it"},

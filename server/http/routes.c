@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/protocol.h"
+#include "server/http/auth.h"
 #include "server/http/events.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
@@ -12,30 +13,33 @@
 #include "server/http/upload.h"
 
 static const struct route table[] = {
-    {METHOD_GET, "/", system_root, 0, false, ""},
-    {METHOD_GET, "/healthz", system_healthz, 0, false, ""},
-    {METHOD_GET, "/readyz", system_readyz, 0, true, ""},
-    {METHOD_GET, "/metrics", system_metrics, 0, false, ""},
-    {METHOD_GET, "/openapi.json", system_openapi, 0, false, ""},
-    {METHOD_GET, "/v1/version", system_version, 0, false, ""},
-    {METHOD_GET, "/v1/settings", system_settings, 0, false, ""},
-    {METHOD_GET, "/v1/scenes", scenes_list, 0, false, "limit cursor"},
-    {METHOD_POST, "/v1/scenes", scenes_add, ROUTE_BODY_UPLOAD, true, "name"},
-    {METHOD_GET, "/v1/scenes/{scene}", scenes_get, 0, false, ""},
-    {METHOD_DELETE, "/v1/scenes/{scene}", scenes_delete, 0, true, ""},
-    {METHOD_GET, "/v1/jobs", jobs_list, 0, false, "state limit cursor"},
-    {METHOD_POST, "/v1/jobs", jobs_add, ROUTE_BODY_JSON, true, "dry_run"},
-    {METHOD_GET, "/v1/jobs/{job}", jobs_get, 0, false, ""},
-    {METHOD_PATCH, "/v1/jobs/{job}", jobs_patch, ROUTE_BODY_JSON, true, ""},
-    {METHOD_DELETE, "/v1/jobs/{job}", jobs_delete, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/cancel", jobs_cancel, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/pause", jobs_pause, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/resume", jobs_resume, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/retry", jobs_retry, 0, true, ""},
-    {METHOD_GET, "/v1/jobs/{job}/events", events_get, 0, false, "after follow"},
-    {METHOD_GET, "/v1/jobs/{job}/log", jobs_log, 0, false, "bytes"},
-    {METHOD_GET, "/v1/jobs/{job}/outputs", outputs_list, 0, false, ""},
-    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", outputs_get, 0, true, ""},
+    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, false, ""},
+    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, false, ""},
+    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, true, ""},
+    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, false, ""},
+    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, false, ""},
+    {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, false, ""},
+    {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, false, ""},
+    {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, false, ""},
+    {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, false, ""},
+    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, false, ""},
+    {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, false, "limit cursor"},
+    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, true, "name"},
+    {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, false, ""},
+    {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, true, ""},
+    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, false, "state limit cursor"},
+    {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, true, "dry_run"},
+    {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, false, ""},
+    {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, true, ""},
+    {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, jobs_cancel, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, jobs_pause, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, jobs_resume, 0, true, ""},
+    {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, jobs_retry, 0, true, ""},
+    {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, false, "after follow"},
+    {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, false, "bytes"},
+    {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, false, ""},
+    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, true, ""},
 };
 
 const struct route *routes_table(size_t *count) {
@@ -128,7 +132,9 @@ struct response *routes_begin(struct api *api, struct request *r) {
             r->route = &table[i];
     if (!r->route)
         return no_route(r);
-    struct response *refusal = check_query(r);
+    struct response *refusal = auth_check(api, r);
+    if (!refusal)
+        refusal = check_query(r);
     if (!refusal)
         refusal = check_media_type(r);
     if (refusal)

@@ -16,9 +16,13 @@ enum route_body {
     ROUTE_BODY_UPLOAD   /* goes to disk */
 };
 
+/* The role that a caller must have at least. */
+enum route_access { ROUTE_PUBLIC, ROUTE_VIEWER, ROUTE_USER, ROUTE_ADMIN };
+
 struct route {
     enum method method;
     const char *pattern; /* "/v1/jobs/{job}": {x} is one part, {x...} one or more at the end */
+    enum route_access access;
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
     bool is_slow;        /* may wait for a disk: not on a thread that serves others */

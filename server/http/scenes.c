@@ -3,28 +3,12 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
 #include "server/http/upload.h"
 #include "server/http/views.h"
-
-/* The row that the path names by its id or the id's beginning; or *refusal. */
-static bool find_scene(struct api *api, const struct request *r, struct scene_row *row,
-                       struct response **refusal) {
-    const char *id = r->target.segments[2];
-    struct error err;
-    size_t digits = strspn(id, "0123456789abcdef");
-    if (digits < 8 || digits > 64 || id[digits] != '\0') {
-        *refusal = problem(r, 404, "\"%.80s\" is no scene's id: 8 to 64 lower-case hex digits", id);
-        return false;
-    }
-    enum status status = digits == 64 ? store_scene_get(api->store, id, row, &err)
-                                      : store_scene_find(api->store, id, row, &err);
-    if (status != STATUS_OK)
-        *refusal = problem_from(r, &err);
-    return status == STATUS_OK;
-}
 
 /* Changes when the row does: a scene has no revision, but only these members ever change. */
 static struct response *tagged(const struct request *r, const struct scene_row *row) {
@@ -37,7 +21,7 @@ static struct response *tagged(const struct request *r, const struct scene_row *
 struct response *scenes_get(struct api *api, struct request *r) {
     struct scene_row row;
     struct response *reply = NULL;
-    if (!find_scene(api, r, &row, &reply))
+    if (!auth_scene(api, r, ACCESS_READ, &row, &reply))
         return reply;
     reply = tagged(r, &row);
     scene_row_release(&row);
@@ -53,7 +37,7 @@ struct response *scenes_list(struct api *api, struct request *r) {
     struct scene_row *rows = mem_calloc(limit, sizeof *rows);
     char next[128] = "";
     struct error err;
-    if (store_scene_list(api->store, cursor ? cursor : "", limit, rows, &count, next, &err) != STATUS_OK) {
+    if (store_scene_list(api->store, &r->caller, cursor ? cursor : "", limit, rows, &count, next, &err) != STATUS_OK) {
         mem_free(rows);
         return err.status == STATUS_INPUT ? problem(r, 400, "%s", err.message) : problem_from(r, &err);
     }
@@ -79,8 +63,8 @@ struct response *scenes_add(struct api *api, struct request *r) {
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = upload_publish(api, r->upload, id, &err);
     if (status == STATUS_OK)
-        status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload), &existed,
-                                 &err);
+        status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload),
+                                 r->caller.user_id, &existed, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     if (status == STATUS_OK)
         status = store_scene_get(api->store, id, &row, &err);
@@ -97,12 +81,15 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
     struct response *refusal = NULL;
-    if (!find_scene(api, r, &row, &refusal))
+    bool is_gone;
+    if (!auth_scene(api, r, ACCESS_CHANGE, &row, &refusal))
         return refusal;
     char *path = mem_printf("scenes/%s", row.id);
     pthread_mutex_lock(&api->scene_mutex);
-    enum status status = store_scene_delete(api->store, row.id, &err);
-    if (status == STATUS_OK)
+    enum status status = store_scene_delete(api->store, row.id,
+                                            r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id,
+                                            &is_gone, &err);
+    if (is_gone)
         status = api_discard(api, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     mem_free(path);

@@ -42,6 +42,8 @@ cJSON *view_job(const struct job *job) {
     json_add_int(v, "revision", job->revision);
     json_add_string(v, "name", job->name);
     json_add_string(v, "scene", job->scene_id);
+    json_add_string(v, "owner", or_null(job->owner));
+    json_add_bool(v, "shared", job->is_shared);
     json_add_string(v, "state", job_state_name(job->state));
     json_add_string(v, "wanted", job_wanted_name(job->wanted));
     json_add_int(v, "priority", job->priority);
@@ -78,6 +80,7 @@ cJSON *view_scene(const struct scene_row *row) {
     cJSON *v = cJSON_CreateObject();
     json_add_string(v, "id", row->id);
     json_add_string(v, "name", row->name);
+    json_add_string(v, "owner", or_null(row->owner));
     json_add_string(v, "state", scene_state_name(row->state));
     json_add_int(v, "bytes", (int64_t)row->bytes);
     add_time(v, "created_at", row->created_ms);

@@ -70,6 +70,7 @@ bool job_may_become(enum job_state from, enum job_state to) {
 }
 
 void job_release(struct job *job) {
+    mem_free(job->owner);
     mem_free(job->name);
     mem_free(job->labels);
     mem_free(job->settings);

@@ -47,6 +47,9 @@ struct job {
     int64_t id;
     int64_t revision;          /* grows by one with every change; the ETag */
     char scene_id[SCENE_ID_SIZE];
+    int64_t owner_id;          /* the user who made it; 0: nobody */
+    char *owner;               /* that user's name; "" */
+    bool is_shared;            /* with the lab: every caller may read it */
     char *name;
     char *labels;              /* JSON object text */
     char *settings;            /* JSON object text, as submitted */

@@ -3,6 +3,7 @@
 #define UNBAKE_STORE_INTERNAL_H
 
 #include <pthread.h>
+#include <stdatomic.h>
 
 #include "server/store/sql.h"
 #include "server/store/store.h"
@@ -12,6 +13,7 @@ struct store {
     struct sql sql;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
+    atomic_bool has_users;
 };
 
 #define STORE_NOTHING_CHANGED (-1)
@@ -31,6 +33,9 @@ enum status store_end(struct store *store, enum status status, int64_t changed_j
                       struct error *err);
 
 int64_t store_now_ms(void); /* Unix time */
+
+/* users.c, while the store is opened: sets has_users. */
+enum status store_look_for_users(struct store *store, struct error *err);
 
 /* Inside a transaction: appends one event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,

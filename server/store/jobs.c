@@ -8,7 +8,8 @@
 
 #define COLUMNS                                                                                \
     "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
-    " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason, hint"
+    " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
+    " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -30,6 +31,9 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .eta_sec = sqlite3_column_double(stmt, 16),
         .reason = sql_dup(stmt, 17),
         .hint = sql_dup(stmt, 18),
+        .owner_id = sqlite3_column_int64(stmt, 19),
+        .owner = sql_dup(stmt, 20),
+        .is_shared = sqlite3_column_int(stmt, 21) != 0,
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -38,14 +42,22 @@ static enum status not_found(int64_t id, struct error *err) {
     return error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)id);
 }
 
+/* Each owner has keys of its own: as it is stored, a key begins with its owner's number. */
+static char *stored_key(const struct job_new *job) {
+    return !job->idempotency_key ? NULL
+           : job->owner_id == 0  ? mem_strdup(job->idempotency_key)
+                                 : mem_printf("%lld/%s", (long long)job->owner_id,
+                                              job->idempotency_key);
+}
+
 /* The job that a known idempotency key made; *id stays 0 when the key is new. */
-static enum status find_replay(struct store *store, const struct job_new *job, int64_t *id,
-                               struct error *err) {
+static enum status find_replay(struct store *store, const struct job_new *job, const char *key,
+                               int64_t *id, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false, same = false;
     enum status status = sql_query(&store->sql, &stmt, err,
                                    "SELECT id, request_sha256 FROM jobs WHERE idempotency_key = ?",
-                                   "t", job->idempotency_key);
+                                   "t", key);
     if (status == STATUS_OK)
         status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
@@ -89,27 +101,30 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    if (job->idempotency_key)
-        status = find_replay(store, job, id, err);
+    char *key = stored_key(job);
+    if (key)
+        status = find_replay(store, job, key, id, err);
     if (status == STATUS_OK && *id == 0)
         status = check_new(store, job, queue_limit, err);
     if (status == STATUS_OK && *id > 0) {
         *replayed = true;
+        mem_free(key);
         return store_end(store, status, STORE_NOTHING_CHANGED, err);
     }
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
-                         " attempts_left, created_ms, idempotency_key, request_sha256)"
-                         " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                         "ttttnnitt", job->scene_id, job->name, job->labels, job->settings,
-                         job->priority, job->max_attempts, store_now_ms(), job->idempotency_key,
-                         job->request_sha256);
+                         " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
+                         " shared) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                         "ttttnnittin", job->scene_id, job->name, job->labels, job->settings,
+                         job->priority, job->max_attempts, store_now_ms(), key,
+                         job->request_sha256, job->owner_id, (int)job->is_shared);
     if (status == STATUS_OK) {
         *id = sqlite3_last_insert_rowid(store->sql.db);
         status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}",
                                     err);
     }
+    mem_free(key);
     return store_end(store, status, *id, err);
 }
 
@@ -130,8 +145,10 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-enum status store_job_list(struct store *store, int state_filter, int64_t before_id, size_t limit,
-                           struct job *jobs, size_t *count, struct error *err) {
+enum status store_job_list(struct store *store, const struct caller *who, int state_filter,
+                           int64_t before_id, size_t limit, struct job *jobs, size_t *count,
+                           struct error *err) {
+    bool sees_all = !who || who->role == ROLE_ADMIN;
     sqlite3_stmt *stmt;
     *count = 0;
     int64_t before = before_id > 0 ? before_id : INT64_MAX;
@@ -139,12 +156,15 @@ enum status store_job_list(struct store *store, int state_filter, int64_t before
     enum status status =
         state_filter < 0
             ? sql_query(&store->sql, &stmt, err,
-                        "SELECT " COLUMNS " FROM jobs WHERE id < ? ORDER BY id DESC LIMIT ?", "ii",
-                        before, (int64_t)limit)
+                        "SELECT " COLUMNS " FROM jobs WHERE id < ?"
+                        " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
+                        "inii", before, (int)sees_all, sees_all ? 0 : who->user_id,
+                        (int64_t)limit)
             : sql_query(&store->sql, &stmt, err,
                         "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ?"
-                        " ORDER BY id DESC LIMIT ?",
-                        "ini", before, state_filter, (int64_t)limit);
+                        " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
+                        "innii", before, state_filter, (int)sees_all, sees_all ? 0 : who->user_id,
+                        (int64_t)limit);
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -156,7 +176,7 @@ enum status store_job_list(struct store *store, int state_filter, int64_t before
 }
 
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
-                            const char *name, const char *labels, int priority,
+                            const char *name, const char *labels, int priority, int shared,
                             struct error *err) {
     int64_t revision;
     enum status status = store_begin(store, err);
@@ -173,8 +193,9 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
         status = sql_run(&store->sql, err,
                          "UPDATE jobs SET revision = revision + 1, name = ifnull(?, name),"
                          " labels = ifnull(?, labels),"
-                         " priority = CASE WHEN ?3 = ?4 THEN priority ELSE ?3 END WHERE id = ?5",
-                         "ttnni", name, labels, priority, INT_MIN, id);
+                         " priority = CASE WHEN ?3 = ?4 THEN priority ELSE ?3 END,"
+                         " shared = CASE WHEN ?5 < 0 THEN shared ELSE ?5 END WHERE id = ?6",
+                         "ttnnni", name, labels, priority, INT_MIN, shared, id);
     return store_end(store, status, id, err);
 }
 

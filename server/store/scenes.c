@@ -12,7 +12,14 @@
 #include "common/mem.h"
 #include "server/store/internal.h"
 
-#define COLUMNS "id, name, state, bytes, created_ms, problems, facts"
+#define COLUMNS                                                                                \
+    "id, name, state, bytes, created_ms, problems, facts, (SELECT users.name FROM scene_owners" \
+    " JOIN users ON users.id = user_id WHERE scene_id = scenes.id"                             \
+    " ORDER BY scene_owners.created_ms, user_id LIMIT 1)"
+/* What user ?2 may read where not all (?1); see caller_access_job. */
+#define IS_READABLE                                                                            \
+    "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"   \
+    " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1))"
 
 static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
     *row = (struct scene_row){
@@ -22,12 +29,14 @@ static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
         .created_ms = sqlite3_column_int64(stmt, 4),
         .problems = sql_dup(stmt, 5),
         .facts = sql_dup(stmt, 6),
+        .owner = sql_dup(stmt, 7),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
 }
 
 void scene_row_release(struct scene_row *row) {
     mem_free(row->name);
+    mem_free(row->owner);
     mem_free(row->problems);
     mem_free(row->facts);
     *row = (struct scene_row){0};
@@ -44,7 +53,7 @@ static enum status state_of(struct store *store, const char *id, int64_t *state,
 }
 
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
-                            bool *existed, struct error *err) {
+                            int64_t owner_id, bool *existed, struct error *err) {
     int64_t state = -1;
     *existed = false;
     enum status status = store_begin(store, err);
@@ -60,6 +69,11 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
         status = sql_run(&store->sql, err,
                          "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
                          (int)SCENE_CHECKING, id);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "INSERT INTO scene_owners (scene_id, user_id, created_ms)"
+                         " VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
+                         "tii", id, owner_id, store_now_ms());
     status = store_end(store, status, 0, err);
     *existed = status == STATUS_OK && state >= 0;
     return status;
@@ -113,8 +127,12 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-enum status store_scene_find(struct store *store, const char *prefix, struct scene_row *row,
-                             struct error *err) {
+static bool sees_all(const struct caller *who) {
+    return !who || who->role == ROLE_ADMIN;
+}
+
+enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix,
+                             struct scene_row *row, struct error *err) {
     *row = (struct scene_row){0};
     size_t length = strlen(prefix);
     if (length < 4 || length >= SCENE_ID_SIZE ||
@@ -126,8 +144,9 @@ enum status store_scene_find(struct store *store, const char *prefix, struct sce
     /* 'g' follows every hex digit. */
     enum status status = sql_query(&store->sql, &stmt, err,
                                    "SELECT " COLUMNS " FROM scenes"
-                                   " WHERE id >= ?1 AND id < ?1 || 'g' LIMIT 2",
-                                   "t", prefix);
+                                   " WHERE id >= ?3 AND id < ?3 || 'g' AND " IS_READABLE
+                                   " LIMIT 2",
+                                   "nit", (int)sees_all(who), who ? who->user_id : 0, prefix);
     if (status == STATUS_OK)
         status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
@@ -145,9 +164,9 @@ enum status store_scene_find(struct store *store, const char *prefix, struct sce
     return status;
 }
 
-enum status store_scene_list(struct store *store, const char *cursor, size_t limit,
-                             struct scene_row *rows, size_t *count, char next_cursor[128],
-                             struct error *err) {
+enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
+                             size_t limit, struct scene_row *rows, size_t *count,
+                             char next_cursor[128], struct error *err) {
     long long before_ms = INT64_MAX;
     char before_id[SCENE_ID_SIZE] = "";
     char rest;
@@ -158,9 +177,11 @@ enum status store_scene_list(struct store *store, const char *cursor, size_t lim
     sqlite3_stmt *stmt;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT " COLUMNS " FROM scenes WHERE (created_ms, id) < (?, ?)"
-                                   " ORDER BY created_ms DESC, id DESC LIMIT ?",
-                                   "iti", (int64_t)before_ms, before_id, (int64_t)limit + 1);
+                                   "SELECT " COLUMNS " FROM scenes"
+                                   " WHERE (created_ms, id) < (?3, ?4) AND " IS_READABLE
+                                   " ORDER BY created_ms DESC, id DESC LIMIT ?5",
+                                   "niiti", (int)sees_all(who), who ? who->user_id : 0,
+                                   (int64_t)before_ms, before_id, (int64_t)limit + 1);
     bool row = status == STATUS_OK;
     while (row && *count <= limit) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -179,26 +200,40 @@ enum status store_scene_list(struct store *store, const char *cursor, size_t lim
     return status;
 }
 
-enum status store_scene_delete(struct store *store, const char *id, struct error *err) {
-    int64_t state = -1, user = 0;
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool *is_gone,
+                               struct error *err) {
+    int64_t state = -1, others = 0, job = 0;
+    *is_gone = false;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
     status = state_of(store, id, &state, err);
     if (status == STATUS_OK && state < 0)
         status = not_found(id, err);
-    else if (status == STATUS_OK && state == SCENE_CHECKING)
+    if (status == STATUS_OK && owner_id >= 0)
+        status = sql_int(&store->sql, 0, &others, err,
+                         "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1",
+                         "ti", id, owner_id);
+    if (status == STATUS_OK && state == SCENE_CHECKING && !others)
         status = error_set(err, STATUS_CONFLICT, "scene %s is being checked", id);
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &user, err,
-                         "SELECT id FROM jobs WHERE scene_id = ? AND state <= 2 LIMIT 1", "t", id);
-    if (status == STATUS_OK && user > 0) {
-        error_set(err, STATUS_CONFLICT, "job %lld still uses scene %s", (long long)user, id);
+        status = sql_int(&store->sql, 0, &job, err,
+                         "SELECT id FROM jobs WHERE scene_id = ? AND state <= 2"
+                         " AND (? = 0 OR owner_id = ?) LIMIT 1",
+                         "tii", id, others, owner_id);
+    if (status == STATUS_OK && job > 0) {
+        error_set(err, STATUS_CONFLICT, "a job still uses scene %s", id);
         status = error_hint(err, "Cancel the job or wait for its end.");
     }
-    if (status == STATUS_OK)
+    if (status == STATUS_OK && others)
+        status = sql_run(&store->sql, err,
+                         "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id,
+                         owner_id);
+    else if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
-    return store_end(store, status, 0, err);
+    status = store_end(store, status, 0, err);
+    *is_gone = status == STATUS_OK && !others;
+    return status;
 }
 
 enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],

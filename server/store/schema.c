@@ -65,5 +65,34 @@ static const char step_1[] =
     ") STRICT, WITHOUT ROWID;"
     "CREATE TABLE probe (id INTEGER PRIMARY KEY CHECK (id = 1), at_ms INTEGER NOT NULL) STRICT;";
 
-const char *const schema_steps[] = {step_1};
+/* Users. A scene is one for all who have uploaded its bytes: each of them owns it; user 0 is nobody,
+ * from a time without tokens. */
+static const char step_2[] =
+    "CREATE TABLE users ("
+    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+    "  name TEXT NOT NULL UNIQUE,"
+    "  created_ms INTEGER NOT NULL"
+    ") STRICT;"
+    "CREATE TABLE tokens ("
+    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+    "  user_id INTEGER NOT NULL REFERENCES users (id),"
+    "  role INTEGER NOT NULL CHECK (role BETWEEN 0 AND 2),"
+    "  hash TEXT NOT NULL,"
+    "  created_ms INTEGER NOT NULL"
+    ") STRICT;"
+    "CREATE INDEX tokens_by_user ON tokens (user_id);"
+    "CREATE TABLE scene_owners ("
+    "  scene_id TEXT NOT NULL REFERENCES scenes (id) ON DELETE CASCADE,"
+    "  user_id INTEGER NOT NULL,"
+    "  created_ms INTEGER NOT NULL,"
+    "  PRIMARY KEY (scene_id, user_id)"
+    ") STRICT, WITHOUT ROWID;"
+    "CREATE INDEX scene_owners_by_user ON scene_owners (user_id);"
+    "INSERT INTO scene_owners SELECT id, 0, created_ms FROM scenes;"
+    "ALTER TABLE jobs ADD COLUMN owner_id INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE jobs ADD COLUMN shared INTEGER NOT NULL DEFAULT 0 CHECK (shared IN (0, 1));"
+    "CREATE INDEX jobs_by_owner ON jobs (owner_id, state);"
+    "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
+
+const char *const schema_steps[] = {step_1, step_2};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

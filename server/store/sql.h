@@ -17,7 +17,7 @@
 
 #include "common/error.h"
 
-#define SQL_STATEMENT_MAX 96
+#define SQL_STATEMENT_MAX 192
 
 struct sql {
     sqlite3 *db;

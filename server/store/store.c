@@ -76,6 +76,8 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = migrate(store, err);
     if (status == STATUS_OK)
+        status = store_look_for_users(store, err);
+    if (status == STATUS_OK)
         status = file_sync_parent(path, err); /* a new file's name is on disk too */
     mem_free(path);
     if (status != STATUS_OK)

@@ -20,6 +20,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "server/job/job.h"
+#include "server/store/users.h"
 
 struct store; /* opaque */
 
@@ -40,6 +41,7 @@ void store_on_change(struct store *store, void (*changed)(void *user, int64_t jo
 struct scene_row {
     char id[SCENE_ID_SIZE];
     char *name;
+    char *owner;            /* the first user who sent it; "" for nobody */
     enum scene_state state;
     uint64_t bytes;         /* of the archive */
     int64_t created_ms;
@@ -48,26 +50,31 @@ struct scene_row {
 };
 void scene_row_release(struct scene_row *row);
 
-/* A complete, durable upload: the row starts in `checking`. Content that is there already is
- * no error: *existed is set and nothing changes, but a rejected one is checked again. */
+/* A complete, durable upload by user owner_id: the row starts in `checking`. Content that is there
+ * already is no error: *existed is set, the user owns it too, and nothing else changes, but a
+ * rejected one is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
-                            bool *existed, struct error *err);
+                            int64_t owner_id, bool *existed, struct error *err);
 enum status store_scene_ready(struct store *store, const char *id, const char *facts,
                               struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *problems,
                                struct error *err);
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
                             struct error *err);
-/* The row whose id begins with `prefix` (4 to 64 hex digits); STATUS_CONFLICT when several do. */
-enum status store_scene_find(struct store *store, const char *prefix, struct scene_row *row,
-                             struct error *err);
-/* Newest first, before (created_ms, id) of a cursor ("" for the first page). rows[limit] out. */
-enum status store_scene_list(struct store *store, const char *cursor, size_t limit,
-                             struct scene_row *rows, size_t *count, char next_cursor[128],
-                             struct error *err);
-/* STATUS_CONFLICT while it is being checked or a job that is not terminal uses it. Terminal jobs
- * keep its id. The caller removes the files after. */
-enum status store_scene_delete(struct store *store, const char *id, struct error *err);
+/* The row whose id begins with `prefix` (4 to 64 hex digits) among those that `who` (NULL: all)
+ * may read; STATUS_CONFLICT when several do. */
+enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix,
+                             struct scene_row *row, struct error *err);
+/* What `who` (NULL: all) may read, newest first, before (created_ms, id) of a cursor ("" for the
+ * first page). rows[limit] out. */
+enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
+                             size_t limit, struct scene_row *rows, size_t *count,
+                             char next_cursor[128], struct error *err);
+/* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
+ * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
+ * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. */
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool *is_gone,
+                               struct error *err);
 /* The oldest scene in `checking`; STATUS_NOT_FOUND when there is none. */
 enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
                                        struct error *err);
@@ -76,6 +83,8 @@ enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZ
 
 struct job_new {
     const char *scene_id, *name, *labels, *settings;
+    int64_t owner_id; /* 0: nobody */
+    bool is_shared;
     int priority, max_attempts;
     const char *idempotency_key; /* NULL: none */
     const char *request_sha256;  /* of the request, compared when the key is known */
@@ -86,12 +95,15 @@ struct job_new {
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
                           int64_t *id, bool *replayed, struct error *err);
 enum status store_job_get(struct store *store, int64_t id, struct job *job, struct error *err);
-/* Newest first; state_filter < 0: all; before_id 0: from the newest. jobs[limit] out. */
-enum status store_job_list(struct store *store, int state_filter, int64_t before_id, size_t limit,
-                           struct job *jobs, size_t *count, struct error *err);
-/* NULL / INT_MIN leave a field. expected_revision -1: any; else STATUS_CONFLICT if it differs. */
+/* What `who` (NULL: all) may read, newest first; state_filter < 0: all; before_id 0: from the
+ * newest. jobs[limit] out. */
+enum status store_job_list(struct store *store, const struct caller *who, int state_filter,
+                           int64_t before_id, size_t limit, struct job *jobs, size_t *count,
+                           struct error *err);
+/* NULL / INT_MIN / -1 leave a field. expected_revision -1: any; else STATUS_CONFLICT if it differs. */
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
-                            const char *name, const char *labels, int priority, struct error *err);
+                            const char *name, const char *labels, int priority, int shared,
+                            struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not running */
 /* Highest priority, then oldest, queued job whose scene has been checked (ready, or rejected:
  * such a job is started only to fail); STATUS_NOT_FOUND if none. */

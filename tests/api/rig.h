@@ -136,7 +136,7 @@ static inline const char *rig_body(const struct buf *reply) {
 static inline void rig_scene(struct rig *rig) {
     struct error err;
     bool existed;
-    rig_must(store_scene_add(rig->store, RIG_SCENE, "room", 10, &existed, &err), &err, "store_scene_add");
+    rig_must(store_scene_add(rig->store, RIG_SCENE, "room", 10, 0, &existed, &err), &err, "store_scene_add");
     if (!existed)
         rig_must(store_scene_ready(rig->store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
 }

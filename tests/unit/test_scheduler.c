@@ -230,7 +230,7 @@ static void add_scene(struct daemon *d, const char *id, const char *role) {
     char *dir = mem_printf("%s/scenes/%s", d->dir, id);
     OK(file_make_dirs(dir, &err));
     OK(file_replace(path, role, strlen(role), &err));
-    OK(store_scene_add(d->store, id, "scene", strlen(role), &existed, &err));
+    OK(store_scene_add(d->store, id, "scene", strlen(role), 0, &existed, &err));
     scheduler_wake(d->scheduler);
     mem_free(path);
     mem_free(dir);

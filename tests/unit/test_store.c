@@ -200,7 +200,7 @@ static void test_queue(void) {
     OK(store_open(&store, dir, &err));
     IS(store_job_next(store, &next, &err), STATUS_NOT_FOUND);
     add_ready_scene(store, SCENE_A);
-    OK(store_scene_add(store, SCENE_B, "unchecked", 1, &existed, &err));
+    OK(store_scene_add(store, SCENE_B, "unchecked", 1, 0, &existed, &err));
     int64_t waits = add_job(store, SCENE_B, 100);
     int64_t low = add_job(store, SCENE_A, -1), old = add_job(store, SCENE_A, 1);
     int64_t young = add_job(store, SCENE_A, 1);
@@ -241,23 +241,23 @@ static void test_queue(void) {
     OK(store_job_get(store, id, &job, &err));
     int64_t revision = job.revision;
     job_release(&job);
-    OK(store_job_patch(store, id, revision, "new", NULL, INT_MIN, &err));
-    IS(store_job_patch(store, id, revision, "newer", NULL, INT_MIN, &err), STATUS_CONFLICT);
-    OK(store_job_patch(store, id, -1, NULL, "{\"a\":\"b\"}", 7, &err));
+    OK(store_job_patch(store, id, revision, "new", NULL, INT_MIN, -1, &err));
+    IS(store_job_patch(store, id, revision, "newer", NULL, INT_MIN, -1, &err), STATUS_CONFLICT);
+    OK(store_job_patch(store, id, -1, NULL, "{\"a\":\"b\"}", 7, -1, &err));
     OK(store_job_get(store, id, &job, &err));
     CHECK_STRING(job.name, "new");
     CHECK_STRING(job.labels, "{\"a\":\"b\"}");
     CHECK(job.priority == 7 && job.revision == revision + 2);
     job_release(&job);
-    IS(store_job_patch(store, 999, -1, "x", NULL, INT_MIN, &err), STATUS_NOT_FOUND);
+    IS(store_job_patch(store, 999, -1, "x", NULL, INT_MIN, -1, &err), STATUS_NOT_FOUND);
 
     /* Pages. */
     struct job jobs[3];
-    OK(store_job_list(store, -1, 0, 3, jobs, &count, &err));
+    OK(store_job_list(store, NULL, -1, 0, 3, jobs, &count, &err));
     CHECK(count == 3 && jobs[0].id == id && jobs[2].id == old);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
-    OK(store_job_list(store, JOB_RUNNING, young, 3, jobs, &count, &err));
+    OK(store_job_list(store, NULL, JOB_RUNNING, young, 3, jobs, &count, &err));
     CHECK(count == 2 && jobs[0].id == old && jobs[1].id == low);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);

@@ -8,60 +8,60 @@ static void test_scenes(void) {
     char *dir = fresh_dir();
     struct store *store;
     struct scene_row row, rows[2];
-    bool existed;
+    bool existed, is_gone;
     char id[SCENE_ID_SIZE], cursor[128];
     size_t count;
     OK(store_open(&store, dir, &err));
     IS(store_scene_next_unchecked(store, id, &err), STATUS_NOT_FOUND);
-    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err));
+    OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err));
     CHECK(!existed);
     OK(store_scene_next_unchecked(store, id, &err));
     CHECK_STRING(id, SCENE_A);
-    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, -1, &is_gone, &err), STATUS_CONFLICT);
     OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
     IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
-    OK(store_scene_add(store, SCENE_A, "one", 10, &existed, &err)); /* checked again */
+    OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err)); /* checked again */
     CHECK(existed);
     OK(store_scene_get(store, SCENE_A, &row, &err));
     CHECK(row.state == SCENE_CHECKING && row.bytes == 10);
     CHECK_STRING(row.problems, "[]");
     scene_row_release(&row);
     OK(store_scene_ready(store, SCENE_A, "{\"n\":1}", &err));
-    OK(store_scene_add(store, SCENE_A, "other name", 10, &existed, &err));
+    OK(store_scene_add(store, SCENE_A, "other name", 10, 0, &existed, &err));
     OK(store_scene_get(store, SCENE_A, &row, &err));
     CHECK(row.state == SCENE_READY);
     CHECK_STRING(row.name, "one");
     CHECK_STRING(row.facts, "{\"n\":1}");
     scene_row_release(&row);
 
-    OK(store_scene_find(store, "aaaa", &row, &err));
+    OK(store_scene_find(store, NULL, "aaaa", &row, &err));
     scene_row_release(&row);
-    IS(store_scene_find(store, "aaa", &row, &err), STATUS_NOT_FOUND);
-    IS(store_scene_find(store, "bbbb", &row, &err), STATUS_NOT_FOUND);
-    IS(store_scene_find(store, "aaaa%", &row, &err), STATUS_NOT_FOUND);
-    OK(store_scene_add(store, SCENE_C, "odd", 1, &existed, &err));
-    IS(store_scene_find(store, "aaaa", &row, &err), STATUS_CONFLICT);
+    IS(store_scene_find(store, NULL, "aaa", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, NULL, "bbbb", &row, &err), STATUS_NOT_FOUND);
+    IS(store_scene_find(store, NULL, "aaaa%", &row, &err), STATUS_NOT_FOUND);
+    OK(store_scene_add(store, SCENE_C, "odd", 1, 0, &existed, &err));
+    IS(store_scene_find(store, NULL, "aaaa", &row, &err), STATUS_CONFLICT);
     OK(store_scene_reject(store, SCENE_C, "[]", &err));
-    OK(store_scene_delete(store, SCENE_C, &err));
+    OK(store_scene_delete(store, SCENE_C, -1, &is_gone, &err));
 
-    OK(store_scene_add(store, SCENE_B, "two", 1, &existed, &err));
+    OK(store_scene_add(store, SCENE_B, "two", 1, 0, &existed, &err));
     cursor[0] = '\0';
     size_t seen = 0;
     do {
         char at[128];
         memcpy(at, cursor, sizeof at);
-        OK(store_scene_list(store, at, 1, rows, &count, cursor, &err));
+        OK(store_scene_list(store, NULL, at, 1, rows, &count, cursor, &err));
         seen += count;
         for (size_t i = 0; i < count; i++)
             scene_row_release(&rows[i]);
     } while (cursor[0] && seen < 10);
     CHECK(seen == 2);
-    IS(store_scene_list(store, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
+    IS(store_scene_list(store, NULL, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
 
     int64_t job = add_job(store, SCENE_A, 0);
-    IS(store_scene_delete(store, SCENE_A, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, -1, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, job, &err));
-    OK(store_scene_delete(store, SCENE_A, &err));
+    OK(store_scene_delete(store, SCENE_A, -1, &is_gone, &err));
     IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
     IS(store_job_retry(store, job, 3, &err), STATUS_CONFLICT); /* nothing to work on */
     store_close(store);

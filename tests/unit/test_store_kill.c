@@ -39,7 +39,7 @@ static void child(const char *dir, int first_key, int fd) {
     bool existed, replayed;
     if (store_open(&store, dir, &err) != STATUS_OK ||
         store_reconcile(store, &requeued, &err) != STATUS_OK ||
-        store_scene_add(store, SCENE, "s", 1, &existed, &err) != STATUS_OK)
+        store_scene_add(store, SCENE, "s", 1, 0, &existed, &err) != STATUS_OK)
         _exit(2);
     if (!existed)
         store_scene_ready(store, SCENE, "{}", &err);

@@ -1,0 +1,254 @@
+/* users.c -- see users.h. A token reads "unbake_NUMBER_SECRET": the number finds the row, and only
+ * the hash of the secret is compared, in constant time. */
+#include "server/store/users.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#include "common/mem.h"
+#include "common/sha256.h"
+#include "server/store/internal.h"
+
+#define TOKEN_PREFIX "unbake_"
+#define SECRET_BYTES 24
+#define SECRET_DIGITS (2 * SECRET_BYTES)
+
+static const char *const role_names[] = {"viewer", "user", "admin"};
+
+const char *role_name(enum role role) {
+    return role_names[role];
+}
+
+bool role_parse(const char *name, enum role *role) {
+    for (int i = ROLE_VIEWER; i <= ROLE_ADMIN; i++) {
+        if (strcmp(name, role_names[i]) != 0)
+            continue;
+        *role = (enum role)i;
+        return true;
+    }
+    return false;
+}
+
+/* --- who sees what ------------------------------------------------------------------------- */
+
+static enum access access_of(const struct caller *who, bool owns, bool is_shared) {
+    if (who->role == ROLE_ADMIN)
+        return ACCESS_CHANGE;
+    if (owns)
+        return who->role >= ROLE_USER ? ACCESS_CHANGE : ACCESS_READ;
+    return is_shared ? ACCESS_READ : ACCESS_NONE;
+}
+
+enum access caller_access_job(const struct caller *who, const struct job *job) {
+    return access_of(who, job->owner_id == who->user_id, job->is_shared);
+}
+
+enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id,
+                               enum access *access, struct error *err) {
+    int64_t owns = 0, shared = 0;
+    *access = ACCESS_NONE;
+    store_lock(store);
+    enum status status =
+        sql_int(&store->sql, 0, &owns, err,
+                "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", scene_id,
+                who->user_id);
+    if (status == STATUS_OK && !owns)
+        status = sql_int(&store->sql, 0, &shared, err,
+                         "SELECT 1 FROM jobs WHERE scene_id = ? AND shared = 1 LIMIT 1", "t",
+                         scene_id);
+    store_unlock(store);
+    if (status == STATUS_OK)
+        *access = access_of(who, owns, shared);
+    return status;
+}
+
+/* --- tokens -------------------------------------------------------------------------------- */
+
+bool store_has_users(struct store *store) {
+    return atomic_load(&store->has_users);
+}
+
+enum status store_look_for_users(struct store *store, struct error *err) {
+    int64_t found;
+    enum status status =
+        sql_int(&store->sql, 0, &found, err, "SELECT 1 FROM users LIMIT 1", "");
+    atomic_store(&store->has_users, found != 0);
+    return status;
+}
+
+static bool name_is_good(const char *name) {
+    size_t length = strlen(name);
+    if (length == 0 || length >= USER_NAME_SIZE || !isalpha((unsigned char)name[0]))
+        return false; /* a digit would look like a token's number */
+    for (size_t i = 0; i < length; i++)
+        if (!isalnum((unsigned char)name[i]) && !strchr("._-@", name[i]))
+            return false;
+    return true;
+}
+
+static enum status make_secret(char secret[SECRET_DIGITS + 1], struct error *err) {
+    unsigned char bytes[SECRET_BYTES];
+    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
+        return error_set(err, STATUS_IO, "the system gives no random bytes");
+    for (size_t i = 0; i < sizeof bytes; i++)
+        snprintf(secret + 2 * i, 3, "%02x", bytes[i]);
+    return STATUS_OK;
+}
+
+static enum status insert_token(struct store *store, const char *name, enum role role,
+                                const char *hash, int64_t *id, struct error *err) {
+    int64_t user;
+    enum status status = sql_run(&store->sql, err,
+                                 "INSERT INTO users (name, created_ms) VALUES (?, ?)"
+                                 " ON CONFLICT (name) DO NOTHING",
+                                 "ti", name, store_now_ms());
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &user, err, "SELECT id FROM users WHERE name = ?", "t",
+                         name);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "INSERT INTO tokens (user_id, role, hash, created_ms)"
+                         " VALUES (?, ?, ?, ?)",
+                         "inti", user, (int)role, hash, store_now_ms());
+    if (status == STATUS_OK)
+        *id = sqlite3_last_insert_rowid(store->sql.db);
+    return status;
+}
+
+enum status store_token_add(struct store *store, const char *name, enum role role,
+                            char token[TOKEN_SIZE], int64_t *id, struct error *err) {
+    char secret[SECRET_DIGITS + 1], hash[SHA256_HEX_SIZE];
+    if (!name_is_good(name)) {
+        error_set(err, STATUS_INPUT, "\"%.80s\" is no name for a user", name);
+        return error_hint(err, "1 to %d letters, digits and . _ - @, a letter first",
+                          USER_NAME_SIZE - 1);
+    }
+    enum status status = make_secret(secret, err);
+    if (status != STATUS_OK)
+        return status;
+    sha256_of(secret, SECRET_DIGITS, hash);
+    status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = insert_token(store, name, role, hash, id, err);
+    status = store_end(store, status, STORE_NOTHING_CHANGED, err);
+    if (status != STATUS_OK)
+        return status;
+    atomic_store(&store->has_users, true);
+    snprintf(token, TOKEN_SIZE, TOKEN_PREFIX "%lld_%s", (long long)*id, secret);
+    return STATUS_OK;
+}
+
+/* Takes the token apart; false where it does not look like one. */
+static bool parse_token(const char *token, int64_t *id, const char **secret) {
+    size_t prefix = strlen(TOKEN_PREFIX);
+    if (strncmp(token, TOKEN_PREFIX, prefix) != 0)
+        return false;
+    const char *number = token + prefix;
+    size_t digits = strspn(number, "0123456789");
+    if (digits < 1 || digits > 18 || number[digits] != '_')
+        return false;
+    *id = strtoll(number, NULL, 10);
+    *secret = number + digits + 1;
+    return strlen(*secret) == SECRET_DIGITS;
+}
+
+enum status store_token_find(struct store *store, const char *token, struct caller *caller,
+                             struct error *err) {
+    int64_t id;
+    const char *secret;
+    char hash[SHA256_HEX_SIZE], wanted[SHA256_HEX_SIZE] = "";
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *caller = (struct caller){0};
+    if (!parse_token(token, &id, &secret))
+        return error_set(err, STATUS_NOT_FOUND, "that is no token of this daemon");
+    sha256_of(secret, SECRET_DIGITS, hash);
+    store_lock(store);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT users.id, role, name, hash FROM tokens JOIN users ON users.id = user_id"
+                  " WHERE tokens.id = ?",
+                  "i", id);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        caller->user_id = sqlite3_column_int64(stmt, 0);
+        caller->token_id = id;
+        caller->role = (enum role)sqlite3_column_int(stmt, 1);
+        snprintf(caller->name, sizeof caller->name, "%s", sql_text(stmt, 2));
+        snprintf(wanted, sizeof wanted, "%s", sql_text(stmt, 3));
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    bool same = sha256_equal(hash, wanted);
+    if (status != STATUS_OK || (found && same))
+        return status;
+    *caller = (struct caller){0};
+    return error_set(err, STATUS_NOT_FOUND, "the token is not, or no longer, valid");
+}
+
+enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
+                               struct error *err) {
+    size_t digits = strspn(number_or_name, "0123456789");
+    bool is_number = digits > 0 && digits <= 18 && number_or_name[digits] == '\0';
+    *count = 0;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    if (is_number)
+        status = sql_run(&store->sql, err, "DELETE FROM tokens WHERE id = ?", "i",
+                         (int64_t)strtoll(number_or_name, NULL, 10));
+    else
+        status = sql_run(&store->sql, err,
+                         "DELETE FROM tokens WHERE user_id ="
+                         " (SELECT id FROM users WHERE name = ?)",
+                         "t", number_or_name);
+    size_t gone = (size_t)sql_changes(&store->sql);
+    if (status == STATUS_OK && gone == 0)
+        status = error_set(err, STATUS_NOT_FOUND,
+                           is_number ? "there is no token %.80s" : "%.80s has no token",
+                           number_or_name);
+    status = store_end(store, status, STORE_NOTHING_CHANGED, err);
+    if (status == STATUS_OK)
+        *count = gone;
+    return status;
+}
+
+bool store_token_is_valid(struct store *store, int64_t id) {
+    int64_t found = 0;
+    store_lock(store);
+    enum status status =
+        sql_int(&store->sql, 0, &found, NULL, "SELECT 1 FROM tokens WHERE id = ?", "i", id);
+    store_unlock(store);
+    return status == STATUS_OK && found != 0;
+}
+
+enum status store_token_list(struct store *store, struct token_row **rows, size_t *count,
+                             struct error *err) {
+    sqlite3_stmt *stmt;
+    *rows = NULL;
+    *count = 0;
+    store_lock(store);
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT tokens.id, tokens.created_ms, role, name FROM tokens"
+                                   " JOIN users ON users.id = user_id ORDER BY tokens.id",
+                                   "");
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        *rows = mem_realloc_array(*rows, *count + 1, sizeof **rows);
+        struct token_row *at = &(*rows)[(*count)++];
+        *at = (struct token_row){.id = sqlite3_column_int64(stmt, 0),
+                                 .created_ms = sqlite3_column_int64(stmt, 1),
+                                 .role = (enum role)sqlite3_column_int(stmt, 2)};
+        snprintf(at->name, sizeof at->name, "%s", sql_text(stmt, 3));
+    }
+    store_unlock(store);
+    return status;
+}

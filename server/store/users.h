@@ -1,0 +1,72 @@
+/* users.h -- who may do what: users, their tokens and roles, and who sees which scene and job.
+ *
+ * 1. A token is shown once, when it is made; the database has only the SHA-256 of its secret.
+ * 2. A thing belongs to the user who made it (0: nobody, from a time without tokens). Others'
+ *    things do not exist for a caller, unless their owner shares them with the lab:
+ *
+ *      role     own things      shared jobs and their scenes   others' things
+ *      viewer   read            read                           --
+ *      user     read, change    read                           --
+ *      admin    read, change    read, change                   read, change
+ *
+ * 3. Users are never removed, so that a number never names another one.
+ *
+ * Thread-safe as store.h is. */
+#ifndef UNBAKE_STORE_USERS_H
+#define UNBAKE_STORE_USERS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/job/job.h"
+
+struct store;
+
+enum role { ROLE_VIEWER, ROLE_USER, ROLE_ADMIN }; /* stored as numbers, each may do more */
+const char *role_name(enum role role);
+bool role_parse(const char *name, enum role *role);
+
+#define USER_NAME_SIZE 65
+#define TOKEN_SIZE 80
+
+/* Who asks. */
+struct caller {
+    int64_t user_id;  /* 0: nobody: the daemon is open, and whoever asks is an admin */
+    int64_t token_id; /* 0: none was needed */
+    enum role role;
+    char name[USER_NAME_SIZE]; /* "" for nobody */
+};
+
+enum access { ACCESS_NONE, ACCESS_READ, ACCESS_CHANGE };
+enum access caller_access_job(const struct caller *who, const struct job *job);
+/* STATUS_OK with ACCESS_NONE also where there is no such scene. */
+enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id,
+                               enum access *access, struct error *err);
+
+/* Whether there is or ever was a user: from then on, nobody comes in without a token. */
+bool store_has_users(struct store *store);
+
+/* Makes a token, and the user where the name is new: 1 to 64 letters, digits and . _ - @ */
+enum status store_token_add(struct store *store, const char *name, enum role role,
+                            char token[TOKEN_SIZE], int64_t *id, struct error *err);
+/* The caller that presents this token; STATUS_NOT_FOUND unless it is valid. What a wrong one has
+ * in common with the right one does not show in the time that this takes. */
+enum status store_token_find(struct store *store, const char *token, struct caller *caller,
+                             struct error *err);
+/* Ends the token of that number, or all of the user of that name. */
+enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
+                               struct error *err);
+bool store_token_is_valid(struct store *store, int64_t id);
+
+struct token_row {
+    int64_t id, created_ms;
+    enum role role;
+    char name[USER_NAME_SIZE];
+};
+/* By number; *rows is the caller's (mem_free). */
+enum status store_token_list(struct store *store, struct token_row **rows, size_t *count,
+                             struct error *err);
+
+#endif

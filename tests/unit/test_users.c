@@ -1,0 +1,191 @@
+/* test_users.c -- tokens, and what is readable for whom in lists. */
+#include <limits.h>
+#include <sqlite3.h>
+
+#include "common/sha256.h"
+#include "tests/unit/store_rig.h"
+
+static void test_equal(void) {
+    char a[SHA256_HEX_SIZE], b[SHA256_HEX_SIZE];
+    sha256_of("a", 1, a);
+    memcpy(b, a, sizeof b);
+    CHECK(sha256_equal(a, b));
+    for (size_t i = 0; i < sizeof a - 1; i++) {
+        b[i] = b[i] == '0' ? '1' : '0';
+        CHECK(!sha256_equal(a, b) && !sha256_equal(b, a));
+        b[i] = a[i];
+    }
+    CHECK(!sha256_equal("", "") && !sha256_equal(a, "") && !sha256_equal("", a));
+    b[SHA256_HEX_SIZE - 2] = '\0';
+    CHECK(!sha256_equal(b, b));
+}
+
+static void test_tokens(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE], second[TOKEN_SIZE], wrong[TOKEN_SIZE];
+    struct store *store;
+    struct caller who;
+    int64_t id, other;
+    size_t count;
+    OK(store_open(&store, dir, &err));
+    CHECK(!store_has_users(store));
+    static const char *const bad[] = {"", "7up", "a b", "a/b", ".", "\xc3\xa9t\xc3\xa9",
+        "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        IS(store_token_add(store, bad[i], ROLE_USER, token, &id, &err), STATUS_INPUT);
+    CHECK(!store_has_users(store));
+    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_add(store, "alice", ROLE_VIEWER, second, &other, &err));
+    CHECK(store_has_users(store) && id != other);
+    OK(store_token_find(store, token, &who, &err));
+    CHECK(who.role == ROLE_USER && who.token_id == id);
+    CHECK_STRING(who.name, "alice");
+    int64_t alice = who.user_id;
+    OK(store_token_find(store, second, &who, &err));
+    CHECK(who.role == ROLE_VIEWER && who.user_id == alice);
+
+    /* Each digit counts, the other token's secret is not this one's, and forms that are none. */
+    for (size_t i = 0; token[i]; i++) {
+        memcpy(wrong, token, sizeof wrong);
+        wrong[i] = wrong[i] == '0' ? '1' : '0';
+        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+        CHECK(who.user_id == 0 && who.token_id == 0 && who.role == ROLE_VIEWER);
+        memcpy(wrong, token, sizeof wrong);
+        wrong[i] = '\0';
+        IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    }
+    snprintf(wrong, sizeof wrong, "unbake_%lld%s", (long long)other, strchr(token + 7, '_'));
+    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    snprintf(wrong, sizeof wrong, "%s0", token);
+    IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
+    IS(store_token_find(store, "unbake_99999999999999999999_", &who, &err), STATUS_NOT_FOUND);
+
+    /* The secret is not in the database. */
+    struct buf content;
+    buf_init(&content, (size_t)64 << 20);
+    char *path = file_join(dir, "state.db-wal");
+    OK(file_read(path, &content, &err));
+    CHECK(content.length > 0 && !memmem(content.data, content.length, strchr(token + 7, '_') + 1, 48));
+    mem_free(path);
+    buf_release(&content);
+
+    struct token_row *rows;
+    OK(store_token_list(store, &rows, &count, &err));
+    CHECK(count == 2 && rows[0].id == id && rows[1].role == ROLE_VIEWER);
+    CHECK_STRING(rows[1].name, "alice");
+    mem_free(rows);
+    char number[24];
+    snprintf(number, sizeof number, "%lld", (long long)id);
+    OK(store_token_revoke(store, number, &count, &err));
+    CHECK(count == 1 && !store_token_is_valid(store, id) && store_token_is_valid(store, other));
+    IS(store_token_find(store, token, &who, &err), STATUS_NOT_FOUND);
+    IS(store_token_revoke(store, number, &count, &err), STATUS_NOT_FOUND);
+    IS(store_token_revoke(store, "bob", &count, &err), STATUS_NOT_FOUND);
+    OK(store_token_revoke(store, "alice", &count, &err));
+    CHECK(count == 1);
+    CHECK(store_has_users(store)); /* who had users once does not fall open */
+    store_close(store);
+    OK(store_open(&store, dir, &err));
+    CHECK(store_has_users(store));
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* --- lists --------------------------------------------------------------------------------- */
+
+static size_t jobs_seen(struct store *store, const struct caller *who, int state) {
+    struct job jobs[10];
+    size_t count;
+    OK(store_job_list(store, who, state, 0, 10, jobs, &count, &err));
+    for (size_t i = 0; i < count; i++)
+        job_release(&jobs[i]);
+    return count;
+}
+
+static size_t scenes_seen(struct store *store, const struct caller *who) {
+    struct scene_row rows[10];
+    size_t count;
+    char next[128];
+    OK(store_scene_list(store, who, "", 10, rows, &count, next, &err));
+    for (size_t i = 0; i < count; i++)
+        scene_row_release(&rows[i]);
+    return count;
+}
+
+static int64_t add_own_job(struct store *store, const char *scene, int64_t owner, const char *key) {
+    struct job_new new = {.scene_id = scene, .owner_id = owner, .name = "n", .labels = "{}",
+                          .settings = "{}", .max_attempts = 2, .idempotency_key = key,
+                          .request_sha256 = "x"};
+    int64_t id = 0;
+    bool replayed;
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    return id;
+}
+
+static void test_lists(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    struct store *store;
+    struct caller alice, bob, admin = {.role = ROLE_ADMIN};
+    struct scene_row row;
+    struct job job;
+    int64_t id;
+    bool existed, is_gone;
+    enum access access;
+    OK(store_open(&store, dir, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &alice, &err));
+    OK(store_token_add(store, "bob", ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &bob, &err));
+    OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
+    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
+    OK(store_scene_ready(store, SCENE_C, "{}", &err));
+    CHECK(scenes_seen(store, &alice) == 1 && scenes_seen(store, &bob) == 1 && scenes_seen(store, &admin) == 2);
+    OK(store_scene_find(store, &alice, "aaaa", &row, &err)); /* ambiguous only among one's own */
+    CHECK_STRING(row.id, SCENE_A);
+    CHECK_STRING(row.owner, "alice");
+    scene_row_release(&row);
+    IS(store_scene_find(store, &admin, "aaaa", &row, &err), STATUS_CONFLICT);
+    IS(store_scene_find(store, &alice, "aaaac", &row, &err), STATUS_NOT_FOUND);
+
+    /* One key each: bob's does not find alice's job. */
+    int64_t first = add_own_job(store, SCENE_A, alice.user_id, "key");
+    int64_t second = add_own_job(store, SCENE_A, bob.user_id, "key");
+    CHECK(first != second && add_own_job(store, SCENE_A, alice.user_id, "key") == first);
+    CHECK(jobs_seen(store, &alice, -1) == 1 && jobs_seen(store, &bob, JOB_QUEUED) == 1 &&
+          jobs_seen(store, &admin, -1) == 2 && jobs_seen(store, NULL, JOB_QUEUED) == 2);
+    OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
+    CHECK(access == ACCESS_NONE);
+    OK(store_job_patch(store, first, -1, NULL, NULL, INT_MIN, 1, &err));
+    OK(store_job_get(store, first, &job, &err));
+    CHECK(job.is_shared && caller_access_job(&bob, &job) == ACCESS_READ &&
+          caller_access_job(&alice, &job) == ACCESS_CHANGE);
+    CHECK_STRING(job.owner, "alice");
+    job_release(&job);
+    OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
+    CHECK(access == ACCESS_READ && jobs_seen(store, &bob, -1) == 2 && scenes_seen(store, &bob) == 2);
+    OK(store_job_patch(store, first, -1, "x", NULL, INT_MIN, -1, &err)); /* stays shared */
+    CHECK(jobs_seen(store, &bob, -1) == 2);
+    OK(store_job_patch(store, first, -1, NULL, NULL, INT_MIN, 0, &err));
+    CHECK(jobs_seen(store, &bob, -1) == 1);
+
+    /* Both have sent the same bytes: the scene stays until the last of them removes it. */
+    OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
+    CHECK(existed && scenes_seen(store, &bob) == 2);
+    IS(store_scene_delete(store, SCENE_A, alice.user_id, &is_gone, &err), STATUS_CONFLICT);
+    OK(store_job_cancel(store, first, &err));
+    OK(store_scene_delete(store, SCENE_A, alice.user_id, &is_gone, &err));
+    CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
+    IS(store_scene_delete(store, SCENE_A, bob.user_id, &is_gone, &err), STATUS_CONFLICT);
+    OK(store_job_cancel(store, second, &err));
+    OK(store_scene_delete(store, SCENE_A, bob.user_id, &is_gone, &err));
+    CHECK(is_gone && scenes_seen(store, &admin) == 1);
+    store_close(store);
+    drop_dir(dir);
+}
+
+int main(void) {
+    test_equal();
+    test_tokens();
+    test_lists();
+    return check_result();
+}
