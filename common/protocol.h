@@ -29,8 +29,11 @@
 #define SCENE_STATE_READY "ready"
 #define SCENE_STATE_REJECTED "rejected"
 
+#define TUS_VERSION "1.0.0" /* of the protocol of /v1/uploads: tus.io */
+
 #define MIME_JSON "application/json"
 #define MIME_PROBLEM "application/problem+json"
+#define MIME_TUS "application/offset+octet-stream" /* the body of a PATCH to /v1/uploads/ID */
 #define MIME_SSE "text/event-stream"
 #define MIME_NDJSON "application/x-ndjson"
 

@@ -42,6 +42,8 @@ static const struct option table[] = {
     INT(max_upload_mib, "MiB", 1, 16777216, "65536", "Largest upload; a larger one is refused with 413."),
     INT(min_free_mib, "MiB", 0, 16777216, "1024",
          "Space of the disk that uploads leave free; below it they are refused with 507."),
+    REAL(upload_keep_hours, "h", 0.001, 87600, "24",
+         "Time after its last byte for which an unfinished upload can be resumed."),
     INT(max_connections, "connections", 8, 100000, "1000", "Open HTTP connections; more have to wait."),
     INT(max_streams, "streams", 1, 100000, "500", "Open event streams; more are refused with 503."),
     REAL(head_timeout_sec, "s", 1, 600, "10", "Time for the whole head of a request to arrive."),

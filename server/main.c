@@ -252,6 +252,7 @@ static enum status build(struct daemon *d, struct error *err) {
         .max_upload_bytes = (uint64_t)c->max_upload_mib << 20,
         .min_free_bytes = (uint64_t)c->min_free_mib << 20,
         .max_streams = (size_t)c->max_streams,
+        .upload_keep_ms = (int64_t)(c->upload_keep_hours * 3.6e6),
         .keepalive_sec = c->keepalive_sec,
         .server_names = c->server_names,
         .libraries = d->libraries,

@@ -13,11 +13,19 @@
 #include "server/http/digests.h"
 #include "server/http/events.h"
 #include "server/http/field.h"
+#include "server/http/partial.h"
 #include "server/http/problem.h"
 
 static bool has_row(struct store *store, const char *folder, const char *name) {
     enum status status;
     int64_t id;
+    if (strcmp(folder, "uploads") == 0) {
+        struct upload_row row;
+        status = store_upload_get(store, name, &row, NULL, 0, NULL);
+        bool is_finished = status == STATUS_OK && *row.scene_id; /* its file is elsewhere */
+        upload_row_release(&row);
+        return status != STATUS_NOT_FOUND && !is_finished;
+    }
     if (strcmp(folder, "jobs") == 0) {
         struct job job;
         if (!field_number(name, 1, INT64_MAX, &id))
@@ -66,8 +74,11 @@ enum status api_new(struct api **out, const struct api_config *config, struct st
     pthread_mutex_init(&api->scene_mutex, NULL);
     api->hub = hub_new(config->keepalive_sec);
     api->digests = digests_new();
+    api->partials = partials_new(api);
     *out = api;
-    enum status status = sweep(api, "uploads", false, err);
+    enum status status = partials_recover(api->partials, err);
+    if (status == STATUS_OK)
+        status = sweep(api, "uploads", true, err);
     if (status == STATUS_OK)
         status = sweep(api, "trash", false, err);
     if (status == STATUS_OK)
@@ -87,6 +98,7 @@ void api_free(struct api *api) {
     if (!api)
         return;
     store_on_change(api->store, NULL, NULL);
+    partials_free(api->partials);
     hub_free(api->hub);
     digests_free(api->digests);
     pthread_mutex_destroy(&api->scene_mutex);

@@ -29,6 +29,7 @@ struct api_config {
     double keepalive_sec;
     enum api_access access;
     bool is_tls;               /* connections are encrypted by this daemon */
+    int64_t upload_keep_ms;    /* an unfinished upload is kept so long after its last byte */
     const char *server_names;  /* besides loopback; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;
@@ -36,6 +37,7 @@ struct api_config {
 
 struct hub;      /* events.h */
 struct digests;  /* digests.h */
+struct partials; /* partial.h */
 struct listener; /* listener.h */
 
 struct api {
@@ -44,6 +46,7 @@ struct api {
     struct scheduler *scheduler; /* borrowed */
     struct hub *hub;
     struct digests *digests;
+    struct partials *partials;
     struct listener *listener; /* NULL before it listens; for figures */
     /* Held while a scene's row and its file appear or disappear together. */
     pthread_mutex_t scene_mutex;

@@ -103,30 +103,43 @@ enum field_range field_range(const char *range, uint64_t size, uint64_t *first, 
 
 static const char base64_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
+bool field_base64(const char *text, size_t length, void *bytes, size_t room, size_t *used) {
+    uint32_t bits = 0;
+    unsigned held = 0;
+    size_t padding = 0;
+    *used = 0;
+    while (padding < 2 && padding < length && text[length - 1 - padding] == '=')
+        padding++;
+    if (length % 4 != 0)
+        return false;
+    for (size_t i = 0; i < length - padding; i++) {
+        const char *digit = text[i] ? strchr(base64_digits, text[i]) : NULL;
+        if (!digit)
+            return false;
+        bits = bits << 6 | (uint32_t)(digit - base64_digits);
+        held += 6;
+        if (held < 8)
+            continue;
+        held -= 8;
+        if (*used == room)
+            return false;
+        ((uint8_t *)bytes)[(*used)++] = (uint8_t)(bits >> held & 0xff);
+    }
+    return true;
+}
+
 bool field_digest(const char *repr_digest, char hex[65]) {
     const char *at = strstr(repr_digest, "sha-256=:");
     if (!at || (at > repr_digest && !strchr(" ,\t", at[-1])))
         return false;
     at += 9;
-    uint32_t bits = 0;
-    unsigned held = 0;
-    size_t used = 0;
-    size_t length = strcspn(at, ":");
-    if (length != 44 || at[43] != '=' || at[44] != ':')
+    uint8_t bytes[32];
+    size_t length = strcspn(at, ":"), used;
+    if (at[length] != ':' || !field_base64(at, length, bytes, sizeof bytes, &used) || used != sizeof bytes)
         return false;
-    for (size_t i = 0; i < 43; i++) {
-        const char *digit = strchr(base64_digits, at[i]);
-        if (!digit)
-            return false;
-        bits = bits << 6 | (uint32_t)(digit - base64_digits);
-        held += 6;
-        if (held >= 8 && used < 64) {
-            held -= 8;
-            snprintf(hex + used, 3, "%02x", (unsigned)(bits >> held & 0xff));
-            used += 2;
-        }
-    }
-    return used == 64;
+    for (size_t i = 0; i < sizeof bytes; i++)
+        snprintf(hex + 2 * i, 3, "%02x", bytes[i]);
+    return true;
 }
 
 void field_digest_format(const char *hex, char text[64]) {

@@ -25,6 +25,14 @@ struct response *scenes_add(struct api *api, struct request *r);
 struct response *scenes_get(struct api *api, struct request *r);
 struct response *scenes_delete(struct api *api, struct request *r);
 
+/* uploads.c */
+struct response *uploads_options(struct api *api, struct request *r);
+struct response *uploads_list(struct api *api, struct request *r);
+struct response *uploads_add(struct api *api, struct request *r);
+struct response *uploads_get(struct api *api, struct request *r);
+struct response *uploads_patch(struct api *api, struct request *r);
+struct response *uploads_delete(struct api *api, struct request *r);
+
 /* jobs.c */
 struct response *jobs_list(struct api *api, struct request *r);
 struct response *jobs_add(struct api *api, struct request *r);

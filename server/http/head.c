@@ -24,7 +24,9 @@ static struct response *refuse(const struct request *r, int status, const char *
 
 static struct response *check_fields(const struct request *r) {
     static const char *const singles[] = {"Content-Length", "Content-Type", "Host", "Range", "If-Match",
-        "If-Range", "Authorization", "Idempotency-Key", "Last-Event-ID", "Expect", "Origin", "X-Content-SHA256"};
+        "If-Range", "Authorization", "Idempotency-Key", "Last-Event-ID", "Expect", "Origin", "X-Content-SHA256",
+        "Tus-Resumable", "Upload-Offset", "Upload-Length", "Upload-Metadata", "Upload-Checksum",
+        "X-HTTP-Method-Override"};
     for (size_t i = 0; i < r->field_count; i++) {
         if (!field_is_token(r->fields[i].name))
             return refuse(r, 400, "a header field's name is not a word");

@@ -34,6 +34,7 @@ struct exchange {
     struct error target_error;  /* what is wrong with the request target, if status is set */
     struct response *reply;     /* kept until the library has sent it */
     bool has_begun, has_replied_early;
+    bool is_resting;            /* the clerk has it in the middle of its body */
     size_t drained;
     /* Under listener->mutex: */
     bool is_waiting;            /* a stream; suspended until it is woken */
@@ -223,7 +224,7 @@ static void *clerk(void *user) {
         l->queue_first = x->next;
         x->next = NULL;
         pthread_mutex_unlock(&l->mutex);
-        x->reply = routes_finish(l->api, &x->request);
+        x->reply = x->is_resting ? routes_rest(l->api, &x->request) : routes_finish(l->api, &x->request);
         MHD_resume_connection(x->connection);
         pthread_mutex_lock(&l->mutex);
     }
@@ -249,6 +250,14 @@ static bool give_to_clerk(struct exchange *x) {
     return given;
 }
 
+/* Lets a clerk do what waits for a disk before more of the body is read. */
+static void rest(struct exchange *x) {
+    guard_enter(x->listener->guard, x->guarded, GUARD_REPLY); /* the client is not to blame */
+    x->is_resting = true;
+    if (!give_to_clerk(x))
+        x->is_resting = false; /* stopping: it is counted when the daemon has stopped */
+}
+
 /* --- requests ---------------------------------------------------------------------------- */
 
 static enum MHD_Result take_field(void *user, enum MHD_ValueKind kind, const char *name, size_t name_size,
@@ -267,7 +276,7 @@ static enum MHD_Result take_field(void *user, enum MHD_ValueKind kind, const cha
 }
 
 static void take_method(struct request *r, const char *method) {
-    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE"};
+    static const char *const names[METHOD_COUNT] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS"};
     r->is_head = strcmp(method, "HEAD") == 0;
     r->method = METHOD_GET;
     while (!r->is_head && r->method < METHOD_COUNT && strcmp(method, names[r->method]) != 0)
@@ -303,9 +312,12 @@ static enum MHD_Result take_body(struct exchange *x, const char *data, size_t *l
     struct listener *l = x->listener;
     guard_body(l->guard, x->guarded, *length);
     if (!x->has_replied_early) {
-        x->reply = routes_data(l->api, &x->request, data, *length);
+        if (!x->reply) /* a rest may have ended it */
+            x->reply = routes_data(l->api, &x->request, data, *length);
         if (x->reply)
             reply_early(x);
+        else if (x->request.wants_rest)
+            rest(x);
     } else {
         x->drained += *length;
     }
@@ -323,6 +335,10 @@ static enum MHD_Result on_request(void *user, struct MHD_Connection *connection,
         x->has_begun = true;
         x->reply = begin(x, method, version);
         return x->reply ? queue_reply(x) : MHD_YES;
+    }
+    if (x->is_resting) {
+        x->is_resting = false;
+        guard_enter(l->guard, x->guarded, GUARD_BODY);
     }
     if (*length > 0)
         return take_body(x, data, length);
@@ -363,7 +379,7 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     if (status >= 100 && status < 600)
         atomic_fetch_add(&l->api->request_count[status / 100], 1);
     /* What may have changed something is worth a line; looking is not. */
-    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "other"};
+    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "other"};
     void (*log_line)(const char *format, ...) = x->request.method == METHOD_GET ? log_debug : log_info;
     log_line("request %s: %s %s: %d%s", x->request.id, names[x->request.method], x->request.target.path, status,
              code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ", cut short");

@@ -10,6 +10,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/http/upload.h"
+#include "server/http/uploads.h"
 
 void request_release(struct request *r) {
     target_release(&r->target);
@@ -25,6 +26,8 @@ void request_drop_body(struct request *r) {
     buf_release(&r->body);
     upload_free(r->upload);
     r->upload = NULL;
+    uploads_drop(r->patch);
+    r->patch = NULL;
 }
 
 const char *request_field(const struct request *r, const char *name) {

@@ -17,7 +17,7 @@
 #include "server/http/target.h"
 #include "server/store/users.h"
 
-enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_COUNT };
+enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_COUNT };
 
 #define REQUEST_ID_SIZE 65
 #define RESPONSE_FIELDS_MAX 12
@@ -28,6 +28,7 @@ struct field {
 
 struct route;
 struct upload;
+struct patch;
 
 struct request {
     int method; /* enum method; METHOD_COUNT for a word that no route knows */
@@ -42,6 +43,8 @@ struct request {
     struct caller caller;      /* who asks; set by routes_begin */
     struct buf body;           /* what was collected of it, for routes that take JSON */
     struct upload *upload;     /* a body that goes to disk; owned */
+    struct patch *patch;       /* a body that goes on with an upload in parts; owned */
+    bool wants_rest;           /* routes_rest must run before more of the body is taken */
 };
 
 void request_release(struct request *r);

@@ -11,6 +11,7 @@
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
 #include "server/http/upload.h"
+#include "server/http/uploads.h"
 
 static const struct route table[] = {
     {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, false, ""},
@@ -27,6 +28,13 @@ static const struct route table[] = {
     {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, true, "name"},
     {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, false, ""},
     {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, true, ""},
+    {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, false, ""},
+    {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, false, "sha256 limit cursor"},
+    {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, true, ""},
+    {METHOD_OPTIONS, "/v1/uploads/{upload}", ROUTE_PUBLIC, uploads_options, 0, false, ""},
+    {METHOD_GET, "/v1/uploads/{upload}", ROUTE_VIEWER, uploads_get, 0, true, ""},
+    {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, true, ""},
+    {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, true, ""},
     {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, false, "state limit cursor"},
     {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, true, "dry_run"},
     {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, false, ""},
@@ -65,9 +73,21 @@ static bool matches(const char *pattern, const struct target *t) {
     return i == t->segment_count;
 }
 
+/* For clients that can send no other methods than GET and POST, as the tus protocol has it. */
+static void override_method(struct request *r) {
+    const char *other = request_field(r, "X-HTTP-Method-Override");
+    if (!other || r->method != METHOD_POST || r->target.segment_count != 3 ||
+        strcmp(r->target.segments[1], "uploads") != 0)
+        return;
+    if (strcmp(other, "PATCH") == 0)
+        r->method = METHOD_PATCH;
+    else if (strcmp(other, "DELETE") == 0)
+        r->method = METHOD_DELETE;
+}
+
 /* 404, or 405 where another method would do. */
 static struct response *no_route(const struct request *r) {
-    static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE"};
+    static const char *const names[] = {"GET, HEAD", "POST", "PATCH", "DELETE", "OPTIONS"};
     char allow[64] = "";
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
         if (!matches(table[i].pattern, &r->target))
@@ -102,7 +122,9 @@ static struct response *check_query(const struct request *r) {
 static struct response *check_media_type(const struct request *r) {
     const char *type = request_field(r, "Content-Type");
     const char *coding = request_field(r, "Content-Encoding");
-    const char *accepted = r->route->body == ROUTE_BODY_UPLOAD ? "application/octet-stream" : MIME_JSON;
+    static const char *const types[] = {[ROUTE_BODY_IGNORED] = MIME_JSON, [ROUTE_BODY_JSON] = MIME_JSON,
+        [ROUTE_BODY_UPLOAD] = "application/octet-stream", [ROUTE_BODY_PATCH] = MIME_TUS};
+    const char *accepted = types[r->route->body];
     const char *detail = NULL;
     if (coding && r->has_body)
         detail = "a body with a Content-Encoding is not taken";
@@ -111,6 +133,8 @@ static struct response *check_media_type(const struct request *r) {
     else if (r->route->body == ROUTE_BODY_JSON && !(type && (field_is_type(type, MIME_JSON) ||
              (r->method == METHOD_PATCH && field_is_type(type, "application/merge-patch+json")))))
         detail = "the body must be JSON and Content-Type say so";
+    else if (r->route->body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))
+        detail = "Content-Type must be " MIME_TUS;
     if (!detail)
         return NULL;
     struct response *reply = problem(r, 415, "%s", detail);
@@ -127,6 +151,7 @@ static struct response *too_large(const struct request *r, uint64_t limit) {
 }
 
 struct response *routes_begin(struct api *api, struct request *r) {
+    override_method(r);
     for (size_t i = 0; i < sizeof table / sizeof *table && !r->route; i++)
         if ((int)table[i].method == r->method && matches(table[i].pattern, &r->target))
             r->route = &table[i];
@@ -139,6 +164,8 @@ struct response *routes_begin(struct api *api, struct request *r) {
         refusal = check_media_type(r);
     if (refusal)
         return refusal;
+    if (r->route->body == ROUTE_BODY_PATCH)
+        return uploads_begin(api, r); /* the upload's length is the limit */
     uint64_t limit = r->route->body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
@@ -152,7 +179,15 @@ struct response *routes_data(struct api *api, struct request *r, const void *dat
             return too_large(r, api->config.max_upload_bytes);
         return upload_data(api, r, data, length);
     }
+    if (r->route->body == ROUTE_BODY_PATCH)
+        return uploads_data(api, r, data, length);
     return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
+}
+
+struct response *routes_rest(struct api *api, struct request *r) {
+    (void)api;
+    r->wants_rest = false;
+    return uploads_rest(r);
 }
 
 struct response *routes_finish(struct api *api, struct request *r) {

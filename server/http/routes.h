@@ -1,8 +1,8 @@
 /* routes.h -- the table of routes, and the way of a request through it.
  *
- *   routes_begin ──> (routes_data ...) ──> routes_finish
+ *   routes_begin ──> (routes_data ... routes_rest ...) ──> routes_finish
  *
- * Each of the first two may end the request with a reply; routes_finish always does. They never
+ * Each of the first three may end the request with a reply; routes_finish always does. They never
  * run at the same time for one request. */
 #ifndef UNBAKE_HTTP_ROUTES_H
 #define UNBAKE_HTTP_ROUTES_H
@@ -13,7 +13,8 @@
 enum route_body {
     ROUTE_BODY_IGNORED, /* a small one is read and forgotten */
     ROUTE_BODY_JSON,    /* collected in request.body */
-    ROUTE_BODY_UPLOAD   /* goes to disk */
+    ROUTE_BODY_UPLOAD,  /* goes to disk */
+    ROUTE_BODY_PATCH    /* goes on with an upload in parts */
 };
 
 /* The role that a caller must have at least. */
@@ -35,6 +36,8 @@ const struct route *routes_table(size_t *count);
 
 struct response *routes_begin(struct api *api, struct request *r);
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length);
+/* Wanted by request.wants_rest, which it clears; waits for a disk. */
+struct response *routes_rest(struct api *api, struct request *r);
 struct response *routes_finish(struct api *api, struct request *r);
 
 #endif

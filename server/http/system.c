@@ -16,8 +16,8 @@ struct response *system_root(struct api *api, struct request *r) {
     (void)api, (void)r;
     static const char *const links[][2] = {
         {"openapi", "/openapi.json"}, {"version", "/v1/version"}, {"settings", "/v1/settings"},
-        {"scenes", "/v1/scenes"},     {"jobs", "/v1/jobs"},       {"health", "/healthz"},
-        {"ready", "/readyz"},         {"metrics", "/metrics"},
+        {"scenes", "/v1/scenes"},     {"uploads", "/v1/uploads"}, {"jobs", "/v1/jobs"},
+        {"health", "/healthz"},       {"ready", "/readyz"},       {"metrics", "/metrics"},
     };
     cJSON *value = cJSON_CreateObject();
     json_add_string(value, "name", "unbaked");

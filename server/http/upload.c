@@ -121,26 +121,34 @@ struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_
         return problem(r, 422, "the body's SHA-256 is %s, and Repr-Digest says %s", id, wanted);
     if (u->bytes == 0)
         return problem(r, 400, "the body, an archive of the bundle, is empty");
-    if (fchmod(u->fd, 0440) == 0 && fsync(u->fd) == 0)
+    if (fsync(u->fd) == 0)
         return NULL;
     error_set_errno(&err, errno, "cannot sync the upload");
     return problem_from(r, &err);
 }
 
-enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err) {
+enum status upload_place(struct api *api, const char *path, const char *id, struct error *err) {
     char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
     char *archive = file_join(dir, "archive");
     enum status status = file_make_dirs(dir, err);
-    if (status == STATUS_OK && rename(u->path, archive) != 0)
+    if (status == STATUS_OK && chmod(path, 0440) != 0)
+        status = error_set_errno(err, errno, "cannot set the mode of %s", path);
+    if (status == STATUS_OK && rename(path, archive) != 0)
         status = error_set_errno(err, errno, "cannot move the upload to %s", archive);
-    if (status == STATUS_OK) {
-        mem_free(u->path);
-        u->path = NULL;
+    if (status == STATUS_OK)
         status = file_sync_parent(archive, err);
-    }
     if (status == STATUS_OK)
         status = file_sync_parent(dir, err);
     mem_free(archive);
     mem_free(dir);
+    return status;
+}
+
+enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err) {
+    enum status status = upload_place(api, u->path, id, err);
+    if (status == STATUS_OK) {
+        mem_free(u->path);
+        u->path = NULL;
+    }
     return status;
 }

@@ -22,6 +22,8 @@ struct response *upload_data(struct api *api, struct request *r, const void *dat
 struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]);
 /* Moves the sealed file to its place, durably. */
 enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err);
+/* Moves the file `path`, which is whole and synced, to where the archive of scene `id` belongs. */
+enum status upload_place(struct api *api, const char *path, const char *id, struct error *err);
 
 uint64_t upload_bytes(const struct upload *u);
 void upload_free(struct upload *u); /* NULL is fine */

@@ -92,6 +92,29 @@ cJSON *view_scene(const struct scene_row *row) {
     return v;
 }
 
+cJSON *view_upload(const struct upload_row *row, int64_t keep_ms) {
+    cJSON *v = cJSON_CreateObject();
+    json_add_string(v, "id", row->id);
+    json_add_string(v, "name", row->name);
+    json_add_string(v, "owner", or_null(row->owner));
+    json_add_int(v, "length", (int64_t)row->length);
+    json_add_int(v, "offset", (int64_t)row->received);
+    json_add_string(v, "sha256", or_null(row->sha256));
+    json_add_string(v, "scene", or_null(row->scene_id));
+    add_time(v, "created_at", row->created_ms);
+    add_time(v, "updated_at", row->updated_ms);
+    add_time(v, "expires_at", row->updated_ms + keep_ms);
+    char path[128];
+    cJSON *links = cJSON_AddObjectToObject(v, "links");
+    snprintf(path, sizeof path, "/v1/uploads/%s", row->id);
+    json_add_string(links, "self", path);
+    if (*row->scene_id) {
+        snprintf(path, sizeof path, "/v1/scenes/%s", row->scene_id);
+        json_add_string(links, "scene", path);
+    }
+    return v;
+}
+
 cJSON *view_output(int64_t job_id, const struct output_row *row) {
     cJSON *v = cJSON_CreateObject();
     json_add_string(v, "name", row->name);

@@ -94,5 +94,24 @@ static const char step_2[] =
     "CREATE INDEX jobs_by_owner ON jobs (owner_id, state);"
     "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
 
-const char *const schema_steps[] = {step_1, step_2};
+/* Uploads in parts. `received` bytes are on disk; `hash` is the state of their SHA-256; `boot` names
+ * the run of the machine in which what lies in the file beyond them can be believed, if any. */
+static const char step_3[] =
+    "CREATE TABLE uploads ("
+    "  id TEXT PRIMARY KEY,"
+    "  owner_id INTEGER NOT NULL,"
+    "  name TEXT NOT NULL,"
+    "  metadata TEXT NOT NULL,"
+    "  sha256 TEXT NOT NULL,"
+    "  length INTEGER NOT NULL,"
+    "  received INTEGER NOT NULL DEFAULT 0 CHECK (received BETWEEN 0 AND length),"
+    "  hash BLOB NOT NULL,"
+    "  boot TEXT NOT NULL,"
+    "  scene_id TEXT NOT NULL DEFAULT '',"
+    "  created_ms INTEGER NOT NULL,"
+    "  updated_ms INTEGER NOT NULL"
+    ") STRICT;"
+    "CREATE INDEX uploads_by_age ON uploads (created_ms, id);";
+
+const char *const schema_steps[] = {step_1, step_2, step_3};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -177,6 +177,49 @@ enum status store_output_get(struct store *store, int64_t job_id, const char *na
 enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows,
                               size_t *count, struct error *err);
 
+/* --- uploads in parts ---------------------------------------------------------------------- */
+
+#define UPLOAD_ID_SIZE 33   /* 32 hex digits and the NUL */
+#define UPLOAD_BOOT_SIZE 40 /* the kernel's boot_id, or "" */
+
+struct upload_row {
+    char id[UPLOAD_ID_SIZE];
+    int64_t owner_id;
+    char *owner;                   /* a user's name; "" for nobody */
+    char *name;                    /* for the scene */
+    char *metadata;                /* as the client gave it: Upload-Metadata */
+    char sha256[SCENE_ID_SIZE];    /* what the client says the whole will have; "" if it does not */
+    uint64_t length, received;     /* bytes; `received` are on disk */
+    char boot[UPLOAD_BOOT_SIZE];   /* see store_upload_begin */
+    char scene_id[SCENE_ID_SIZE];  /* what became of it, once all is received; "" before */
+    int64_t created_ms, updated_ms;
+};
+void upload_row_release(struct upload_row *row);
+
+/* A new row with nothing received; id, owner_id, name, metadata, sha256, length and boot are taken from *row.
+ * `hash`: the state of an empty hash. STATUS_LIMIT when there are `limit` unfinished ones. */
+enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash,
+                             size_t hash_size, size_t limit, struct error *err);
+/* hash (may be NULL) gets the kept state; STATUS_CORRUPT when it has another size. */
+enum status store_upload_get(struct store *store, const char *id, struct upload_row *row, void *hash,
+                             size_t hash_size, struct error *err);
+/* Those of `who` (NULL or an admin: all), newest first; sha256 "" for all; cursor as in
+ * store_scene_list. */
+enum status store_upload_list(struct store *store, const struct caller *who, const char *sha256,
+                              const char *cursor, size_t limit, struct upload_row *rows, size_t *count,
+                              char next_cursor[128], struct error *err);
+/* The file may now hold bytes beyond `received` that are good while the machine runs on (`boot` is
+ * its boot id), or that are not to be believed ("" ). */
+enum status store_upload_begin(struct store *store, const char *id, const char *boot,
+                               struct error *err);
+/* So many bytes are on disk, with the state of their hash. Never goes back: less than is known is
+ * no error and changes nothing. */
+enum status store_upload_advance(struct store *store, const char *id, uint64_t received,
+                                 const void *hash, size_t hash_size, struct error *err);
+enum status store_upload_finish(struct store *store, const char *id, const char *scene_id,
+                                struct error *err);
+enum status store_upload_delete(struct store *store, const char *id, struct error *err);
+
 /* --- figures ----------------------------------------------------------------------------- */
 
 struct store_counts {

@@ -43,7 +43,7 @@ static inline void rig_start(struct rig *rig, const struct guard_limits *limits,
         .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     rig_must(scheduler_new(&rig->scheduler, &work, rig->store, &err), &err, "scheduler_new");
     struct api_config config = {.data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
-        .max_upload_bytes = 8 << 20, .max_streams = 60, .keepalive_sec = keepalive_sec,
+        .max_upload_bytes = 8 << 20, .max_streams = 60, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
         .server_names = "lab.example.org"};
     rig_must(api_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "api_new");
     struct listener_config network = {.address = "127.0.0.1", .connection_max = 200, .limits = *limits};

@@ -1,0 +1,365 @@
+/* uploads.c -- /v1/uploads: bundles in parts, by the tus protocol 1.0.0 (tus.io) with its
+ * extensions creation, termination, expiration and checksum. What is on disk is partial.c's. */
+#include "server/http/uploads.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+#include <time.h>
+
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "common/sha1.h"
+#include "common/sha256.h"
+#include "common/utf8.h"
+#include "server/http/field.h"
+#include "server/http/handlers.h"
+#include "server/http/partial.h"
+#include "server/http/problem.h"
+#include "server/http/views.h"
+
+#define METADATA_MAX 1000 /* bytes; it is given back in a field */
+#define NAME_MAX_BYTES 200
+
+enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
+
+struct patch {
+    struct claim *claim;
+    enum checksum checksum;
+    uint8_t wanted[32];
+    struct sha1 sha1;
+    struct sha256 sha256;
+};
+
+/* --- what all of them have ------------------------------------------------------------------ */
+
+static struct response *tagged(struct response *reply) {
+    response_field(reply, "Tus-Resumable", TUS_VERSION);
+    return reply;
+}
+
+/* The protocol's version: must be said where `is_needed`. NULL when it is ours. */
+static struct response *check_version(const struct request *r, bool is_needed) {
+    const char *version = request_field(r, "Tus-Resumable");
+    if (version ? strcmp(version, TUS_VERSION) == 0 : !is_needed)
+        return NULL;
+    struct response *reply = problem_full(r, 412, version ? "Tus-Resumable names another version"
+                                                          : "the field Tus-Resumable is missing",
+                                          "send Tus-Resumable: " TUS_VERSION, NULL);
+    response_field(reply, "Tus-Version", TUS_VERSION);
+    return tagged(reply);
+}
+
+static struct response *refuse(const struct request *r, const struct error *err) {
+    if (err->status == STATUS_LIMIT) /* longer than was said; a full queue is told otherwise */
+        return tagged(problem_full(r, 413, err->message, err->hint, NULL));
+    return tagged(problem_from(r, err));
+}
+
+/* The id in the path, where there is such an upload and it is the caller's; or *refusal. Others'
+ * uploads do not exist for a caller. */
+static const char *find_upload(struct api *api, const struct request *r, struct response **refusal) {
+    const char *id = r->target.segments[2];
+    struct upload_row row = {0};
+    struct error err;
+    enum status status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
+    if (strlen(id) == UPLOAD_ID_SIZE - 1 && strspn(id, "0123456789abcdef") == UPLOAD_ID_SIZE - 1)
+        status = store_upload_get(api->store, id, &row, NULL, 0, &err);
+    if (status == STATUS_OK && row.owner_id != r->caller.user_id && r->caller.role != ROLE_ADMIN)
+        status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
+    upload_row_release(&row);
+    if (status == STATUS_OK)
+        return id;
+    *refusal = refuse(r, &err);
+    return NULL;
+}
+
+static void add_expiry(struct api *api, struct response *reply, int64_t updated_ms) {
+    char text[64];
+    struct tm utc;
+    time_t seconds = (time_t)((updated_ms + api->config.upload_keep_ms) / 1000);
+    gmtime_r(&seconds, &utc);
+    strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* the locale is always C */
+    response_field(reply, "Upload-Expires", "%s", text);
+}
+
+/* Where the upload stands, in fields. */
+static void add_place(struct api *api, struct response *reply, const struct upload_row *row) {
+    response_field(reply, "Upload-Offset", "%" PRIu64, row->received);
+    if (*row->scene_id)
+        response_field(reply, "Link", "</v1/scenes/%s>; rel=\"related\"", row->scene_id);
+    else
+        add_expiry(api, reply, row->updated_ms);
+}
+
+struct response *uploads_options(struct api *api, struct request *r) {
+    (void)r;
+    struct response *reply = tagged(response_new(204));
+    response_field(reply, "Tus-Version", TUS_VERSION);
+    response_field(reply, "Tus-Extension", "creation,termination,expiration,checksum");
+    response_field(reply, "Tus-Checksum-Algorithm", "sha1,sha256");
+    response_field(reply, "Tus-Max-Size", "%" PRIu64, api->config.max_upload_bytes);
+    return reply;
+}
+
+/* --- creation ------------------------------------------------------------------------------- */
+
+/* Takes a pair of Upload-Metadata that we know; the others are kept but mean nothing here. */
+static bool take_pair(struct upload_row *row, const char *key, size_t key_length, const char *value,
+                      size_t value_length) {
+    char bytes[METADATA_MAX + 1];
+    size_t used;
+    if (!field_base64(value, value_length, bytes, METADATA_MAX, &used))
+        return false;
+    bytes[used] = '\0';
+    bool is_text = strlen(bytes) == used && utf8_valid(bytes, used, NULL);
+    if (key_length == 6 && memcmp(key, "sha256", 6) == 0) {
+        if (!field_is_sha256(bytes) || !is_text)
+            return false;
+        memcpy(row->sha256, bytes, SCENE_ID_SIZE);
+    } else if ((key_length == 4 && memcmp(key, "name", 4) == 0) ||
+               (key_length == 8 && memcmp(key, "filename", 8) == 0 && !row->name)) {
+        if (!is_text || used == 0 || used > NAME_MAX_BYTES)
+            return false;
+        mem_free(row->name);
+        row->name = mem_strdup(bytes);
+    }
+    return true;
+}
+
+static struct response *read_metadata(const struct request *r, struct upload_row *row) {
+    const char *text = request_field(r, "Upload-Metadata");
+    row->metadata = mem_strdup(text ? text : "");
+    if (strlen(row->metadata) > METADATA_MAX)
+        return problem(r, 400, "Upload-Metadata is longer than %d bytes", METADATA_MAX);
+    for (const char *at = row->metadata; *at;) {
+        size_t length = strcspn(at, ","), key = strcspn(at, " ,");
+        size_t value = key + strspn(at + key, " "), end = length;
+        while (end > value && at[end - 1] == ' ')
+            end--;
+        if (key == 0 || !take_pair(row, at, key, at + value, end > value ? end - value : 0))
+            return problem_full(r, 400, "Upload-Metadata is not a list of keys with values in base64",
+                                "name has 1 to 200 bytes of UTF-8, sha256 has 64 lower-case hex digits", NULL);
+        at += length;
+        at += *at == ',';
+        at += strspn(at, " ");
+    }
+    return NULL;
+}
+
+/* NULL, or why the upload cannot be made. Fills what the client says of it. */
+static struct response *read_creation(struct api *api, const struct request *r, struct upload_row *row) {
+    const char *text = request_field(r, "Upload-Length");
+    int64_t length = 0;
+    struct response *refusal = check_version(r, true);
+    if (refusal)
+        return refusal;
+    if (r->has_body)
+        return problem(r, 400, "an upload is created without a body; its bytes come by PATCH");
+    if (!text)
+        return problem(r, 400, "the field Upload-Length is missing%s",
+                       request_field(r, "Upload-Defer-Length") ? "; it cannot be told later" : "");
+    if (!field_number(text, 1, INT64_MAX, &length))
+        return problem(r, 400, "Upload-Length must be a number of bytes, 1 or more");
+    if ((uint64_t)length > api->config.max_upload_bytes) {
+        cJSON *members = cJSON_CreateObject();
+        json_add_int(members, "limit_bytes", (int64_t)api->config.max_upload_bytes);
+        return problem_full(r, 413, "the upload would be larger than is taken here", "", members);
+    }
+    row->length = (uint64_t)length;
+    refusal = read_metadata(r, row);
+    return refusal ? refusal : api_check_room(api, r, row->length);
+}
+
+struct response *uploads_add(struct api *api, struct request *r) {
+    struct upload_row row = {.owner_id = r->caller.user_id};
+    struct error err;
+    struct response *reply = read_creation(api, r, &row);
+    if (reply) {
+        upload_row_release(&row);
+        return request_field(r, "Tus-Resumable") ? tagged(reply) : reply;
+    }
+    if (!row.name)
+        row.name = mem_strndup(*row.sha256 ? row.sha256 : "upload", 12);
+    enum status status = partial_create(api->partials, &row, &err);
+    if (status != STATUS_OK) {
+        reply = tagged(problem_from(r, &err));
+    } else {
+        struct timespec now;
+        clock_gettime(CLOCK_REALTIME, &now);
+        reply = tagged(response_new(201));
+        response_field(reply, "Location", "/v1/uploads/%s", row.id);
+        add_expiry(api, reply, (int64_t)now.tv_sec * 1000);
+    }
+    upload_row_release(&row);
+    return reply;
+}
+
+/* --- looking -------------------------------------------------------------------------------- */
+
+struct response *uploads_get(struct api *api, struct request *r) {
+    struct response *reply = check_version(r, r->is_head);
+    struct upload_row row;
+    struct error err;
+    const char *id = reply ? NULL : find_upload(api, r, &reply);
+    if (reply)
+        return reply;
+    if (partial_look(api->partials, id, &row, &err) != STATUS_OK)
+        return refuse(r, &err);
+    reply = response_json(200, view_upload(&row, api->config.upload_keep_ms));
+    mem_free(reply->fields[1].value); /* of Cache-Control */
+    reply->fields[1].value = mem_strdup("no-store");
+    response_field(reply, "Upload-Length", "%" PRIu64, row.length);
+    if (*row.metadata)
+        response_field(reply, "Upload-Metadata", "%s", row.metadata);
+    add_place(api, reply, &row);
+    upload_row_release(&row);
+    return tagged(reply);
+}
+
+struct response *uploads_list(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    const char *cursor = target_query(&r->target, "cursor"), *sha256 = target_query(&r->target, "sha256");
+    size_t limit = view_limit(r, &refusal), count = 0;
+    if (!refusal && sha256 && !field_is_sha256(sha256))
+        refusal = problem(r, 400, "sha256 must be 64 lower-case hex digits");
+    if (refusal)
+        return refusal;
+    struct upload_row *rows = mem_calloc(limit, sizeof *rows);
+    char next[128] = "";
+    struct error err;
+    if (store_upload_list(api->store, &r->caller, sha256 ? sha256 : "", cursor ? cursor : "", limit, rows, &count, next,
+                          &err) != STATUS_OK) {
+        mem_free(rows);
+        return err.status == STATUS_INPUT ? problem(r, 400, "%s", err.message) : problem_from(r, &err);
+    }
+    cJSON *items = cJSON_CreateArray();
+    for (size_t i = 0; i < count; i++) {
+        cJSON_AddItemToArray(items, view_upload(&rows[i], api->config.upload_keep_ms));
+        upload_row_release(&rows[i]);
+    }
+    mem_free(rows);
+    return view_page(r, items, next);
+}
+
+/* --- going on ------------------------------------------------------------------------------- */
+
+static struct response *read_checksum(const struct request *r, struct patch *p) {
+    const char *text = request_field(r, "Upload-Checksum");
+    if (!text)
+        return NULL;
+    size_t name = strcspn(text, " "), used, size = 0;
+    if (name == 4 && memcmp(text, "sha1", 4) == 0)
+        p->checksum = CHECKSUM_SHA1, size = SHA1_BYTES;
+    else if (name == 6 && memcmp(text, "sha256", 6) == 0)
+        p->checksum = CHECKSUM_SHA256, size = sizeof p->wanted;
+    else
+        return problem(r, 400, "Upload-Checksum must be of sha1 or sha256");
+    const char *value = text + name + strspn(text + name, " ");
+    if (!field_base64(value, strlen(value), p->wanted, size, &used) || used != size)
+        return problem(r, 400, "Upload-Checksum is not the base64 of %zu bytes", size);
+    sha1_init(&p->sha1);
+    sha256_init(&p->sha256);
+    return NULL;
+}
+
+struct response *uploads_begin(struct api *api, struct request *r) {
+    struct response *refusal = check_version(r, true);
+    const char *text = request_field(r, "Upload-Offset");
+    const char *id = refusal ? NULL : find_upload(api, r, &refusal);
+    int64_t offset = 0;
+    struct error err;
+    if (!refusal && (!text || !field_number(text, 0, INT64_MAX, &offset)))
+        refusal = tagged(problem(r, 400, "Upload-Offset must be a number of bytes"));
+    if (refusal)
+        return refusal;
+    struct patch *p = r->patch = mem_calloc(1, sizeof *p);
+    refusal = read_checksum(r, p);
+    if (refusal)
+        return tagged(refusal);
+    if (partial_claim(api->partials, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->claim, &err) !=
+        STATUS_OK)
+        return refuse(r, &err);
+    if (r->content_length > 0 && (uint64_t)r->content_length > partial_room(p->claim))
+        return tagged(problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld",
+                              partial_room(p->claim), (long long)r->content_length));
+    uint64_t unreserved = partial_unreserved(p->claim);
+    refusal = unreserved ? api_check_room(api, r, unreserved) : NULL;
+    return refusal ? tagged(refusal) : NULL;
+}
+
+struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
+    struct patch *p = r->patch;
+    struct error err;
+    if (partial_write(p->claim, data, length, &err) != STATUS_OK)
+        return refuse(r, &err);
+    atomic_fetch_add(&api->uploaded_bytes, length);
+    if (p->checksum == CHECKSUM_SHA1)
+        sha1_update(&p->sha1, data, length);
+    else if (p->checksum == CHECKSUM_SHA256)
+        sha256_update(&p->sha256, data, length);
+    /* The library does not bear a pause between the chunks of one piece that it has read. */
+    r->wants_rest = r->content_length > 0 && partial_is_due(p->claim);
+    return NULL;
+}
+
+struct response *uploads_rest(struct request *r) {
+    struct error err;
+    return partial_commit(r->patch->claim, &err) == STATUS_OK ? NULL : refuse(r, &err);
+}
+
+void uploads_drop(struct patch *p) {
+    if (!p)
+        return;
+    partial_release(p->claim);
+    mem_free(p);
+}
+
+static bool is_as_sent(struct patch *p) {
+    uint8_t found[32] = {0};
+    if (p->checksum == CHECKSUM_NONE)
+        return true;
+    if (p->checksum == CHECKSUM_SHA1) {
+        sha1_bytes(&p->sha1, found);
+        return memcmp(found, p->wanted, SHA1_BYTES) == 0;
+    }
+    char hex[SHA256_HEX_SIZE];
+    sha256_hex(&p->sha256, hex);
+    for (size_t i = 0; i < sizeof found; i++) {
+        unsigned byte = 0;
+        sscanf(hex + 2 * i, "%2x", &byte);
+        found[i] = (uint8_t)byte;
+    }
+    return memcmp(found, p->wanted, sizeof found) == 0;
+}
+
+struct response *uploads_patch(struct api *api, struct request *r) {
+    struct patch *p = r->patch;
+    struct error err;
+    struct upload_row row = {0};
+    enum status status = STATUS_OK;
+    if (!is_as_sent(p))
+        return tagged(problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten"));
+    if (p->checksum != CHECKSUM_NONE)
+        status = partial_accept(p->claim, &err);
+    if (status == STATUS_OK)
+        status = partial_look(api->partials, r->target.segments[2], &row, &err);
+    if (status != STATUS_OK)
+        return refuse(r, &err);
+    struct response *reply = tagged(response_new(204));
+    add_place(api, reply, &row);
+    upload_row_release(&row);
+    return reply;
+}
+
+struct response *uploads_delete(struct api *api, struct request *r) {
+    struct response *reply = check_version(r, false);
+    struct error err;
+    const char *id = reply ? NULL : find_upload(api, r, &reply);
+    if (reply)
+        return reply;
+    if (partial_remove(api->partials, id, &err) != STATUS_OK)
+        return refuse(r, &err);
+    return tagged(response_new(204));
+}
