@@ -7,6 +7,8 @@
 /* submit.c */
 extern const struct option submit_options[];
 int submit_run(struct client *c, const struct options *o);
+/* Adds "key=value" to an object of labels. */
+enum status label_add(cJSON *labels, const char *text, struct error *err);
 
 /* watch.c */
 extern const struct option watch_options[], logs_options[];
@@ -16,7 +18,7 @@ int logs_run(struct client *c, const struct options *o);
 int watch_job(struct client *c, int64_t job, bool all);
 
 /* jobs.c */
-extern const struct option list_options[];
+extern const struct option list_options[], retry_options[], rm_options[];
 int list_run(struct client *c, const struct options *o);
 int show_run(struct client *c, const struct options *o);
 int cancel_run(struct client *c, const struct options *o);
@@ -24,6 +26,11 @@ int pause_run(struct client *c, const struct options *o);
 int resume_run(struct client *c, const struct options *o);
 int retry_run(struct client *c, const struct options *o);
 int rm_run(struct client *c, const struct options *o);
+
+/* edit.c */
+extern const struct option edit_options[], extend_options[];
+int edit_run(struct client *c, const struct options *o);
+int extend_run(struct client *c, const struct options *o);
 
 /* get.c */
 extern const struct option get_options[];

@@ -15,6 +15,15 @@ const struct option list_options[] = {
     {0},
 };
 
+const struct option retry_options[] = {
+    {"from", 0, OPTION_TEXT, "STAGE", "do that stage and all after it anew"},
+    {0},
+};
+const struct option rm_options[] = {
+    {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
+    {0},
+};
+
 static const char *const states[] = {JOB_STATE_QUEUED,    JOB_STATE_RUNNING, JOB_STATE_PAUSED,
                                      JOB_STATE_SUCCEEDED, JOB_STATE_FAILED,  JOB_STATE_CANCELLED};
 
@@ -209,7 +218,39 @@ int show_run(struct client *c, const struct options *o) {
 
 /* --- actions ------------------------------------------------------------------------------- */
 
-/* POST /v1/jobs/ID/ACTION, or DELETE of the job where action is NULL. */
+/* DELETE of a job, or what that would do. */
+static int remove_job(struct client *c, const char *word, bool dry_run) {
+    struct reply reply;
+    struct error err;
+    int64_t id;
+    char path[80], bytes[16];
+    int code = CLIENT_OK;
+    reply_init(&reply);
+    enum status status = client_job_id(c, word, &id, &reply, &err);
+    if (status == STATUS_OK) {
+        snprintf(path, sizeof path, "/v1/jobs/%lld%s", (long long)id, dry_run ? "?dry_run=1" : "");
+        struct request_call call = {.path = path, .method = "DELETE"};
+        status = request_run(c->request, &call, &reply, &err);
+    }
+    if (status != STATUS_OK) {
+        code = client_fail(c, &reply, &err);
+    } else if (c->json) {
+        cJSON *value = dry_run ? cJSON_Duplicate(reply.json, true) : cJSON_CreateObject();
+        json_add_int(value, "id", id);
+        json_add_bool(value, "removed", !dry_run);
+        client_print_json(c, value);
+        cJSON_Delete(value);
+    } else if (dry_run) {
+        format_bytes(bytes, member_number(reply.json, "bytes", 0.0));
+        printf("job %lld: %.0f files, %s\n", (long long)id, member_number(reply.json, "files", 0.0), bytes);
+    } else if (!c->quiet) {
+        printf("job %lld removed\n", (long long)id);
+    }
+    reply_release(&reply);
+    return code;
+}
+
+/* POST /v1/jobs/ID/ACTION. */
 static int act_on(struct client *c, const char *word, const char *action) {
     struct reply reply;
     struct error err;
@@ -219,24 +260,15 @@ static int act_on(struct client *c, const char *word, const char *action) {
     reply_init(&reply);
     enum status status = client_job_id(c, word, &id, &reply, &err);
     if (status == STATUS_OK) {
-        snprintf(path, sizeof path, "/v1/jobs/%lld%s%s", (long long)id, action ? "/" : "",
-                 action ? action : "");
-        struct request_call call = {.path = path, .method = action ? "POST" : "DELETE"};
+        snprintf(path, sizeof path, "/v1/jobs/%lld/%.40s", (long long)id, action);
+        struct request_call call = {.path = path, .method = "POST"};
         status = request_run(c->request, &call, &reply, &err);
     }
     const char *state = member_text(reply.json, "state"), *wanted = member_text(reply.json, "wanted");
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
-    else if (c->json) {
-        cJSON *removed = action ? NULL : cJSON_CreateObject();
-        if (removed) {
-            json_add_int(removed, "id", id);
-            json_add_bool(removed, "removed", true);
-        }
-        client_print_json(c, action ? reply.json : removed);
-        cJSON_Delete(removed);
-    } else if (!c->quiet && !action)
-        printf("job %lld removed\n", (long long)id);
+    else if (c->json)
+        client_print_json(c, reply.json);
     else if (!c->quiet)
         printf("job %lld is %s%s%s\n", (long long)id, state, strcmp(wanted, "run") ? ", to " : "",
                strcmp(wanted, "run") ? wanted : "");
@@ -244,11 +276,13 @@ static int act_on(struct client *c, const char *word, const char *action) {
     return code;
 }
 
-/* All of them, also after one failed; the first failure is the exit status. */
+/* All of them, also after one failed; the first failure is the exit status. Removes them where
+ * there is no action. */
 static int act_on_all(struct client *c, const struct options *o, const char *action) {
     int first = CLIENT_OK;
     for (size_t i = 0; i < o->word_count; i++) {
-        int code = act_on(c, o->word[i], action);
+        int code = action ? act_on(c, o->word[i], action)
+                          : remove_job(c, o->word[i], options_flag(o, "dry-run"));
         if (first == CLIENT_OK)
             first = code;
         if (code == CLIENT_UNREACHABLE || code == CLIENT_INTERRUPTED)
@@ -270,7 +304,17 @@ int resume_run(struct client *c, const struct options *o) {
 }
 
 int retry_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, "retry");
+    const char *from = options_text(o, "from", NULL);
+    struct buf action;
+    buf_init(&action, 4096);
+    buf_puts(&action, "retry");
+    if (from) {
+        buf_puts(&action, "?from=");
+        request_escape(&action, from, false);
+    }
+    int code = act_on_all(c, o, buf_text(&action));
+    buf_release(&action);
+    return code;
 }
 
 int rm_run(struct client *c, const struct options *o) {

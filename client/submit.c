@@ -42,7 +42,7 @@ struct submission {
 
 /* --- the job ------------------------------------------------------------------------------- */
 
-static enum status add_label(cJSON *labels, const char *text, struct error *err) {
+enum status label_add(cJSON *labels, const char *text, struct error *err) {
     const char *equals = strchr(text, '=');
     if (!equals || equals == text)
         return error_set(err, STATUS_INPUT, "label \"%.100s\" is not of the form key=value", text);
@@ -65,7 +65,7 @@ static enum status describe_job(struct submission *s, const struct options *o, s
         if (strcmp(given->option->name, "set") == 0)
             status = settings_parse_assignment(given->text, settings, err);
         else if (strcmp(given->option->name, "label") == 0)
-            status = add_label(labels, given->text, err);
+            status = label_add(labels, given->text, err);
     }
     json_add(s->job, "settings", settings);
     json_add(s->job, "labels", labels);

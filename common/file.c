@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <fts.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -146,6 +147,25 @@ static enum status remove_at(int dir_fd, const char *name, const char *path, str
 
 enum status file_remove_tree(const char *path, struct error *err) {
     return remove_at(AT_FDCWD, path, path, err);
+}
+
+enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, struct error *err) {
+    char *roots[] = {mem_strdup(path), NULL};
+    enum status status = STATUS_OK;
+    *files = *bytes = 0;
+    FTS *tree = fts_open(roots, FTS_PHYSICAL | FTS_NOCHDIR, NULL);
+    if (!tree)
+        status = error_set_errno(err, errno, "cannot list folder %s", path);
+    for (FTSENT *entry; tree && (entry = fts_read(tree)) != NULL;) {
+        if (entry->fts_info != FTS_F)
+            continue;
+        ++*files;
+        *bytes += (uint64_t)entry->fts_statp->st_blocks * 512;
+    }
+    if (tree)
+        fts_close(tree);
+    mem_free(roots[0]);
+    return status;
 }
 
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err) {

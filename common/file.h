@@ -29,6 +29,10 @@ enum status file_make_dirs(const char *path, struct error *err);
 /* Removes a file or a whole tree, never following a symbolic link; absent is no error. */
 enum status file_remove_tree(const char *path, struct error *err);
 
+/* Adds up the plain files below `path` and what they take of the disk; what is not there, or goes
+ * meanwhile, is nothing. */
+enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, struct error *err);
+
 /* Bytes free to an unprivileged process on the file system of `path`. */
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err);
 

@@ -36,6 +36,8 @@ static const struct option table[] = {
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
     REAL(checkpoint_interval_sec, "s", 0.1, 86400, "60",
          "Time between a job's checkpoints; up to five times as long on a slow disk."),
+    REAL(checkpoint_keep_hours, "h", 0, 100000, "168",
+         "Time that the checkpoint of a job which succeeded is kept, so that it can be extended."),
     REAL(stop_grace_sec, "s", 1, 3600, "30",
          "Time that a job has to write its checkpoint when it is stopped."),
     BOOL(sandbox, "yes", "Keep jobs from the network and from files that are not theirs."),

@@ -29,7 +29,7 @@ struct config {
     int64_t max_running, threads, max_attempts, queue_limit, worker_memory_mib;
     int64_t max_upload_mib, min_free_mib;
     int64_t max_connections, max_streams, body_min_bytes_per_sec;
-    double checkpoint_interval_sec, stop_grace_sec;
+    double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;
     double upload_keep_hours;
     double head_timeout_sec, idle_timeout_sec, keepalive_sec;
     bool sandbox;

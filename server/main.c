@@ -243,6 +243,7 @@ static enum status build(struct daemon *d, struct error *err) {
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,
         .stop_grace_sec = c->stop_grace_sec,
+        .checkpoint_keep_sec = 3600.0 * c->checkpoint_keep_hours,
         .sandbox = c->sandbox,
     };
     struct api_config limits = {

@@ -43,6 +43,7 @@ struct response *jobs_cancel(struct api *api, struct request *r);
 struct response *jobs_pause(struct api *api, struct request *r);
 struct response *jobs_resume(struct api *api, struct request *r);
 struct response *jobs_retry(struct api *api, struct request *r);
+struct response *jobs_extend(struct api *api, struct request *r);
 
 /* outputs.c */
 struct response *outputs_list(struct api *api, struct request *r);

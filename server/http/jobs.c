@@ -3,7 +3,9 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "common/file.h"
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
@@ -103,6 +105,8 @@ struct wish {
     char *labels; /* JSON text; owned; NULL: not given */
     int priority; /* INT_MIN: not given */
     int shared;   /* -1: not given */
+    enum job_place place;
+    int64_t before; /* with JOB_PLACE_BEFORE */
 };
 
 static void wish_release(struct wish *w) {
@@ -137,6 +141,22 @@ static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
     else
         problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX,
                       PRIORITY_MAX);
+}
+
+/* "first", "last" or the number of a job. */
+static void read_order(struct wish *w, const cJSON *member, cJSON *params) {
+    double before = cJSON_IsNumber(member) ? member->valuedouble : 0.0;
+    const char *word = cJSON_IsString(member) ? member->valuestring : "";
+    w->place = JOB_PLACE_KEEP;
+    if (strcmp(word, "first") == 0)
+        w->place = JOB_PLACE_FIRST;
+    else if (strcmp(word, "last") == 0)
+        w->place = JOB_PLACE_LAST;
+    else if (before >= 1 && before < 9e15 && before == floor(before))
+        w->place = JOB_PLACE_BEFORE;
+    else
+        problem_param(params, "order", NULL, "must be \"first\", \"last\" or the number of the job to go before");
+    w->before = (int64_t)before;
 }
 
 /* Checks the settings alone; the caller's problems get "settings." before their names. */
@@ -179,13 +199,16 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
             w->shared = cJSON_IsTrue(member);
         else if (strcmp(name, "shared") == 0)
             problem_param(params, name, NULL, "must be true or false");
+        else if (!is_new && strcmp(name, "order") == 0)
+            read_order(w, member, params);
         else if (is_new && strcmp(name, "scene") == 0)
             w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
             problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, shared"
-                                               : "there are name, priority, labels, shared", "is not known here");
+                                               : "there are name, priority, labels, shared, order",
+                          "is not known here");
     }
     if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
         problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
@@ -259,12 +282,17 @@ static struct response *add_job(struct api *api, const struct request *r, const 
     return reply;
 }
 
-static struct response *check_submission(const struct request *r, bool *dry_run) {
+static struct response *read_dry_run(const struct request *r, bool *dry_run) {
     const char *text = target_query(&r->target, "dry_run");
-    const char *key = request_field(r, "Idempotency-Key");
     *dry_run = text && strcmp(text, "1") == 0;
-    if (text && !*dry_run && strcmp(text, "0") != 0)
-        return problem(r, 400, "dry_run must be 0 or 1");
+    return text && !*dry_run && strcmp(text, "0") != 0 ? problem(r, 400, "dry_run must be 0 or 1") : NULL;
+}
+
+static struct response *check_submission(const struct request *r, bool *dry_run) {
+    const char *key = request_field(r, "Idempotency-Key");
+    struct response *refusal = read_dry_run(r, dry_run);
+    if (refusal)
+        return refusal;
     size_t length = key ? strlen(key) : 1;
     bool visible = true;
     for (size_t i = 0; key && i < length; i++)
@@ -339,8 +367,9 @@ struct response *jobs_patch(struct api *api, struct request *r) {
         params = NULL;
     }
     if (!reply) {
-        enum status status = store_job_patch(api->store, id, revision, w.name, w.labels, w.priority, w.shared,
-                                             &err);
+        struct job_patch patch = {.name = w.name, .labels = w.labels, .priority = w.priority,
+                                  .shared = w.shared, .place = w.place, .before_id = w.before};
+        enum status status = store_job_patch(api->store, id, revision, &patch, &err);
         if (status == STATUS_CONFLICT)
             reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
         else if (status != STATUS_OK)
@@ -354,11 +383,38 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     return reply;
 }
 
+/* What removing the job would free. */
+static struct response *measure_job(struct api *api, const struct request *r, int64_t id) {
+    struct job job;
+    struct error err;
+    uint64_t files = 0, bytes = 0;
+    enum status status = store_job_get(api->store, id, &job, &err);
+    if (status != STATUS_OK)
+        return problem_from(r, &err);
+    char *path = mem_printf("%s/jobs/%lld", api->config.data_dir, (long long)id);
+    if (job.state == JOB_RUNNING)
+        status = error_set(&err, STATUS_CONFLICT, "job %lld is running", (long long)id);
+    if (status == STATUS_OK)
+        status = file_tree_size(path, &files, &bytes, &err);
+    mem_free(path);
+    job_release(&job);
+    if (status != STATUS_OK)
+        return problem_from(r, &err);
+    cJSON *value = cJSON_CreateObject();
+    json_add_bool(value, "dry_run", true);
+    json_add_int(value, "files", (int64_t)files);
+    json_add_int(value, "bytes", (int64_t)bytes);
+    return response_json(200, value);
+}
+
 struct response *jobs_delete(struct api *api, struct request *r) {
-    struct response *refusal = NULL;
-    int64_t id = own_job(api, r, &refusal);
+    bool dry_run;
+    struct response *refusal = read_dry_run(r, &dry_run);
+    int64_t id = refusal ? 0 : own_job(api, r, &refusal);
     if (refusal)
         return refusal;
+    if (dry_run)
+        return measure_job(api, r, id);
     struct error err;
     enum status status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
@@ -394,10 +450,6 @@ static enum status do_resume(struct api *api, int64_t id, struct error *err) {
     return store_job_resume(api->store, id, err);
 }
 
-static enum status do_retry(struct api *api, int64_t id, struct error *err) {
-    return store_job_retry(api->store, id, api->config.max_attempts, err);
-}
-
 struct response *jobs_cancel(struct api *api, struct request *r) {
     return act(api, r, do_cancel);
 }
@@ -411,5 +463,86 @@ struct response *jobs_resume(struct api *api, struct request *r) {
 }
 
 struct response *jobs_retry(struct api *api, struct request *r) {
-    return act(api, r, do_retry);
+    struct response *refusal = NULL;
+    const char *from = target_query(&r->target, "from");
+    bool keeps_checkpoint;
+    int64_t id = own_job(api, r, &refusal);
+    if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
+        refusal = problem_full(r, 400, "from must name a stage",
+                               "load, prepare, observe, refine, report, export", NULL);
+    if (refusal)
+        return refusal;
+    struct error err;
+    if (store_job_retry(api->store, id, api->config.max_attempts, from, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    scheduler_wake(api->scheduler);
+    return show(api, r, id, 202);
+}
+
+/* --- extending --------------------------------------------------------------------------- */
+
+/* The job's settings with its limit, of iterations or of time, put off by what the body says;
+ * NULL, and *refusal, where that makes no sense. The caller's (mem_free). */
+static char *longer_settings(const struct request *r, const struct job *job, struct response **refusal) {
+    struct error err;
+    cJSON *body = NULL, *settings = NULL, *params = cJSON_CreateArray();
+    struct settings full;
+    char *text = NULL;
+    settings_init(&full);
+    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK ||
+        json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, &err) != STATUS_OK) {
+        *refusal = problem(r, 400, "%s", err.message);
+    } else if (settings_apply(&full, settings, NULL, &err) != STATUS_OK || !cJSON_IsObject(body) ||
+               cJSON_GetArraySize(body) != 1) {
+        *refusal = problem(r, 400, "the request body is not {\"iterations\": N} or {\"time_limit_sec\": SEC}");
+    } else {
+        /* The limit that the job has is the one that can be put off. */
+        const char *limit = settings_number(&full, "iterations") > 0 ? "iterations" : "time_limit_sec";
+        double more = cJSON_IsNumber(body->child) ? body->child->valuedouble : -1.0;
+        if (strcmp(body->child->string, limit) != 0)
+            problem_param(params, body->child->string, NULL, "is not what limits this job: %s is", limit);
+        else if (!(more > 0.0))
+            problem_param(params, limit, NULL, "must be a number above 0");
+        double sum = settings_number(&full, limit) + more;
+        cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
+        json_add_number(settings, limit, sum);
+        if (cJSON_GetArraySize(params) == 0)
+            settings_apply(&full, settings, params, NULL);
+        if (cJSON_GetArraySize(params) > 0) {
+            *refusal = problem_invalid(r, "the job cannot be extended by that", params);
+            params = NULL;
+        } else {
+            text = json_text(settings);
+        }
+    }
+    settings_release(&full);
+    cJSON_Delete(params);
+    cJSON_Delete(settings);
+    cJSON_Delete(body);
+    return text;
+}
+
+struct response *jobs_extend(struct api *api, struct request *r) {
+    struct response *refusal = NULL;
+    struct job job;
+    struct error err;
+    int64_t id = own_job(api, r, &refusal);
+    if (refusal)
+        return refusal;
+    if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    char *settings = longer_settings(r, &job, &refusal);
+    char *checkpoint = mem_printf("%s/jobs/%lld/checkpoint.db", api->config.data_dir, (long long)id);
+    if (!refusal && job_is_terminal(job.state) && access(checkpoint, F_OK) != 0)
+        refusal = problem_full(r, 409, "the job's checkpoint is no longer there: there is nothing to go on from",
+                               "submit the room again, with more iterations or time", NULL);
+    if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &err) != STATUS_OK)
+        refusal = problem_from(r, &err);
+    mem_free(checkpoint);
+    mem_free(settings);
+    job_release(&job);
+    if (refusal)
+        return refusal;
+    scheduler_wake(api->scheduler);
+    return show(api, r, id, 202);
 }

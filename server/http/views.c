@@ -47,6 +47,7 @@ cJSON *view_job(const struct job *job) {
     json_add_string(v, "state", job_state_name(job->state));
     json_add_string(v, "wanted", job_wanted_name(job->wanted));
     json_add_int(v, "priority", job->priority);
+    json_add_int(v, "turn", job->turn);
     add_text(v, "labels", job->labels);
     add_text(v, "settings", job->settings);
     json_add_int(v, "attempt", job->attempt);

@@ -12,6 +12,8 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/job/housekeeping.h"
+#include "server/job/memory.h"
 #include "server/worker/progress.h"
 
 #define EVENTS_MAX 500000   /* of one attempt: an honest one stays far below */
@@ -52,6 +54,9 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
         return status;
     char *out = file_join(a->dir, "out"), *scene = scene_dir(config, job->scene_id);
     char *files = file_join(scene, "files");
+    struct buf reduced;
+    buf_init(&reduced, 4096);
+    cJSON *smaller = memory_reduce(settings, job->memory_step, &thread_count, &reduced);
     cJSON *order = new_order("reconstruct", config, thread_count);
     json_add_string(order, "scene_id", job->scene_id);
     json_add_string(order, "scene", files);
@@ -59,11 +64,15 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
     json_add_int(order, "job_id", job->id);
     json_add_int(order, "attempt", a->number);
     json_add_number(order, "checkpoint_interval_sec", config->checkpoint_interval_sec);
-    json_add(order, "settings", settings);
+    json_add(order, "settings", smaller);
+    if (reduced.length > 0)
+        json_add_string(order, "reduced", buf_text(&reduced));
     status = file_make_dirs(out, err);
     if (status == STATUS_OK)
         status = write_order(a->dir, order, err);
     cJSON_Delete(order);
+    cJSON_Delete(settings);
+    buf_release(&reduced);
     mem_free(files);
     mem_free(scene);
     mem_free(out);
@@ -75,6 +84,7 @@ static void empty(struct attempt *a) {
     mem_free(a->dir);
     mem_free(a->end_message);
     mem_free(a->end_hint);
+    mem_free(a->settings);
     cJSON_Delete(a->problems);
     cJSON_Delete(a->facts);
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
@@ -90,6 +100,18 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
     }
     scene_row_release(&row);
     return status;
+}
+
+/* What a retry from a stage asks for; done before the process starts, so it is done once. */
+static enum status restart(struct attempt *a, struct store *store, const struct job *job,
+                           struct error *err) {
+    bool keeps_checkpoint;
+    if (!job->restart_from[0])
+        return STATUS_OK;
+    enum status status = STATUS_OK;
+    if (job_stage_parse(job->restart_from, &keeps_checkpoint) && !keeps_checkpoint)
+        status = housekeeping_drop_checkpoint(a->dir, err);
+    return status == STATUS_OK ? store_job_restarted(store, job->id, a->number, err) : status;
 }
 
 /* Enters that an attempt could not even begin. */
@@ -128,8 +150,14 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
+        a->settings = mem_strdup(job.settings);
+        a->thread_count = thread_count;
+        a->memory_step = job.memory_step;
+        a->oom_kills = memory_oom_kills();
         status = check_scene(store, job.scene_id, &why);
     }
+    if (status == STATUS_OK)
+        status = restart(a, store, &job, &why);
     if (status == STATUS_OK)
         status = order_job(a, config, &job, thread_count, &why);
     if (status == STATUS_OK)
@@ -312,7 +340,14 @@ void attempt_listen(struct attempt *a, struct store *store) {
 
 /* --- the outcome -------------------------------------------------------------------------------- */
 
-enum outcome { OUTCOME_OK, OUTCOME_INPUT, OUTCOME_CRASH, OUTCOME_STOPPED, OUTCOME_BLOCKED };
+enum outcome {
+    OUTCOME_OK,
+    OUTCOME_INPUT,
+    OUTCOME_CRASH,
+    OUTCOME_MEMORY, /* a crash that a smaller working set may mend */
+    OUTCOME_STOPPED,
+    OUTCOME_BLOCKED
+};
 
 struct verdict {
     enum outcome outcome;
@@ -331,8 +366,11 @@ static void judge_signal(const struct attempt *a, struct verdict *v) {
     int number = WTERMSIG(a->wait_status);
     char text[256];
     if (number == SIGKILL) {
-        say(v, OUTCOME_CRASH, "killed from outside, most likely because the machine ran out of"
-                              " memory", HINT_MEMORY);
+        bool by_kernel = memory_oom_kills() > a->oom_kills;
+        say(v, by_kernel ? OUTCOME_MEMORY : OUTCOME_CRASH,
+            by_kernel ? "killed because the machine ran out of memory"
+                      : "killed from outside, or by a limit of memory that does not say so",
+            HINT_MEMORY);
         return;
     }
     snprintf(text, sizeof text, "the worker crashed (%s)", strsignal(number));
@@ -354,7 +392,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
         say(v, OUTCOME_INPUT, message[0] ? message : "the input is at fault", hint);
         return;
     case PROGRESS_EXIT_MEMORY:
-        say(v, OUTCOME_CRASH, "out of memory", HINT_MEMORY);
+        say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY);
         return;
     case PROGRESS_EXIT_NO_SPACE:
         snprintf(text, sizeof text, "disk full: %.900s", message);
@@ -386,9 +424,9 @@ static void judge(const struct attempt *a, struct verdict *v) {
     else
         judge_signal(a, v);
     /* We wanted it to end: how it did is of no interest. */
-    if (v->outcome == OUTCOME_CRASH && a->stopping)
+    if ((v->outcome == OUTCOME_CRASH || v->outcome == OUTCOME_MEMORY) && a->stopping)
         say(v, OUTCOME_STOPPED, "", "");
-    if (v->outcome != OUTCOME_CRASH)
+    if (v->outcome != OUTCOME_CRASH && v->outcome != OUTCOME_MEMORY)
         return;
     if (a->has_end && a->end_status != STATUS_OK) /* it could speak for itself */
         return;
@@ -397,6 +435,28 @@ static void judge(const struct attempt *a, struct verdict *v) {
     if (words[0])
         snprintf(v->reason + used, sizeof v->reason - used, "; its last words: %s", words);
     mem_free(words);
+}
+
+/* Enters an attempt that ran out of memory: the next one gets by with less, where it can. */
+static enum status settle_memory(const struct attempt *a, struct store *store,
+                                 const struct verdict *v, struct error *err) {
+    struct buf reason, what;
+    cJSON *settings = NULL;
+    int step = a->memory_step;
+    buf_init(&what, 4096);
+    buf_init(&reason, 4096);
+    buf_puts(&reason, v->reason);
+    if (json_parse(a->settings, strlen(a->settings), "settings", &settings, NULL) == STATUS_OK &&
+        memory_can_reduce(settings, step, a->thread_count, &what)) {
+        step++;
+        buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
+    }
+    enum status status = store_job_crash(store, a->job_id, a->number, buf_text(&reason), v->hint,
+                                         step, err);
+    cJSON_Delete(settings);
+    buf_release(&reason);
+    buf_release(&what);
+    return status;
 }
 
 static enum status settle_job(const struct attempt *a, struct store *store, const struct verdict *v,
@@ -408,9 +468,10 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
     case OUTCOME_BLOCKED:
         return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_STOPPED: return store_job_stop(store, a->job_id, a->number, "", err);
+    case OUTCOME_MEMORY: return settle_memory(a, store, v, err);
     case OUTCOME_CRASH: break;
     }
-    return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, err);
+    return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, a->memory_step, err);
 }
 
 static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v,
@@ -439,19 +500,6 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
     return status;
 }
 
-/* A finished job needs no checkpoint; it may be gigabytes. Every other outcome can be taken up
- * again from it. */
-static void drop_checkpoint(const struct attempt *a) {
-    static const char *const names[] = {"checkpoint.db", "checkpoint.db-journal"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        struct error err;
-        char *path = file_join(a->dir, names[i]);
-        if (file_remove_tree(path, &err) != STATUS_OK)
-            log_warning("job %lld: %s", (long long)a->job_id, err.message);
-        mem_free(path);
-    }
-}
-
 enum status attempt_settle(struct attempt *a, struct store *store, struct error *err) {
     struct verdict verdict;
     judge(a, &verdict);
@@ -460,10 +508,9 @@ enum status attempt_settle(struct attempt *a, struct store *store, struct error 
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
-    if (a->job_id && verdict.outcome == OUTCOME_OK && status == STATUS_OK)
-        drop_checkpoint(a);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
+        [OUTCOME_MEMORY] = "broke off",
         [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};
     if (a->job_id)
         log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number,

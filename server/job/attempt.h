@@ -27,6 +27,9 @@ struct attempt {
     bool stopping;                /* it was asked to stop */
     bool killed;                  /* by us */
     double kill_at_sec;           /* as clock_sec; 0: never */
+    char *settings;               /* of the job, as asked for; owned; NULL for a check */
+    int thread_count, memory_step; /* what it was to have, and how often that was made smaller */
+    uint64_t oom_kills;           /* of the machine, before it started */
     long event_count;             /* what it has reported */
     bool complained;              /* a report could not be entered, and the log says so */
     /* What it said of itself. */

@@ -63,10 +63,26 @@ bool job_may_become(enum job_state from, enum job_state to) {
         [JOB_RUNNING] = {[JOB_QUEUED] = true, [JOB_PAUSED] = true, [JOB_SUCCEEDED] = true,
                          [JOB_FAILED] = true, [JOB_CANCELLED] = true},
         [JOB_PAUSED] = {[JOB_QUEUED] = true, [JOB_CANCELLED] = true},
+        [JOB_SUCCEEDED] = {[JOB_QUEUED] = true},
         [JOB_FAILED] = {[JOB_QUEUED] = true},
         [JOB_CANCELLED] = {[JOB_QUEUED] = true},
     };
     return (unsigned)from < JOB_STATE_COUNT && (unsigned)to < JOB_STATE_COUNT && arrow[from][to];
+}
+
+bool job_stage_parse(const char *name, bool *keeps_checkpoint) {
+    static const struct {
+        const char *name;
+        bool keeps_checkpoint;
+    } stages[] = {{"load", false},   {"prepare", false}, {"observe", false},
+                  {"refine", false}, {"report", true},   {"export", true}};
+    for (size_t i = 0; i < sizeof stages / sizeof *stages; i++) {
+        if (strcmp(name, stages[i].name) == 0) {
+            *keeps_checkpoint = stages[i].keeps_checkpoint;
+            return true;
+        }
+    }
+    return false;
 }
 
 void job_release(struct job *job) {
@@ -75,6 +91,7 @@ void job_release(struct job *job) {
     mem_free(job->labels);
     mem_free(job->settings);
     mem_free(job->stage);
+    mem_free(job->restart_from);
     mem_free(job->reason);
     mem_free(job->hint);
     *job = (struct job){.eta_sec = -1.0};

@@ -7,10 +7,12 @@
  *        ├──> cancelled
  *        └──> paused ──> queued | cancelled     running ──> paused (checkpoint, then stop)
  *
- *      failed | cancelled ──> queued   only by the user's explicit retry, which is a new life of
- *                                      the job with its attempts counted from 0 again
+ *      failed | cancelled ──> queued   only by the user's explicit retry (of a stage, also from
+ *      succeeded ──> queued            succeeded) or extend: a new life of the job with its
+ *                                      attempts counted from 0 again
  *
- * 1. succeeded, failed and cancelled are sinks for everything but retry: exactly one is reached.
+ * 1. succeeded, failed and cancelled are sinks for everything but retry and extend: exactly one is
+ *    reached.
  * 2. A running job has exactly one attempt; a report that names another is refused.
  * 3. A request to a running job (pause, cancel) is recorded in `wanted` before the worker hears
  *    of it, so a crash of the daemon in between forgets nothing. */
@@ -40,6 +42,10 @@ bool job_is_terminal(enum job_state state);
 /* The arrows of the diagram above. */
 bool job_may_become(enum job_state from, enum job_state to);
 
+/* The stages that a retry can begin with, and whether one keeps the checkpoint: what comes before
+ * the end of the optimisation is done anew from the start of it. */
+bool job_stage_parse(const char *name, bool *keeps_checkpoint);
+
 #define SCENE_ID_SIZE 65 /* the SHA-256 of the uploaded content, in hex, and the NUL */
 
 /* A row of the jobs table. Strings are owned; job_release frees them. */
@@ -54,12 +60,15 @@ struct job {
     char *labels;              /* JSON object text */
     char *settings;            /* JSON object text, as submitted */
     int priority;              /* larger first */
+    int64_t turn;              /* among jobs of one priority: smaller first */
     enum job_state state;
     enum job_wanted wanted;
     int attempt;               /* of the present or last run; 0 before the first */
     int attempts_left;
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
     char *stage;               /* last reported; "" before */
+    char *restart_from;        /* the stage that the next attempt begins with; "": where it was */
+    int memory_step;           /* how often its working set was made smaller; see job/memory.h */
     double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
     char *reason;              /* why it failed or is paused, in plain words; "" if not */

@@ -21,7 +21,9 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
+#include "server/job/housekeeping.h"
 
+#define HOUSEKEEPING_SEC 600.0
 #define RETRY_SEC 5.0         /* after the store or a start failed */
 #define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
 
@@ -34,6 +36,7 @@ struct scheduler {
     size_t slot_count;
     struct attempt *slot; /* [slot_count] */
     bool must_retry;      /* something failed that may work later */
+    double housekeeping_at; /* as clock_sec */
     struct pollfd *poll;  /* [1 + 2 * slot_count] */
 };
 
@@ -199,6 +202,8 @@ static void follow_wishes(struct scheduler *s) {
 /* Kills whose time is up; returns how long poll may sleep, in ms. */
 static int keep_deadlines(struct scheduler *s) {
     double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
+    if (!atomic_load(&s->stopping))
+        sleep = fmin(sleep, fmax(s->housekeeping_at - now, 0.0));
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         if (a->phase != ATTEMPT_ALIVE)
@@ -249,6 +254,13 @@ static bool any_alive(const struct scheduler *s) {
     return false;
 }
 
+static void keep_house(struct scheduler *s) {
+    if (clock_sec() < s->housekeeping_at)
+        return;
+    housekeeping_run(&s->config, s->store);
+    s->housekeeping_at = clock_sec() + HOUSEKEEPING_SEC;
+}
+
 enum status scheduler_run(struct scheduler *s, struct error *err) {
     size_t requeued;
     enum status status = store_reconcile(s->store, &requeued, err);
@@ -268,6 +280,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         } else {
             start_check(s);
             start_jobs(s);
+            keep_house(s);
         }
         follow_wishes(s);
         wait_for_something(s, keep_deadlines(s));

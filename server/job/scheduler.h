@@ -19,6 +19,7 @@ struct scheduler_config {
     uint64_t worker_memory_bytes;   /* 0: no limit */
     double checkpoint_interval_sec;
     double stop_grace_sec;          /* SIGTERM to SIGKILL */
+    double checkpoint_keep_sec;     /* of a job that has succeeded */
     bool sandbox;
 };
 

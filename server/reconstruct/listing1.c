@@ -49,6 +49,7 @@ struct counters {
     int32_t decided; /* the emitters are fixed */
     double curve_sum[CURVE_POINTS];
     double curve_count[CURVE_POINTS];
+    double planned; /* iterations or seconds that the curve is drawn over */
 };
 
 struct refine {
@@ -241,7 +242,8 @@ static double iterate(struct refine *f, double fraction) {
     world_update_lights(&f->r->world);
     if (!f->counters.decided && fraction >= DECISION_AT)
         decide_emitters(f);
-    if (f->counters.level != level_at(f, fraction)) {
+    /* Never back to a coarser one: an extended job has a smaller part of its run behind it. */
+    if (f->counters.level > level_at(f, fraction)) {
         f->counters.level = level_at(f, fraction);
         params_refine(&f->params, f->counters.level);
     }
@@ -303,11 +305,26 @@ static enum status save(struct refine *f, struct error *err) {
     return f->hooks->checkpoint_save(f->hooks->user, (long)f->counters.iteration, array, count, err);
 }
 
+/* The run was extended: what the curve has lies in a smaller part of it. */
+static void redraw_curve(struct refine *f) {
+    struct counters *c = &f->counters;
+    double planned = f->iteration_limit ? (double)f->iteration_limit : f->time_limit_sec;
+    for (size_t i = 0; planned > c->planned && i < CURVE_POINTS; i++) {
+        size_t bin = (size_t)((double)i * c->planned / planned);
+        double sum = c->curve_sum[i], count = c->curve_count[i];
+        c->curve_sum[i] = c->curve_count[i] = 0.0;
+        c->curve_sum[bin] += sum;
+        c->curve_count[bin] += count;
+    }
+    c->planned = planned;
+}
+
 static enum status load(struct refine *f, struct error *err) {
     struct state_array array[24];
     size_t count = state_arrays(f, array);
     bool found;
     enum status status = f->hooks->checkpoint_load(f->hooks->user, array, count, &found, err);
+    redraw_curve(f);
     if (status == STATUS_OK && found) {
         params_set_level(&f->params, f->counters.level);
         if (f->counters.decided)

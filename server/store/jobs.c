@@ -9,7 +9,8 @@
 #define COLUMNS                                                                                \
     "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
     " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
-    " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared"
+    " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
+    " restart_from, memory_step"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -34,6 +35,9 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .owner_id = sqlite3_column_int64(stmt, 19),
         .owner = sql_dup(stmt, 20),
         .is_shared = sqlite3_column_int(stmt, 21) != 0,
+        .turn = sqlite3_column_int64(stmt, 22),
+        .restart_from = sql_dup(stmt, 23),
+        .memory_step = sqlite3_column_int(stmt, 24),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -115,7 +119,8 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
         status = sql_run(&store->sql, err,
                          "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
                          " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
-                         " shared) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                         " shared, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?,"
+                         "                       (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
                          "ttttnnittin", job->scene_id, job->name, job->labels, job->settings,
                          job->priority, job->max_attempts, store_now_ms(), key,
                          job->request_sha256, job->owner_id, (int)job->is_shared);
@@ -175,9 +180,50 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
     return status;
 }
 
+/* Gives job `id` its place before `next`, of the same owner; all after that move by one. */
+static enum status place_before(struct store *store, int64_t id, int64_t next, struct error *err) {
+    int64_t turn, priority;
+    enum status status =
+        sql_int(&store->sql, INT64_MIN, &turn, err,
+                "SELECT turn FROM jobs WHERE id = ?1 AND id <> ?2 AND state IN (?3, ?4)"
+                " AND owner_id = (SELECT owner_id FROM jobs WHERE id = ?2)",
+                "iinn", next, id, (int)JOB_QUEUED, (int)JOB_PAUSED);
+    if (status == STATUS_OK && turn == INT64_MIN)
+        return error_set(err, STATUS_INPUT,
+                         "job %lld is no waiting job of the same owner: nothing goes before it",
+                         (long long)next);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &priority, err, "SELECT priority FROM jobs WHERE id = ?",
+                         "i", next);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE jobs SET turn = turn + 1 WHERE turn >= ? AND state IN (?, ?)",
+                         "inn", turn, (int)JOB_QUEUED, (int)JOB_PAUSED);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE jobs SET turn = ?, priority = ? WHERE id = ?",
+                         "iii", turn, priority, id);
+    return status;
+}
+
+static enum status place(struct store *store, int64_t id, const struct job_patch *patch,
+                         struct error *err) {
+    switch (patch->place) {
+    case JOB_PLACE_KEEP: break;
+    case JOB_PLACE_FIRST:
+        return sql_run(&store->sql, err,
+                       "UPDATE jobs SET turn = (SELECT min(turn) - 1 FROM jobs) WHERE id = ?", "i",
+                       id);
+    case JOB_PLACE_LAST:
+        return sql_run(&store->sql, err,
+                       "UPDATE jobs SET turn = (SELECT max(turn) + 1 FROM jobs) WHERE id = ?", "i",
+                       id);
+    case JOB_PLACE_BEFORE: return place_before(store, id, patch->before_id, err);
+    }
+    return STATUS_OK;
+}
+
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
-                            const char *name, const char *labels, int priority, int shared,
-                            struct error *err) {
+                            const struct job_patch *patch, struct error *err) {
     int64_t revision;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
@@ -195,7 +241,10 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
                          " labels = ifnull(?, labels),"
                          " priority = CASE WHEN ?3 = ?4 THEN priority ELSE ?3 END,"
                          " shared = CASE WHEN ?5 < 0 THEN shared ELSE ?5 END WHERE id = ?6",
-                         "ttnnni", name, labels, priority, INT_MIN, shared, id);
+                         "ttnnni", patch->name, patch->labels, patch->priority, INT_MIN,
+                         patch->shared, id);
+    if (status == STATUS_OK)
+        status = place(store, id, patch, err);
     return store_end(store, status, id, err);
 }
 
@@ -221,7 +270,7 @@ enum status store_job_next(struct store *store, int64_t *id, struct error *err) 
     enum status status = sql_int(&store->sql, 0, id, err,
                                  "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
                                  " WHERE jobs.state = ? AND scenes.state >= ?"
-                                 " ORDER BY priority DESC, jobs.id LIMIT 1",
+                                 " ORDER BY priority DESC, turn LIMIT 1",
                                  "nn", (int)JOB_QUEUED, (int)SCENE_READY);
     store_unlock(store);
     return status == STATUS_OK && *id == 0

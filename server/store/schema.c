@@ -113,5 +113,15 @@ static const char step_3[] =
     ") STRICT;"
     "CREATE INDEX uploads_by_age ON uploads (created_ms, id);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3};
+/* Places in the queue, what a retry does anew, how often a job ran out of memory. */
+static const char step_4[] =
+    "ALTER TABLE jobs ADD COLUMN turn INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE jobs ADD COLUMN restart_from TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE jobs ADD COLUMN memory_step INTEGER NOT NULL DEFAULT 0;"
+    "UPDATE jobs SET turn = id;"
+    "DROP INDEX jobs_by_turn;"
+    "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, turn);"
+    "CREATE INDEX jobs_turn ON jobs (turn);";
+
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -100,12 +100,20 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
 enum status store_job_list(struct store *store, const struct caller *who, int state_filter,
                            int64_t before_id, size_t limit, struct job *jobs, size_t *count,
                            struct error *err);
-/* NULL / INT_MIN / -1 leave a field. expected_revision -1: any; else STATUS_CONFLICT if it differs. */
+enum job_place { JOB_PLACE_KEEP, JOB_PLACE_FIRST, JOB_PLACE_LAST, JOB_PLACE_BEFORE };
+struct job_patch {
+    const char *name, *labels; /* NULL: as it is */
+    int priority;              /* INT_MIN: as it is */
+    int shared;                /* 0, 1; -1: as it is */
+    enum job_place place;      /* among the jobs of its priority */
+    int64_t before_id;         /* with JOB_PLACE_BEFORE, which takes over that job's priority */
+};
+/* expected_revision -1: any; else STATUS_CONFLICT if it differs. STATUS_INPUT when the job to go
+ * before does not wait. */
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
-                            const char *name, const char *labels, int priority, int shared,
-                            struct error *err);
+                            const struct job_patch *patch, struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not running */
-/* Highest priority, then oldest, queued job whose scene has been checked (ready, or rejected:
+/* Of highest priority, then first in turn, the queued job whose scene has been checked (ready, or rejected:
  * such a job is started only to fail); STATUS_NOT_FOUND if none. */
 enum status store_job_next(struct store *store, int64_t *id, struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
@@ -114,11 +122,15 @@ enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
 
 /* What users ask. A running job only gets its wish recorded; the scheduler fulfils it (wake it).
  * Asking again for what is so already is STATUS_OK and changes nothing. Resume takes back a wish
- * to pause; retry is for failed and cancelled jobs only. */
+ * to pause. Retry is for failed and cancelled jobs; with `from`, a stage that job_stage_parse
+ * knows (else NULL), also for succeeded ones. Extend gives a job that has ended new settings. */
 enum status store_job_cancel(struct store *store, int64_t id, struct error *err);
 enum status store_job_pause(struct store *store, int64_t id, struct error *err);
 enum status store_job_resume(struct store *store, int64_t id, struct error *err);
-enum status store_job_retry(struct store *store, int64_t id, int max_attempts, struct error *err);
+enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
+                            struct error *err);
+enum status store_job_extend(struct store *store, int64_t id, int max_attempts,
+                             const char *settings, struct error *err);
 
 /* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A wish
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
@@ -127,9 +139,12 @@ enum status store_job_succeed(struct store *store, int64_t id, int attempt, stru
 /* The input is at fault: trying again will not help. */
 enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,
                            const char *hint, struct error *err);
-/* The attempt crashed: back to the queue, or failed when it was the last one. */
+/* The job's restart_from was seen to. */
+enum status store_job_restarted(struct store *store, int64_t id, int attempt, struct error *err);
+/* The attempt crashed: back to the queue, or failed when it was the last one. memory_step is what
+ * the next attempt gets. */
 enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
-                            const char *hint, struct error *err);
+                            const char *hint, int memory_step, struct error *err);
 /* The attempt was stopped by us (a wish, shutdown): back to the queue, or as was wished. */
 enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason,
                            struct error *err);

@@ -8,6 +8,8 @@
  *                   store_job_resume    paused           queued
  *                                       running          running, wanted = run (from pause only)
  *                   store_job_retry     failed, cancelled  queued, attempts_left = max_attempts
+ *                                       (with a stage, also succeeded)
+ *                   store_job_extend    any terminal     queued, attempts_left = max_attempts
  *      scheduler    store_job_start     queued           running, attempt + 1
  *                   store_job_succeed   running          succeeded
  *                   store_job_fail      running          failed
@@ -181,25 +183,53 @@ enum status store_job_resume(struct store *store, int64_t id, struct error *err)
     return store_end(store, status, id, err);
 }
 
-enum status store_job_retry(struct store *store, int64_t id, int max_attempts, struct error *err) {
-    struct present now;
+/* A new life for a job that has ended; in the transaction that job_begin began. */
+static enum status revive(struct store *store, struct present *now, int max_attempts,
+                          struct error *err) {
     int64_t scene = 0;
+    enum status status =
+        sql_int(&store->sql, 0, &scene, err,
+                "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ?", "i",
+                now->id);
+    if (status == STATUS_OK && !scene)
+        status = error_set(err, STATUS_CONFLICT, "the scene of job %lld was deleted",
+                           (long long)now->id);
+    if (status != STATUS_OK)
+        return status;
+    now->attempts_left = max_attempts;
+    return move(store, now, JOB_QUEUED, "", "", err);
+}
+
+enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
+                            struct error *err) {
+    struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
         return status;
-    if (now.state != JOB_FAILED && now.state != JOB_CANCELLED)
+    if (!job_is_terminal(now.state) || (now.state == JOB_SUCCEEDED && !from))
         status = forbidden(&now, "retried", err);
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &scene, err,
-                         "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ?",
-                         "i", id);
-    if (status == STATUS_OK && !scene)
-        status = error_set(err, STATUS_CONFLICT, "the scene of job %lld was deleted",
-                           (long long)id);
-    if (status == STATUS_OK) {
-        now.attempts_left = max_attempts;
-        status = move(store, &now, JOB_QUEUED, "", "", err);
-    }
+        status = revive(store, &now, max_attempts, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE jobs SET restart_from = ?, memory_step = 0 WHERE id = ?", "ti",
+                         from ? from : "", id);
+    return store_end(store, status, id, err);
+}
+
+enum status store_job_extend(struct store *store, int64_t id, int max_attempts,
+                             const char *settings, struct error *err) {
+    struct present now;
+    enum status status = job_begin(store, id, &now, err);
+    if (status != STATUS_OK)
+        return status;
+    if (!job_is_terminal(now.state))
+        status = forbidden(&now, "extended", err);
+    if (status == STATUS_OK)
+        status = revive(store, &now, max_attempts, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE jobs SET settings = ? WHERE id = ?", "ti",
+                         settings, id);
     return store_end(store, status, id, err);
 }
 
@@ -243,14 +273,26 @@ enum status store_job_fail(struct store *store, int64_t id, int attempt, const c
     return finish(store, id, attempt, JOB_FAILED, reason, hint, err);
 }
 
+enum status store_job_restarted(struct store *store, int64_t id, int attempt, struct error *err) {
+    struct present now;
+    enum status status = attempt_begin(store, id, attempt, &now, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err, "UPDATE jobs SET restart_from = '' WHERE id = ?", "i", id);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
 enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
-                            const char *hint, struct error *err) {
+                            const char *hint, int memory_step, struct error *err) {
     struct present now;
     enum status status = attempt_begin(store, id, attempt, &now, err);
     if (status != STATUS_OK)
         return status;
     now.attempts_left -= now.attempts_left > 0;
     status = move(store, &now, now.attempts_left > 0 ? JOB_QUEUED : JOB_FAILED, reason, hint, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE jobs SET memory_step = ? WHERE id = ?", "ni",
+                         memory_step, id);
     return store_end(store, status, id, err);
 }
 

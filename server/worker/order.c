@@ -14,6 +14,8 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
     if (status == STATUS_OK)
         status = json_string(o->json, "name", WHAT, "", &o->name, err);
     if (status == STATUS_OK)
+        status = json_string(o->json, "reduced", WHAT, "", &o->reduced, err);
+    if (status == STATUS_OK)
         status = json_number(o->json, "job_id", WHAT, 0.0, &job_id, err);
     if (status == STATUS_OK)
         status = json_number(o->json, "attempt", WHAT, 0.0, &attempt, err);

@@ -25,6 +25,7 @@ struct order {
     /* kind "reconstruct" */
     const char *scene;      /* folder of the unpacked bundle */
     const char *name;       /* of the job, for the report's title; may be "" */
+    const char *reduced;    /* what was made smaller after it ran out of memory; may be "" */
     const cJSON *settings;  /* object */
     int64_t job_id;
     int attempt;

@@ -187,10 +187,17 @@ static enum status load_checkpoint(void *user, struct state_array *array, size_t
     return checkpoint_clear(run->checkpoint, err);
 }
 
-/* What the state depends on. Settings are what the user gave: defaults belong to the program. */
+/* What the state depends on. Settings are what the user gave: defaults belong to the program.
+ * How long the work goes on is not part of it (a job may be extended), nor how much an iteration
+ * takes on (which is less after running out of memory). */
 static char *fingerprint_of(const struct order *order) {
     char hex[SHA256_HEX_SIZE];
-    char *settings = json_text(order->settings);
+    static const char *const apart[] = {"iterations", "time_limit_sec", "texels_per_iteration"};
+    cJSON *kept = cJSON_Duplicate(order->settings, true);
+    for (size_t i = 0; i < sizeof apart / sizeof *apart; i++)
+        cJSON_DeleteItemFromObjectCaseSensitive(kept, apart[i]);
+    char *settings = json_text(kept);
+    cJSON_Delete(kept);
     sha256_of(settings, strlen(settings), hex);
     mem_free(settings);
     return mem_printf("scene %s settings %s", order->scene_id, hex);
@@ -316,8 +323,12 @@ static enum status reconstruct(struct run *run, const struct settings *settings,
     double now = clock_sec();
     run->next_checkpoint = now + run->order->checkpoint_interval_sec;
     run->next_preview = now; /* the first one shows that something happens */
+    if (run->order->reduced[0])
+        progress_log(run->progress, "warning", run->order->reduced);
     status = stop_requested(run) ? error_set(err, STATUS_CANCELLED, "stopped after stage load")
                                  : reconstruct_run(&scene, settings, pool, &hooks, &r, err);
+    if (status == STATUS_OK && run->order->reduced[0])
+        json_add_string(r.report, "reduced_after_out_of_memory", run->order->reduced);
     if (status == STATUS_OK)
         status = write_outputs(run, &r, err);
     reconstruct_release(&r);

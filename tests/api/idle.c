@@ -1,5 +1,5 @@
 /* idle -- the HTTP side over a store that no scheduler moves, for shell tests. Prints its address
- * and the id of a scene that is ready; then reads commands, one a line, and answers each "ok" or
+ * the id of a scene that is ready and its data folder; then reads commands, one a line, and answers each "ok" or
  * with an error's message:
  *
  *   start JOB | succeed JOB ATTEMPT | fail JOB ATTEMPT | stop JOB ATTEMPT
@@ -29,7 +29,7 @@ int main(void) {
     char line[256];
     rig_start(&rig, &rig_patient, 15);
     rig_scene(&rig);
-    printf("http://127.0.0.1:%u %s\n", listener_port(rig.listener), RIG_SCENE);
+    printf("http://127.0.0.1:%u %s %s\n", listener_port(rig.listener), RIG_SCENE, rig.dir);
     fflush(stdout);
     while (fgets(line, sizeof line, stdin)) {
         line[strcspn(line, "\n")] = '\0';

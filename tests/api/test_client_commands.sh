@@ -52,6 +52,33 @@ equal "$out" 4
 run 0 submit "$work/room" --set seed=9007199254740991 --dry-run --json
 has "$out" '"seed":9007199254740991'
 
+# --- again, for longer, elsewhere in the queue ------------------------------------------------------
+
+run 0 extend 1 --iterations 4
+has "$out" "job 1 is "
+run 0 watch 1
+run 0 watch 1 --json --all
+has "$out" "resumed at iteration 3"
+run 0 get 1 report.json -o "$work/longer"
+equal "$(jq '.refine.iterations, .settings.iterations' "$work/longer/report.json" | tr '\n' ' ')" "7 7 "
+run 4 extend 1 --time 5
+has "$err" "iterations is"
+run 2 extend 1
+run 0 retry 1 --from report
+run 0 watch 1
+run 0 retry 1 --from refine -q
+run 0 watch 1
+run 4 retry 1 --from lunch
+run 0 pause "$("$build/unbake" submit --scene "${scene:0:10}" $long -q)" -q
+run 0 edit last --priority 7 --label a=b --name 'new name' --first --json
+so '.priority == 7 and .labels == {"a": "b"} and .name == "new name"'
+run 2 edit last
+run 2 edit last --first --last
+run 4 edit last --before last
+run 0 rm last --dry-run
+has "$out" "files"
+run 0 rm last
+
 # --- watch, logs -----------------------------------------------------------------------------------
 
 run 0 watch 1

@@ -10,7 +10,7 @@ move() { echo "$*" >&"${idle[1]}"; read -r answer <&"${idle[0]}"; equal "$answer
 state() { call GET "/v1/jobs/$1"; equal "$(field .state)" "$2" "state of job $1"; }
 
 coproc idle { exec "$build/tests/api/idle"; }
-read -r url scene <&"${idle[0]}"
+read -r url scene idle_dir <&"${idle[0]}"
 
 # --- faults, all at once ---
 post /v1/jobs '{"settings":{"textur_size":1,"seed":"x"},"priority":101,"labels":{"a":1},"nme":"x"}'; expect 422
@@ -96,6 +96,12 @@ patch "/v1/jobs/$job" '{"priority":6}' -H "If-Match: $etag"; expect 412 "a stale
 patch "/v1/jobs/$job" '{"priority":6}' -H 'If-Match: *'; expect 200
 call GET "/v1/jobs/$job" -H "If-None-Match: $etag"; expect 200
 patch /v1/jobs/4242 '{}' -H 'If-Match: *'; expect 404
+patch "/v1/jobs/$job" '{"order":"middle"}' -H 'If-Match: *'; expect 422; equal "$(field '.invalid_params[0].name')" order
+patch "/v1/jobs/$job" '{"order":4242}' -H 'If-Match: *'; expect 422 "before a job that is not there"
+turn=$(curl -s "$url/v1/jobs/$job" | jq .turn)
+patch "/v1/jobs/$job" '{"order":"last"}' -H 'If-Match: *'; expect 200
+[ "$(field .turn)" -gt "$turn" ] || fail "turn $(field .turn) after $turn"
+patch "/v1/jobs/$job" "{\"order\":$once}" -H 'If-Match: *'; expect 200; equal "$(field .priority)" 0 "priority of its new place"
 
 # --- actions: act ACTION STATUS, on $job ---
 act() { call POST "/v1/jobs/$job/$1"; expect "$2" "$1 of a job that is $(curl -s "$url/v1/jobs/$job" | jq -r '.state + "/" + .wanted')"; }
@@ -117,6 +123,23 @@ for action in cancel pause resume retry; do call POST "/v1/jobs/4242/$action"; e
 call POST "/v1/jobs/$job/explode"; expect 404
 call GET "/v1/jobs/$job/cancel"; expect 405; equal "$(header allow)" POST
 call DELETE "/v1/scenes/$scene"; expect 409 "a scene with queued jobs"
+
+# --- done again, and for longer ---
+call POST "/v1/jobs/$job/retry?from=lunch"; expect 400; field .hint | grep -q refine || fail "no stages in the hint"
+call POST "/v1/jobs/$job/retry?from=report"; expect 202; state "$job" queued
+move start "$job"; move succeed "$job" 5
+post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend without a checkpoint"
+mkdir -p "$idle_dir/jobs/$job"; head -c 20000 /dev/zero >"$idle_dir/jobs/$job/checkpoint.db"
+for bad in '{}' '[]' '{"time_limit_sec":1,"iterations":1}'; do post "/v1/jobs/$job/extend" "$bad"; expect 400 "extend by $bad"; done
+for bad in '{"time_limit_sec":0}' '{"time_limit_sec":"x"}' '{"time_limit_sec":1e9}' '{"iterations":5}'; do
+    post "/v1/jobs/$job/extend" "$bad"; expect 422 "extend by $bad"
+done
+post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 202; equal "$(field .settings.time_limit_sec)" 660
+post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend of a queued job"
+move start "$job"; move succeed "$job" 6
+call DELETE "/v1/jobs/$job?dry_run=1"; expect 200; equal "$(field .files)" 1 files; [ "$(field .bytes)" -ge 20000 ] || fail "$(field .bytes) bytes"
+call DELETE "/v1/jobs/$job?dry_run=x"; expect 400
+state "$job" succeeded
 
 # --- removal ---
 call DELETE "/v1/jobs/$job"; expect 204; call GET "/v1/jobs/$job"; expect 404; call DELETE "/v1/jobs/$job"; expect 404

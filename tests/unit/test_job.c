@@ -7,7 +7,7 @@ int main(void) {
     /* The diagram of job.h, row by row: Queued Running Paused Succeeded Failed Cancelled. */
     static const char *const arrows[JOB_STATE_COUNT] = {
         [JOB_QUEUED] = ".RP..C", [JOB_RUNNING] = "Q.PSFC", [JOB_PAUSED] = "Q....C",
-        [JOB_SUCCEEDED] = "......", [JOB_FAILED] = "Q.....", [JOB_CANCELLED] = "Q.....",
+        [JOB_SUCCEEDED] = "Q.....", [JOB_FAILED] = "Q.....", [JOB_CANCELLED] = "Q.....",
     };
     for (int from = 0; from < JOB_STATE_COUNT; from++) {
         for (int to = 0; to < JOB_STATE_COUNT; to++)

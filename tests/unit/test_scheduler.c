@@ -362,7 +362,7 @@ static void test_outcomes(struct daemon *d) {
     expect(d, input, JOB_FAILED, 1, "the mesh is empty", "export it again");
     expect(d, full, JOB_PAUSED, 1, "disk full: checkpoint.db", "resume");
     expect(d, memory, JOB_FAILED, 2, "could not allocate 12345", "smaller texture_size");
-    expect(d, killed, JOB_FAILED, 2, "ran out of memory", "smaller texture_size");
+    expect(d, killed, JOB_FAILED, 2, "killed from outside", "smaller texture_size");
     expect(d, silent, JOB_FAILED, 2, "without a result", "");
     expect(d, deserter, JOB_FAILED, 2, "told to stop from outside", "");
     expect(d, around, JOB_SUCCEEDED, 1, "", "");

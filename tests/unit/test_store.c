@@ -55,7 +55,7 @@ static enum condition condition_of(struct store *store, int64_t id) {
  * nothing changed, '=' is STATUS_OK and nothing changed. Letters: Queued Running paUsing
  * caNcelling Paused Succeeded Failed Cancelled. */
 static void test_transitions(void) {
-    enum action { CANCEL, PAUSE, RESUME, RETRY, START, SUCCEED, FAIL, CRASH, STOP, BLOCK, ACTIONS };
+    enum action { CANCEL, PAUSE, RESUME, RETRY, AGAIN, EXTEND, START, SUCCEED, FAIL, CRASH, STOP, BLOCK, ACTIONS };
     static const char letters[] = "QRUNPSFC";
     static const char *const table[ACTIONS] = {
         /*           QRUNPSFC */
@@ -63,6 +63,8 @@ static void test_transitions(void) {
         [PAUSE] =   "PU=-=---",
         [RESUME] =  "==R-Q---",
         [RETRY] =   "------QQ",
+        [AGAIN] =   "-----QQQ",
+        [EXTEND] =  "-----QQQ",
         [START] =   "R-------",
         [SUCCEED] = "-SSC----",
         [FAIL] =    "-FFC----",
@@ -84,11 +86,13 @@ static void test_transitions(void) {
             case CANCEL: status = store_job_cancel(store, id, &err); break;
             case PAUSE: status = store_job_pause(store, id, &err); break;
             case RESUME: status = store_job_resume(store, id, &err); break;
-            case RETRY: status = store_job_retry(store, id, 3, &err); break;
+            case RETRY: status = store_job_retry(store, id, 3, NULL, &err); break;
+            case AGAIN: status = store_job_retry(store, id, 3, "report", &err); break;
+            case EXTEND: status = store_job_extend(store, id, 3, "{\"seed\":2}", &err); break;
             case START: status = store_job_start(store, id, &started, &err); break;
             case SUCCEED: status = store_job_succeed(store, id, attempt, &err); break;
             case FAIL: status = store_job_fail(store, id, attempt, "r", "h", &err); break;
-            case CRASH: status = store_job_crash(store, id, attempt, "r", "h", &err); break;
+            case CRASH: status = store_job_crash(store, id, attempt, "r", "h", 0, &err); break;
             case STOP: status = store_job_stop(store, id, attempt, "r", &err); break;
             case BLOCK: status = store_job_block(store, id, attempt, "r", "h", &err); break;
             case ACTIONS: break;
@@ -120,7 +124,7 @@ static void test_attempts(void) {
     int first, second, third;
     struct job job;
     OK(store_job_start(store, id, &first, &err));
-    OK(store_job_crash(store, id, first, "signal 11", "", &err));
+    OK(store_job_crash(store, id, first, "signal 11", "", 0, &err));
     OK(store_job_start(store, id, &second, &err));
     CHECK(second == first + 1);
 
@@ -130,7 +134,7 @@ static void test_attempts(void) {
        STATUS_CONFLICT);
     IS(store_job_succeed(store, id, first, &err), STATUS_CONFLICT);
     IS(store_job_fail(store, id, first, "", "", &err), STATUS_CONFLICT);
-    IS(store_job_crash(store, id, first, "", "", &err), STATUS_CONFLICT);
+    IS(store_job_crash(store, id, first, "", "", 0, &err), STATUS_CONFLICT);
     IS(store_job_stop(store, id, first, "", &err), STATUS_CONFLICT);
     IS(store_job_block(store, id, first, "", "", &err), STATUS_CONFLICT);
     CHECK(condition_of(store, id) == RUNNING);
@@ -138,7 +142,7 @@ static void test_attempts(void) {
     /* A stop that we asked for costs no attempt, the second crash is the last. */
     OK(store_job_stop(store, id, second, "shutdown", &err));
     OK(store_job_start(store, id, &third, &err));
-    OK(store_job_crash(store, id, third, "signal 6", "try less", &err));
+    OK(store_job_crash(store, id, third, "signal 6", "try less", 0, &err));
     OK(store_job_get(store, id, &job, &err));
     CHECK(job.state == JOB_FAILED && job.attempt == third && job.attempts_left == 0);
     CHECK_STRING(job.reason, "signal 6");
@@ -148,7 +152,7 @@ static void test_attempts(void) {
     CHECK(strstr((events_of(store, id), last_event), "\"reason\":\"signal 6\"") != NULL);
 
     /* A retry is a new life, but numbers of attempts are not used again. */
-    OK(store_job_retry(store, id, 2, &err));
+    OK(store_job_retry(store, id, 2, NULL, &err));
     OK(store_job_start(store, id, &first, &err));
     CHECK(first == third + 1);
     OK(store_job_get(store, id, &job, &err));
@@ -241,15 +245,18 @@ static void test_queue(void) {
     OK(store_job_get(store, id, &job, &err));
     int64_t revision = job.revision;
     job_release(&job);
-    OK(store_job_patch(store, id, revision, "new", NULL, INT_MIN, -1, &err));
-    IS(store_job_patch(store, id, revision, "newer", NULL, INT_MIN, -1, &err), STATUS_CONFLICT);
-    OK(store_job_patch(store, id, -1, NULL, "{\"a\":\"b\"}", 7, -1, &err));
+    struct job_patch patch = {.name = "new", .priority = INT_MIN, .shared = -1};
+    OK(store_job_patch(store, id, revision, &patch, &err));
+    patch.name = "newer";
+    IS(store_job_patch(store, id, revision, &patch, &err), STATUS_CONFLICT);
+    patch = (struct job_patch){.labels = "{\"a\":\"b\"}", .priority = 7, .shared = -1};
+    OK(store_job_patch(store, id, -1, &patch, &err));
     OK(store_job_get(store, id, &job, &err));
     CHECK_STRING(job.name, "new");
     CHECK_STRING(job.labels, "{\"a\":\"b\"}");
     CHECK(job.priority == 7 && job.revision == revision + 2);
     job_release(&job);
-    IS(store_job_patch(store, 999, -1, "x", NULL, INT_MIN, -1, &err), STATUS_NOT_FOUND);
+    IS(store_job_patch(store, 999, -1, &patch, &err), STATUS_NOT_FOUND);
 
     /* Pages. */
     struct job jobs[3];
@@ -393,7 +400,51 @@ static void test_threads(void) {
     drop_dir(dir);
 }
 
+/* The waiting jobs in the order in which they would start. */
+static void check_turns(struct store *store, const int64_t *wanted, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        int64_t id;
+        OK(store_job_next(store, &id, &err));
+        CHECK_THAT(id == wanted[i], "place %zu: job %lld, wanted %lld", i, (long long)id,
+                   (long long)wanted[i]);
+        OK(store_job_pause(store, id, &err));
+    }
+    for (size_t i = 0; i < count; i++)
+        OK(store_job_resume(store, wanted[i], &err));
+}
+
+static void test_order(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    int64_t a = add_job(store, SCENE_A, 0), b = add_job(store, SCENE_A, 0);
+    int64_t c = add_job(store, SCENE_A, 0), d = add_job(store, SCENE_A, 5);
+    check_turns(store, (int64_t[]){d, a, b, c}, 4);
+    struct job_patch patch = {.priority = INT_MIN, .shared = -1, .place = JOB_PLACE_FIRST};
+    OK(store_job_patch(store, c, -1, &patch, &err));
+    check_turns(store, (int64_t[]){d, c, a, b}, 4);
+    patch.place = JOB_PLACE_LAST;
+    OK(store_job_patch(store, a, -1, &patch, &err));
+    check_turns(store, (int64_t[]){d, c, b, a}, 4);
+    patch.place = JOB_PLACE_BEFORE;
+    patch.before_id = b;
+    OK(store_job_patch(store, a, -1, &patch, &err));
+    check_turns(store, (int64_t[]){d, c, a, b}, 4);
+    OK(store_job_patch(store, d, -1, &patch, &err)); /* leaves its priority for b's */
+    check_turns(store, (int64_t[]){c, a, d, b}, 4);
+    int64_t e = add_job(store, SCENE_A, 0);
+    check_turns(store, (int64_t[]){c, a, d, b, e}, 5);
+    IS(store_job_patch(store, b, -1, &patch, &err), STATUS_INPUT);
+    OK(store_job_cancel(store, e, &err));
+    patch.before_id = e;
+    IS(store_job_patch(store, a, -1, &patch, &err), STATUS_INPUT);
+    store_close(store);
+    drop_dir(dir);
+}
+
 int main(void) {
+    test_order();
     test_transitions();
     test_attempts();
     test_reconcile();

@@ -155,7 +155,7 @@ static void test_lists(void) {
           jobs_seen(store, &admin, -1) == 2 && jobs_seen(store, NULL, JOB_QUEUED) == 2);
     OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
     CHECK(access == ACCESS_NONE);
-    OK(store_job_patch(store, first, -1, NULL, NULL, INT_MIN, 1, &err));
+    OK(store_job_patch(store, first, -1, &(struct job_patch){.priority = INT_MIN, .shared = 1}, &err));
     OK(store_job_get(store, first, &job, &err));
     CHECK(job.is_shared && caller_access_job(&bob, &job) == ACCESS_READ &&
           caller_access_job(&alice, &job) == ACCESS_CHANGE);
@@ -163,9 +163,9 @@ static void test_lists(void) {
     job_release(&job);
     OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
     CHECK(access == ACCESS_READ && jobs_seen(store, &bob, -1) == 2 && scenes_seen(store, &bob) == 2);
-    OK(store_job_patch(store, first, -1, "x", NULL, INT_MIN, -1, &err)); /* stays shared */
+    OK(store_job_patch(store, first, -1, &(struct job_patch){.name = "x", .priority = INT_MIN, .shared = -1}, &err)); /* stays shared */
     CHECK(jobs_seen(store, &bob, -1) == 2);
-    OK(store_job_patch(store, first, -1, NULL, NULL, INT_MIN, 0, &err));
+    OK(store_job_patch(store, first, -1, &(struct job_patch){.priority = INT_MIN, .shared = 0}, &err));
     CHECK(jobs_seen(store, &bob, -1) == 1);
 
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */

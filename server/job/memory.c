@@ -1,0 +1,68 @@
+/* memory.c -- see memory.h. */
+#include "server/job/memory.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "common/settings.h"
+
+#define TEXELS_LEAST 64
+#define SIDE_LEAST 64
+
+static double halved(double value, int times, double least) {
+    for (; times > 0 && value / 2.0 >= least; times--)
+        value = (double)(int64_t)(value / 2.0);
+    return value;
+}
+
+/* Replaces one setting where `smaller` is. */
+static void replace(cJSON *settings, const char *name, double present, double smaller,
+                    struct buf *what) {
+    if (smaller >= present)
+        return;
+    cJSON_DeleteItemFromObjectCaseSensitive(settings, name);
+    json_add_number(settings, name, smaller);
+    buf_printf(what, "%s%s %.0f", what->length ? ", " : "", name, smaller);
+}
+
+cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct buf *what) {
+    cJSON *smaller = cJSON_Duplicate(settings, true);
+    struct settings full;
+    int threads = (int)halved(*thread_count, step, 1.0);
+    if (threads < *thread_count)
+        buf_printf(what, "%d thread%s", threads, threads == 1 ? "" : "s");
+    *thread_count = threads;
+    settings_init(&full);
+    if (settings_apply(&full, settings, NULL, NULL) == STATUS_OK) {
+        double texels = settings_number(&full, "texels_per_iteration");
+        double side = settings_number(&full, "texture_size");
+        replace(smaller, "texels_per_iteration", texels, halved(texels, 2 * step, TEXELS_LEAST), what);
+        replace(smaller, "texture_size", side, halved(side, step - 1, SIDE_LEAST), what);
+    }
+    settings_release(&full);
+    return smaller;
+}
+
+bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct buf *what) {
+    struct buf present;
+    int threads = thread_count;
+    buf_init(&present, 4096);
+    cJSON_Delete(memory_reduce(settings, step, &threads, &present));
+    threads = thread_count;
+    cJSON_Delete(memory_reduce(settings, step + 1, &threads, what));
+    bool differs = strcmp(buf_text(&present), buf_text(what)) != 0;
+    buf_release(&present);
+    return differs;
+}
+
+uint64_t memory_oom_kills(void) {
+    char line[128];
+    unsigned long long count = 0;
+    FILE *file = fopen("/proc/vmstat", "re");
+    if (!file)
+        return 0;
+    while (fgets(line, sizeof line, file) && sscanf(line, "oom_kill %llu", &count) != 1)
+        ;
+    fclose(file);
+    return count;
+}
