@@ -7,7 +7,7 @@
 #include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/reconstruct/exposure.h"
+#include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/views.h"
@@ -87,8 +87,7 @@ static enum status prepare(struct run *run, struct error *err) {
     if (status != STATUS_OK)
         return status;
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
-    size_t solved = exposure_solve(r->scene, &run->views, &r->atlas, &r->inverse);
-    views_update_median(&run->views);
+    calibrate(r, &run->views, run->hooks);
     cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
     json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
     json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
@@ -102,7 +101,6 @@ static enum status prepare(struct run *run, struct error *err) {
     json_add_number(figures, "atlas_utilisation",
                     (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
     json_add_int(figures, "training_photographs", (int64_t)run->views.train_count);
-    json_add_int(figures, "exposures_solved", (int64_t)solved);
     json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
     return STATUS_OK;
 }

@@ -62,10 +62,13 @@ static void scale_image(struct image *image, double factor) {
 
 /* A frame that saturates cannot tell how much brighter the room is than its clip. */
 static void clip_image(struct image *image, const struct photograph *photo) {
-    size_t pixels = (size_t)image->width * image->height;
     const float gain[3] = {photo->gain.r, photo->gain.g, photo->gain.b};
-    for (size_t i = 0; i < 3 * pixels; i++)
-        image->pixel[i] = fminf(image->pixel[i], photo->clip / (photo->exposure * gain[i % 3]));
+    for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
+        float x = (float)(i % image->width) + 0.5f, y = (float)(i / image->width) + 0.5f;
+        float clip = photo->clip / (photo->exposure * photograph_falloff(photo, x, y));
+        for (size_t c = 0; c < 3; c++)
+            image->pixel[3 * i + c] = fminf(image->pixel[3 * i + c], clip / gain[c]);
+    }
 }
 
 /* The room as recovered, from a camera, as an R G B picture. */

@@ -129,7 +129,8 @@ void views_release(struct views *v) {
 }
 
 bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
-    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    const struct photograph *photo = &v->scene->photograph[v->train[train]];
+    const struct camera *camera = &photo->camera;
     vec3 to_camera = vec3_sub(camera_origin(camera), point);
     float squared = vec3_dot(to_camera, to_camera);
     float distance = sqrtf(squared);
@@ -143,7 +144,7 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, 
     if (accel_occluded(v->accel, origin, direction, 0.0f, distance))
         return false;
     view->train = train;
-    view->weight = cosine / (squared * distance);
+    view->weight = cosine / (squared * distance) * photograph_trust(photo);
     return true;
 }
 

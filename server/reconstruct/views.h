@@ -30,7 +30,7 @@ struct views {
 struct view {
     uint32_t train;  /* index into views.train */
     float x, y;      /* place in the picture, pixels */
-    float weight;    /* cosine over squared distance: solid angle per area of surface, relative */
+    float weight;    /* solid angle per area of surface (cosine over squared distance) x photograph_trust */
 };
 
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,

@@ -38,6 +38,14 @@ static inline void taps(float x, uint32_t count, size_t index[2], float *weight)
     *weight = centred - (float)index[0];
 }
 
+float photograph_falloff(const struct photograph *photo, float x, float y) {
+    const float *v = photo->vignette;
+    if (v[0] == 0.0f && v[1] == 0.0f && v[2] == 0.0f)
+        return 1.0f;
+    float s = photograph_radius(photo, x, y);
+    return expf(s * (v[0] + s * (v[1] + s * v[2])));
+}
+
 bool photograph_sample(const struct photograph *photo, float x, float y,
                        struct photograph_sample *sample) {
     uint32_t width = photo->camera.width, height = photo->camera.height;
@@ -63,8 +71,9 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     }
     if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
         return false;
-    float r = 1.0f / (photo->exposure * photo->gain.r), g = 1.0f / (photo->exposure * photo->gain.g),
-          b = 1.0f / (photo->exposure * photo->gain.b);
+    float scale = photo->exposure * photograph_falloff(photo, x, y);
+    float r = 1.0f / (scale * photo->gain.r), g = 1.0f / (scale * photo->gain.g),
+          b = 1.0f / (scale * photo->gain.b);
     sample->radiance = rgb_make(value[0] * r, value[1] * g, value[2] * b);
     sample->clip_radiance = rgb_make(photo->clip * r, photo->clip * g, photo->clip * b);
     return true;

@@ -1,7 +1,10 @@
 /* photograph.h -- a posed photograph: linear pixels, exposure, mask.
  *
- * A stored value is exposure x gain x radiance: radiance L shows as min(L * exposure * gain,
- * clip), clip being infinite for HDR frames. */
+ * A stored value is exposure x gain x falloff x radiance: radiance L shows as
+ * min(L * exposure * gain * falloff, clip), clip being infinite for HDR frames. The falloff
+ * (vignette) is exp(v0 s + v1 s^2 + v2 s^3), s being the squared distance from the principal
+ * point over the squared half diagonal: never 0 or negative, whatever the coefficients. It is
+ * divided out in each look-up and not in the stored pixels, since the clip is of those. */
 #ifndef UNBAKE_SCENE_PHOTOGRAPH_H
 #define UNBAKE_SCENE_PHOTOGRAPH_H
 
@@ -19,18 +22,35 @@ struct photograph {
     bool exposure_known;
     float exposure;         /* pixel value per radiance; 1 until it is solved where not known */
     rgb gain;               /* per channel, 1 by default */
+    float vignette[3];      /* v0 v1 v2 of the falloff; 0: none */
+    float blur_px;          /* motion blur beyond that of its neighbours, standard deviation; 0: none */
     float clip;             /* value at which a pixel is saturated; INFINITY for HDR */
     uint16_t (*pixel)[3];   /* [height][width] linear half-precision values; owned */
     uint8_t *mask;          /* [height][width] 0 where the pixel must not be used, or NULL; owned */
 };
 
 struct photograph_sample {
-    rgb radiance;           /* value / (exposure * gain) */
+    rgb radiance;           /* value / (exposure * gain * falloff) */
     bool saturated[3];      /* per channel: the value is a lower bound */
     rgb clip_radiance;      /* radiance at which this frame saturates; INFINITY for HDR */
 };
 
 void photograph_release(struct photograph *photo);
+
+/* s of the falloff at pixel place (x, y): 1 in the corners. */
+static inline float photograph_radius(const struct photograph *photo, float x, float y) {
+    const struct camera *c = &photo->camera;
+    float w = (float)c->width, h = (float)c->height, dx = x - c->cx, dy = y - c->cy;
+    return 4.0f * (dx * dx + dy * dy) / (w * w + h * h);
+}
+
+/* The share of light that the vignette leaves at pixel place (x, y). */
+float photograph_falloff(const struct photograph *photo, float x, float y);
+
+/* How far a look-up counts against one in a sharp photograph. */
+static inline float photograph_trust(const struct photograph *photo) {
+    return 1.0f / (1.0f + photo->blur_px * photo->blur_px);
+}
 
 /* Bilinear look-up at pixel place (x, y) inside the picture; a channel is saturated when a tap
  * of weight is. False when a tap is masked or not finite. */

@@ -51,6 +51,22 @@ int main(void) {
     CHECK_NEAR(s.clip_radiance.g, 1.0, 1e-6);
     CHECK(photograph_sample(&p, 0.5f, 0.5f, &s) && !s.saturated[0]); /* the neighbour has no weight */
 
+    /* The vignette is divided out, of the clip too: a corner saturates at more radiance. */
+    p.camera.cx = 1.5f;
+    p.camera.cy = 1.0f;
+    p.vignette[0] = -0.25f;
+    p.vignette[1] = -0.5f;
+    double corner = (double)photograph_radius(&p, 2.5f, 1.5f); /* (1 + 0.25) / (2.25 + 1) */
+    double left = exp(-0.25 * corner - 0.5 * corner * corner);
+    CHECK_NEAR(corner, 1.25 / 3.25, 1e-6);
+    CHECK_NEAR(photograph_radius(&p, 3.0f, 2.0f), 1.0, 1e-6);
+    CHECK(photograph_sample(&p, 2.5f, 1.5f, &s) && s.saturated[0]);
+    CHECK_NEAR(s.radiance.r, 4.0 / left, 1e-5);
+    CHECK_NEAR(s.radiance.b, 0.5 / left, 1e-5);
+    CHECK_NEAR(s.clip_radiance.r, 2.0 / left, 1e-5);
+    CHECK(photograph_falloff(&p, 1.5f, 1.0f) == 1.0f);
+    memset(p.vignette, 0, sizeof p.vignette);
+
     p.mask = mem_calloc(6, 1);
     memset(p.mask, 255, 6);
     p.mask[1] = 0;

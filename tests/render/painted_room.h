@@ -1,0 +1,177 @@
+/* painted_room.h -- the small room with radiance painted on its walls, and its photographs: the truth
+ * is a formula, so a capture takes no path tracing and every error can be told exactly.
+ *
+ * Photographs have 2 x 2 samples a pixel and 1 % noise; surfaces are a little brighter towards one
+ * side, as slightly glossy ones are. */
+#ifndef UNBAKE_TESTS_RENDER_PAINTED_ROOM_H
+#define UNBAKE_TESTS_RENDER_PAINTED_ROOM_H
+
+#include "common/rng.h"
+#include "server/reconstruct/views.h"
+#include "server/render/accel.h"
+#include "server/scene/atlas.h"
+#include "tests/render/small_room.h"
+
+#define PAINTED_WIDTH 160
+#define PAINTED_HEIGHT 120
+#define PAINTED_FRAMES 24
+#define PAINTED_TEXTURE 256
+
+struct painted {
+    struct parallel *pool;
+    struct scene scene;
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct accel *accel;
+    struct views views;
+    struct photograph clean[PAINTED_FRAMES]; /* as taken; pixels owned, names not */
+};
+
+/* Evenly distributed in [-1, 1]. */
+static inline float painted_random(uint64_t frame, uint64_t what) {
+    return 2.0f * rng_to_float((uint32_t)rng_key(frame, what, 7)) - 1.0f;
+}
+
+/* Radiance without the part that depends on the view. */
+static inline rgb painted_radiance(int64_t object, vec3 p) {
+    float shade = 0.6f + 0.15f * p.x + 0.1f * p.y + 0.05f * p.z;
+    float wave = sinf(5.0f * p.x + 3.0f * p.y + 1.0f) * sinf(4.0f * p.z - 2.0f * p.y + 6.0f * p.x);
+    float fine = sinf(17.0f * p.x + 5.0f * p.z) * sinf(15.0f * p.y + 9.0f * p.z + 0.5f);
+    return rgb_scale(wall_color[object], shade * (1.0f + 0.35f * wave + 0.35f * fine));
+}
+
+static inline void painted_take(struct painted *room, int frame) {
+    struct photograph *photo = &room->scene.photograph[frame];
+    vec3 origin = camera_origin(&photo->camera);
+    for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++) {
+        rgb sum = {0, 0, 0};
+        for (int k = 0; k < 4; k++) {
+            vec3 direction;
+            struct accel_hit hit;
+            float x = (float)(i % PAINTED_WIDTH) + ((float)(k % 2) + 0.5f) / 2.0f;
+            float y = (float)(i / PAINTED_WIDTH) + ((float)(k / 2) + 0.5f) / 2.0f;
+            if (!camera_direction(&photo->camera, x, y, &direction) ||
+                !accel_intersect(room->accel, origin, direction, 0.0f, INFINITY, &hit))
+                continue;
+            rgb value = painted_radiance(room->scene.mesh.object_id[hit.triangle],
+                                         vec3_mad(origin, hit.distance_m, direction));
+            float gloss = 1.0f + 0.03f * direction.x;
+            sum = rgb_mad(sum, gloss / 4.0f, value);
+        }
+        const float value[3] = {sum.r, sum.g, sum.b};
+        for (size_t c = 0; c < 3; c++) {
+            float noise = 1.0f + 0.0173f * painted_random((uint64_t)frame, 3 * i + c);
+            photo->pixel[i][c] = image_half_from_float(value[c] * noise);
+        }
+    }
+}
+
+/* A capture without faults: HDR frames of exposure 1, every eighth of them held out. */
+static inline void painted_make(struct painted *room, int threads) {
+    struct error err = {0};
+    *room = (struct painted){.pool = parallel_new(threads)};
+    make_mesh(&room->scene.mesh);
+    segments_from_object_id(&room->segments, &room->scene.mesh);
+    CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, &err) ==
+          STATUS_OK);
+    inverse_uv_make(&room->inverse, &room->atlas, room->scene.mesh.triangle_count, room->pool);
+    CHECK(accel_new(&room->accel, &room->scene.mesh, room->pool, &err) == STATUS_OK);
+    room->scene.photograph = mem_calloc(PAINTED_FRAMES, sizeof *room->scene.photograph);
+    room->scene.photograph_count = PAINTED_FRAMES;
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        struct photograph *photo = &room->scene.photograph[f];
+        *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f,
+                                     .gain = {1, 1, 1}, .clip = INFINITY, .is_test = f % 8 == 7};
+        photo->name = mem_printf("frame %d", f);
+        photo->camera = look(spread(f, 0.4f), spread(f * 7 + 3, 0.0f));
+        photo->camera.width = PAINTED_WIDTH;
+        photo->camera.height = PAINTED_HEIGHT;
+        photo->camera.fx = photo->camera.fy = 100.0f;
+        photo->camera.cx = PAINTED_WIDTH / 2.0f;
+        photo->camera.cy = PAINTED_HEIGHT / 2.0f;
+        photo->pixel = mem_array(PAINTED_WIDTH * PAINTED_HEIGHT, sizeof *photo->pixel);
+        painted_take(room, f);
+        room->clean[f] = *photo;
+        room->clean[f].pixel = mem_array(PAINTED_WIDTH * PAINTED_HEIGHT, sizeof *photo->pixel);
+        memcpy(room->clean[f].pixel, photo->pixel, PAINTED_WIDTH * PAINTED_HEIGHT * sizeof *photo->pixel);
+    }
+    views_init(&room->views, &room->scene, &room->segments, room->accel, room->pool);
+}
+
+/* Photographs as they were taken, whatever was done to them. */
+static inline void painted_reset(struct painted *room) {
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        struct photograph *photo = &room->scene.photograph[f];
+        uint16_t(*pixel)[3] = photo->pixel;
+        *photo = room->clean[f];
+        photo->pixel = pixel;
+        memcpy(pixel, room->clean[f].pixel, PAINTED_WIDTH * PAINTED_HEIGHT * sizeof *pixel);
+    }
+}
+
+static inline void painted_release(struct painted *room) {
+    for (int f = 0; f < PAINTED_FRAMES; f++)
+        mem_free(room->clean[f].pixel);
+    views_release(&room->views);
+    accel_free(room->accel);
+    inverse_uv_release(&room->inverse);
+    atlas_release(&room->atlas);
+    segments_release(&room->segments);
+    scene_release(&room->scene);
+    parallel_free(room->pool);
+}
+
+/* Multiplies the stored pixels by gain and the vignette exp(-vignette s); clips. */
+static inline void painted_spoil(struct photograph *photo, rgb gain, float vignette) {
+    const float g[3] = {gain.r, gain.g, gain.b};
+    for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++) {
+        float x = (float)(i % PAINTED_WIDTH) + 0.5f, y = (float)(i / PAINTED_WIDTH) + 0.5f;
+        float falloff = expf(-vignette * photograph_radius(photo, x, y));
+        for (size_t c = 0; c < 3; c++) {
+            float value = image_float_from_half(photo->pixel[i][c]) * g[c] * falloff;
+            photo->pixel[i][c] = image_half_from_float(fminf(value, photo->clip));
+        }
+    }
+}
+
+/* Fuses the photographs at an even choice of texels and compares with the truth: rms of the
+ * logarithm's error, all channels, after the mean error (a matter of units) is taken off. */
+static inline double painted_error(const struct painted *room) {
+    double sum = 0.0, squares = 0.0, count = 0.0;
+    for (size_t i = 0; i < room->inverse.valid_count; i += 37) {
+        uint32_t texel = room->inverse.valid[i], triangle;
+        float b1, b2;
+        if (!inverse_uv_lookup(&room->inverse, &room->atlas, (float)(texel % PAINTED_TEXTURE) + 0.5f,
+                               (float)(texel / PAINTED_TEXTURE) + 0.5f, &triangle, &b1, &b2))
+            continue;
+        vec3 point = mesh_point(&room->scene.mesh, triangle, b1, b2);
+        vec3 normal = vec3_normalize(mesh_cross(&room->scene.mesh, triangle));
+        rgb truth = painted_radiance(room->scene.mesh.object_id[triangle], point);
+        double fused[3] = {0}, weight = 0.0;
+        for (uint32_t t = 0; t < room->views.train_count; t++) {
+            struct view view;
+            struct photograph_sample s;
+            const struct photograph *photo = &room->scene.photograph[room->views.train[t]];
+            if (!views_sees(&room->views, t, point, normal, &view) || !views_clean(&room->views, &view) ||
+                !photograph_sample(photo, view.x, view.y, &s) || s.saturated[0] || s.saturated[1] ||
+                s.saturated[2])
+                continue;
+            double w = (double)view.weight;
+            fused[0] += w * log((double)s.radiance.r);
+            fused[1] += w * log((double)s.radiance.g);
+            fused[2] += w * log((double)s.radiance.b);
+            weight += w;
+        }
+        const double wanted[3] = {log((double)truth.r), log((double)truth.g), log((double)truth.b)};
+        for (int c = 0; c < 3 && weight > 0.0; c++) {
+            double error = fused[c] / weight - wanted[c];
+            sum += error;
+            squares += error * error;
+            count += 1.0;
+        }
+    }
+    return sqrt(squares / count - sum * sum / (count * count));
+}
+
+#endif

@@ -1,0 +1,127 @@
+/* calibrate_light.h: drift, white balance and vignette are put into a capture and found again; a
+ * capture without them is left alone. */
+#include "server/reconstruct/calibrate_light.h"
+
+#include "tests/render/painted_room.h"
+
+static struct light_found run(struct painted *room, bool faults) {
+    struct light_found found;
+    calibrate_light(&room->scene, &room->views, &room->atlas, &room->inverse, faults, room->pool, &found);
+    return found;
+}
+
+/* Largest error of the frames' gains, after each channel's mean (a matter of units) is taken off. */
+static double worst_gain(const struct painted *room, const rgb *truth) {
+    double worst = 0.0;
+    for (int c = 0; c < 3; c++) {
+        double error[PAINTED_FRAMES], mean = 0.0;
+        for (size_t t = 0; t < room->views.train_count; t++) {
+            const struct photograph *photo = &room->scene.photograph[room->views.train[t]];
+            const rgb *wanted = &truth[room->views.train[t]];
+            const float gain[3] = {photo->gain.r / wanted->r, photo->gain.g / wanted->g,
+                                   photo->gain.b / wanted->b};
+            error[t] = log((double)(gain[c] * photo->exposure));
+            mean += error[t] / (double)room->views.train_count;
+        }
+        for (size_t t = 0; t < room->views.train_count; t++)
+            worst = fmax(worst, fabs(error[t] - mean));
+    }
+    return worst;
+}
+
+static double worst_vignette(const struct painted *room, double truth) {
+    double worst = 0.0;
+    for (int i = 0; i <= 10; i++) {
+        const float *v = room->scene.photograph[0].vignette;
+        double s = i / 10.0;
+        double found = s * ((double)v[0] + s * ((double)v[1] + s * (double)v[2]));
+        worst = fmax(worst, fabs(found + truth * s));
+    }
+    return worst;
+}
+
+static void test_clean(struct painted *room) {
+    painted_reset(room);
+    struct light_found found = run(room, true);
+    CHECK(!found.drift && !found.white_balance && !found.vignette && found.exposures_solved == 0);
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        const struct photograph *photo = &room->scene.photograph[f];
+        CHECK(photo->exposure == 1.0f && photo->gain.r == 1.0f && photo->gain.g == 1.0f &&
+              photo->gain.b == 1.0f && photo->vignette[0] == 0.0f);
+    }
+}
+
+/* Only the first frame tells its exposure; the others have gains between 1/4 and 4. */
+static void test_unknown(struct painted *room) {
+    rgb truth[PAINTED_FRAMES];
+    painted_reset(room);
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        truth[f] = rgb_gray(f == 0 ? 1.0f : powf(4.0f, painted_random((uint64_t)f, 1)));
+        painted_spoil(&room->scene.photograph[f], truth[f], 0.0f);
+        room->scene.photograph[f].exposure_known = f == 0;
+    }
+    struct light_found found = run(room, false);
+    CHECK(found.exposures_solved == room->views.train_count - 1);
+    CHECK_THAT(worst_gain(room, truth) < 0.02, "off by %.4f", worst_gain(room, truth));
+    CHECK_THAT(found.spread_after < 0.1 * found.spread_before, "%.4f", found.spread_after);
+    CHECK(room->scene.photograph[0].exposure == 1.0f && room->scene.photograph[0].gain.r == 1.0f);
+    /* A held-out frame is not touched. */
+    CHECK(room->scene.photograph[7].is_test && room->scene.photograph[7].exposure == 1.0f);
+}
+
+/* Frames that claim exposure 1 drift by up to `drift`, their colours by up to `color`, and all have
+ * the vignette. What is found must be within 2 %, and fusing must get better by `factor`. */
+static void test_faults(struct painted *room, float drift, float color, float vignette, double factor) {
+    rgb truth[PAINTED_FRAMES];
+    painted_reset(room);
+    for (uint64_t f = 0; f < PAINTED_FRAMES; f++) {
+        float level = drift * painted_random(f, 1), warm = color * painted_random(f, 2);
+        truth[f] = rgb_make(expf(level + warm), expf(level), expf(level - warm));
+        painted_spoil(&room->scene.photograph[f], truth[f], vignette);
+    }
+    double before = painted_error(room);
+    struct light_found found = run(room, true);
+    double after = painted_error(room);
+    printf("drift %.2f color %.2f vignette %.2f: gains within %.4f, vignette within %.4f, spread %.4f -> "
+           "%.4f, fused error %.4f -> %.4f\n",
+           (double)drift, (double)color, (double)vignette, worst_gain(room, truth),
+           worst_vignette(room, (double)vignette), found.spread_before, found.spread_after, before, after);
+    CHECK(found.drift == (drift > 0.0f) && found.white_balance == (color > 0.0f) &&
+          found.vignette == (vignette > 0.0f));
+    CHECK(worst_gain(room, truth) < 0.02);
+    CHECK(worst_vignette(room, (double)vignette) < 0.02);
+    CHECK_THAT(before > factor * after, "%.4f, then %.4f", before, after);
+}
+
+/* The photographs as the last test left them, calibrated again by another number of threads. */
+static void test_threads(struct painted *room) {
+    struct light_found found;
+    struct photograph first[PAINTED_FRAMES];
+    memcpy(first, room->scene.photograph, sizeof first);
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        room->scene.photograph[f].gain = rgb_gray(1.0f);
+        memset(room->scene.photograph[f].vignette, 0, sizeof first[f].vignette);
+    }
+    struct parallel *pool = parallel_new(3);
+    calibrate_light(&room->scene, &room->views, &room->atlas, &room->inverse, true, pool, &found);
+    parallel_free(pool);
+    for (int f = 0; f < PAINTED_FRAMES; f++) {
+        const struct photograph *photo = &room->scene.photograph[f];
+        CHECK(memcmp(&photo->gain, &first[f].gain, sizeof photo->gain) == 0);
+        CHECK(memcmp(photo->vignette, first[f].vignette, sizeof photo->vignette) == 0);
+    }
+}
+
+int main(void) {
+    struct painted room;
+    painted_make(&room, 1);
+    test_clean(&room);
+    test_unknown(&room);
+    test_faults(&room, 0.15f, 0.0f, 0.0f, 1.5);
+    test_faults(&room, 0.0f, 0.15f, 0.0f, 1.5);
+    test_faults(&room, 0.0f, 0.0f, 0.4f, 2.0);
+    test_faults(&room, 0.15f, 0.15f, 0.4f, 2.0);
+    test_threads(&room);
+    painted_release(&room);
+    return check_result();
+}
