@@ -277,11 +277,7 @@ static size_t state_arrays(struct refine *f, struct state_array *array) {
     size_t texels = (size_t)m->base_color.width * m->base_color.height;
     size_t n = 0;
 #define ADD(name_, data_, bytes_) array[n++] = (struct state_array){name_, data_, bytes_}
-#define ADD_ADAM(name_, adam_)                                                                  \
-    ADD(name_ ".mean", (adam_)->mean, (adam_)->count * (size_t)(adam_)->width * sizeof(float)); \
-    ADD(name_ ".square", (adam_)->square,                                                       \
-        (adam_)->count * (size_t)(adam_)->width * sizeof(float));                               \
-    ADD(name_ ".touches", (adam_)->touch_count, (adam_)->count * sizeof(uint16_t))
+#define ADD_ADAM(name_, adam_) ADD(name_ ".adam", (adam_)->record, adam_bytes(adam_))
     ADD("counters", &f->counters, sizeof f->counters);
     ADD("base_color", m->base_color.texel, texels * sizeof *m->base_color.texel);
     ADD("roughness", m->roughness, segments * sizeof *m->roughness);

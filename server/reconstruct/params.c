@@ -28,6 +28,7 @@
 #define MATCH_PRIOR 12.0f
 
 #define CHUNK 1024 /* touched texels a work item */
+#define AHEAD 16   /* texels under way to the cache */
 
 static size_t blocks_across(uint32_t texels, int level) {
     return ((size_t)texels + ((size_t)1 << level) - 1) >> level;
@@ -83,7 +84,7 @@ void params_set_level(struct params *p, int level) {
 }
 
 void params_refine(struct params *p, int level) {
-    adam_reset(&p->base_color, block_count(p, p->level));
+    adam_reset(&p->base_color, 0, block_count(p, p->level));
     params_set_level(p, level);
 }
 
@@ -113,6 +114,14 @@ static void step_texels(void *user, size_t chunk, int thread) {
     size_t end = (chunk + 1) * CHUNK < job->count ? (chunk + 1) * CHUNK : job->count;
     for (size_t i = chunk * CHUNK; i < end; i++) {
         uint32_t texel = job->gradient->texel[i];
+        if (i + AHEAD < job->count) {
+            /* At a random place a step is little arithmetic and three trips to memory. (Not in a
+             * function of its own: GCC finds that it does nothing and leaves it out.) */
+            uint32_t later = job->gradient->texel[i + AHEAD];
+            __builtin_prefetch(adam_record(&job->p->base_color, later), 1);
+            __builtin_prefetch(job->p->materials->base_color.texel[later], 1);
+            __builtin_prefetch(&job->p->inverse->triangle[later]);
+        }
         const rgb *d = &job->gradient->d_base_color[i];
         float gradient[3] = {d->r, d->g, d->b}, step[3];
         adam_touch(&job->p->base_color, texel, gradient, step);
@@ -229,11 +238,10 @@ void params_match(struct params *p, uint32_t texel, const struct loss_match *mat
     struct texture *texture = &p->materials->base_color;
     size_t across = blocks_across(texture->width, p->level);
     size_t bx = texel % texture->width >> p->level, by = texel / texture->width >> p->level;
-    uint16_t *looks = &p->base_color.touch_count[by * across + bx];
+    float *looks = &adam_record(&p->base_color, by * across + bx)[0];
     float prior = MATCH_PRIOR * (float)(1 << (p->coarsest - p->level));
-    float step = 2.0f * trust / ((float)*looks + prior);
-    if (*looks < UINT16_MAX)
-        ++*looks;
+    float step = 2.0f * trust / (*looks + prior);
+    *looks += 1.0f;
     step *= slowdown(p, texel);
     float factor[3];
     for (int c = 0; c < 3; c++)
@@ -261,9 +269,7 @@ void params_set_emission(struct params *p, size_t segment, rgb emission) {
     p->log_emission[segment][0] = log_emission(emission.r);
     p->log_emission[segment][1] = log_emission(emission.g);
     p->log_emission[segment][2] = log_emission(emission.b);
-    memset(p->emission.mean + 3 * segment, 0, 3 * sizeof *p->emission.mean);
-    memset(p->emission.square + 3 * segment, 0, 3 * sizeof *p->emission.square);
-    p->emission.touch_count[segment] = 0;
+    adam_reset(&p->emission, segment, 1);
 }
 
 void params_fill_unseen(struct params *p, const float *count) {
@@ -284,7 +290,7 @@ void params_fill_unseen(struct params *p, const float *count) {
         const double *s = sum[p->segments->of_triangle[inverse->triangle[texel]]];
         size_t block = (texel / texture->width >> p->level) * across +
                        (texel % texture->width >> p->level);
-        if (count[texel] > 0.0f || p->base_color.touch_count[block] > 0 || !(s[3] > 0.0))
+        if (count[texel] > 0.0f || adam_touches(&p->base_color, block) > 0.0f || !(s[3] > 0.0))
             continue;
         for (int c = 0; c < 3; c++)
             texture->texel[texel][c] = (float)(s[c] / s[3]);
