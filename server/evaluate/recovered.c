@@ -230,6 +230,19 @@ static enum status take_segment_values(struct recovered *r, const char *dir, str
     return status;
 }
 
+/* Distant light; most rooms have none. */
+static enum status take_environment(struct recovered *r, const char *dir, struct parallel *pool,
+                                    struct error *err) {
+    struct image map = {0};
+    char *path = file_join(dir, "environment.exr");
+    enum status status = image_read(path, &map, NULL, err);
+    if (status == STATUS_OK)
+        world_set_environment(&r->world, &map, pool);
+    image_release(&map);
+    mem_free(path);
+    return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+}
+
 enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
                            struct recovered *r, struct error *err) {
     struct charted charted = {0};
@@ -250,6 +263,8 @@ enum status recovered_load(const char *dir, const struct mesh *mesh, struct para
     status = take_segment_values(r, dir, err);
     if (status == STATUS_OK)
         status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, pool, err);
+    if (status == STATUS_OK)
+        status = take_environment(r, dir, pool, err);
 out:
     image_release(&base_color);
     if (status != STATUS_OK)

@@ -127,6 +127,38 @@ static enum status make_folder(const struct export *e, const char *name, struct 
     return status;
 }
 
+/* --- distant light ------------------------------------------------------------------------ */
+
+#define ENVIRONMENT_TITLE "Distant light"
+#define ENVIRONMENT_ABOUT                                                                     \
+    "by latitude and longitude, what the photographs show where they look out of the room; "  \
+    "dimmed in the preview where it was filled in"
+
+static enum status put_environment_preview(struct export *e, struct error *err) {
+    struct image image;
+    if (!e->input->environment)
+        return STATUS_OK;
+    picture_environment(e->input, &image);
+    enum status status = put_image(e, EVENT_PREVIEW, "preview/environment.png", &image, FORMAT_PNG,
+                                   ENVIRONMENT_ABOUT, err);
+    image_release(&image);
+    return status;
+}
+
+static enum status put_environment(struct export *e, struct error *err) {
+    const struct export_input *in = e->input;
+    if (!in->environment)
+        return STATUS_OK;
+    enum status status = put_image(e, EVENT_OUTPUT, "environment.exr", in->environment, FORMAT_EXR_FLOAT,
+                                   ENVIRONMENT_ABOUT, err);
+    if (status == STATUS_OK)
+        status = put_image(e, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
+                           FORMAT_EXR_FLOAT,
+                           "photographs by direction, 0 where it was filled in, and the spread of what they show",
+                           err);
+    return status;
+}
+
 /* --- previews and textures ---------------------------------------------------------------- */
 
 static enum status put_previews(struct export *e, struct error *err) {
@@ -141,7 +173,7 @@ static enum status put_previews(struct export *e, struct error *err) {
         status = put_image(e, EVENT_PREVIEW, name, &image, FORMAT_PNG, kinds[k].about, err);
         image_release(&image);
     }
-    return status;
+    return status == STATUS_OK ? put_environment_preview(e, err) : status;
 }
 
 static enum status put_textures(struct export *e, struct error *err) {
@@ -243,19 +275,22 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
     size_t shown = e->input->comparison_count;
     if (shown > PAGE_COMPARISONS)
         shown = PAGE_COMPARISONS;
-    struct report_picture texture[KIND_COUNT];
+    struct report_picture texture[KIND_COUNT + 1];
+    size_t texture_count = KIND_COUNT + (e->input->environment ? 1 : 0);
     struct report_picture *comparison = mem_array(shown, sizeof *comparison);
     for (size_t k = 0; k < KIND_COUNT; k++)
         texture[k] = (struct report_picture){
             mem_printf("%s/preview/%s.png", e->dir, kinds[k].stem), kinds[k].title,
             kinds[k].about};
+    texture[KIND_COUNT] = (struct report_picture){file_join(e->dir, "preview/environment.png"),
+                                                  ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
     for (size_t i = 0; i < shown; i++) {
         char name[64];
         comparison_file(name, i);
         comparison[i] = (struct report_picture){file_join(e->dir, name),
                                                 e->input->comparison[i].name, NULL};
     }
-    struct report_page page = {e->input->title, report, KIND_COUNT, shown, texture, comparison};
+    struct report_page page = {e->input->title, report, texture_count, shown, texture, comparison};
     struct buf html;
     buf_init(&html, PAGE_LIMIT);
     enum status status = report_html(&page, &html, err);
@@ -265,7 +300,7 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
     for (size_t i = 0; i < shown; i++)
         mem_free((char *)comparison[i].path);
     mem_free(comparison);
-    for (size_t k = 0; k < KIND_COUNT; k++)
+    for (size_t k = 0; k <= KIND_COUNT; k++)
         mem_free((char *)texture[k].path);
     return status;
 }
@@ -298,6 +333,8 @@ enum status export_outputs(const char *dir, const struct export_input *input,
     enum status status = put_previews(&e, err);
     if (status == STATUS_OK)
         status = put_textures(&e, err);
+    if (status == STATUS_OK)
+        status = put_environment(&e, err);
     if (status == STATUS_OK)
         status = put_mesh(&e, err);
     if (status == STATUS_OK)

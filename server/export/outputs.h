@@ -9,7 +9,13 @@
  *                    values continue EXPORT_MARGIN texels beyond the charts, so that other
  *                    renderers may filter and make mipmaps
  *   confidence.exr   float: `count` observations and `spread` of their radiance, by texel
+ *   environment.exr  float: distant light, R G B by latitude and longitude (the column over the width is
+ *                    atan2(x, -z) / 2 pi modulo 1, the row over the height acos(y) / pi), where
+ *                    some was seen
+ *   environment_confidence.exr   float: by direction the `count` of photographs that show it, 0 where it
+ *                    was filled in, and the `spread` of what they show
  *   preview/base_color.png roughness.png specular.png emission.png confidence.png
+ *           environment.png
  *                    at most EXPORT_PREVIEW_SIZE texels a side
  *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
@@ -51,6 +57,8 @@ struct export_input {
     const float *confidence_count;     /* [height][width] observations; NULL while not known: */
     const float *confidence_spread;    /* [height][width] their spread;  then no preview of it */
     const bool *is_emitter;            /* [segment_count] */
+    const struct image *environment;   /* R G B; NULL: no distant light; */
+    const struct image *environment_confidence; /* count, spread; NULL as the former */
     size_t comparison_count;
     const struct export_comparison *comparison;
     /* An object. report.json is this plus "segments" (one entry each) and "files". The page draws

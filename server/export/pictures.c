@@ -183,6 +183,34 @@ void picture_preview(const struct export_input *input, enum picture_kind kind,
     }
 }
 
+#define ENVIRONMENT_GRAY 0.2f
+
+void picture_environment(const struct export_input *input, struct image *image) {
+    const struct image *map = input->environment, *known = input->environment_confidence;
+    uint32_t step = (map->width + EXPORT_PREVIEW_SIZE - 1) / EXPORT_PREVIEW_SIZE;
+    double roots = 0.0, seen = 0.0; /* the mean root is little moved by a sun */
+    for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
+        const float *p = map->pixel + i * map->channel_count;
+        if (known->pixel[i * known->channel_count] > 0.0f) {
+            roots += sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
+            seen += 1.0;
+        }
+    }
+    float scale = roots > 0.0 ? ENVIRONMENT_GRAY * (float)(seen * seen / (roots * roots)) : 1.0f;
+    image_init(image, map->width / step, map->height / step, 3, rgb_channel);
+    for (uint32_t y = 0; y < image->height; y++) {
+        for (uint32_t x = 0; x < image->width; x++) {
+            float *out = &image->pixel[((size_t)y * image->width + x) * 3];
+            for (uint32_t k = 0; k < step * step; k++) {
+                size_t at = (size_t)(y * step + k / step) * map->width + x * step + k % step;
+                float shown = known->pixel[at * known->channel_count] > 0.0f ? 1.0f : 0.5f;
+                for (size_t c = 0; c < 3; c++)
+                    out[c] += shown * scale * map->pixel[at * map->channel_count + c] / (float)(step * step);
+            }
+        }
+    }
+}
+
 /* --- side-by-sides ------------------------------------------------------------------------ */
 
 static rgb pixel_at(const struct image *image, size_t pixel) {

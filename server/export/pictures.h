@@ -33,6 +33,10 @@ void picture_texture(const struct export_input *input, enum picture_kind kind,
 void picture_preview(const struct export_input *input, enum picture_kind kind,
                      struct image *image);
 
+/* The environment with the typical luminance of what was seen at mid grey; what was filled in is
+ * at half its brightness. There must be one. */
+void picture_environment(const struct export_input *input, struct image *image);
+
 /* Photograph | re-render | signed relative difference of luminance (red: the re-render is too
  * bright, blue: too dark, white: equal). One exposure for both pictures, chosen from the
  * photograph. */

@@ -105,8 +105,18 @@ static enum status prepare(struct run *run, struct error *err) {
     return STATUS_OK;
 }
 
+/* Needs exposures; lights the room from here on. */
+static void make_environment(struct run *run) {
+    struct reconstruction *r = run->r;
+    if (!environment_make(&r->environment, &run->views, r->pool))
+        return;
+    world_set_environment(&r->world, &r->environment.map, r->pool);
+    json_add(r->report, "environment", environment_figures(&r->environment));
+}
+
 static enum status observe(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
+    make_environment(run);
     observed_make(&run->r->observed, &run->views, &run->r->atlas, &run->r->inverse, run->r->pool);
     return STATUS_OK;
 }
@@ -148,6 +158,7 @@ void reconstruct_release(struct reconstruction *r) {
     }
     mem_free(r->held_out);
     mem_free(r->is_emitter);
+    environment_release(&r->environment);
     observed_release(&r->observed);
     world_release(&r->world);
     materials_release(&r->materials);

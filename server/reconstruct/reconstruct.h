@@ -16,6 +16,7 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"
+#include "server/reconstruct/environment.h"
 #include "server/reconstruct/state.h"
 #include "server/reconstruct/observe.h"
 #include "server/render/world.h"
@@ -63,6 +64,7 @@ struct reconstruction {
     struct materials materials;
     struct world world;
     struct observed observed;        /* what the photographs show of each texel */
+    struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
     bool *is_emitter;                /* [segment_count]; owned */
     size_t held_out_count;
     struct held_out *held_out;       /* [held_out_count]; owned */

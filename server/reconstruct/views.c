@@ -16,11 +16,13 @@
 #define EDGE_FOOTPRINTS 3.0f
 #define EDGE_RELATIVE 0.002f
 
+#define NO_SURFACE UINT32_MAX
+
 struct corner {
     vec3 point;
     vec3 normal;
     float distance_m;
-    uint32_t segment; /* UINT32_MAX: no surface */
+    uint32_t segment; /* or NO_SURFACE */
 };
 
 struct edge_job {
@@ -29,9 +31,15 @@ struct edge_job {
     uint32_t train;
 };
 
+static bool hits_centre(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
+    vec3 direction;
+    return !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
+           accel_occluded(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY);
+}
+
 static struct corner trace_corner(const struct edge_job *job, const struct camera *camera,
                                   uint32_t x, uint32_t y) {
-    struct corner corner = {.segment = UINT32_MAX};
+    struct corner corner = {.segment = NO_SURFACE};
     vec3 direction;
     struct accel_hit hit;
     vec3 origin = camera_origin(camera);
@@ -48,7 +56,7 @@ static struct corner trace_corner(const struct edge_job *job, const struct camer
 static bool differ(const struct corner *a, const struct corner *b, float focal) {
     if (a->segment != b->segment)
         return true;
-    if (a->segment == UINT32_MAX)
+    if (a->segment == NO_SURFACE)
         return false;
     vec3 between = vec3_sub(b->point, a->point);
     float slack = a->distance_m * (EDGE_FOOTPRINTS / focal + EDGE_RELATIVE);
@@ -62,15 +70,19 @@ static void mark_row(void *user, size_t row, int thread) {
     const struct edge_job *job = user;
     const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
     const struct camera *camera = &photo->camera;
-    uint8_t *out = job->views->straddles[job->train] + row * camera->width;
+    uint8_t *out = job->views->shows[job->train] + row * camera->width;
     uint32_t y = (uint32_t)row;
     struct corner left_top = trace_corner(job, camera, 0, y);
     struct corner left_low = trace_corner(job, camera, 0, y + 1);
     for (uint32_t x = 0; x < camera->width; x++) {
         struct corner top = trace_corner(job, camera, x + 1, y);
         struct corner low = trace_corner(job, camera, x + 1, y + 1);
-        out[x] = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
-                 differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
+        bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
+                     differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
+        out[x] = mixed ? VIEWS_MIXED : VIEWS_SURFACE;
+        /* What is thinner than a pixel may hide between the corners. */
+        if (!mixed && low.segment == NO_SURFACE)
+            out[x] = hits_centre(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
         left_top = top;
         left_low = low;
     }
@@ -106,14 +118,14 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
                 const struct accel *accel, struct parallel *pool) {
     *v = (struct views){.scene = scene, .accel = accel};
     v->train = mem_array(scene->photograph_count, sizeof *v->train);
-    v->straddles = mem_array(scene->photograph_count, sizeof *v->straddles);
+    v->shows = mem_array(scene->photograph_count, sizeof *v->shows);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
             v->train[v->train_count++] = (uint32_t)i;
     }
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct camera *camera = &scene->photograph[v->train[t]].camera;
-        v->straddles[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
         struct edge_job job = {.views = v, .segments = segments, .train = t};
         parallel_for(pool, camera->height, mark_row, &job);
     }
@@ -122,8 +134,8 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
 
 void views_release(struct views *v) {
     for (size_t t = 0; t < v->train_count; t++)
-        mem_free(v->straddles[t]);
-    mem_free(v->straddles);
+        mem_free(v->shows[t]);
+    mem_free(v->shows);
     mem_free(v->train);
     *v = (struct views){0};
 }
@@ -148,19 +160,28 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, 
     return true;
 }
 
-bool views_clean(const struct views *v, const struct view *view) {
-    const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
-    const uint8_t *straddles = v->straddles[view->train];
-    long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
-    for (long dy = 0; dy < 2; dy++) {
-        for (long dx = 0; dx < 2; dx++) {
-            long x = x0 + dx, y = y0 + dy;
-            if (x >= 0 && y >= 0 && x < (long)camera->width && y < (long)camera->height &&
-                straddles[y * (long)camera->width + x])
+/* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show
+ * `wanted`. */
+static bool all_show(const struct views *v, uint32_t train, float x, float y, int margin, uint8_t wanted) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    const uint8_t *shows = v->shows[train];
+    long x0 = (long)floorf(x - 0.5f), y0 = (long)floorf(y - 0.5f);
+    for (long row = y0 - margin; row <= y0 + 1 + margin; row++) {
+        for (long column = x0 - margin; column <= x0 + 1 + margin; column++) {
+            if (column >= 0 && row >= 0 && column < (long)camera->width && row < (long)camera->height &&
+                shows[row * (long)camera->width + column] != wanted)
                 return false;
         }
     }
     return true;
+}
+
+bool views_clean(const struct views *v, const struct view *view) {
+    return all_show(v, view->train, view->x, view->y, 0, VIEWS_SURFACE);
+}
+
+bool views_open(const struct views *v, uint32_t train, float x, float y, int margin) {
+    return all_show(v, train, x, y, margin, VIEWS_OPEN);
 }
 
 size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, size_t max,

@@ -2,7 +2,9 @@
  *
  * A photograph is consulted only where it is clean: a pixel whose four corner rays meet another
  * segment or a depth edge mixes two surfaces, and its value belongs to neither. Where no
- * photograph of a point is clean the unclean ones are taken. Held-out frames are never used. */
+ * photograph of a point is clean the unclean ones are taken. A pixel whose corner rays and whose
+ * centre's ray meet no surface at all shows distant light (environment.h). Held-out frames are
+ * never used. */
 #ifndef UNBAKE_RECONSTRUCT_VIEWS_H
 #define UNBAKE_RECONSTRUCT_VIEWS_H
 
@@ -17,12 +19,15 @@
 
 #define VIEWS_PICK_MAX 64
 
+/* What a pixel shows. */
+enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN };
+
 struct views {
     const struct scene *scene;  /* borrowed */
     const struct accel *accel;  /* borrowed */
     size_t train_count;
     uint32_t *train;            /* [train_count] photographs that may be used; owned */
-    uint8_t **straddles;        /* [train_count][height * width] 1: the pixel mixes surfaces; owned */
+    uint8_t **shows;            /* [train_count][height * width] VIEWS_SURFACE: one surface, ...; owned */
     float median_radiance;      /* of the training pixels (mean of the channels) */
 };
 
@@ -46,6 +51,10 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometri
 
 /* Whether all four pixels that a look-up at the view's place reads are clean. */
 bool views_clean(const struct views *v, const struct view *view);
+
+/* Whether nothing but distant light is in the pixels that a look-up at a place reads and in all
+ * within `margin` pixels of them (those outside of the picture do not count). */
+bool views_open(const struct views *v, uint32_t train, float x, float y, int margin);
 
 /* Up to `max` (at most VIEWS_PICK_MAX) photographs that see the point, in an order drawn by
  * `key`; clean ones only, unless there is none. Returns their number. */

@@ -9,16 +9,22 @@
 
 #define PI 3.14159265358979323846
 #define GUIDE_DENSITY 4 /* entries of a table's guide per entry */
+/* The least that a direction's reach is taken for, as a part of the mean over the light. */
+#define LEAST_REACH 0.1
+/* The least part of the samples that either of environment and emitters gets. */
+#define LEAST_CHANCE 0.05f
 
-/* weight[count] >= 0, not all 0. */
+/* weight[count] >= 0; of weights that are all 0 no table is made. */
 static void table_make(struct light_table *t, size_t count, const float *weight) {
-    t->count = count;
     t->total = 0.0;
+    for (size_t i = 0; i < count; i++)
+        t->total += (double)weight[i];
+    if (!(t->total > 0.0))
+        return;
+    t->count = count;
     t->cumulative = mem_array(count + 1, sizeof *t->cumulative);
     t->guide_count = count * GUIDE_DENSITY;
     t->guide = mem_array(t->guide_count, sizeof *t->guide);
-    for (size_t i = 0; i < count; i++)
-        t->total += weight[i];
     double sum = 0.0;
     for (size_t i = 0; i < count; i++) {
         t->cumulative[i] = (float)(sum / t->total);
@@ -46,13 +52,8 @@ static float row_sine(const struct lights *l, size_t row) {
     return (float)sin(PI * ((double)row + 0.5) / (double)(l->height - 1));
 }
 
-struct lights *lights_new(const struct image *environment) {
-    struct lights *l = mem_calloc(1, sizeof *l);
-    if (!environment || environment->height < 2)
-        return l;
-    assert(environment->channel_count >= 3);
-    l->width = environment->width;
-    l->height = environment->height;
+/* Copies the pixels; the first column comes again behind the last. */
+static void take_pixels(struct lights *l, const struct image *environment) {
     size_t stride = (size_t)l->width + 1;
     l->environment = mem_array(stride * l->height, sizeof *l->environment);
     for (size_t y = 0; y < l->height; y++) {
@@ -64,25 +65,85 @@ struct lights *lights_new(const struct image *environment) {
                     isfinite(pixel[c]) && pixel[c] > 0.0f ? pixel[c] : 0.0f;
         }
     }
+}
+
+/* Luminance of a cell times the sine of its polar angle. */
+static float cell_light(const struct lights *l, size_t x, size_t y) {
+    size_t stride = (size_t)l->width + 1;
+    float sum = 0.0f;
+    for (size_t k = 0; k < 4; k++) {
+        const float *p = l->environment[(y + k / 2) * stride + x + k % 2];
+        sum += rgb_luminance((rgb){p[0], p[1], p[2]});
+    }
+    return 0.25f * sum * row_sine(l, y);
+}
+
+/* The reach of a cell of the map. */
+static float cell_share(const struct lights *l, const struct reach *reach, size_t x, size_t y) {
+    return reach ? reach_share(reach, ((double)x + 1.0) / l->width, ((double)y + 0.5) / (l->height - 1)) : 1.0f;
+}
+
+static void make_cells(struct lights *l, const struct reach *reach) {
     size_t cell_count = (size_t)l->width * (l->height - 1);
     float *weight = mem_array(cell_count, sizeof *weight);
-    double total = 0.0;
-    for (size_t y = 0; y + 1 < l->height; y++) {
-        for (size_t x = 0; x < l->width; x++) {
-            float sum = 0.0f;
-            for (size_t k = 0; k < 4; k++) {
-                const float *p = l->environment[(y + k / 2) * stride + x + k % 2];
-                sum += rgb_luminance((rgb){p[0], p[1], p[2]});
-            }
-            weight[y * l->width + x] = sum * row_sine(l, y);
-            total += weight[y * l->width + x];
-        }
+    double shines = 0.0, arrives = 0.0;
+    for (size_t i = 0; i < cell_count; i++) {
+        weight[i] = cell_light(l, i % l->width, i / l->width);
+        shines += (double)weight[i];
+        arrives += (double)(weight[i] * cell_share(l, reach, i % l->width, i / l->width));
     }
-    if (total > 0.0) {
-        table_make(&l->cells, cell_count, weight);
-        l->environment_chance = 1.0f;
-    }
+    /* What no ray of the reach has found may yet be there. */
+    float least = arrives > 0.0 ? (float)(LEAST_REACH * arrives / shines) : 1.0f;
+    for (size_t i = 0; i < cell_count; i++)
+        weight[i] *= fmaxf(least, cell_share(l, reach, i % l->width, i / l->width));
+    double cell_angle = 2.0 * PI * PI / ((double)l->width * (double)(l->height - 1));
+    l->environment_power = reach ? arrives * cell_angle * reach->area : -1.0;
+    table_make(&l->cells, cell_count, weight);
     mem_free(weight);
+}
+
+static float chance_of_environment(const struct lights *l) {
+    double emitter_power = PI * l->triangles.total;
+    if (!(l->cells.total > 0.0))
+        return 0.0f;
+    if (!(emitter_power > 0.0))
+        return 1.0f;
+    if (l->environment_power < 0.0)
+        return 0.5f;
+    double share = l->environment_power / (l->environment_power + emitter_power);
+    return clampf((float)share, LEAST_CHANCE, 1.0f - LEAST_CHANCE);
+}
+
+/* Shares samples out between environment and emitters, after either changed. */
+static void share_samples(struct lights *l) {
+    l->environment_chance = chance_of_environment(l);
+    if (!(l->triangles.total > 0.0))
+        return;
+    for (size_t s = 0; s < l->segment_count; s++)
+        l->area_density[s] = (float)((1.0 - (double)l->environment_chance) *
+                                     fmax(0.0, (double)rgb_luminance(l->emission[s])) / l->triangles.total);
+    for (size_t i = 0; i < l->triangle_count; i++)
+        l->triangle[i].density = l->area_density[l->triangle[i].segment];
+}
+
+void lights_set_environment(struct lights *l, const struct image *environment, const struct reach *reach) {
+    table_release(&l->cells);
+    mem_free(l->environment);
+    l->environment = NULL;
+    l->width = l->height = 0;
+    if (environment && environment->height >= 2) {
+        assert(environment->channel_count >= 3);
+        l->width = environment->width;
+        l->height = environment->height;
+        take_pixels(l, environment);
+        make_cells(l, reach);
+    }
+    share_samples(l);
+}
+
+struct lights *lights_new(const struct image *environment) {
+    struct lights *l = mem_calloc(1, sizeof *l);
+    lights_set_environment(l, environment, NULL);
     return l;
 }
 
@@ -129,18 +190,8 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
         l->triangle[at++] = (struct light_triangle){
             .corner = a, .edge1 = edge1, .edge2 = edge2, .radiance = l->emission[segment], .segment = segment};
     }
-    double total = 0.0;
-    for (size_t i = 0; i < l->triangle_count; i++)
-        total += power[i];
-    l->environment_chance = l->cells.total > 0.0 ? (total > 0.0 ? 0.5f : 1.0f) : 0.0f;
-    if (total > 0.0) {
-        table_make(&l->triangles, l->triangle_count, power);
-        for (size_t s = 0; s < segments->count; s++)
-            l->area_density[s] = (float)((1.0 - (double)l->environment_chance) *
-                                         fmax(0.0, (double)rgb_luminance(l->emission[s])) / total);
-        for (size_t i = 0; i < l->triangle_count; i++)
-            l->triangle[i].density = l->area_density[l->triangle[i].segment];
-    }
+    table_make(&l->triangles, l->triangle_count, power);
+    share_samples(l);
     mem_free(power);
 }
 

@@ -2,8 +2,10 @@
  *
  * A triangle of an emitter segment is picked with probability proportional to its power, area
  * times luminance, and a point on it uniformly; it emits from its front side only. The
- * environment is a latitude-longitude map, picked by luminance times solid angle, constant
- * within a cell of the map. With both present each gets half of the samples. */
+ * environment is a latitude-longitude map, picked by luminance times solid angle and, where that
+ * was measured, by how much of the direction's light finds a way in (reach.h), constant within a
+ * cell of the map. With both present samples are shared out by power: what emitters send out, and
+ * what of the environment arrives. */
 #ifndef UNBAKE_RENDER_LIGHT_H
 #define UNBAKE_RENDER_LIGHT_H
 
@@ -13,6 +15,7 @@
 
 #include "common/image.h"
 #include "common/vec.h"
+#include "server/render/reach.h"
 #include "server/scene/materials.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
@@ -46,7 +49,8 @@ struct lights {
     rgb *emission;           /* [segment_count] owned copy: what the tables were made from */
     float *area_density;     /* [segment_count] density by area with which a point on a front face
                               * is picked; 0 for what does not emit; owned */
-    float environment_chance;
+    float environment_chance; /* with which a sample goes to the environment */
+    double environment_power; /* what arrives of it; negative where that was not measured */
     uint32_t width, height;  /* of the environment; 0 when there is none */
     float (*environment)[3]; /* [height][width + 1], last column = first; owned */
     struct light_table cells; /* (height - 1) rows of `width` cells */
@@ -78,6 +82,11 @@ struct light_sample {
 
 struct lights *lights_new(const struct image *environment);
 void lights_free(struct lights *lights);
+
+/* Puts a copy of another environment in the place of the present one (NULL: none). Without a reach
+ * every direction is thought to be open, and half of all samples go to the environment. */
+void lights_set_environment(struct lights *lights, const struct image *environment,
+                            const struct reach *reach);
 
 /* Rebuilds the tables of triangles; call after emission changed. */
 void lights_update(struct lights *lights, const struct mesh *mesh, const struct segments *segments,

@@ -41,9 +41,18 @@ enum status world_init(struct world *w, const struct mesh *mesh, const struct se
     w->triangle = mem_calloc_large(mesh->triangle_count, sizeof *w->triangle);
     for (size_t i = 0; i < mesh->triangle_count; i++)
         bake_triangle(&w->triangle[i], w, i);
-    w->lights = lights_new(environment);
+    w->lights = lights_new(NULL);
+    if (environment)
+        world_set_environment(w, environment, pool);
     lights_update(w->lights, mesh, segments, materials);
     return STATUS_OK;
+}
+
+void world_set_environment(struct world *w, const struct image *environment, struct parallel *pool) {
+    struct reach reach;
+    if (environment)
+        reach_measure(&reach, w->mesh, w->accel, pool);
+    lights_set_environment(w->lights, environment, environment ? &reach : NULL);
 }
 
 void world_release(struct world *w) {

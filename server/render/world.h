@@ -45,6 +45,10 @@ enum status world_init(struct world *world, const struct mesh *mesh, const struc
                        const struct image *environment, struct parallel *pool, struct error *err);
 void world_release(struct world *world);
 
+/* Puts another environment, which is copied, in the place of the present one; NULL: none. Measures
+ * how it reaches the surfaces. */
+void world_set_environment(struct world *world, const struct image *environment, struct parallel *pool);
+
 /* Rebuilds the emitter tables after emission changed. */
 void world_update_lights(struct world *world);
 

@@ -232,6 +232,8 @@ static struct export_input input_of(const struct run *run, const struct reconstr
         .confidence_count = r->observed.count,
         .confidence_spread = r->observed.spread,
         .is_emitter = r->is_emitter,
+        .environment = r->environment.map.pixel ? &r->environment.map : NULL,
+        .environment_confidence = r->environment.map.pixel ? &r->environment.confidence : NULL,
         .report = r->report,
     };
 }

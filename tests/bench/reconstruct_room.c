@@ -105,6 +105,8 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
         .confidence_count = r->observed.count,
         .confidence_spread = r->observed.spread,
         .is_emitter = r->is_emitter,
+        .environment = r->environment.map.pixel ? &r->environment.map : NULL,
+        .environment_confidence = r->environment.map.pixel ? &r->environment.confidence : NULL,
         .comparison_count = r->held_out_count,
         .comparison = pair,
         .report = r->report,

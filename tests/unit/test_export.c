@@ -176,6 +176,38 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
     mem_free(path);
 }
 
+/* Distant light adds two files and a preview, in which what was filled in is dimmed. */
+static void test_environment(const char *dir, struct export_input *in, struct announced *heard) {
+    static const char *const names[] = {"R", "G", "B"}, *const known_names[] = {"count", "spread"};
+    struct image map, known, back;
+    struct error err;
+    image_init(&map, 8, 4, 3, names);
+    image_init(&known, 8, 4, 2, known_names);
+    for (int i = 0; i < 32; i++) {
+        for (int c = 0; c < 3; c++)
+            map.pixel[3 * i + c] = i == 9 ? 1e5f : 3.0f; /* a sun beyond half precision */
+        known.pixel[2 * i] = i < 16 ? 2.0f : 0.0f;
+    }
+    int outputs = heard->outputs, previews = heard->previews;
+    in->environment = &map, in->environment_confidence = &known;
+    CHECK(export_outputs(dir, in, hear, heard, &err) == STATUS_OK);
+    CHECK(heard->outputs == 2 * outputs + 2 && heard->previews == 2 * previews + 1);
+    read_back(dir, "environment.exr", &back);
+    CHECK(back.width == 8 && back.channel_count == 3 &&
+          memcmp(back.pixel, map.pixel, 32 * 3 * sizeof *map.pixel) == 0);
+    image_release(&back);
+    read_back(dir, "environment_confidence.exr", &back);
+    CHECK(back.pixel[0] == 2.0f && back.pixel[2 * 31] == 0.0f);
+    image_release(&back);
+    read_back(dir, "preview/environment.png", &back);
+    CHECK(back.width == 8 && back.pixel[0] > 1.2f * back.pixel[3 * 31] && back.pixel[3 * 31] > 0.0f);
+    CHECK(back.pixel[3 * 9] == 1.0f);
+    image_release(&back);
+    in->environment = in->environment_confidence = NULL;
+    image_release(&map);
+    image_release(&known);
+}
+
 int main(void) {
     static const char *const names[] = {"R", "G", "B"};
     char dir[] = "/tmp/unbake-export-XXXXXX";
@@ -201,7 +233,7 @@ int main(void) {
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
     struct export_input in = {
         "room <1> & \"2\"", &room.mesh, &room.segments, &room.atlas, &room.inverse, &room.materials,
-        NULL, NULL, is_emitter, 1, &comparison, report};
+        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
@@ -215,6 +247,7 @@ int main(void) {
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
     test_report(dir, room.segments.count);
+    test_environment(dir, &in, &heard);
     heard.refuse = true;
     CHECK(export_outputs(dir, &in, hear, &heard, &err) == STATUS_CANCELLED);
 

@@ -1,0 +1,90 @@
+/* reach.c -- see reach.h. */
+#include "server/render/reach.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+
+#define PI 3.14159265358979323846
+#define POINTS 256 /* surface points a bin */
+#define SEED UINT64_C(0x7265616368)
+
+struct measure {
+    const struct mesh *mesh;
+    const struct accel *accel;
+    double *area_until; /* [triangle_count] summed area up to and with the triangle */
+    float share[REACH_ROWS][REACH_COLUMNS];
+};
+
+/* A number in [0, 1): `which` of sample `i` of a bin. */
+static float number(size_t bin, size_t i, uint64_t which) {
+    return rng_to_float((uint32_t)(rng_key(SEED + which, bin, i) >> 32));
+}
+
+static size_t triangle_at(const struct measure *m, double area) {
+    size_t first = 0, last = m->mesh->triangle_count - 1;
+    while (first < last) {
+        size_t middle = (first + last) / 2;
+        if (m->area_until[middle] > area)
+            last = middle;
+        else
+            first = middle + 1;
+    }
+    return first;
+}
+
+/* Surface points are stratified by area, directions random within the bin. */
+static void measure_bin(void *user, size_t bin, int thread) {
+    (void)thread;
+    struct measure *m = user;
+    double total = m->area_until[m->mesh->triangle_count - 1];
+    float sum = 0.0f;
+    for (size_t i = 0; i < POINTS; i++) {
+        double phi = 2.0 * PI * ((double)(bin % REACH_COLUMNS) + (double)number(bin, i, 0)) / REACH_COLUMNS;
+        double theta = PI * ((double)(bin / REACH_COLUMNS) + (double)number(bin, i, 1)) / REACH_ROWS;
+        vec3 direction = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+        size_t t = triangle_at(m, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
+        vec3 normal = vec3_normalize(mesh_cross(m->mesh, t));
+        float cosine = vec3_dot(normal, direction), root = sqrtf(number(bin, i, 3)), along = number(bin, i, 4);
+        if (!(cosine > 0.0f))
+            continue;
+        vec3 point = mesh_point(m->mesh, t, root * (1.0f - along), root * along);
+        vec3 origin = accel_offset(point, normal, direction);
+        if (!accel_occluded(m->accel, origin, direction, 0.0f, INFINITY))
+            sum += cosine;
+    }
+    m->share[bin / REACH_COLUMNS][bin % REACH_COLUMNS] = sum / POINTS;
+}
+
+/* Few rays find a small opening: neighbours learn from each other. */
+static float blurred(const struct measure *m, int row, int column) {
+    float sum = 0.0f;
+    for (int y = row - 1; y <= row + 1; y++) {
+        for (int x = column - 1; x <= column + 1; x++) {
+            int inside = y < 0 ? 0 : y < REACH_ROWS ? y : REACH_ROWS - 1;
+            sum += m->share[inside][(x + REACH_COLUMNS) % REACH_COLUMNS];
+        }
+    }
+    return sum / 9.0f;
+}
+
+void reach_measure(struct reach *reach, const struct mesh *mesh, const struct accel *accel,
+                   struct parallel *pool) {
+    struct measure *m = mem_calloc(1, sizeof *m);
+    *m = (struct measure){.mesh = mesh, .accel = accel};
+    m->area_until = mem_array(mesh->triangle_count, sizeof *m->area_until);
+    double total = 0.0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        total += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
+        m->area_until[i] = total;
+    }
+    parallel_for(pool, (size_t)REACH_ROWS * REACH_COLUMNS, measure_bin, m);
+    for (int y = 0; y < REACH_ROWS; y++)
+        for (int x = 0; x < REACH_COLUMNS; x++)
+            reach->share[y][x] = blurred(m, y, x);
+    reach->area = total;
+    mem_free(m->area_until);
+    mem_free(m);
+}
