@@ -17,7 +17,7 @@ const struct option command_shared_options[] = {
     {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
     {"quiet", 'q', OPTION_FLAG, NULL, "print only what was asked for: no progress, no remarks"},
     {"retry", 0, OPTION_SECONDS, "SEC",
-     "how long to try while the server is away (3; fetching 60, watching 600)"},
+     "how long to try while the server is away (3; fetching 60, watching and sending 600)"},
     {"help", 'h', OPTION_FLAG, NULL, "print this help"},
     {0},
 };

@@ -105,7 +105,7 @@ static enum status cancelled(struct error *err) {
 /* --- the reply ----------------------------------------------------------------------------- */
 
 void reply_init(struct reply *reply) {
-    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1};
+    *reply = (struct reply){.retry_after_sec = -1.0, .range_first = -1, .upload_offset = -1};
     buf_init(&reply->body, BODY_MAX);
 }
 
@@ -144,6 +144,12 @@ static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
     value = header_value(line, "Content-Range");
     if (value && strncasecmp(value, "bytes ", 6) == 0 && value[6] >= '0' && value[6] <= '9')
         reply->range_first = strtoll(value + 6, NULL, 10);
+    value = header_value(line, "Location");
+    if (value && strlen(value) < sizeof reply->location)
+        snprintf(reply->location, sizeof reply->location, "%s", value);
+    value = header_value(line, "Upload-Offset");
+    if (value && *value >= '0' && *value <= '9')
+        reply->upload_offset = strtoll(value, NULL, 10);
     return length;
 }
 
@@ -200,7 +206,10 @@ static struct curl_slist *set_up(struct attempt *a, const char *url, const char 
         curl_easy_setopt(easy, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)call->read_length);
         curl_easy_setopt(easy, CURLOPT_READFUNCTION, on_read);
         curl_easy_setopt(easy, CURLOPT_READDATA, a);
-        headers = curl_slist_append(headers, "Content-Type: application/octet-stream");
+        char type[128];
+        snprintf(type, sizeof type, "Content-Type: %s",
+                 call->content_type ? call->content_type : "application/octet-stream");
+        headers = curl_slist_append(headers, type);
         headers = curl_slist_append(headers, "Expect: 100-continue");
     } else if (body || (call->method && strcmp(call->method, "POST") == 0)) {
         curl_easy_setopt(easy, CURLOPT_POSTFIELDS, body ? body : "");
@@ -208,7 +217,9 @@ static struct curl_slist *set_up(struct attempt *a, const char *url, const char 
             headers = curl_slist_append(headers, "Content-Type: " MIME_JSON);
         headers = curl_slist_append(headers, "Expect:");
     }
-    if (call->method)
+    if (call->method && strcmp(call->method, "HEAD") == 0)
+        curl_easy_setopt(easy, CURLOPT_NOBODY, 1L);
+    else if (call->method)
         curl_easy_setopt(easy, CURLOPT_CUSTOMREQUEST, call->method);
     curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers);
     return headers;

@@ -39,6 +39,8 @@ struct reply {
     char content_type[128];
     double retry_after_sec; /* negative: not said */
     int64_t range_first;    /* of Content-Range; -1: not said */
+    char location[256];     /* "": not said */
+    int64_t upload_offset;  /* -1: not said */
 };
 void reply_init(struct reply *reply);
 void reply_release(struct reply *reply);
@@ -53,6 +55,7 @@ struct request_call {
     enum status (*read)(void *user, void *bytes, size_t room, size_t *got, struct error *err);
     enum status (*rewind)(void *user, struct error *err);
     uint64_t read_length;
+    const char *content_type; /* of that body; NULL: application/octet-stream */
 
     /* Gets the body of a 200 or 206 piece by piece; false ends the request, successfully. */
     bool (*sink)(void *user, const struct reply *reply, const char *bytes, size_t length);

@@ -4,7 +4,8 @@
  *    is not sent.
  * 2. The job is checked by the server (a dry run) before anything is sent, so that a mistyped
  *    setting does not cost an upload.
- * 3. The upload names its SHA-256; a room that changed meanwhile is refused by the server.
+ * 3. The upload names its SHA-256; a room that changed meanwhile is refused by the server. What was
+ *    broken off goes on where it was (upload.h).
  * 4. The job is queued under an idempotency key: however often the request is sent, one job. */
 #include <errno.h>
 #include <stdlib.h>
@@ -14,6 +15,7 @@
 #include "client/commands.h"
 #include "client/meter.h"
 #include "client/pack.h"
+#include "client/upload.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/settings.h"
@@ -136,44 +138,14 @@ static enum status ask_for_scene(struct submission *s, struct reply *reply, stru
     return status;
 }
 
-static enum status read_pack(void *user, void *bytes, size_t room, size_t *got, struct error *err) {
-    return pack_read(((struct submission *)user)->pack, bytes, room, got, err);
-}
-
-static enum status rewind_pack(void *user, struct error *err) {
-    return pack_rewind(((struct submission *)user)->pack, err);
-}
-
-static void on_sent(void *user, double sent) {
-    meter_update(&((struct submission *)user)->meter, sent);
-}
-
 static enum status upload(struct submission *s, struct reply *reply, struct error *err) {
-    struct client *c = s->client;
-    struct buf path;
-    char digest[128], size[16];
-    buf_init(&path, 4096);
-    buf_puts(&path, "/v1/scenes?name=");
-    request_escape(&path, s->name, false);
-    snprintf(digest, sizeof digest, "X-Content-SHA256: %s", s->scene);
-    struct request_call call = {
-        .method = "POST",
-        .path = buf_text(&path),
-        .header = {digest},
-        .read = read_pack,
-        .rewind = rewind_pack,
-        .read_length = s->length,
-        .tick = on_sent,
-        .user = s,
-        .same_twice = true,
-    };
-    meter_begin(&s->meter, meter_terminal(c), "sending", 0.0, (double)s->length);
-    enum status status = request_run(c->request, &call, reply, err);
-    meter_end(&s->meter);
-    buf_release(&path);
+    struct upload u = {.client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene,
+                       .length = s->length};
+    char size[16];
+    enum status status = upload_send(&u, reply, err);
     format_bytes(size, (double)s->length);
     if (status == STATUS_OK)
-        client_note(c, "sent %s (%zu file%s, %s)", s->name, pack_file_count(s->pack),
+        client_note(s->client, "sent %s (%zu file%s, %s)", s->name, pack_file_count(s->pack),
                     pack_file_count(s->pack) == 1 ? "" : "s", size);
     return status;
 }
@@ -298,7 +270,7 @@ int submit_run(struct client *c, const struct options *o) {
     int64_t job = 0;
     enum status status = submit(&s, o, &reply, &err);
     if (status == STATUS_CANCELLED)
-        error_hint(&err, "no job was queued");
+        error_hint(&err, "no job was queued; the same command goes on where this one stopped");
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
     else if (options_flag(o, "dry-run"))

@@ -165,7 +165,9 @@ static struct response *read_creation(struct api *api, const struct request *r, 
     if ((uint64_t)length > api->config.max_upload_bytes) {
         cJSON *members = cJSON_CreateObject();
         json_add_int(members, "limit_bytes", (int64_t)api->config.max_upload_bytes);
-        return problem_full(r, 413, "the upload would be larger than is taken here", "", members);
+        char detail[128];
+        snprintf(detail, sizeof detail, "the upload is larger than %" PRIu64 " bytes", api->config.max_upload_bytes);
+        return problem_full(r, 413, detail, "", members);
     }
     row->length = (uint64_t)length;
     refusal = read_metadata(r, row);

@@ -24,7 +24,7 @@ struct step {
 };
 
 struct script {
-    struct step step[16];
+    struct step step[24];
     size_t count, done; /* done is read by the other thread after it waited for the client */
     int listener, port;
     pthread_t thread;
@@ -529,14 +529,42 @@ static void test_submit(void) {
     put_part("room/images/a.png", "png\n");
     add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
     add_reply(&s, "422 Invalid", "", UNKNOWN_SCENE, "POST /v1/jobs?dry_run=1 ", NULL, NULL);
-    add_step(&s, "", "POST /v1/scenes?name=room ", NULL, NULL); /* the first upload is lost */
-    add_reply(&s, "201 Created", "", "{}", "POST /v1/scenes?name=room ", "X-Content-SHA256: ", NULL);
+    add_reply(&s, "200 OK", "", "{\"items\":[],\"next\":null}", "GET /v1/uploads?sha256=", NULL, NULL);
+    /* "room" and 64 hex digits */
+    add_reply(&s, "201 Created", "Location: /v1/uploads/ab\r\n", "", "POST /v1/uploads ",
+              "Upload-Length: 3072\r\n", "Upload-Metadata: name cm9vbQ==,sha256 ");
+    add_step(&s, "", "PATCH /v1/uploads/ab ", "Upload-Offset: 0\r\n", "Content-Length: 3072\r\n"); /* broken off */
+    add_reply(&s, "503 Busy", "Retry-After: 0\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
+    add_reply(&s, "200 OK", "Upload-Offset: 1000\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
+    add_reply(&s, "409 Conflict", "", "{\"detail\":\"no\"}", "PATCH", "Upload-Offset: 1000\r\n", NULL); /* it moved on */
+    add_reply(&s, "200 OK", "Upload-Offset: 1500\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
+    add_reply(&s, "204 No Content", "Upload-Offset: 2000\r\n", "", "PATCH", "Upload-Offset: 1500\r\n", NULL);
+    add_reply(&s, "200 OK", "Upload-Offset: 2000\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
+    add_step(&s, "", "PATCH", "Upload-Offset: 2000\r\n", "Content-Length: 1072\r\n"); /* only the reply is lost */
+    add_reply(&s, "200 OK", "Upload-Offset: 3072\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
     add_reply(&s, "201 Created", "", "{\"id\":7,\"name\":\"room\",\"scene\":\"abcdef\"}", "POST /v1/jobs ",
               "Idempotency-Key: ", NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "submit %s/got/room/ --set texture_size=256 --label a=b", root), 0);
     CHECK_STRING(out_text, "job 7 is queued: room (scene abcdef)\n");
+    CHECK_PART(err_text, "sent room (2 files");
     script_end(&s, "submit");
+
+    /* Another process had begun: this one finds it and goes on; that it is gone is no end either. */
+    add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
+    add_reply(&s, "422 Invalid", "", UNKNOWN_SCENE, "POST /v1/jobs?dry_run=1 ", NULL, NULL);
+    add_reply(&s, "200 OK", "", "{\"items\":[{\"length\":3072,\"scene\":\"ab\",\"links\":{\"self\":\"/v1/uploads/1\"}},"
+              "{\"length\":3072,\"scene\":null,\"links\":{\"self\":\"/v1/uploads/2\"}}]}", "GET /v1/uploads?sha256=", NULL, NULL);
+    add_reply(&s, "200 OK", "Upload-Offset: 512\r\n", "", "HEAD /v1/uploads/2 ", NULL, NULL);
+    add_reply(&s, "404 Not Found", "", "{\"detail\":\"expired\"}", "PATCH /v1/uploads/2 ", "Upload-Offset: 512\r\n", NULL);
+    add_reply(&s, "200 OK", "", "{\"items\":[]}", "GET /v1/uploads?sha256=", NULL, NULL);
+    add_reply(&s, "201 Created", "Location: /v1/uploads/3\r\n", "", "POST /v1/uploads ", NULL, NULL);
+    add_reply(&s, "204 No Content", "Upload-Offset: 3072\r\n", "", "PATCH /v1/uploads/3", "Upload-Offset: 0\r\n", NULL);
+    add_reply(&s, "201 Created", "", "{\"id\":8,\"name\":\"room\",\"scene\":\"abcdef\"}", "POST /v1/jobs ", NULL, NULL);
+    script_start(&s);
+    CHECK_EXIT(client(&s, "submit %s/got/room/", root), 0);
+    CHECK_PART(err_text, "512 B of 3.0 KiB are on the server already");
+    script_end(&s, "submit, going on");
 
     /* A fault of a setting is told before anything is sent; that of the scene is none. */
     add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
