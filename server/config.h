@@ -27,6 +27,7 @@ struct option {
 struct config {
     char *listen, *server_names, *data_dir, *log_level; /* owned */
     int64_t max_running, threads, max_attempts, queue_limit, worker_memory_mib;
+    int64_t user_max_running, user_queue_limit, user_max_mib;
     int64_t max_upload_mib, min_free_mib;
     int64_t max_connections, max_streams, body_min_bytes_per_sec;
     double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;

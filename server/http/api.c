@@ -142,3 +142,19 @@ struct response *api_check_room(struct api *api, const struct request *r, uint64
              (unsigned long long)(keep >> 20));
     return problem_full(r, 507, detail, "delete jobs or scenes that nobody needs", NULL);
 }
+
+struct response *api_check_share(struct api *api, const struct request *r, uint64_t bytes) {
+    struct error err;
+    uint64_t kept, limit = api->config.user_max_bytes;
+    if (limit == 0 || r->caller.user_id == 0)
+        return NULL;
+    if (store_user_bytes(api->store, r->caller.user_id, &kept, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    if (kept < limit && bytes <= limit - kept)
+        return NULL;
+    char detail[256];
+    snprintf(detail, sizeof detail, "your scenes and outputs take %llu MiB, %llu MiB are wanted, and %llu MiB are "
+             "what a user may keep", (unsigned long long)(kept >> 20), (unsigned long long)(bytes >> 20),
+             (unsigned long long)(limit >> 20));
+    return problem_full(r, 507, detail, "delete jobs or scenes that you do not need", NULL);
+}

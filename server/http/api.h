@@ -23,6 +23,8 @@ struct api_config {
     const char *data_dir;
     int max_attempts;
     size_t queue_limit;        /* queued jobs */
+    size_t user_queue_limit;   /* of them, of one user; 0: no limit */
+    uint64_t user_max_bytes;   /* that one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
     uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */
     size_t max_streams;        /* event streams at once */
@@ -64,5 +66,7 @@ enum status api_discard(struct api *api, const char *path, struct error *err);
 
 /* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
 struct response *api_check_room(struct api *api, const struct request *r, uint64_t bytes);
+/* The same when the caller keeps so much that `bytes` more pass user_max_bytes. */
+struct response *api_check_share(struct api *api, const struct request *r, uint64_t bytes);
 
 #endif

@@ -261,6 +261,7 @@ static struct response *add_job(struct api *api, const struct request *r, const 
         .settings = settings,
         .priority = w->priority == INT_MIN ? 0 : w->priority,
         .max_attempts = api->config.max_attempts,
+        .user_queue_limit = api->config.user_queue_limit,
         .idempotency_key = request_field(r, "Idempotency-Key"),
         .request_sha256 = digest,
     };
@@ -324,6 +325,8 @@ struct response *jobs_add(struct api *api, struct request *r) {
     }
     if (!reply && !dry_run)
         reply = api_check_room(api, r, 0);
+    if (!reply && !dry_run)
+        reply = api_check_share(api, r, 0);
     if (!reply)
         reply = dry_run ? dry_run_reply(&scene, &settings) : add_job(api, r, &w, &scene);
     if (has_scene)

@@ -64,6 +64,8 @@ struct response *upload_begin(struct api *api, struct request *r) {
     struct response *refusal = check_request(r);
     if (!refusal)
         refusal = api_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
+    if (!refusal)
+        refusal = api_check_share(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (refusal)
         return refusal;
     struct error err;
@@ -104,7 +106,10 @@ struct response *upload_data(struct api *api, struct request *r, const void *dat
     (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start),
                           SYNC_FILE_RANGE_WRITE);
     u->step_start = u->bytes;
-    return u->is_reserved ? NULL : api_check_room(api, r, 0);
+    if (u->is_reserved)
+        return NULL;
+    struct response *refusal = api_check_room(api, r, 0);
+    return refusal ? refusal : api_check_share(api, r, u->bytes);
 }
 
 struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]) {

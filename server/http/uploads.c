@@ -171,7 +171,9 @@ static struct response *read_creation(struct api *api, const struct request *r, 
     }
     row->length = (uint64_t)length;
     refusal = read_metadata(r, row);
-    return refusal ? refusal : api_check_room(api, r, row->length);
+    if (!refusal)
+        refusal = api_check_room(api, r, row->length);
+    return refusal ? refusal : api_check_share(api, r, row->length);
 }
 
 struct response *uploads_add(struct api *api, struct request *r) {

@@ -150,6 +150,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
+        a->owner_id = job.owner_id;
         a->settings = mem_strdup(job.settings);
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
@@ -500,8 +501,16 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
     return status;
 }
 
+void attempt_charge(struct attempt *a, struct store *store) {
+    double used = supervisor_cpu_sec(&a->worker);
+    if (a->job_id && used > a->charged_sec &&
+        store_usage_add(store, a->owner_id, used - a->charged_sec, NULL) == STATUS_OK)
+        a->charged_sec = used;
+}
+
 enum status attempt_settle(struct attempt *a, struct store *store, struct error *err) {
     struct verdict verdict;
+    attempt_charge(a, store);
     judge(a, &verdict);
     enum status status = a->job_id ? settle_job(a, store, &verdict, err)
                                    : settle_check(a, store, &verdict, err);

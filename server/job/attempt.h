@@ -19,6 +19,8 @@ enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 struct attempt {
     enum attempt_phase phase;
     int64_t job_id;               /* 0: the check of a scene */
+    int64_t owner_id;             /* whose job it is */
+    double charged_sec;           /* CPU time that was entered for that user */
     int number;                   /* fences what is entered for the job */
     char scene_id[SCENE_ID_SIZE];
     char *dir;
@@ -51,6 +53,10 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
 
 /* Reads what the worker says and notices its end. */
 void attempt_listen(struct attempt *a, struct store *store);
+
+/* Enters the CPU time since the last call for the job's owner. A failure is no harm: the next call
+ * makes up for it. */
+void attempt_charge(struct attempt *a, struct store *store);
 
 /* Enters the outcome of an ended attempt and empties it. */
 enum status attempt_settle(struct attempt *a, struct store *store, struct error *err);

@@ -105,13 +105,24 @@ static int thread_share(struct scheduler *s) {
     return share > 0 ? share : 1;
 }
 
+/* Before it is decided whose turn it is. */
+static void charge_all(struct scheduler *s) {
+    struct store_counts counts;
+    if (store_count(s->store, &counts, NULL) != STATUS_OK || counts.jobs_by_state[JOB_QUEUED] == 0)
+        return;
+    for (size_t i = 0; i < s->slot_count; i++)
+        if (s->slot[i].phase == ATTEMPT_ALIVE)
+            attempt_charge(&s->slot[i], s->store);
+}
+
 static void start_jobs(struct scheduler *s) {
     for (size_t i = 0; i + 1 < s->slot_count; i++) {
         struct error err;
         /* A job that came to nothing has left the queue: look at the next one. */
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
             int64_t id;
-            enum status status = store_job_next(s->store, &id, &err);
+            charge_all(s);
+            enum status status = store_job_next(s->store, s->config.user_max_running, &id, &err);
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)

@@ -15,6 +15,7 @@ struct scheduler_config {
     const char *data_dir;           /* borrowed; holds scenes/ID/, jobs/ID/ */
     const char *worker_binary;      /* /proc/self/exe */
     int max_running;                /* jobs at once */
+    int user_max_running;           /* of them, of one user; 0: all */
     int thread_count;               /* shared between running jobs; 0: all processors */
     uint64_t worker_memory_bytes;   /* 0: no limit */
     double checkpoint_interval_sec;

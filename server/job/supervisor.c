@@ -10,8 +10,10 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "common/file.h"
@@ -201,9 +203,22 @@ bool supervisor_bury(struct worker *w, int *wait_status,
     /* Not yet reaped, so its number still names its session and nobody else's. */
     kill(-w->pid, SIGKILL);
     read_pipe(w, (size_t)64 << 20, each, user);
-    waitpid(w->pid, wait_status, 0);
+    struct rusage used = {0};
+    wait4(w->pid, wait_status, 0, &used);
+    w->cpu_sec = (double)used.ru_utime.tv_sec + 1e-6 * (double)used.ru_utime.tv_usec +
+                 (double)used.ru_stime.tv_sec + 1e-6 * (double)used.ru_stime.tv_usec;
     w->pid = 0;
     return true;
+}
+
+double supervisor_cpu_sec(const struct worker *w) {
+    clockid_t clock;
+    struct timespec used;
+    if (w->pid <= 0)
+        return w->cpu_sec;
+    if (clock_getcpuclockid(w->pid, &clock) != 0 || clock_gettime(clock, &used) != 0)
+        return 0.0;
+    return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
 }
 
 char *supervisor_last_words(const struct worker *w, size_t limit) {

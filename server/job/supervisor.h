@@ -25,6 +25,7 @@ struct worker {
     struct buf line; /* what has come of the present line */
     bool skipping;   /* the present line is too long: dropped up to its end */
     char *log_path;
+    double cpu_sec;  /* that it took in all, once it is buried */
     off_t log_start; /* where this process's part of the log begins */
 };
 
@@ -41,6 +42,9 @@ void supervisor_signal(struct worker *w, int signal);
  * the rest of its pipe read through `each`, *wait_status is as waitpid gives it. */
 bool supervisor_bury(struct worker *w, int *wait_status,
                      void (*each)(void *user, const char *line, size_t length), void *user);
+
+/* CPU time of the process so far, or in all. */
+double supervisor_cpu_sec(const struct worker *w);
 
 /* The last lines that the process wrote to its log, at most `limit` bytes, on one line; the
  * caller's (mem_free), "" if none. */

@@ -93,8 +93,16 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
     status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?",
                      "n", (int)JOB_QUEUED);
     if (status == STATUS_OK && (uint64_t)queued >= queue_limit)
-        status = error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu",
-                           (long long)queued, queue_limit);
+        return error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu",
+                         (long long)queued, queue_limit);
+    if (status != STATUS_OK || job->user_queue_limit == 0 || job->owner_id == 0)
+        return status;
+    status = sql_int(&store->sql, 0, &queued, err,
+                     "SELECT count(*) FROM jobs WHERE owner_id = ? AND state = ?", "in",
+                     job->owner_id, (int)JOB_QUEUED);
+    if (status == STATUS_OK && (uint64_t)queued >= job->user_queue_limit)
+        status = error_set(err, STATUS_LIMIT, "%lld of your jobs are queued already, the limit is %zu",
+                           (long long)queued, job->user_queue_limit);
     return status;
 }
 
@@ -263,19 +271,6 @@ enum status store_job_delete(struct store *store, int64_t id, struct error *err)
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ?", "i", id);
     return store_end(store, status, id, err);
-}
-
-enum status store_job_next(struct store *store, int64_t *id, struct error *err) {
-    store_lock(store);
-    enum status status = sql_int(&store->sql, 0, id, err,
-                                 "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
-                                 " WHERE jobs.state = ? AND scenes.state >= ?"
-                                 " ORDER BY priority DESC, turn LIMIT 1",
-                                 "nn", (int)JOB_QUEUED, (int)SCENE_READY);
-    store_unlock(store);
-    return status == STATUS_OK && *id == 0
-               ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run")
-               : status;
 }
 
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,

@@ -123,5 +123,11 @@ static const char step_4[] =
     "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, turn);"
     "CREATE INDEX jobs_turn ON jobs (turn);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4};
+/* Fair turns. */
+static const char step_5[] =
+    "CREATE TABLE usage (owner_id INTEGER PRIMARY KEY, weight REAL NOT NULL) STRICT;"
+    "DROP INDEX jobs_by_turn;"
+    "CREATE INDEX jobs_by_turn ON jobs (state, owner_id, priority DESC, turn);";
+
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -86,10 +86,11 @@ struct job_new {
     int64_t owner_id; /* 0: nobody */
     bool is_shared;
     int priority, max_attempts;
+    size_t user_queue_limit;     /* queued jobs of its owner; 0: no limit */
     const char *idempotency_key; /* NULL: none */
     const char *request_sha256;  /* of the request, compared when the key is known */
 };
-/* queue_limit: STATUS_LIMIT when that many jobs are queued. With a known key: the earlier job's
+/* queue_limit: STATUS_LIMIT when that many jobs are queued, by all or by its owner (who is somebody). With a known key: the earlier job's
  * id and *replayed; STATUS_CONFLICT when the request differs. The scene may still be in
  * `checking`; STATUS_CONFLICT when it is rejected, STATUS_NOT_FOUND when there is none. */
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
@@ -113,9 +114,18 @@ struct job_patch {
 enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
                             const struct job_patch *patch, struct error *err);
 enum status store_job_delete(struct store *store, int64_t id, struct error *err); /* not running */
-/* Of highest priority, then first in turn, the queued job whose scene has been checked (ready, or rejected:
- * such a job is started only to fail); STATUS_NOT_FOUND if none. */
-enum status store_job_next(struct store *store, int64_t *id, struct error *err);
+/* The queued job whose turn it is, among those whose scene has been checked (ready, or rejected:
+ * such a job is started only to fail); STATUS_NOT_FOUND if none. Of the users that have fewer than
+ * user_max_running jobs running (0: no limit), the one with the least recent CPU time; of that
+ * user's jobs the one of highest priority, then the first in turn. */
+enum status store_job_next(struct store *store, int user_max_running, int64_t *id,
+                           struct error *err);
+/* Charges CPU time to a user; thread-safe, as all is. */
+enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec,
+                            struct error *err);
+/* What a user keeps: scenes, outputs, and uploads that are under way with their whole length. */
+enum status store_user_bytes(struct store *store, int64_t user_id, uint64_t *bytes,
+                             struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
                               enum job_wanted *wanted, size_t *count, struct error *err);

@@ -202,7 +202,7 @@ static void test_queue(void) {
     size_t count;
     int attempt;
     OK(store_open(&store, dir, &err));
-    IS(store_job_next(store, &next, &err), STATUS_NOT_FOUND);
+    IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
     add_ready_scene(store, SCENE_A);
     OK(store_scene_add(store, SCENE_B, "unchecked", 1, 0, &existed, &err));
     int64_t waits = add_job(store, SCENE_B, 100);
@@ -210,13 +210,13 @@ static void test_queue(void) {
     int64_t young = add_job(store, SCENE_A, 1);
     int64_t order[] = {old, young, low};
     for (size_t i = 0; i < 3; i++) {
-        OK(store_job_next(store, &next, &err));
+        OK(store_job_next(store, 0, &next, &err));
         CHECK(next == order[i]);
         OK(store_job_start(store, next, &attempt, &err));
     }
-    IS(store_job_next(store, &next, &err), STATUS_NOT_FOUND);
+    IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
     OK(store_scene_reject(store, SCENE_B, "[]", &err));
-    OK(store_job_next(store, &next, &err));
+    OK(store_job_next(store, 0, &next, &err));
     CHECK(next == waits);
     OK(store_job_pause(store, young, &err));
     OK(store_job_running(store, 8, ids, wanted, &count, &err));
@@ -404,7 +404,7 @@ static void test_threads(void) {
 static void check_turns(struct store *store, const int64_t *wanted, size_t count) {
     for (size_t i = 0; i < count; i++) {
         int64_t id;
-        OK(store_job_next(store, &id, &err));
+        OK(store_job_next(store, 0, &id, &err));
         CHECK_THAT(id == wanted[i], "place %zu: job %lld, wanted %lld", i, (long long)id,
                    (long long)wanted[i]);
         OK(store_job_pause(store, id, &err));

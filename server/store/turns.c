@@ -1,0 +1,77 @@
+/* turns.c -- whose turn it is: the next job to start, what users have used, what they keep.
+ *
+ * Between users the one with the least recent CPU time goes first, a second of which counts half
+ * after HALF_LIFE_SEC. What is stored is w = log2 of the sum over all charges of
+ * seconds * 2^(time / HALF_LIFE_SEC): it does not change while time passes, so users are compared
+ * without looking at the clock, and a clock set wrong for a day misjudges a day's work by a factor
+ * of two at most. */
+#include <math.h>
+
+#include "server/store/internal.h"
+
+#define HALF_LIFE_SEC 86400.0
+
+enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    double before = 0.0;
+    if (!(cpu_sec > 0.0))
+        return STATUS_OK;
+    double weight = log2(cpu_sec) + (double)store_now_ms() * 1e-3 / HALF_LIFE_SEC;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_query(&store->sql, &stmt, err, "SELECT weight FROM usage WHERE owner_id = ?", "i",
+                       owner_id);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        before = sqlite3_column_double(stmt, 0);
+        sqlite3_reset(stmt);
+        weight = fmax(weight, before) + log2(1.0 + exp2(-fabs(weight - before)));
+    }
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "INSERT OR REPLACE INTO usage (owner_id, weight) VALUES (?, ?)", "id",
+                         owner_id, weight);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_job_next(struct store *store, int user_max_running, int64_t *id,
+                           struct error *err) {
+    store_lock(store);
+    enum status status =
+        sql_int(&store->sql, 0, id, err,
+                "WITH busy (user_id, count) AS"
+                " (SELECT owner_id, count(*) FROM jobs WHERE state = ?1 GROUP BY owner_id)"
+                "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
+                " LEFT JOIN busy ON busy.user_id = jobs.owner_id"
+                " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
+                " WHERE jobs.state = ?2 AND scenes.state >= ?3"
+                "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
+                " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
+                "  priority DESC, turn LIMIT 1",
+                "nnnn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running);
+    store_unlock(store);
+    return status == STATUS_OK && *id == 0
+               ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run")
+               : status;
+}
+
+enum status store_user_bytes(struct store *store, int64_t user_id, uint64_t *bytes,
+                             struct error *err) {
+    int64_t sum = 0;
+    store_lock(store);
+    enum status status =
+        sql_int(&store->sql, 0, &sum, err,
+                "SELECT (SELECT ifnull(sum(bytes), 0) FROM scenes"
+                "         JOIN scene_owners ON scene_id = id WHERE user_id = ?1)"
+                "     + (SELECT ifnull(sum(outputs.bytes), 0) FROM outputs"
+                "         JOIN jobs ON jobs.id = job_id WHERE owner_id = ?1)"
+                "     + (SELECT ifnull(sum(length), 0) FROM uploads"
+                "         WHERE owner_id = ?1 AND scene_id = '')",
+                "i", user_id);
+    store_unlock(store);
+    *bytes = (uint64_t)sum;
+    return status;
+}

@@ -1,0 +1,98 @@
+/* test_turns.c -- whose turn it is between users, and their limits. */
+#include "tests/unit/store_rig.h"
+
+static struct store *store;
+
+static int64_t job_of(int64_t user, int priority) {
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
+                          .priority = priority, .max_attempts = 2, .owner_id = user,
+                          .user_queue_limit = 3};
+    int64_t id = 0;
+    bool replayed;
+    enum status status = store_job_add(store, &new, 1000, &id, &replayed, &err);
+    return status == STATUS_OK ? id : -(int64_t)status;
+}
+
+static int64_t owner_next(int limit) {
+    struct job job = {0};
+    int64_t id, owner = -1;
+    if (store_job_next(store, limit, &id, &err) == STATUS_OK &&
+        store_job_get(store, id, &job, &err) == STATUS_OK)
+        owner = job.owner_id;
+    job_release(&job);
+    return owner;
+}
+
+int main(void) {
+    char *dir = fresh_dir();
+    int64_t id;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+
+    /* Whoever used least is first, whatever the others' priorities. */
+    CHECK(job_of(1, 100) > 0 && job_of(2, 0) > 0 && job_of(3, 50) > 0);
+    OK(store_usage_add(store, 1, 100.0, &err));
+    OK(store_usage_add(store, 2, 10.0, &err));
+    CHECK(owner_next(0) == 3);
+    OK(store_usage_add(store, 3, 1.0, &err));
+    CHECK(owner_next(0) == 3);
+    for (int i = 0; i < 20; i++)
+        OK(store_usage_add(store, 3, 1.0, &err)); /* charges add up: 21 s */
+    CHECK(owner_next(0) == 2);
+    OK(store_usage_add(store, 2, 12.0, &err)); /* 22 s */
+    CHECK(owner_next(0) == 3);
+    OK(store_usage_add(store, 3, 0.0, &err));
+    OK(store_usage_add(store, 3, -5.0, &err));
+    CHECK(owner_next(0) == 3);
+
+    /* What runs already counts against the limit of running jobs, the user's own only. */
+    OK(store_job_next(store, 1, &id, &err));
+    OK(store_job_start(store, id, &attempt, &err));
+    int64_t second = job_of(3, 0);
+    CHECK(owner_next(1) == 2 && owner_next(2) == 3);
+    OK(store_job_succeed(store, id, attempt, &err));
+    CHECK(owner_next(1) == 3);
+    OK(store_job_start(store, second, &attempt, &err));
+
+    /* One user's queue is full, others' is not; nobody has no limit. */
+    CHECK(job_of(2, 0) > 0 && job_of(2, 0) > 0);
+    CHECK(job_of(2, 0) == -(int64_t)STATUS_LIMIT);
+    CHECK(job_of(3, 0) > 0);
+    for (int i = 0; i < 5; i++)
+        CHECK(job_of(0, 0) > 0);
+    CHECK(owner_next(1) == 0); /* nobody has used nothing */
+
+    /* Ten users with a job after another: turns differ by one at most. */
+    int started[10] = {0};
+    for (int user = 11; user <= 20; user++)
+        for (int i = 0; i < 3; i++)
+            CHECK(job_of(user, 0) > 0);
+    for (;;) {
+        struct job job;
+        if (store_job_next(store, 1, &id, &err) != STATUS_OK)
+            break;
+        OK(store_job_get(store, id, &job, &err));
+        OK(store_job_start(store, id, &attempt, &err));
+        OK(store_usage_add(store, job.owner_id, 3600.0, &err));
+        OK(store_job_succeed(store, id, attempt, &err));
+        if (job.owner_id > 10) {
+            int *mine = &started[job.owner_id - 11], least = 99;
+            for (int i = 0; i < 10; i++)
+                least = started[i] < least ? started[i] : least;
+            CHECK_THAT(++*mine <= least + 1, "user %lld has its turn %d, somebody none after %d",
+                       (long long)job.owner_id, *mine, least);
+        }
+        job_release(&job);
+    }
+
+    uint64_t bytes;
+    OK(store_user_bytes(store, 0, &bytes, &err));
+    CHECK(bytes == 10);
+    OK(store_output_put(store, second, 1, EVENT_OUTPUT, "a.exr", 1000, SCENE_A, "x/y", &err));
+    OK(store_user_bytes(store, 3, &bytes, &err));
+    CHECK_THAT(bytes == 1000, "%llu bytes", (unsigned long long)bytes);
+    store_close(store);
+    drop_dir(dir);
+    return check_result();
+}
