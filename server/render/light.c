@@ -9,6 +9,7 @@
 
 #define PI 3.14159265358979323846
 #define GUIDE_DENSITY 4 /* entries of a table's guide per entry */
+#define MAX_BLOCK_COLUMNS 512
 /* The least that a direction's reach is taken for, as a part of the mean over the light. */
 #define LEAST_REACH 0.1
 /* The least part of the samples that either of environment and emitters gets. */
@@ -83,28 +84,47 @@ static float cell_share(const struct lights *l, const struct reach *reach, size_
     return reach ? reach_share(reach, ((double)x + 1.0) / l->width, ((double)y + 0.5) / (l->height - 1)) : 1.0f;
 }
 
-static void make_cells(struct lights *l, const struct reach *reach) {
+/* Cells of a block. */
+static uint32_t block_width(const struct lights *l, uint32_t block) {
+    uint32_t left = l->width - block % l->block_columns * l->grain;
+    return left < l->grain ? left : l->grain;
+}
+
+static uint32_t block_height(const struct lights *l, uint32_t block) {
+    uint32_t left = l->height - 1 - block / l->block_columns * l->grain;
+    return left < l->grain ? left : l->grain;
+}
+
+static void make_blocks(struct lights *l, const struct reach *reach) {
+    l->grain = (l->width + MAX_BLOCK_COLUMNS - 1) / MAX_BLOCK_COLUMNS;
+    l->block_columns = (l->width + l->grain - 1) / l->grain;
+    size_t block_count = (size_t)l->block_columns * ((l->height - 2) / l->grain + 1);
     size_t cell_count = (size_t)l->width * (l->height - 1);
-    float *weight = mem_array(cell_count, sizeof *weight);
+    float *weight = mem_calloc(block_count, sizeof *weight);
     double shines = 0.0, arrives = 0.0;
-    for (size_t i = 0; i < cell_count; i++) {
-        weight[i] = cell_light(l, i % l->width, i / l->width);
-        shines += (double)weight[i];
-        arrives += (double)(weight[i] * cell_share(l, reach, i % l->width, i / l->width));
+    /* What no ray of the reach has found may yet be there: the second time round. */
+    for (int pass = 0; pass < 2; pass++) {
+        float least = arrives > 0.0 ? (float)(LEAST_REACH * arrives / shines) : 1.0f;
+        for (size_t i = 0; i < cell_count; i++) {
+            size_t x = i % l->width, y = i / l->width;
+            float light = cell_light(l, x, y), share = cell_share(l, reach, x, y);
+            if (pass == 1) {
+                weight[y / l->grain * l->block_columns + x / l->grain] += light * fmaxf(least, share);
+                continue;
+            }
+            shines += (double)light;
+            arrives += (double)(light * share);
+        }
     }
-    /* What no ray of the reach has found may yet be there. */
-    float least = arrives > 0.0 ? (float)(LEAST_REACH * arrives / shines) : 1.0f;
-    for (size_t i = 0; i < cell_count; i++)
-        weight[i] *= fmaxf(least, cell_share(l, reach, i % l->width, i / l->width));
     double cell_angle = 2.0 * PI * PI / ((double)l->width * (double)(l->height - 1));
     l->environment_power = reach ? arrives * cell_angle * reach->area : -1.0;
-    table_make(&l->cells, cell_count, weight);
+    table_make(&l->blocks, block_count, weight);
     mem_free(weight);
 }
 
 static float chance_of_environment(const struct lights *l) {
     double emitter_power = PI * l->triangles.total;
-    if (!(l->cells.total > 0.0))
+    if (!(l->blocks.total > 0.0))
         return 0.0f;
     if (!(emitter_power > 0.0))
         return 1.0f;
@@ -127,7 +147,7 @@ static void share_samples(struct lights *l) {
 }
 
 void lights_set_environment(struct lights *l, const struct image *environment, const struct reach *reach) {
-    table_release(&l->cells);
+    table_release(&l->blocks);
     mem_free(l->environment);
     l->environment = NULL;
     l->width = l->height = 0;
@@ -136,7 +156,7 @@ void lights_set_environment(struct lights *l, const struct image *environment, c
         l->width = environment->width;
         l->height = environment->height;
         take_pixels(l, environment);
-        make_cells(l, reach);
+        make_blocks(l, reach);
     }
     share_samples(l);
 }
@@ -160,7 +180,7 @@ void lights_free(struct lights *l) {
     if (!l)
         return;
     release_triangles(l);
-    table_release(&l->cells);
+    table_release(&l->blocks);
     mem_free(l->environment);
     mem_free(l);
 }
@@ -195,19 +215,55 @@ void lights_update(struct lights *l, const struct mesh *mesh, const struct segme
     mem_free(power);
 }
 
+/* Column and row of a direction in the map, in units of cells, which lie between pixel centres. As
+ * in Mitsuba 3, a column's centre is half a pixel in, and the first and last row are the poles. */
+static void environment_place(const struct lights *l, vec3 d, float *x, float *y) {
+    float turn = atan2f(d.x, -d.z) * (float)(0.5 / PI) - 0.5f / (float)l->width;
+    turn -= floorf(turn);
+    *x = fminf(turn * (float)l->width, (float)l->width * 0x1.fffffep-1f);
+    float bottom = (float)(l->height - 1);
+    *y = clampf(acosf(clampf(d.y, -1.0f, 1.0f)) * (float)(1.0 / PI) * bottom, 0.0f,
+                bottom * 0x1.fffffep-1f);
+}
+
+/* The map at a place as environment_place gives it. */
+static rgb radiance_at(const struct lights *l, float x, float y) {
+    size_t i = (size_t)x, j = (size_t)y, stride = (size_t)l->width + 1;
+    float fx = x - (float)i, fy = y - (float)j;
+    const float(*p)[3] = (const float(*)[3])l->environment + j * stride + i;
+    float value[3];
+    for (int c = 0; c < 3; c++) {
+        float top = p[0][c] + fx * (p[1][c] - p[0][c]);
+        float bottom = p[stride][c] + fx * (p[stride + 1][c] - p[stride][c]);
+        value[c] = top + fy * (bottom - top);
+    }
+    return (rgb){value[0], value[1], value[2]};
+}
+
+/* Density by solid angle of the directions of a block, at this sine of the polar angle. */
+static float density_of(const struct lights *l, uint32_t block, float sine) {
+    float probability = l->blocks.cumulative[block + 1] - l->blocks.cumulative[block];
+    float cell_angle = (float)(2.0 * PI * PI) / ((float)l->width * (float)(l->height - 1));
+    float cells = (float)(block_width(l, block) * block_height(l, block));
+    return l->environment_chance * probability / (cells * cell_angle * sine);
+}
+
 static void sample_environment(const struct lights *l, float pick, float u, float v,
                                struct light_sample *s) {
-    uint32_t cell = light_table_pick(&l->cells, pick);
-    uint32_t row = cell / l->width, column = cell - row * l->width;
-    double phi = 2.0 * PI * ((double)column + 0.5 + (double)u) / (double)l->width;
-    double theta = PI * ((double)row + (double)v) / (double)(l->height - 1);
+    uint32_t block = light_table_pick(&l->blocks, pick);
+    uint32_t left = block % l->block_columns * l->grain, top = block / l->block_columns * l->grain;
+    float x = (float)left + u * (float)block_width(l, block), y = (float)top + v * (float)block_height(l, block);
+    x = fminf(x, (float)l->width * 0x1.fffffep-1f);
+    y = fminf(y, (float)(l->height - 1) * 0x1.fffffep-1f);
+    double phi = 2.0 * PI * ((double)x + 0.5) / (double)l->width;
+    double theta = PI * (double)y / (double)(l->height - 1);
     double sine = sin(theta);
     s->direction = (vec3){(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
     s->point = s->normal = (vec3){0.0f, 0.0f, 0.0f};
     s->distance_m = INFINITY;
     s->segment = LIGHT_ENVIRONMENT;
-    s->radiance = lights_environment(l, s->direction);
-    s->pdf = lights_pdf_environment(l, s->direction);
+    s->radiance = radiance_at(l, x, y);
+    s->pdf = density_of(l, block, fmaxf((float)sine, 1e-6f));
 }
 
 void lights_sample(const struct lights *l, vec3 point, float pick, float u, float v,
@@ -235,32 +291,12 @@ void lights_sample(const struct lights *l, vec3 point, float pick, float u, floa
         s->pdf = lights_pdf_segment(l, t->segment, s->distance_m, cosine);
 }
 
-/* Column and row of a direction in the map, in units of cells, which lie between pixel centres. As
- * in Mitsuba 3, a column's centre is half a pixel in, and the first and last row are the poles. */
-static void environment_place(const struct lights *l, vec3 d, float *x, float *y) {
-    float turn = atan2f(d.x, -d.z) * (float)(0.5 / PI) - 0.5f / (float)l->width;
-    turn -= floorf(turn);
-    *x = fminf(turn * (float)l->width, (float)l->width * 0x1.fffffep-1f);
-    float bottom = (float)(l->height - 1);
-    *y = clampf(acosf(clampf(d.y, -1.0f, 1.0f)) * (float)(1.0 / PI) * bottom, 0.0f,
-                bottom * 0x1.fffffep-1f);
-}
-
 rgb lights_environment(const struct lights *l, vec3 direction) {
     if (l->width == 0)
         return (rgb){0.0f, 0.0f, 0.0f};
     float x, y;
     environment_place(l, direction, &x, &y);
-    size_t i = (size_t)x, j = (size_t)y, stride = (size_t)l->width + 1;
-    float fx = x - (float)i, fy = y - (float)j;
-    const float(*p)[3] = (const float(*)[3])l->environment + j * stride + i;
-    float value[3];
-    for (int c = 0; c < 3; c++) {
-        float top = p[0][c] + fx * (p[1][c] - p[0][c]);
-        float bottom = p[stride][c] + fx * (p[stride + 1][c] - p[stride][c]);
-        value[c] = top + fy * (bottom - top);
-    }
-    return (rgb){value[0], value[1], value[2]};
+    return radiance_at(l, x, y);
 }
 
 float lights_pdf_environment(const struct lights *l, vec3 direction) {
@@ -268,9 +304,6 @@ float lights_pdf_environment(const struct lights *l, vec3 direction) {
         return 0.0f;
     float x, y;
     environment_place(l, direction, &x, &y);
-    size_t cell = (size_t)y * l->width + (size_t)x;
-    float probability = l->cells.cumulative[cell + 1] - l->cells.cumulative[cell];
-    float sine = sqrtf(fmaxf(1.0f - direction.y * direction.y, 1e-12f));
-    float cell_angle = (float)(2.0 * PI * PI) / ((float)l->width * (float)(l->height - 1));
-    return l->environment_chance * probability / (cell_angle * sine);
+    uint32_t block = (uint32_t)y / l->grain * l->block_columns + (uint32_t)x / l->grain;
+    return density_of(l, block, sqrtf(fmaxf(1.0f - direction.y * direction.y, 1e-12f)));
 }

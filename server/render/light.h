@@ -4,7 +4,7 @@
  * times luminance, and a point on it uniformly; it emits from its front side only. The
  * environment is a latitude-longitude map, picked by luminance times solid angle and, where that
  * was measured, by how much of the direction's light finds a way in (reach.h), constant within a
- * cell of the map. With both present samples are shared out by power: what emitters send out, and
+ * cell of the map (of a large map: a block of cells, so that the table stays in the cache). With both present samples are shared out by power: what emitters send out, and
  * what of the environment arrives. */
 #ifndef UNBAKE_RENDER_LIGHT_H
 #define UNBAKE_RENDER_LIGHT_H
@@ -53,7 +53,9 @@ struct lights {
     double environment_power; /* what arrives of it; negative where that was not measured */
     uint32_t width, height;  /* of the environment; 0 when there is none */
     float (*environment)[3]; /* [height][width + 1], last column = first; owned */
-    struct light_table cells; /* (height - 1) rows of `width` cells */
+    uint32_t grain;          /* cells along each side of a block; the last ones may be smaller */
+    uint32_t block_columns;
+    struct light_table blocks; /* of width x (height - 1) cells, which lie between pixel centres */
 };
 
 /* The entry whose range holds u in [0, 1): a linear search from the guide's entry, mostly

@@ -124,13 +124,24 @@ static double environment_density(const void *user, vec3 d) {
     return (double)lights_pdf_environment(user, d);
 }
 
-static void check_environment(void) {
+/* A map of patches, about 32 around; where there is a reach, half of the directions are closed. */
+static void check_environment(uint32_t width, uint32_t height, bool has_reach) {
     static double found[CELLS], expected[CELLS];
-    struct image map = {.width = 32, .height = 17, .channel_count = 3};
+    struct image map = {.width = width, .height = height, .channel_count = 3};
     map.pixel = mem_array((size_t)map.width * map.height * 3, sizeof(float));
-    for (uint32_t i = 0; i < map.width * map.height * 3; i++)
-        map.pixel[i] = powf(number(3, i, 0), 8.0f) * (i % 5 == 0 ? 0.0f : 3.0f);
+    for (uint32_t i = 0; i < map.width * map.height; i++) {
+        uint32_t patch = i / width * 32 / width * 32 + i % width * 32 / width;
+        for (uint32_t c = 0; c < 3; c++)
+            map.pixel[3 * i + c] = powf(number(3, 3 * patch + c, 0), 8.0f) * ((3 * patch + c) % 5 == 0 ? 0.0f : 3.0f);
+    }
     struct lights *lights = lights_new(&map);
+    struct reach *reach = mem_calloc(1, sizeof *reach);
+    reach->area = 2.0;
+    for (int i = 0; i < REACH_ROWS * REACH_COLUMNS; i++)
+        reach->share[i / REACH_COLUMNS][i % REACH_COLUMNS] = i % REACH_COLUMNS < REACH_COLUMNS / 2 ? 0.0f : 0.25f;
+    if (has_reach)
+        lights_set_environment(lights, &map, reach);
+    mem_free(reach);
     CHECK(lights_any(lights) && lights->environment_chance == 1.0f);
     memset(found, 0, sizeof found);
     double sum = 0.0;
@@ -143,7 +154,7 @@ static void check_environment(void) {
     }
     integrate(environment_density, lights, 24, expected);
     double z = chi_square(CELLS, found, expected), whole = 0.0, bright = 0.0;
-    CHECK_THAT(z < 4.0, "environment: chi-square %.2f sigma", z);
+    CHECK_THAT(z < 4.0, "environment of %u: chi-square %.2f sigma", width, z);
     for (uint64_t i = 0; i < SAMPLES; i++) {
         float up = 2.0f * number(5, i, 0) - 1.0f, turn = (float)(2.0 * PI) * number(5, i, 1);
         float r = sqrtf(1.0f - up * up);
@@ -212,7 +223,9 @@ int main(void) {
             check_bsdf(roughness[r], r == 1 ? 0.3f : 1.0f, cosine[c]);
     check_bsdf(0.5f, 0.0f, 0.5f);
     check_emitters();
-    check_environment();
+    check_environment(32, 17, false);
+    check_environment(32, 17, true);
+    check_environment(1100, 400, true); /* blocks of cells, the last ones smaller */
     check_reciprocity();
     check_sampler();
     return check_result();
