@@ -1,7 +1,7 @@
-/* log.c -- see log.h. Control characters in a message are replaced, so that what a user sent
- * cannot forge a line. */
+/* log.c -- see log.h. */
 #include "common/log.h"
 
+#include <assert.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -9,12 +9,24 @@
 #include <time.h>
 #include <unistd.h>
 
-static atomic_int current_level = LOG_INFO;
+#include "common/utf8.h"
+
+/* Sentence and values are cut before they are quoted, so that a line is whole whatever they hold. */
+#define MESSAGE_BYTES 1500
+#define VALUE_BYTES 256
+#define LINE_BYTES (2 * MESSAGE_BYTES + LOG_FIELDS_MAX * (2 * VALUE_BYTES + 40) + 200)
+
+static atomic_int current_level = LOG_INFO, current_format = LOG_TEXT;
 
 static const char *const level_names[] = {"error", "warning", "info", "debug"};
+static const char *const format_names[] = {"text", "logfmt", "json"};
 
 void log_set_level(enum log_level level) {
     atomic_store(&current_level, (int)level);
+}
+
+void log_set_format(enum log_format format) {
+    atomic_store(&current_format, (int)format);
 }
 
 bool log_level_parse(const char *name, enum log_level *level) {
@@ -27,38 +39,137 @@ bool log_level_parse(const char *name, enum log_level *level) {
     return false;
 }
 
-static void write_line(enum log_level level, const char *format, va_list args) {
+bool log_format_parse(const char *name, enum log_format *format) {
+    for (int i = LOG_TEXT; i <= LOG_JSON; i++) {
+        if (strcmp(name, format_names[i]) == 0) {
+            *format = (enum log_format)i;
+            return true;
+        }
+    }
+    return false;
+}
+
+struct line {
+    char text[LINE_BYTES];
+    size_t length;
+};
+
+static void put(struct line *line, const char *text, size_t length) {
+    assert(line->length + length <= LINE_BYTES);
+    memcpy(line->text + line->length, text, length);
+    line->length += length;
+}
+
+static void put_text(struct line *line, const char *text) {
+    put(line, text, strlen(text));
+}
+
+/* The text without control bytes and without what is no UTF-8; `quoted`: with \ before " and \ */
+static void put_clean(struct line *line, const char *text, bool quoted) {
+    size_t length = strlen(text), bad;
+    while (length > 0) {
+        size_t good = utf8_valid(text, length, &bad) ? length : bad;
+        for (size_t i = 0; i < good; i++) {
+            unsigned char c = (unsigned char)text[i];
+            if (quoted && (c == '"' || c == '\\'))
+                put(line, "\\", 1);
+            put(line, c < 0x20 || c == 0x7f ? "?" : &text[i], 1);
+        }
+        if (good == length)
+            break;
+        put(line, "?", 1);
+        text += good + 1;
+        length -= good + 1;
+    }
+}
+
+static void put_quoted(struct line *line, const char *text) {
+    put(line, "\"", 1);
+    put_clean(line, text, true);
+    put(line, "\"", 1);
+}
+
+/* key=value, with quotes where the value needs them. */
+static void put_pair(struct line *line, const char *key, const char *value) {
+    put(line, " ", 1);
+    put_text(line, key);
+    put(line, "=", 1);
+    if (*value && strcspn(value, " =\"\\") == strlen(value))
+        put_clean(line, value, false);
+    else
+        put_quoted(line, value);
+}
+
+static void put_member(struct line *line, const char *key, const char *value, bool is_number) {
+    put(line, ",\"", 2);
+    put_text(line, key);
+    put(line, "\":", 2);
+    if (is_number)
+        put_text(line, value);
+    else
+        put_quoted(line, value);
+}
+
+static void write_line(enum log_level level, const struct log_field *fields, size_t count,
+                       const char *format, va_list args) {
     if ((int)level > atomic_load(&current_level))
         return;
-    char line[2048];
+    enum log_format style = (enum log_format)atomic_load(&current_format);
+    struct line line = {.length = 0};
+    char message[MESSAGE_BYTES], value[VALUE_BYTES], at[40];
     struct timespec now;
     struct tm utc;
     clock_gettime(CLOCK_REALTIME, &now);
     gmtime_r(&now.tv_sec, &utc);
-    size_t used = strftime(line, sizeof line, "%Y-%m-%dT%H:%M:%S", &utc);
-    int n = snprintf(line + used, sizeof line - used, ".%03ldZ %s: ", now.tv_nsec / 1000000,
-                     level_names[level]);
-    used += (size_t)n;
-    n = vsnprintf(line + used, sizeof line - used - 1, format, args);
-    size_t length = used + (n < 0 ? 0 : (size_t)n);
-    if (length > sizeof line - 2)
-        length = sizeof line - 2;
-    for (size_t i = used; i < length; i++) {
-        if ((unsigned char)line[i] < 0x20 || line[i] == 0x7f)
-            line[i] = '?';
+    size_t used = strftime(at, sizeof at, "%Y-%m-%dT%H:%M:%S", &utc);
+    snprintf(at + used, sizeof at - used, ".%03ldZ", now.tv_nsec / 1000000);
+    vsnprintf(message, sizeof message, format, args);
+    put_text(&line, style == LOG_TEXT ? "" : style == LOG_JSON ? "{\"time\":\"" : "time=");
+    put_text(&line, at);
+    if (style == LOG_TEXT) {
+        put(&line, " ", 1);
+        put_text(&line, level_names[level]);
+        put(&line, ": ", 2);
+        put_clean(&line, message, false);
+    } else if (style == LOG_LOGFMT) {
+        put_pair(&line, "level", level_names[level]);
+        put(&line, " msg=", 5);
+        put_quoted(&line, message);
+    } else {
+        put(&line, "\"", 1);
+        put_member(&line, "level", level_names[level], false);
+        put_member(&line, "msg", message, false);
     }
-    line[length++] = '\n';
+    assert(count <= LOG_FIELDS_MAX);
+    for (size_t i = 0; i < count; i++) {
+        if (!fields[i].value)
+            continue;
+        snprintf(value, sizeof value, "%s", fields[i].value);
+        if (style == LOG_JSON)
+            put_member(&line, fields[i].key, value, fields[i].is_number);
+        else
+            put_pair(&line, fields[i].key, value);
+    }
+    put_text(&line, style == LOG_JSON ? "}\n" : "\n");
     /* Nothing sensible can be done when stderr itself fails. */
-    if (write(STDERR_FILENO, line, length) < 0)
+    if (write(STDERR_FILENO, line.text, line.length) < 0)
         return;
 }
 
-#define DEFINE_LOG(name, level)              \
-    void name(const char *format, ...) {     \
-        va_list args;                        \
-        va_start(args, format);              \
-        write_line(level, format, args);     \
-        va_end(args);                        \
+void log_fields(enum log_level level, const struct log_field *fields, size_t count,
+                const char *format, ...) {
+    va_list args;
+    va_start(args, format);
+    write_line(level, fields, count, format, args);
+    va_end(args);
+}
+
+#define DEFINE_LOG(name, level)                \
+    void name(const char *format, ...) {       \
+        va_list args;                          \
+        va_start(args, format);                \
+        write_line(level, NULL, 0, format, args); \
+        va_end(args);                          \
     }
 
 DEFINE_LOG(log_error, LOG_ERROR)

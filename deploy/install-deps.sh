@@ -2,7 +2,7 @@
 # Installs the Debian packages that building, running and testing need, if any is missing.
 # Does nothing, and asks for no rights, when all are there.
 set -eu
-packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libcjson-dev
+packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
 libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev libcurl4-openssl-dev libseccomp-dev
 zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
 

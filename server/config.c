@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "common/file.h"
-#include "common/log.h"
 #include "common/mem.h"
 #include "common/nearest.h"
 
@@ -25,10 +24,15 @@ static const struct option table[] = {
     TEXT(data_dir, "/var/lib/unbaked",
          "Folder of everything that the daemon keeps. One daemon a folder; a local disk."),
     TEXT(listen, "127.0.0.1:7117",
-         "Address and port for HTTP, loopback only. Port 0 takes a free one."),
+         "Address and port for HTTP. Port 0 takes a free one."),
+    TEXT(access, "auto",
+         "Who may use the daemon: auto (anybody on loopback until there is a token), tokens or open."),
+    TEXT(tls_certificate, "", "PEM file of the certificate chain for HTTPS. Empty: plain HTTP."),
+    TEXT(tls_key, "", "PEM file of the certificate's key. SIGHUP reads both files again."),
     TEXT(server_names, "",
          "Host names besides localhost that the daemon answers for, as a proxy passes them on."),
     TEXT(log_level, "info", "error, warning, info or debug; the log goes to stderr."),
+    TEXT(log_format, "text", "text, logfmt or json: how a line of the log is written."),
     INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time."),
     INT(threads, "threads", 0, 1024, "0", "Threads shared by the running jobs. 0: one a processor."),
     INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
@@ -195,7 +199,7 @@ enum status config_read(struct config *c, const char *path, struct buf *problems
 }
 
 enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
-                           struct error *err) {
+                           bool *is_loopback, struct error *err) {
     const char *colon = strrchr(listen, ':');
     size_t length = colon ? (size_t)(colon - listen) : 0;
     const char *host = listen;
@@ -205,36 +209,48 @@ enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE]
         length -= 2;
     }
     double number = colon ? read_number(colon + 1) : NAN;
-    if (length == 0 || length >= CONFIG_ADDRESS_SIZE || !(number >= 0 && number <= 65535) ||
-        number != floor(number))
+    bool is_good = length > 0 && length < CONFIG_ADDRESS_SIZE && number >= 0 && number <= 65535 &&
+                   number == floor(number);
+    struct in_addr v4;
+    struct in6_addr v6;
+    snprintf(address, CONFIG_ADDRESS_SIZE, "%.*s", is_good ? (int)length : 0, host);
+    if (!is_v6 && strcmp(address, "localhost") == 0)
+        snprintf(address, CONFIG_ADDRESS_SIZE, "127.0.0.1");
+    if (!is_good || inet_pton(is_v6 ? AF_INET6 : AF_INET, address, is_v6 ? (void *)&v6 : &v4) != 1)
         return error_set(err, STATUS_INPUT,
                          "listen must be like 127.0.0.1:7117 or [::1]:7117, not \"%s\"", listen);
     *port = (uint16_t)number;
-    snprintf(address, CONFIG_ADDRESS_SIZE, "%.*s", (int)length, host);
-    if (strcmp(address, "localhost") == 0)
-        snprintf(address, CONFIG_ADDRESS_SIZE, "127.0.0.1");
-    struct in_addr v4;
-    struct in6_addr v6;
-    bool is_loopback = is_v6 ? inet_pton(AF_INET6, address, &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6)
-                             : inet_pton(AF_INET, address, &v4) == 1 && ntohl(v4.s_addr) >> 24 == 127;
-    if (is_loopback)
-        return STATUS_OK;
-    error_set(err, STATUS_INPUT, "listen is \"%s\", which is not a loopback address: anybody who "
-              "reaches the daemon may use it, so it listens on loopback only", listen);
-    return error_hint(err, "put a proxy that asks for passwords in front (deploy/nginx.conf)");
+    *is_loopback = is_v6 ? IN6_IS_ADDR_LOOPBACK(&v6) : ntohl(v4.s_addr) >> 24 == 127;
+    return STATUS_OK;
+}
+
+static void check_word(const char *name, const char *value, const char *const *words, struct buf *problems) {
+    for (size_t i = 0; words[i]; i++)
+        if (strcmp(words[i], value) == 0)
+            return;
+    buf_printf(problems, "%s must be", name);
+    for (size_t i = 0; words[i]; i++)
+        buf_printf(problems, "%s %s", i == 0 ? "" : words[i + 1] ? "," : " or", words[i]);
+    buf_printf(problems, ", not \"%s\"\n", value);
 }
 
 void config_check(const struct config *c, struct buf *problems) {
+    static const char *const levels[] = {"error", "warning", "info", "debug", NULL};
+    static const char *const formats[] = {"text", "logfmt", "json", NULL};
+    static const char *const accesses[] = {"auto", "tokens", "open", NULL};
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port;
+    bool is_loopback;
     struct error err;
-    enum log_level level;
-    if (config_address(c->listen, address, &port, &err) != STATUS_OK)
+    if (config_address(c->listen, address, &port, &is_loopback, &err) != STATUS_OK)
         buf_printf(problems, "%s%s%s\n", err.message, *err.hint ? "; " : "", err.hint);
-    if (!log_level_parse(c->log_level, &level))
-        buf_printf(problems, "log_level must be error, warning, info or debug, not \"%s\"\n", c->log_level);
+    check_word("access", c->access, accesses, problems);
+    check_word("log_level", c->log_level, levels, problems);
+    check_word("log_format", c->log_format, formats, problems);
     if (*c->data_dir == '\0')
         buf_puts(problems, "data_dir must name a folder\n");
+    if ((*c->tls_certificate != '\0') != (*c->tls_key != '\0'))
+        buf_puts(problems, "tls_certificate and tls_key go together: one of them is missing\n");
     if (c->max_streams >= c->max_connections)
         buf_printf(problems, "max_streams (%lld) must be less than max_connections (%lld)\n",
                    (long long)c->max_streams, (long long)c->max_connections);

@@ -25,7 +25,8 @@ struct option {
 };
 
 struct config {
-    char *listen, *server_names, *data_dir, *log_level; /* owned */
+    char *listen, *access, *tls_certificate, *tls_key, *server_names; /* owned */
+    char *data_dir, *log_level, *log_format;                          /* owned */
     int64_t max_running, threads, max_attempts, queue_limit, worker_memory_mib;
     int64_t user_max_running, user_queue_limit, user_max_mib;
     int64_t max_upload_mib, min_free_mib;
@@ -51,9 +52,9 @@ enum status config_read(struct config *c, const char *path, struct buf *problems
 void config_check(const struct config *c, struct buf *problems);
 
 #define CONFIG_ADDRESS_SIZE 64
-/* Takes `listen` apart: "127.0.0.1:7117", "[::1]:0", "localhost:7117". STATUS_INPUT when it is
- * none of these, or not a loopback address: without tokens, nothing else is safe. */
+/* Takes `listen` apart: "127.0.0.1:7117", "[::1]:0", "localhost:7117", "0.0.0.0:443". STATUS_INPUT
+ * when it is no such thing. */
 enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
-                           struct error *err);
+                           bool *is_loopback, struct error *err);
 
 #endif

@@ -1,20 +1,18 @@
-/* main.c -- the daemon's entry: flags, configuration, wiring, signals.
+/* main.c -- the daemon's entry: wiring, signals. The command line is read by invocation.c.
  *
- *   lock the data folder ──> store ──> scheduler ──> api ──> listener ──> scheduler_run
+ *   lock the data folder ──> store ──> scheduler ──> api ──> listener ──> admin ──> scheduler_run
  *
  * and back in the same order when SIGTERM or SIGINT comes: nothing new is accepted, running jobs
- * write checkpoints and go back to the queue, streams end, the database is closed. SIGHUP does
- * nothing: the configuration changes by a restart, never by surprise. */
+ * write checkpoints and go back to the queue, streams end, the database is closed. SIGHUP reads
+ * the TLS certificate again; options change by a restart, never by surprise. */
 #include <archive.h>
 #include <cjson/cJSON.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -22,29 +20,15 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/config.h"
-#include "server/demo/generate.h"
-#include "server/evaluate/evaluate.h"
+#include "server/admin/admin.h"
+#include "server/admin/folder.h"
+#include "server/commands.h"
 #include "server/http/api.h"
+#include "server/http/events.h"
 #include "server/http/listener.h"
 #include "server/job/scheduler.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"
-#include "server/worker/worker.h"
-
-#define EXIT_USAGE 2
-
-/* What `unbaked NAME ...` runs instead of the daemon. argv[0] is the name. */
-static const struct command {
-    const char *name;
-    int (*run)(int argc, char **argv);
-    const char *help;
-} commands[] = {
-    {"demo-room", demo_command, "DIR: make a room whose materials and lights are known"},
-    {"evaluate", evaluate_command, "ROOM OUTPUTS: compare a job's outputs with a known room"},
-    {"worker", worker_main, "DIR: one attempt of a job; the daemon runs it"},
-};
-#define COMMAND_COUNT (sizeof commands / sizeof *commands)
 
 #define LIBRARY_COUNT 5
 
@@ -66,161 +50,17 @@ static void print_version(void) {
         printf("%s %s\n", list[i].name, list[i].version);
 }
 
-static void print_help(void) {
-    printf("unbaked takes scenes over HTTP and reconstructs their materials and lighting.\n\n"
-           "usage: unbaked [--config FILE] [--data DIR] [--listen ADDRESS:PORT] [--set NAME=VALUE]...\n\n"
-           "  --config FILE      read options from FILE (config/unbaked.conf documents them)\n"
-           "  --data DIR         the same as --set data_dir=DIR\n"
-           "  --listen ADDR:PORT the same as --set listen=ADDR:PORT; port 0 takes a free one\n"
-           "  --set NAME=VALUE   an option; wins over the file\n"
-           "  --port-file FILE   write the port to FILE once connections are accepted\n"
-           "  --check-config     say what is wrong with the configuration, and do no more\n"
-           "  --version          versions of the daemon and of its libraries\n"
-           "  --help             this\n\ncommands:\n");
-    for (size_t i = 0; i < COMMAND_COUNT; i++)
-        printf("  unbaked %s %s\n", commands[i].name, commands[i].help);
-    printf("\noptions for --set:\n");
-    size_t count;
-    const struct option *table = config_table(&count);
-    for (size_t i = 0; i < count; i++)
-        printf("  %-24s %s [%s%s%s]\n", table[i].name, table[i].help, table[i].default_text,
-               *table[i].unit ? " " : "", table[i].unit);
-    printf("\nexample: unbaked --data ~/unbaked --set max_running=2\n"
-           "exit status: 0 stopped when asked to, 1 failed, %d bad usage or configuration\n", EXIT_USAGE);
-}
-
-/* --- the command line -------------------------------------------------------------------- */
-
-struct invocation {
-    struct config config;
-    const char *port_file; /* NULL: none */
-    bool only_check;
+const struct flag daemon_flags[] = {
+    INVOCATION_FLAGS,
+    {"--listen", "ADDRESS:PORT", "the same as --set listen=ADDRESS:PORT; port 0 takes a free one"},
+    {"--port-file", "FILE", "write the port to FILE once connections are accepted"},
+    {"--check-config", NULL, "say what is wrong with the configuration, and do no more"},
+    {"--version", NULL, "versions of the daemon and of its libraries"},
+    {"--help", NULL, "print this help"},
+    {0},
 };
 
-static const struct flag {
-    const char *name;
-    bool has_value;
-} flags[] = {{"--config", true},     {"--data", true},          {"--listen", true},   {"--set", true},
-             {"--port-file", true},  {"--check-config", false}, {"--version", false}, {"--help", false}};
-
-/* Finds argv[*i] among the flags and its value, after '=' or as the next argument; NULL, with the
- * problem told, when it is none. */
-static const struct flag *next_flag(int argc, char **argv, int *i, const char **value) {
-    const char *text = argv[(*i)++];
-    size_t length = strcspn(text, "=");
-    for (size_t k = 0; k < sizeof flags / sizeof *flags; k++) {
-        if (strlen(flags[k].name) != length || strncmp(text, flags[k].name, length) != 0)
-            continue;
-        bool is_inside = text[length] == '=';
-        *value = is_inside ? text + length + 1 : NULL;
-        if (flags[k].has_value && !is_inside)
-            *value = *i < argc ? argv[(*i)++] : NULL;
-        if (flags[k].has_value == (*value != NULL))
-            return &flags[k];
-        fprintf(stderr, "unbaked: %s %s\n", flags[k].name,
-                flags[k].has_value ? "needs a value" : "takes no value");
-        return NULL;
-    }
-    fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists what there is\n", text);
-    return NULL;
-}
-
-/* Applies one flag that sets an option. */
-static void apply_flag(struct config *c, const char *flag, const char *value, struct buf *problems) {
-    if (strcmp(flag, "--data") == 0)
-        config_set(c, "data_dir", value, flag, problems);
-    if (strcmp(flag, "--listen") == 0)
-        config_set(c, "listen", value, flag, problems);
-    const char *equals = strchr(value, '=');
-    if (strcmp(flag, "--set") != 0)
-        return;
-    if (!equals) {
-        buf_printf(problems, "--set: \"%s\" is not of the form NAME=VALUE\n", value);
-        return;
-    }
-    char *name = mem_strndup(value, (size_t)(equals - value));
-    config_set(c, name, equals + 1, flag, problems);
-    mem_free(name);
-}
-
-/* Goes over the flags: once for the files and words among them, then, over what the file said,
- * for the options (`options` true). -1 to go on, or the exit status. */
-static int read_flags(int argc, char **argv, struct invocation *in, bool options, struct buf *problems) {
-    for (int i = 1; i < argc;) {
-        const char *value;
-        const struct flag *flag = next_flag(argc, argv, &i, &value);
-        if (!flag)
-            return EXIT_USAGE;
-        if (options) {
-            apply_flag(&in->config, flag->name, value ? value : "", problems);
-        } else if (strcmp(flag->name, "--config") == 0) {
-            struct error err;
-            if (config_read(&in->config, value, problems, &err) != STATUS_OK)
-                buf_printf(problems, "%s\n", err.message);
-        } else if (strcmp(flag->name, "--port-file") == 0) {
-            in->port_file = value;
-        } else if (strcmp(flag->name, "--check-config") == 0) {
-            in->only_check = true;
-        } else if (strcmp(flag->name, "--version") == 0) {
-            print_version();
-            return EXIT_SUCCESS;
-        } else if (strcmp(flag->name, "--help") == 0) {
-            print_help();
-            return EXIT_SUCCESS;
-        }
-    }
-    return -1;
-}
-
-/* Fills in->config from the defaults, the file and the flags. -1 to go on, or the exit status. */
-static int read_invocation(int argc, char **argv, struct invocation *in) {
-    struct buf problems;
-    buf_init(&problems, (size_t)1 << 20);
-    config_init(&in->config);
-    int code = read_flags(argc, argv, in, false, &problems);
-    if (code < 0)
-        code = read_flags(argc, argv, in, true, &problems);
-    if (code < 0)
-        config_check(&in->config, &problems);
-    if (problems.length > 0)
-        fputs(buf_text(&problems), stderr);
-    if (code < 0 && problems.length > 0)
-        code = EXIT_USAGE;
-    else if (code < 0 && in->only_check)
-        code = EXIT_SUCCESS;
-    buf_release(&problems);
-    return code;
-}
-
 /* --- the daemon -------------------------------------------------------------------------- */
-
-/* Takes the data folder for this process alone; *fd holds the lock while it is open. */
-static enum status lock_folder(const char *dir, int *fd, struct error *err) {
-    *fd = -1;
-    if (file_make_dirs(dir, err) != STATUS_OK)
-        return error_hint(err, "--data DIR takes another data folder");
-    char *path = file_join(dir, "lock");
-    char holder[32] = "";
-    enum status status = STATUS_OK;
-    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
-    if (*fd < 0) {
-        status = error_set_errno(err, errno, "cannot open %s", path);
-    } else if (flock(*fd, LOCK_EX | LOCK_NB) != 0) {
-        ssize_t got = errno == EWOULDBLOCK ? pread(*fd, holder, sizeof holder - 1, 0) : -1;
-        holder[got > 0 ? strcspn(holder, "\n") : 0] = '\0';
-        if (got >= 0)
-            status = error_set(err, STATUS_CONFLICT, "the data folder %s already has a daemon (process %s)",
-                               dir, *holder ? holder : "unknown");
-        else
-            status = error_set_errno(err, errno, "cannot lock %s", path);
-    } else {
-        int length = snprintf(holder, sizeof holder, "%ld\n", (long)getpid());
-        if (ftruncate(*fd, 0) != 0 || pwrite(*fd, holder, (size_t)length, 0) != length)
-            status = error_set_errno(err, errno, "cannot write %s", path);
-    }
-    mem_free(path);
-    return status;
-}
 
 struct daemon {
     struct config *config;
@@ -229,8 +69,35 @@ struct daemon {
     struct scheduler *scheduler;
     struct api *api;
     struct listener *listener;
+    struct admin *admin;
     struct api_library libraries[LIBRARY_COUNT];
 };
+
+/* An address that others can reach needs tokens, or the plain wish for none. */
+static enum status check_access(const struct daemon *d, bool is_loopback, struct error *err) {
+    const struct config *c = d->config;
+    if (strcmp(c->access, "auto") == 0 && !is_loopback && !store_has_users(d->store)) {
+        error_set(err, STATUS_INPUT, "listen is \"%s\", which is not a loopback address, and there are no "
+                  "tokens: anybody who reaches the daemon could use it", c->listen);
+        return error_hint(err, "`unbaked token add NAME --role admin` makes one; access = open lets anybody in");
+    }
+    if (!is_loopback && !*c->tls_certificate)
+        log_warning("without tls_certificate, tokens and scenes cross the network unencrypted");
+    if (!is_loopback && strcmp(c->access, "open") == 0)
+        log_warning("access = open: anybody who reaches %s may do everything", c->listen);
+    return STATUS_OK;
+}
+
+static enum api_access read_access(const char *word) {
+    return strcmp(word, "open") == 0     ? API_ACCESS_OPEN
+           : strcmp(word, "tokens") == 0 ? API_ACCESS_TOKENS
+                                         : API_ACCESS_AUTO;
+}
+
+static void on_revoked(void *user) {
+    struct daemon *d = user;
+    hub_recheck(d->api->hub);
+}
 
 static enum status build(struct daemon *d, struct error *err) {
     const struct config *c = d->config;
@@ -258,37 +125,53 @@ static enum status build(struct daemon *d, struct error *err) {
         .max_streams = (size_t)c->max_streams,
         .upload_keep_ms = (int64_t)(c->upload_keep_hours * 3.6e6),
         .keepalive_sec = c->keepalive_sec,
+        .access = read_access(c->access),
+        .is_tls = *c->tls_certificate != '\0',
         .server_names = c->server_names,
         .libraries = d->libraries,
         .library_count = LIBRARY_COUNT,
     };
     struct listener_config network = {
         .connection_max = (unsigned)c->max_connections,
+        .certificate_file = *c->tls_certificate ? c->tls_certificate : NULL,
+        .key_file = c->tls_key,
         .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec,
                    (double)c->body_min_bytes_per_sec},
     };
     char address[CONFIG_ADDRESS_SIZE];
     network.address = address;
-    enum status status = config_address(c->listen, address, &network.port, err);
+    bool is_loopback;
+    enum status status = config_address(c->listen, address, &network.port, &is_loopback, err);
     if (status == STATUS_OK)
         status = store_open(&d->store, c->data_dir, err);
+    if (status == STATUS_OK)
+        status = check_access(d, is_loopback, err);
     if (status == STATUS_OK)
         status = scheduler_new(&d->scheduler, &work, d->store, err);
     if (status == STATUS_OK)
         status = api_new(&d->api, &limits, d->store, d->scheduler, err);
     if (status == STATUS_OK)
         status = listener_start(&d->listener, &network, d->api, err);
+    if (status == STATUS_OK)
+        status = admin_start(&d->admin, c->data_dir, d->store, on_revoked, d, err);
     return status;
 }
 
 static void *wait_for_signal(void *user) {
     struct daemon *d = user;
+    struct error err;
     sigset_t asked;
     int number = 0;
     sigemptyset(&asked);
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGINT);
-    sigwait(&asked, &number);
+    sigaddset(&asked, SIGHUP);
+    while (sigwait(&asked, &number) == 0 && number == SIGHUP) {
+        if (listener_reload(d->listener, &err) == STATUS_OK)
+            log_info("SIGHUP: the TLS certificate was read again; options change by a restart only");
+        else
+            log_error("SIGHUP: %s; the old certificate stays in use", err.message);
+    }
     log_info("%s: stopping", number == SIGINT ? "SIGINT" : "SIGTERM");
     listener_quiesce(d->listener);
     scheduler_stop(d->scheduler);
@@ -304,14 +187,14 @@ static void raise_descriptor_limit(void) {
     setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-/* SIGTERM and SIGINT go to one thread that waits for them; all others inherit the block. */
+/* SIGTERM, SIGINT and SIGHUP go to one thread that waits for them; all others inherit the block. */
 static void prepare_signals(void) {
     sigset_t asked;
     sigemptyset(&asked);
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGINT);
+    sigaddset(&asked, SIGHUP);
     pthread_sigmask(SIG_BLOCK, &asked, NULL);
-    signal(SIGHUP, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
 }
 
@@ -332,12 +215,13 @@ static enum status announce(const struct daemon *d, const char *port_file, struc
     char text[16];
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port = 0;
-    enum status status = config_address(d->config->listen, address, &port, err);
+    bool is_loopback;
+    enum status status = config_address(d->config->listen, address, &port, &is_loopback, err);
     if (status != STATUS_OK)
         return status;
     port = listener_port(d->listener);
     bool is_v6 = strchr(address, ':') != NULL;
-    printf("http://%s%s%s:%u\n", is_v6 ? "[" : "", address, is_v6 ? "]" : "", port);
+    printf("http%s://%s%s%s:%u\n", *d->config->tls_certificate ? "s" : "", is_v6 ? "[" : "", address, is_v6 ? "]" : "", port);
     fflush(stdout);
     log_info("listening on %s port %u", address, port);
     int length = snprintf(text, sizeof text, "%u\n", port);
@@ -359,20 +243,24 @@ static enum status serve(struct daemon *d, const char *port_file, struct error *
     return status;
 }
 
-static int run_daemon(struct invocation *in) {
-    struct daemon d = {.config = &in->config, .lock_fd = -1};
+static int run_daemon(struct config *config, const char *port_file) {
+    struct daemon d = {.config = config, .lock_fd = -1};
     struct error err;
     enum log_level level = LOG_INFO;
-    log_level_parse(in->config.log_level, &level);
+    enum log_format format = LOG_TEXT;
+    log_level_parse(config->log_level, &level);
     log_set_level(level);
+    log_format_parse(config->log_format, &format);
+    log_set_format(format);
     raise_descriptor_limit();
     prepare_signals();
     log_start(&d);
-    enum status status = lock_folder(in->config.data_dir, &d.lock_fd, &err);
+    enum status status = folder_lock(config->data_dir, &d.lock_fd, &err);
     if (status == STATUS_OK)
         status = build(&d, &err);
     if (status == STATUS_OK)
-        status = serve(&d, in->port_file, &err);
+        status = serve(&d, port_file, &err);
+    admin_stop(d.admin);
     listener_stop(d.listener);
     api_free(d.api);
     scheduler_free(d.scheduler);
@@ -386,14 +274,29 @@ static int run_daemon(struct invocation *in) {
     return status == STATUS_OK ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 
-int main(int argc, char **argv) {
-    for (size_t i = 0; argc > 1 && i < COMMAND_COUNT; i++)
-        if (strcmp(argv[1], commands[i].name) == 0)
-            return commands[i].run(argc - 1, argv + 1);
-    struct invocation in = {.port_file = NULL};
-    int code = read_invocation(argc, argv, &in);
+int daemon_command(int argc, char **argv) {
+    struct invocation in;
+    size_t count;
+    int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
+    if (code < 0 && in.word_count > 0) {
+        fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
+        code = EXIT_USAGE;
+    } else if (code < 0 && invocation_has(&in, "--help")) {
+        command_help(command_table(&count), stdout);
+        code = EXIT_SUCCESS;
+    } else if (code < 0 && invocation_has(&in, "--version")) {
+        print_version();
+        code = EXIT_SUCCESS;
+    } else if (code < 0 && invocation_has(&in, "--check-config")) {
+        code = EXIT_SUCCESS;
+    }
     if (code < 0)
-        code = run_daemon(&in);
-    config_release(&in.config);
+        code = run_daemon(&in.config, invocation_value(&in, "--port-file", NULL));
+    invocation_release(&in);
     return code;
+}
+
+int main(int argc, char **argv) {
+    const struct command *command = argc > 1 ? command_find(argv[1]) : NULL;
+    return command ? command->run(argc - 1, argv + 1) : daemon_command(argc, argv);
 }

@@ -27,6 +27,7 @@ engine='server/(ingest|scene|render|reconstruct|export)/'
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
+forbid server/admin "$engine|server/http/[^t]" 'admin never sees the engine, and of http only tls.h'
 forbid server/store "$engine|server/(http|worker)/" 'store never sees the engine, http or the worker'
 forbid server/job "$engine|server/http/" 'job never sees the engine or http'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
@@ -47,6 +48,7 @@ forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(de
 
 own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/http/listener.c server/http/mhd.h
+own 'gnutls/' server/http/tls.c
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
 own 'curl/' client/request.c
 own 'openexr' common/exr.c

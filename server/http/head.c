@@ -79,7 +79,7 @@ static struct response *check_host(const struct request *r, const char *version,
     }
     if (!field_host(host, &length))
         return refuse(r, 400, "the Host field is not a host");
-    if (!field_is_loopback_host(host, length) && !is_server_name(server_names, host, length)) {
+    if (server_names && !field_is_loopback_host(host, length) && !is_server_name(server_names, host, length)) {
         struct response *reply = problem_full(r, 403, "this daemon does not answer for that Host",
             "behind a proxy, list the public name in server_names of the configuration", NULL);
         reply->must_close = true;

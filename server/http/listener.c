@@ -18,7 +18,9 @@
 #include "server/http/events.h"
 #include "server/http/head.h"
 #include "server/http/problem.h"
+#include "server/http/auth.h"
 #include "server/http/routes.h"
+#include "server/http/tls.h"
 
 #define LIBRARY_THREADS 4
 #define CLERK_THREADS 4
@@ -36,6 +38,7 @@ struct exchange {
     bool has_begun, has_replied_early;
     bool is_resting;            /* the clerk has it in the middle of its body */
     size_t drained;
+    double begun_sec;           /* the request line was there */
     /* Under listener->mutex: */
     bool is_waiting;            /* a stream; suspended until it is woken */
     bool is_woken;              /* while it was not waiting */
@@ -46,6 +49,7 @@ struct listener {
     struct api *api;
     struct MHD_Daemon *daemon;
     struct guard *guard;
+    struct tls *tls; /* NULL: plain HTTP */
     int socket_fd; /* -1 once quiesced */
     uint16_t port;
     pthread_t clerks[CLERK_THREADS];
@@ -191,8 +195,10 @@ static enum MHD_Result queue_reply(struct exchange *x) {
  * so the reply goes to the socket past it. What follows is drained for a while, lest the
  * connection be reset before the client has read it. */
 static void reply_early(struct exchange *x) {
+    bool is_tls = x->listener->tls != NULL;
     const union MHD_ConnectionInfo *info =
-        MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        MHD_get_connection_info(x->connection, is_tls ? MHD_CONNECTION_INFO_GNUTLS_SESSION
+                                                      : MHD_CONNECTION_INFO_CONNECTION_FD);
     struct response *reply = x->reply;
     struct buf text;
     request_drop_body(&x->request);
@@ -204,7 +210,9 @@ static void reply_early(struct exchange *x) {
     buf_puts(&text, "\r\n");
     buf_append(&text, reply->text, reply->length);
     /* A few hundred bytes into an empty socket buffer; where they do not fit, nobody reads. */
-    if (info)
+    if (info && is_tls)
+        tls_send(info->tls_session, text.data, text.length);
+    else if (info)
         (void)!send(info->connect_fd, text.data, text.length, MSG_DONTWAIT | MSG_NOSIGNAL);
     buf_release(&text);
     x->has_replied_early = true;
@@ -293,7 +301,7 @@ static struct response *begin(struct exchange *x, const char *method, const char
     const char *length = request_field(r, "Content-Length");
     r->has_body = request_field(r, "Transfer-Encoding") || (length && strcmp(length, "0") != 0);
     r->content_length = length ? strtoll(length, NULL, 10) : r->has_body ? -1 : 0;
-    struct response *refusal = head_check(r, version, l->api->config.server_names);
+    struct response *refusal = head_check(r, version, auth_is_open(l->api) ? l->api->config.server_names : NULL);
     if (!refusal && x->target_error.status != STATUS_OK)
         refusal = problem(r, 400, "%s", x->target_error.message);
     if (!refusal)
@@ -362,9 +370,27 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
     struct exchange *x = mem_calloc(1, sizeof *x);
     x->listener = user;
     x->connection = connection;
+    x->begun_sec = clock_sec();
     x->guarded = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context;
     target_parse(&x->request.target, target, &x->target_error);
     return x;
+}
+
+/* What may have changed something is worth a line; looking is not. */
+static void log_request(const struct exchange *x, int status, bool is_whole) {
+    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "other"};
+    const struct request *r = &x->request;
+    char status_text[8], duration[24];
+    snprintf(status_text, sizeof status_text, "%d", status);
+    snprintf(duration, sizeof duration, "%.1f", 1000.0 * (clock_sec() - x->begun_sec));
+    const struct log_field fields[] = {
+        {"request", r->id, false},         {"method", r->is_head ? "HEAD" : names[r->method], false},
+        {"path", r->target.path, false},   {"status", status_text, true},
+        {"ms", duration, true},            {"user", *r->caller.name ? r->caller.name : NULL, false},
+        {"end", is_whole ? NULL : "cut short", false},
+    };
+    log_fields(r->method == METHOD_GET ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
+               "answered");
 }
 
 static void on_completed(void *user, struct MHD_Connection *connection, void **context,
@@ -378,11 +404,7 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     int status = x->reply ? x->reply->status : 0;
     if (status >= 100 && status < 600)
         atomic_fetch_add(&l->api->request_count[status / 100], 1);
-    /* What may have changed something is worth a line; looking is not. */
-    static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "other"};
-    void (*log_line)(const char *format, ...) = x->request.method == METHOD_GET ? log_debug : log_info;
-    log_line("request %s: %s %s: %d%s", x->request.id, names[x->request.method], x->request.target.path, status,
-             code == MHD_REQUEST_TERMINATED_COMPLETED_OK ? "" : ", cut short");
+    log_request(x, status, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
     bool was_stream = x->reply && x->reply->stream && x->reply->stream->wake;
     response_free(x->reply); /* closes the stream: after this nobody wakes x */
     if (was_stream)
@@ -445,9 +467,20 @@ static enum status open_socket(struct listener *l, const struct listener_config 
     return status;
 }
 
+enum status listener_reload(struct listener *l, struct error *err) {
+    return l->tls ? tls_reload(l->tls, err) : STATUS_OK;
+}
+
 static enum status start_library(struct listener *l, const struct listener_config *config, struct error *err) {
+    struct MHD_OptionItem tls[] = {
+        {MHD_OPTION_HTTPS_CERT_CALLBACK, 0, tls_certificate_callback()},
+        {MHD_OPTION_HTTPS_PRIORITIES, 0, "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2"},
+        {MHD_OPTION_END, 0, NULL},
+    };
+    struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
     l->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG, 0, NULL,
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG |
+            (l->tls ? (unsigned)MHD_USE_TLS : 0), 0, NULL,
         NULL, on_request, l,
         MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
         MHD_OPTION_LISTEN_SOCKET, l->socket_fd,
@@ -458,6 +491,7 @@ static enum status start_library(struct listener *l, const struct listener_confi
         MHD_OPTION_URI_LOG_CALLBACK, on_target, l,
         MHD_OPTION_NOTIFY_COMPLETED, on_completed, l,
         MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
+        MHD_OPTION_ARRAY, l->tls ? tls : plain,
         MHD_OPTION_END);
     return l->daemon ? STATUS_OK : error_set_errno(err, errno, "libmicrohttpd does not start");
 }
@@ -470,6 +504,8 @@ enum status listener_start(struct listener **out, const struct listener_config *
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     enum status status = open_socket(l, config, err);
+    if (status == STATUS_OK && config->certificate_file)
+        status = tls_new(&l->tls, config->certificate_file, config->key_file, err);
     if (status == STATUS_OK)
         status = guard_new(&l->guard, &config->limits, on_tick, l, err);
     for (; status == STATUS_OK && l->clerk_count < CLERK_THREADS; l->clerk_count++) {
@@ -529,6 +565,7 @@ void listener_stop(struct listener *l) {
         close(l->socket_fd);
     if (l->guard)
         guard_free(l->guard);
+    tls_free(l->tls);
     l->api->listener = NULL;
     pthread_cond_destroy(&l->changed);
     pthread_mutex_destroy(&l->mutex);

@@ -20,6 +20,7 @@
 struct listener_config {
     const char *address; /* numeric: "127.0.0.1", "::1" */
     uint16_t port;       /* 0: any free one */
+    const char *certificate_file, *key_file; /* HTTPS; certificate_file NULL: plain HTTP */
     unsigned connection_max;
     struct guard_limits limits;
 };
@@ -27,6 +28,8 @@ struct listener_config {
 enum status listener_start(struct listener **l, const struct listener_config *config, struct api *api,
                            struct error *err);
 uint16_t listener_port(const struct listener *l);
+/* Reads the certificate and its key again, if there are any. Any thread but not two at once. */
+enum status listener_reload(struct listener *l, struct error *err);
 /* Accepts no further connection; those that exist are served. Any thread, once. */
 void listener_quiesce(struct listener *l);
 void listener_stop(struct listener *l); /* NULL is fine */

@@ -118,10 +118,10 @@ int problem_status(enum status status) {
 struct response *problem_from(const struct request *r, const struct error *err) {
     int status = problem_status(err->status);
     if (status == 500) {
-        log_error("request %s: %s", r->id, err->message);
+        log_fields(LOG_ERROR, &(struct log_field){"request", r->id, false}, 1, "%s", err->message);
         return problem_full(r, 500, "the server failed at this; its log says more", "", NULL);
     }
     if (status == 507)
-        log_warning("request %s: %s", r->id, err->message);
+        log_fields(LOG_WARNING, &(struct log_field){"request", r->id, false}, 1, "%s", err->message);
     return problem_full(r, status, err->message, err->hint, NULL);
 }

@@ -32,6 +32,9 @@ const char *store_library_version(void); /* SQLite's */
 /* Writes and reads back a row: what /readyz asks. */
 enum status store_probe(struct store *store, struct error *err);
 
+/* Writes a consistent copy to the empty file `path` while others go on using the store. */
+enum status store_backup(struct store *store, const char *path, struct error *err);
+
 /* Called, outside the store's mutex, after a transaction that appended events to `job_id` (0: a
  * scene changed). One subscriber; set before threads start. */
 void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user);

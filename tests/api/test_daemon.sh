@@ -14,8 +14,7 @@ printf 'max_runing = 1\nthreads = -1\n' >"$work/bad.conf"
 grep -q 'bad.conf:1: .*did you mean max_running' "$work/err" && grep -q 'bad.conf:2: threads' "$work/err" ||
     fail "not all problems at once: $(cat "$work/err")"
 "$build/unbaked" --check-config --config config/unbaked.conf || fail "config/unbaked.conf is refused"
-"$build/unbaked" --check-config --listen 0.0.0.0:80 2>"$work/err"; equal $? 2 "exit status for a public address"
-grep -q 'not a loopback address' "$work/err" || fail "$(cat "$work/err")"
+"$build/unbaked" --check-config --listen 0.0.0.0 2>"$work/err"; equal $? 2 "exit status without a port"
 
 # --- life ---
 start_daemon --set keepalive_sec=1

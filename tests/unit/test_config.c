@@ -123,11 +123,15 @@ static void check_faults(void) {
     CHECK(config_read(&c, "/nonexistent/unbaked.conf", &problems, &err) == STATUS_NOT_FOUND);
     config_set(&c, "max_streams", "1000", "flag", &problems);
     config_set(&c, "log_level", "loud", "flag", &problems);
-    config_set(&c, "listen", "0.0.0.0:80", "flag", &problems);
+    config_set(&c, "listen", "0.0.0.0", "flag", &problems);
+    config_set(&c, "access", "all", "flag", &problems);
+    config_set(&c, "tls_key", "key.pem", "flag", &problems);
     config_check(&c, &problems);
     CHECK(strstr(buf_text(&problems), "max_streams (1000) must be less than max_connections (1000)"));
     CHECK(strstr(buf_text(&problems), "log_level must be"));
-    CHECK(strstr(buf_text(&problems), "not a loopback address"));
+    CHECK(strstr(buf_text(&problems), "listen must be like"));
+    CHECK(strstr(buf_text(&problems), "access must be auto, tokens or open, not \"all\""));
+    CHECK(strstr(buf_text(&problems), "one of them is missing"));
     buf_release(&problems);
     config_release(&c);
 }
@@ -136,24 +140,28 @@ static void check_addresses(void) {
     static const struct {
         const char *text, *address;
         int port; /* -1: refused */
+        bool is_public;
     } cases[] = {
-        {"127.0.0.1:7117", "127.0.0.1", 7117}, {"127.8.9.1:0", "127.8.9.1", 0},
-        {"localhost:80", "127.0.0.1", 80},     {"[::1]:65535", "::1", 65535},
-        {"0.0.0.0:80", "", -1},  {"[::]:80", "", -1},        {"192.168.1.1:80", "", -1},
-        {"::1:80", "", -1},      {"127.0.0.1", "", -1},      {"127.0.0.1:65536", "", -1},
-        {"127.0.0.1:-1", "", -1}, {":80", "", -1},           {"127.1:80", "", -1},
-        {"127.0.0.1.evil.org:80", "", -1}, {"[127.0.0.1]:80", "", -1}, {"", "", -1},
-        {"[::ffff:127.0.0.1]:80", "", -1}, {"127.0.0.1:8 ", "", -1},
+        {"127.0.0.1:7117", "127.0.0.1", 7117, false}, {"127.8.9.1:0", "127.8.9.1", 0, false},
+        {"localhost:80", "127.0.0.1", 80, false},     {"[::1]:65535", "::1", 65535, false},
+        {"0.0.0.0:80", "0.0.0.0", 80, true}, {"[::]:80", "::", 80, true},
+        {"192.168.1.1:80", "192.168.1.1", 80, true},
+        {"[::ffff:127.0.0.1]:80", "::ffff:127.0.0.1", 80, true}, /* not known for loopback */
+        {"::1:80", "", -1, false},      {"127.0.0.1", "", -1, false},      {"127.0.0.1:65536", "", -1, false},
+        {"127.0.0.1:-1", "", -1, false}, {":80", "", -1, false},           {"127.1:80", "", -1, false},
+        {"127.0.0.1.evil.org:80", "", -1, false}, {"[127.0.0.1]:80", "", -1, false}, {"", "", -1, false},
+        {"127.0.0.1:8 ", "", -1, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char address[CONFIG_ADDRESS_SIZE];
         uint16_t port = 1;
+        bool is_loopback = false;
         struct error err;
-        enum status status = config_address(cases[i].text, address, &port, &err);
+        enum status status = config_address(cases[i].text, address, &port, &is_loopback, &err);
         if (cases[i].port < 0) {
             CHECK_THAT(status == STATUS_INPUT, "%s", cases[i].text);
         } else {
-            CHECK_THAT(status == STATUS_OK && port == cases[i].port, "%s", cases[i].text);
+            CHECK_THAT(status == STATUS_OK && port == cases[i].port && is_loopback != cases[i].is_public, "%s", cases[i].text);
             CHECK_STRING(address, cases[i].address);
         }
     }

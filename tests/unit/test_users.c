@@ -21,7 +21,7 @@ static void test_equal(void) {
 }
 
 static void test_tokens(void) {
-    char *dir = fresh_dir(), token[TOKEN_SIZE], second[TOKEN_SIZE], wrong[TOKEN_SIZE];
+    char *dir = fresh_dir(), token[TOKEN_SIZE], second[TOKEN_SIZE], wrong[TOKEN_SIZE + 40];
     struct store *store;
     struct caller who;
     int64_t id, other;
@@ -45,11 +45,11 @@ static void test_tokens(void) {
 
     /* Each digit counts, the other token's secret is not this one's, and forms that are none. */
     for (size_t i = 0; token[i]; i++) {
-        memcpy(wrong, token, sizeof wrong);
+        memcpy(wrong, token, sizeof token);
         wrong[i] = wrong[i] == '0' ? '1' : '0';
         IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
         CHECK(who.user_id == 0 && who.token_id == 0 && who.role == ROLE_VIEWER);
-        memcpy(wrong, token, sizeof wrong);
+        memcpy(wrong, token, sizeof token);
         wrong[i] = '\0';
         IS(store_token_find(store, wrong, &who, &err), STATUS_NOT_FOUND);
     }

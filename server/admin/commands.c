@@ -1,0 +1,200 @@
+/* commands.c -- see commands.h. Results go to stdout, faults to stderr with exit status 1, wrong
+ * command lines and configurations with 2. */
+#include "server/admin/commands.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/admin/admin.h"
+#include "server/commands.h"
+
+#define HELP_FLAG {"--help", NULL, "print this help"}
+
+const struct flag token_flags[] = {
+    {"--role", "ROLE", "of a new token: viewer, user (the default) or admin"},
+    {"--json", NULL, "print JSON"},
+    INVOCATION_FLAGS,
+    HELP_FLAG,
+    {0},
+};
+const struct flag backup_flags[] = {INVOCATION_FLAGS, HELP_FLAG, {0}};
+const struct flag check_config_flags[] = {INVOCATION_FLAGS, HELP_FLAG, {0}};
+
+static int fail(const struct error *err) {
+    fprintf(stderr, "unbaked: %s\n", err->message);
+    if (*err->hint)
+        fprintf(stderr, "  hint: %s\n", err->hint);
+    return err->status == STATUS_INPUT ? EXIT_USAGE : EXIT_FAILURE;
+}
+
+/* -1 to go on, or the exit status. */
+static int begin(struct invocation *in, const char *name, int argc, char **argv, const struct flag *flags,
+                 size_t words_min, size_t words_max) {
+    int code = invocation_read(in, argc, argv, flags, CONFIG_FILE_DEFAULT);
+    if (code < 0 && invocation_has(in, "--help")) {
+        command_help(command_find(name), stdout);
+        return EXIT_SUCCESS;
+    }
+    if (code < 0 && (in->word_count < words_min || in->word_count > words_max)) {
+        command_help(command_find(name), stderr);
+        return EXIT_USAGE;
+    }
+    log_set_level(LOG_WARNING);
+    return code;
+}
+
+/* --- token --------------------------------------------------------------------------------- */
+
+static void print_tokens(const cJSON *items) {
+    const cJSON *item;
+    printf("%6s  %-20s %-7s %s\n", "token", "user", "role", "made");
+    cJSON_ArrayForEach(item, items) {
+        char made[32];
+        double ms = 0;
+        json_number(item, "created_ms", "a token", 0, &ms, NULL);
+        time_t seconds = (time_t)(ms / 1000);
+        struct tm utc;
+        gmtime_r(&seconds, &utc);
+        strftime(made, sizeof made, "%Y-%m-%d %H:%MZ", &utc);
+        printf("%6d  %-20s %-7s %s\n", cJSON_GetObjectItem(item, "id")->valueint,
+               cJSON_GetStringValue(cJSON_GetObjectItem(item, "user")),
+               cJSON_GetStringValue(cJSON_GetObjectItem(item, "role")), made);
+    }
+}
+
+static void print_token_reply(const char *action, const cJSON *reply) {
+    if (strcmp(action, "list") == 0) {
+        print_tokens(cJSON_GetObjectItem(reply, "items"));
+    } else if (strcmp(action, "add") == 0) {
+        fputs("This is shown once; whoever has it is this user:\n", stderr);
+        printf("%s\n", cJSON_GetStringValue(cJSON_GetObjectItem(reply, "token")));
+    } else {
+        printf("revoked: %d\n", cJSON_GetObjectItem(reply, "count")->valueint);
+    }
+}
+
+int token_command(int argc, char **argv) {
+    struct invocation in;
+    struct error err;
+    cJSON *request = cJSON_CreateObject(), *reply = NULL;
+    int fd, code = begin(&in, "token", argc, argv, token_flags, 1, 2);
+    const char *action = code < 0 ? in.words[0] : "";
+    bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
+    if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
+        fprintf(stderr, "unbaked: there is no \"token %.80s\": add, list, revoke\n", action);
+        code = EXIT_USAGE;
+    } else if (code < 0 && in.word_count != (is_add || is_revoke ? 2 : 1)) {
+        fprintf(stderr, "unbaked: token %s takes %s\n", action,
+                is_add ? "the user's NAME" : is_revoke ? "a token's number or a user's name" : "no more words");
+        code = EXIT_USAGE;
+    }
+    if (code < 0) {
+        char *command = mem_printf("token-%s", action);
+        json_add_string(request, "command", command);
+        mem_free(command);
+        if (is_add)
+            json_add_string(request, "name", in.words[1]);
+        if (is_revoke)
+            json_add_string(request, "which", in.words[1]);
+        json_add_string(request, "role", invocation_value(&in, "--role", "user"));
+        if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
+            code = fail(&err);
+        } else if (invocation_has(&in, "--json")) {
+            char *text = json_text(reply);
+            printf("%s\n", text);
+            mem_free(text);
+        } else {
+            print_token_reply(action, reply);
+        }
+    }
+    cJSON_Delete(request);
+    cJSON_Delete(reply);
+    invocation_release(&in);
+    return code < 0 ? EXIT_SUCCESS : code;
+}
+
+/* --- backup -------------------------------------------------------------------------------- */
+
+/* Copies what fd holds to `path`, which appears only when it is whole and on the disk. */
+static enum status keep(int fd, const char *path, uint64_t *bytes, struct error *err) {
+    char *part = mem_printf("%s.part", path), chunk[65536];
+    enum status status = STATUS_OK;
+    ssize_t got = 0;
+    *bytes = 0;
+    int out = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (out < 0)
+        status = error_set_errno(err, errno, "cannot create %s", part);
+    while (status == STATUS_OK && (got = read(fd, chunk, sizeof chunk)) > 0) {
+        status = file_write_all(out, chunk, (size_t)got, part, err);
+        *bytes += (uint64_t)got;
+    }
+    if (status == STATUS_OK && (got < 0 || fsync(out) != 0 || rename(part, path) != 0))
+        status = error_set_errno(err, errno, "cannot write %s", path);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err);
+    if (out >= 0)
+        close(out);
+    if (status != STATUS_OK)
+        unlink(part);
+    mem_free(part);
+    return status;
+}
+
+int backup_command(int argc, char **argv) {
+    struct invocation in;
+    struct error err;
+    uint64_t bytes = 0;
+    cJSON *request = cJSON_CreateObject(), *reply = NULL;
+    int fd = -1, code = begin(&in, "backup", argc, argv, backup_flags, 1, 1);
+    json_add_string(request, "command", "backup");
+    if (code < 0) {
+        enum status status = admin_call(in.config.data_dir, request, &reply, &fd, &err);
+        if (status == STATUS_OK && fd < 0)
+            status = error_set(&err, STATUS_INTERNAL, "the daemon sent no copy");
+        if (status == STATUS_OK)
+            status = keep(fd, in.words[0], &bytes, &err);
+        if (status != STATUS_OK)
+            code = fail(&err);
+        else
+            printf("%s: %llu bytes\n", in.words[0], (unsigned long long)bytes);
+    }
+    if (fd >= 0)
+        close(fd);
+    cJSON_Delete(request);
+    cJSON_Delete(reply);
+    invocation_release(&in);
+    return code < 0 ? EXIT_SUCCESS : code;
+}
+
+/* --- check-config -------------------------------------------------------------------------- */
+
+int check_config_command(int argc, char **argv) {
+    struct invocation in;
+    int code = begin(&in, "check-config", argc, argv, check_config_flags, 0, 1);
+    struct buf problems;
+    struct error err;
+    buf_init(&problems, (size_t)1 << 20);
+    if (code < 0 && in.word_count == 1 &&
+        config_read(&in.config, in.words[0], &problems, &err) != STATUS_OK)
+        buf_printf(&problems, "%s\n", err.message);
+    if (code < 0 && in.word_count == 1)
+        config_check(&in.config, &problems);
+    if (code < 0 && problems.length > 0) {
+        fputs(buf_text(&problems), stderr);
+        code = EXIT_USAGE;
+    }
+    if (code < 0)
+        puts("the configuration is good");
+    buf_release(&problems);
+    invocation_release(&in);
+    return code < 0 ? EXIT_SUCCESS : code;
+}

@@ -1,0 +1,248 @@
+/* doctor.c -- `unbaked doctor`: what works on this machine, as the configuration would use it.
+ *
+ * Each check is a line: ok, warn (it works, but look at it) or FAIL (the daemon, or its jobs,
+ * will not work). Nothing is changed; a file is written into the data folder and removed. */
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/magic.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/statfs.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "server/admin/admin.h"
+#include "server/admin/commands.h"
+#include "server/commands.h"
+#include "server/http/tls.h"
+#include "server/worker/sandbox.h"
+
+const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print this help"}, {0}};
+
+enum verdict { GOOD, WARN, BAD };
+
+static int bad_count;
+
+__attribute__((format(printf, 3, 4)))
+static void tell(enum verdict verdict, const char *what, const char *format, ...) {
+    static const char *const words[] = {"ok", "warn", "FAIL"};
+    char text[1200];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    printf("%-5s %-12s %s\n", words[verdict], what, text);
+    bad_count += verdict == BAD;
+}
+
+/* --- the machine ----------------------------------------------------------------------------- */
+
+static void check_limits(const struct config *c) {
+    struct rlimit files;
+    int64_t wanted = 2 * c->max_connections + 100; /* a connection and the file that it is sent */
+    if (getrlimit(RLIMIT_NOFILE, &files) != 0)
+        tell(WARN, "limits", "the limit of open files cannot be read: %s", strerror(errno));
+    else if (files.rlim_max < (rlim_t)wanted)
+        tell(WARN, "limits", "%llu open files allowed, %lld wanted for max_connections = %lld (LimitNOFILE=)",
+             (unsigned long long)files.rlim_max, (long long)wanted, (long long)c->max_connections);
+    else
+        tell(GOOD, "limits", "%llu open files allowed", (unsigned long long)files.rlim_max);
+}
+
+static void check_processors(const struct config *c) {
+    long count = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES);
+    uint64_t memory = (uint64_t)pages * (uint64_t)sysconf(_SC_PAGESIZE) >> 20;
+    uint64_t wanted = (uint64_t)c->worker_memory_mib * (uint64_t)c->max_running;
+    enum verdict verdict = wanted > memory || c->threads > count ? WARN : GOOD;
+    tell(verdict, "machine", "%ld processors, %llu MiB of memory; jobs use %lld threads (0: all) and %s", count,
+         (unsigned long long)memory, (long long)c->threads,
+         wanted == 0 ? "as much memory as they ask for" : wanted > memory ? "may use more memory than there is"
+                                                                           : "have room");
+}
+
+/* Tries the sandbox in a child, where it does no harm. */
+static void check_sandbox(const struct config *c) {
+    struct sandbox_result result = {.text = ""};
+    int channel[2];
+    if (!c->sandbox) {
+        tell(WARN, "sandbox", "sandbox = no: jobs read strangers' files with all the daemon's rights");
+        return;
+    }
+    pid_t child = pipe2(channel, O_CLOEXEC) == 0 ? fork() : -1;
+    if (child == 0) {
+        struct sandbox sandbox = {.write_dir = "/tmp"};
+        sandbox_enter(&sandbox, &result);
+        /* What it says, held against what it does. */
+        int etc = open("/etc/passwd", O_RDONLY | O_CLOEXEC);
+        int net = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        result.files = result.files && etc < 0;
+        result.system_calls = result.system_calls && net < 0;
+        bool sent = write(channel[1], &result, sizeof result) == (ssize_t)sizeof result;
+        _exit(!sent);
+    }
+    if (child < 0 || read(channel[0], &result, sizeof result) != (ssize_t)sizeof result) {
+        tell(BAD, "sandbox", "a process in the sandbox does not even start");
+    } else {
+        tell(result.files ? GOOD : WARN, "sandbox", "Landlock %s", result.files
+             ? "keeps jobs from files that are not theirs"
+             : "is missing (Linux 5.13, lsm=landlock): jobs may read files that are not theirs");
+        tell(result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s", result.system_calls
+             ? "keeps jobs from the network and from new programs"
+             : "is missing: jobs may use the network");
+    }
+    if (child > 0) {
+        close(channel[0]);
+        close(channel[1]);
+        waitpid(child, NULL, 0);
+    }
+}
+
+/* --- the data folder ------------------------------------------------------------------------- */
+
+static bool is_remote(const char *dir) {
+    struct statfs info;
+    if (statfs(dir, &info) != 0)
+        return false;
+    unsigned long type = (unsigned long)info.f_type;
+    return type == NFS_SUPER_MAGIC || type == SMB_SUPER_MAGIC || type == 0xFE534D42UL /* SMB2 */ ||
+           type == 0xFF534D42UL /* CIFS */ || type == 0x65735546UL /* FUSE: who knows */;
+}
+
+static bool check_writable(const char *dir) {
+    char *path = file_join(dir, "doctor-XXXXXX");
+    int fd = mkostemp(path, O_CLOEXEC);
+    bool good = fd >= 0 && write(fd, "x", 1) == 1 && fsync(fd) == 0;
+    int number = errno;
+    if (fd >= 0) {
+        close(fd);
+        unlink(path);
+    }
+    mem_free(path);
+    if (!good)
+        tell(BAD, "data", "user %d cannot write to %s: %s", (int)geteuid(), dir, strerror(number));
+    return good;
+}
+
+static void check_disk(const struct config *c) {
+    uint64_t room;
+    struct error err;
+    struct stat info;
+    const char *dir = c->data_dir;
+    if (stat(dir, &info) != 0) {
+        tell(WARN, "data", "%s is not there; the daemon makes it where it may", dir);
+        return;
+    }
+    if (geteuid() == 0 && info.st_uid != 0 && seteuid(info.st_uid) != 0) { /* the daemon is its owner */
+        tell(BAD, "data", "cannot act as the owner of %s: %s", dir, strerror(errno));
+        return;
+    }
+    if (check_writable(dir))
+        tell(info.st_mode & 07 ? WARN : GOOD, "data", "%s can be written%s", dir,
+             info.st_mode & 07 ? ", and others can look into it: chmod o= it" : "");
+    if (is_remote(dir))
+        tell(BAD, "data", "%s lies on a network file system, where SQLite's locks cannot be relied on", dir);
+    if (file_free_bytes(dir, &room, &err) != STATUS_OK)
+        tell(BAD, "disk", "%s", err.message);
+    else
+        tell(room >> 20 < (uint64_t)c->min_free_mib ? BAD : GOOD, "disk", "%llu MiB free; min_free_mib = %lld",
+             (unsigned long long)(room >> 20), (long long)c->min_free_mib);
+}
+
+/* --- the daemon ------------------------------------------------------------------------------ */
+
+static bool daemon_runs(const char *dir) {
+    char *path = file_join(dir, "lock");
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    bool runs = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0;
+    if (fd >= 0)
+        close(fd);
+    mem_free(path);
+    return runs;
+}
+
+static void check_tokens(const struct config *c, bool runs, bool is_loopback) {
+    struct error err;
+    char *path = file_join(c->data_dir, "state.db");
+    int fd, count = 0;
+    if (runs || access(path, R_OK) == 0) {
+        cJSON *request = cJSON_CreateObject(), *reply;
+        json_add_string(request, "command", "token-list");
+        if (admin_call(c->data_dir, request, &reply, &fd, &err) == STATUS_OK)
+            count = cJSON_GetArraySize(cJSON_GetObjectItem(reply, "items"));
+        else
+            tell(BAD, "database", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
+        cJSON_Delete(request);
+        cJSON_Delete(reply);
+    }
+    mem_free(path);
+    if (count > 0)
+        tell(GOOD, "tokens", "%d", count);
+    else if (strcmp(c->access, "open") == 0)
+        tell(is_loopback ? GOOD : WARN, "tokens", "access = open: whoever reaches %s may do everything", c->listen);
+    else if (is_loopback)
+        tell(GOOD, "tokens", "none: whoever has an account on this machine may do everything");
+    else
+        tell(BAD, "tokens", "none, and %s is no loopback address: `unbaked token add NAME --role admin`", c->listen);
+}
+
+static void check_tls(const struct config *c, bool is_loopback) {
+    struct tls *tls;
+    struct error err;
+    struct stat info;
+    double days = 0;
+    if (!*c->tls_certificate) {
+        tell(is_loopback ? GOOD : WARN, "tls", is_loopback ? "none, on loopback"
+             : "none: tokens and scenes cross the network unencrypted");
+        return;
+    }
+    if (tls_new(&tls, c->tls_certificate, c->tls_key, &err) != STATUS_OK ||
+        tls_days_left(c->tls_certificate, &days, &err) != STATUS_OK) {
+        tell(BAD, "tls", "%s", err.message);
+        return;
+    }
+    tls_free(tls);
+    tell(days < 0 ? BAD : days < 14 ? WARN : GOOD, "tls", "the certificate %s %.0f days",
+         days < 0 ? "has expired, for" : "is good for", days < 0 ? -days : days);
+    if (stat(c->tls_key, &info) == 0 && info.st_mode & 07)
+        tell(WARN, "tls", "everybody here can read the key: chmod o= %s", c->tls_key);
+}
+
+int doctor_command(int argc, char **argv) {
+    struct invocation in;
+    struct error err;
+    char address[CONFIG_ADDRESS_SIZE];
+    uint16_t port;
+    bool is_loopback = true;
+    int code = invocation_read(&in, argc, argv, doctor_flags, CONFIG_FILE_DEFAULT);
+    if (code < 0 && (invocation_has(&in, "--help") || in.word_count > 0)) {
+        code = in.word_count > 0 ? EXIT_USAGE : EXIT_SUCCESS;
+        command_help(command_find("doctor"), in.word_count > 0 ? stderr : stdout);
+    }
+    if (code < 0) {
+        const struct config *c = &in.config;
+        bool runs = daemon_runs(c->data_dir);
+        log_set_level(LOG_ERROR);
+        config_address(c->listen, address, &port, &is_loopback, &err); /* was checked with the rest */
+        tell(GOOD, "program", "unbaked " UNBAKE_VERSION "; a daemon %s on %s", runs ? "runs" : "does not run",
+             c->data_dir);
+        check_processors(c);
+        check_limits(c);
+        check_sandbox(c);
+        check_tls(c, is_loopback);
+        check_tokens(c, runs, is_loopback);
+        check_disk(c);
+        code = bad_count > 0;
+    }
+    invocation_release(&in);
+    return code;
+}

@@ -1,0 +1,39 @@
+/* folder.c -- see folder.h. */
+#include "server/admin/folder.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+
+enum status folder_lock(const char *dir, int *fd, struct error *err) {
+    *fd = -1;
+    if (file_make_dirs(dir, err) != STATUS_OK)
+        return error_hint(err, "--data DIR takes another data folder");
+    char *path = file_join(dir, "lock");
+    char holder[32] = "";
+    enum status status = STATUS_OK;
+    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
+    if (*fd < 0) {
+        status = error_set_errno(err, errno, "cannot open %s", path);
+    } else if (flock(*fd, LOCK_EX | LOCK_NB) != 0) {
+        ssize_t got = errno == EWOULDBLOCK ? pread(*fd, holder, sizeof holder - 1, 0) : -1;
+        holder[got > 0 ? strcspn(holder, "\n") : 0] = '\0';
+        if (got >= 0)
+            status = error_set(err, STATUS_CONFLICT, "the data folder %s already has a daemon (process %s)",
+                               dir, *holder ? holder : "unknown");
+        else
+            status = error_set_errno(err, errno, "cannot lock %s", path);
+    } else {
+        int length = snprintf(holder, sizeof holder, "%ld\n", (long)getpid());
+        if (ftruncate(*fd, 0) != 0 || pwrite(*fd, holder, (size_t)length, 0) != length)
+            status = error_set_errno(err, errno, "cannot write %s", path);
+    }
+    mem_free(path);
+    return status;
+}

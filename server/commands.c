@@ -1,0 +1,93 @@
+/* commands.c -- see commands.h. */
+#include "server/commands.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/admin/commands.h"
+#include "server/demo/generate.h"
+#include "server/evaluate/evaluate.h"
+#include "server/worker/worker.h"
+
+static const struct command table[] = {
+    {"", "", "take scenes over HTTP and reconstruct their materials and lighting",
+     "Runs in the foreground and logs to stderr. SIGTERM and SIGINT stop it: running jobs write a\n"
+     "checkpoint and go back to the queue. SIGHUP reads the TLS certificate again.\n",
+     "  unbaked --data ~/unbaked --set max_running=2\n", daemon_flags, daemon_command},
+    {"token", "add NAME|list|revoke WHICH", "make, list and revoke the tokens of users",
+     "`token add` makes a token for the user NAME and prints it, once. WHICH is a token's number or a\n"
+     "user's name; what is revoked stops working at once, in open streams too. While there has never\n"
+     "been a token, whoever reaches the daemon may do everything.\n",
+     "  unbaked token add alice\n  unbaked token add wall-display --role viewer\n"
+     "  unbaked token revoke alice\n",
+     token_flags, token_command},
+    {"check-config", "[FILE]", "say what is wrong with a configuration", "",
+     "  unbaked check-config /etc/unbaked.conf\n", check_config_flags, check_config_command},
+    {"doctor", "", "say what works on this machine and what does not",
+     "Looks at libraries, limits, permissions, the disk and what the kernel offers for the sandbox.\n"
+     "Ends with 1 when something keeps the daemon from working.\n",
+     "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
+    {"backup", "FILE", "write a consistent copy of the database, also while the daemon works",
+     "FILE is a whole state.db: users, scenes, jobs, events. The files of scenes and jobs never change\n"
+     "once they are there: copy those folders after it, with rsync, say.\n",
+     "  unbaked backup /backup/state.db && rsync -a /var/lib/unbaked/scenes /var/lib/unbaked/jobs /backup/\n",
+     backup_flags, backup_command},
+    {"demo-room", "DIR", "make a room whose materials and lights are known", "",
+     "  unbaked demo-room /tmp/room\n", NULL, demo_command},
+    {"evaluate", "ROOM OUTPUTS", "compare a job's outputs with a known room", "",
+     "  unbaked evaluate /tmp/room /tmp/room-textures\n", NULL, evaluate_command},
+    {"manual", "PAGE", "write unbaked.8, unbaked.conf.5, or the completion for bash or zsh", "",
+     "  unbaked manual unbaked.8 | man -l -\n", NULL, manual_command},
+    {"worker", "DIR", "one attempt of a job; the daemon runs it", "", "", NULL, worker_main},
+};
+#define COMMAND_COUNT (sizeof table / sizeof *table)
+
+const struct command *command_table(size_t *count) {
+    *count = COMMAND_COUNT;
+    return table;
+}
+
+const struct command *command_find(const char *name) {
+    for (size_t i = 1; i < COMMAND_COUNT; i++)
+        if (strcmp(table[i].name, name) == 0)
+            return &table[i];
+    return NULL;
+}
+
+static void print_flags(const struct flag *flags, FILE *out) {
+    for (; flags && flags->name; flags++) {
+        char *left = mem_printf("%s%s%s", flags->name, flags->value ? " " : "", flags->value ? flags->value : "");
+        fprintf(out, "  %-20s %s\n", left, flags->help);
+        mem_free(left);
+    }
+}
+
+static void print_commands_and_options(FILE *out) {
+    size_t count;
+    const struct option *options = config_table(&count);
+    fputs("\ncommands:\n", out);
+    for (size_t i = 1; i < COMMAND_COUNT; i++)
+        fprintf(out, "  unbaked %s %s: %s\n", table[i].name, table[i].arguments, table[i].summary);
+    fputs("\noptions for --set and the file:\n", out);
+    for (size_t i = 0; i < count; i++)
+        fprintf(out, "  %-24s %s [%s%s%s]\n", options[i].name, options[i].help, options[i].default_text,
+                *options[i].unit ? " " : "", options[i].unit);
+}
+
+void command_help(const struct command *command, FILE *out) {
+    bool is_daemon = command == table;
+    fprintf(out, "usage: unbaked%s%s%s%s%s\n\n%s.\n", is_daemon ? "" : " ", command->name,
+            *command->arguments ? " " : "", command->arguments, command->flags ? " [OPTION]..." : "",
+            command->summary);
+    if (*command->details)
+        fprintf(out, "\n%s", command->details);
+    if (command->flags)
+        fputs("\n", out);
+    print_flags(command->flags, out);
+    if (is_daemon)
+        print_commands_and_options(out);
+    if (*command->example)
+        fprintf(out, "\nexample:\n%s", command->example);
+    fprintf(out, "\nexit status: 0 done%s, 1 failed, %d bad usage or configuration\n",
+            is_daemon ? " (stopped when asked to)" : "", EXIT_USAGE);
+}

@@ -1,0 +1,31 @@
+/* tls.h -- the daemon's certificate and key, read again while connections are served. tls.c is the
+ * only include of GnuTLS.
+ *
+ * The certificate in use is one of the process: libmicrohttpd asks for it without saying for whom. */
+#ifndef UNBAKE_HTTP_TLS_H
+#define UNBAKE_HTTP_TLS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/error.h"
+
+struct tls; /* opaque */
+
+/* PEM files: a chain, the server's certificate first, and its key. */
+enum status tls_new(struct tls **tls, const char *certificate_file, const char *key_file,
+                    struct error *err);
+/* Reads the files again; connections that begin from now on get what they hold. On an error, what
+ * was there before stays. */
+enum status tls_reload(struct tls *tls, struct error *err);
+void tls_free(struct tls *tls); /* NULL is fine; no connection is left */
+
+/* What libmicrohttpd takes as MHD_OPTION_HTTPS_CERT_CALLBACK. */
+void *tls_certificate_callback(void);
+/* Writes into a connection's session what is no part of a reply; as many bytes as go at once. */
+void tls_send(void *session, const void *data, size_t length);
+
+/* Days until the file's first certificate expires (negative: days since), for `unbaked doctor`. */
+enum status tls_days_left(const char *certificate_file, double *days, struct error *err);
+
+#endif

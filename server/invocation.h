@@ -1,0 +1,51 @@
+/* invocation.h -- a command line of `unbaked` and the configuration that it names.
+ *
+ * Options come from their defaults, then the file, then the command line. */
+#ifndef UNBAKE_SERVER_INVOCATION_H
+#define UNBAKE_SERVER_INVOCATION_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "server/config.h"
+
+#define EXIT_USAGE 2
+#define CONFIG_FILE_DEFAULT "/etc/unbaked.conf" /* of the commands; the daemon is told its file */
+
+struct flag {
+    const char *name;  /* "--config"; NULL ends a table */
+    const char *value; /* what the help calls its value; NULL: it takes none */
+    const char *help;
+};
+
+#define WORDS_MAX 8
+
+struct invocation {
+    struct config config;
+    const char *words[WORDS_MAX]; /* what is no flag; borrowed from argv */
+    size_t word_count;
+    struct {
+        const struct flag *flag;
+        const char *value; /* NULL where it takes none */
+    } given[64];
+    size_t given_count;
+};
+
+/* Every command that works on a data folder takes these: --config, --data, --set. */
+#define INVOCATION_FLAGS                                                                       \
+    {"--config", "FILE", "read options from FILE; unbaked.conf(5) lists them"},                \
+    {"--data", "DIR", "the same as --set data_dir=DIR"},                                       \
+    {"--set", "NAME=VALUE", "an option; wins over the file"}
+
+/* Reads argv[1...]. Faults are told on stderr, all those of the configuration at once. -1 to go
+ * on, or the exit status. Needs invocation_release in any case. `config_file` is read where no
+ * --config or --data is given and it is there; NULL: none. */
+int invocation_read(struct invocation *in, int argc, char **argv, const struct flag *flags,
+                    const char *config_file);
+void invocation_release(struct invocation *in);
+
+bool invocation_has(const struct invocation *in, const char *flag);
+/* The last value given, or `fallback`. */
+const char *invocation_value(const struct invocation *in, const char *flag, const char *fallback);
+
+#endif

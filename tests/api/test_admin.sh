@@ -1,0 +1,145 @@
+#!/bin/bash
+# What whoever runs a daemon does: tokens with and without a running daemon, addresses that need
+# them, TLS, backups, check-config, doctor, the log's formats, manual pages and completions.
+set -u
+. tests/api/lib.sh "$@"
+
+unbaked() { "$build/unbaked" "$@" 2>"$work/err"; }
+refused() { # WANTED-STATUS PART-OF-THE-MESSAGE COMMAND...
+    local wanted=$1 part=$2
+    shift 2
+    "$@" >"$work/out" 2>"$work/err"
+    equal $? "$wanted" "exit status of $*"
+    grep -qF -- "$part" "$work/err" || fail "$*: $(cat "$work/err")"
+}
+
+# --- tokens without a daemon ---
+alice=$(unbaked token add alice --data "$data") || fail "token add: $(cat "$work/err")"
+[[ $alice =~ ^unbake_1_[0-9a-f]{48}$ ]] || fail "the token is '$alice'"
+equal "$(unbaked token list --data "$data" | awk 'NR > 1 {print $1, $2, $3}')" "1 alice user" "token list"
+refused 2 'there is no role "king"' unbaked token add bob --role king --data "$data"
+refused 2 'is no name for a user' unbaked token add 7up --data "$data"
+refused 2 'add, list, revoke' unbaked token remove alice --data "$data"
+refused 2 "takes the user's NAME" unbaked token add --data "$data"
+refused 2 'did you mean --role' unbaked token add bob --rolle admin --data "$data"
+refused 1 'bob has no token' unbaked token revoke bob --data "$data"
+grep -rqF "${alice#unbake_1_}" "$data" && fail "the token's secret is in the data folder"
+
+# --- with one ---
+start_daemon --set keepalive_sec=1 --set log_format=json
+equal "$(stat -c %a "$data/admin.sock")" 600 "mode of the admin socket"
+admin=$(unbaked token add ada --role admin --data "$data")
+viewer=$(unbaked token add wall --role=viewer --data "$data")
+equal "$(unbaked token list --json --data "$data" | jq -r '[.items[].user] | join(" ")')" "alice ada wall" tokens
+call GET /v1/jobs; expect 401; equal "$(header www-authenticate)" 'Bearer realm="unbaked"' WWW-Authenticate
+call GET /healthz; expect 200
+as() { local token=$1; shift; call "$@" -H "Authorization: Bearer $token"; }
+as "$alice" GET /v1/session; equal "$(field '"\(.user) \(.role) \(.open)"')" "alice user false" session
+as "$viewer" GET /v1/jobs; expect 200
+as "$viewer" POST /v1/jobs -H 'Content-Type: application/json' -d '{}'; expect 403
+as "${alice%?}0" GET /v1/jobs; as "${alice%?}1" GET /v1/jobs; as unbake_1_ GET /v1/jobs; expect 401
+as "$alice" GET /v1/jobs -H 'Host: any.example'; expect 200 "any Host, with a token"
+
+head -c 3000 /dev/urandom >"$work/junk"
+as "$alice" POST /v1/scenes -T "$work/junk"; expect 201; scene=$(field .id); equal "$(field .owner)" alice owner
+as "$admin" GET "/v1/scenes/$scene"; expect 200
+as "$viewer" GET "/v1/scenes/$scene"; expect 404
+
+# --- revoking ---
+unbaked token revoke alice --data "$data" >/dev/null || fail "token revoke: $(cat "$work/err")"
+as "$alice" GET /v1/jobs; expect 401 "after its revocation"
+unbaked token revoke 2 --data "$data" >/dev/null; as "$admin" GET /v1/jobs; expect 401
+unbaked token revoke wall --data "$data" >/dev/null; call GET /v1/jobs; expect 401 "when no token is left"
+
+# --- backup ---
+equal "$(unbaked backup "$work/copy.db" --data "$data" | cut -d: -f1)" "$work/copy.db" "what backup prints"
+equal "$(stat -c %a "$work/copy.db")" 600 "mode of a backup"
+equal "$(sqlite3 "$work/copy.db" "PRAGMA integrity_check; SELECT count(*) FROM users")" $'ok\n3' "the backup"
+equal "$(find "$data/trash" -type f)" "" "left in trash/"
+refused 1 'cannot create' unbaked backup /proc/nowhere/file --data "$data"
+refused 2 'usage' unbaked backup --data "$data"
+tail -n 3 "$work/log" | jq -e '.level and .msg and .time' >/dev/null || fail "the log is no JSON: $(tail -n 3 "$work/log")"
+jq -se 'any(.msg == "answered" and .user == "alice" and .status == 201 and .method == "POST" and .request)' \
+    "$work/log" >/dev/null || fail "no line for the upload: $(grep answered "$work/log")"
+unbaked doctor --data "$data" --set min_free_mib=1 >"$work/out" || fail "doctor: $(cat "$work/out")"
+grep -q 'a daemon runs' "$work/out" || fail "doctor: $(cat "$work/out")"
+stop_daemon
+mkdir "$work/restored"; cp "$work/copy.db" "$work/restored/state.db"
+equal "$(unbaked token list --data "$work/restored" | wc -l)" 1 "a restored database"
+
+# --- addresses ---
+refused 1 'there are no tokens' "$build/unbaked" --data "$work/fresh" --listen 0.0.0.0:0
+refused 1 'there are no tokens' "$build/unbaked" --data "$work/fresh" --listen '[::]:0'
+refused 2 'access must be' "$build/unbaked" --data "$work/fresh" --set access=nobody
+refused 2 'go together' "$build/unbaked" --data "$work/fresh" --set tls_key=x
+unbaked doctor --data "$work/fresh" --set listen=0.0.0.0:1 >"$work/out"; equal $? 1 "doctor's exit status"
+grep -q '^FAIL *tokens' "$work/out" || fail "doctor: $(cat "$work/out")"
+data=$work/open start_daemon --set access=tokens
+call GET /v1/jobs; expect 401 "access = tokens without any"
+stop_daemon
+data=$work/open2; unbaked token add eve --data "$data" >/dev/null
+start_daemon --set access=open --set log_format=logfmt
+call GET /v1/jobs; expect 200 "access = open"
+stop_daemon
+tail -n 1 "$work/log" | grep -qE '^time=\S+Z level=info msg="stopped"$' || fail "logfmt: $(tail -n 1 "$work/log")"
+
+# --- check-config ---
+unbaked check-config config/unbaked.conf >/dev/null || fail "check-config: $(cat "$work/err")"
+printf 'max_runing = 1\nlog_format = xml\n' >"$work/bad.conf"
+refused 2 'did you mean max_running' unbaked check-config "$work/bad.conf"
+grep -q 'log_format must be text, logfmt or json' "$work/err" || fail "$(cat "$work/err")"
+
+# --- TLS ---
+certificate() {
+    openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj "/CN=$1" \
+        -addext 'subjectAltName=IP:127.0.0.1' -keyout "$work/key.pem" -out "$work/cert.pem" 2>/dev/null
+}
+if command -v openssl >/dev/null; then
+    certificate first; cp "$work/cert.pem" "$work/first.pem"
+    data=$work/tls
+    start_daemon --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem" --set max_upload_mib=1
+    url=https://${url#http://}
+    equal "$(cat "$work/stdout")" "$url" "what it prints"
+    call GET /healthz --cacert "$work/first.pem"; expect 200 "over TLS"
+    call GET /healthz; equal "$status" 000 "with an unknown certificate"
+    head -c 300000 /dev/urandom >"$work/junk"
+    call POST /v1/scenes --cacert "$work/first.pem" -T "$work/junk"; expect 201 "an upload over TLS"
+    # A refusal in the middle of a body goes past the library, but into the session.
+    head -c 3000000 /dev/zero | curl -sS -m 60 --cacert "$work/first.pem" -X POST -T - -H 'Transfer-Encoding: chunked' \
+        -o "$work/body" -w '%{http_code}' "$url/v1/scenes" >"$work/out" 2>/dev/null
+    equal "$(cat "$work/out")" 413 "a refusal in the middle of a body"
+    echo broken >"$work/key.pem"; kill -HUP "$daemon_pid"
+    wait_for 10 grep -q 'the old certificate stays' "$work/log"
+    call GET /healthz --cacert "$work/first.pem"; expect 200 "after a bad reload"
+    certificate second; kill -HUP "$daemon_pid"
+    wait_for 10 grep -q 'certificate was read again' "$work/log"
+    call GET /healthz --cacert "$work/cert.pem"; expect 200 "the new certificate"
+    call GET /healthz --cacert "$work/first.pem"; equal "$status" 000 "the old certificate, after a reload"
+    unbaked doctor --data "$data" --set min_free_mib=1 --set tls_certificate="$work/cert.pem" --set tls_key="$work/first.pem" \
+        >"$work/out" && fail "doctor takes a certificate for a key"
+    stop_daemon
+    equal "$daemon_status" 0 "exit status with TLS"
+    refused 1 'key.pem' "$build/unbaked" --data "$data" --listen 127.0.0.1:0 \
+        --set tls_certificate="$work/first.pem" --set tls_key="$work/key.pem"
+fi
+
+# --- what is made from the tables ---
+for page in unbaked.8 unbaked.conf.5; do
+    unbaked manual "$page" >"$work/$page" || fail "manual $page"
+    grep -q '^\.TH UNBAKED' "$work/$page" || fail "$page has no title"
+    [ -z "$(command -v man)" ] || equal "$(man --warnings -l "$work/$page" 2>&1 >/dev/null)" "" "warnings of man for $page"
+done
+for name in $(sed -n 's/^\([a-z_]*\) =.*/\1/p' config/unbaked.conf); do
+    grep -q "fB$name" "$work/unbaked.conf.5" || fail "unbaked.conf.5 has no $name"
+done
+complete_with() { # PROGRAM WORD...: what bash would offer for the last word
+    bash -c '. "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); "_$1"; echo "${COMPREPLY[*]}"' - "$work/$1.bash" "$@"
+}
+unbaked manual bash >"$work/unbaked.bash"
+equal "$(complete_with unbaked tok)" token "completion of a command"
+equal "$(complete_with unbaked token rev)" revoke "completion of a word"
+equal "$(complete_with unbaked token add x --role v)" viewer "completion of a value"
+equal "$(complete_with unbaked --set max_run)" max_running= "completion of an option"
+unbaked manual zsh | head -n 1 | grep -qx '#compdef unbaked' || fail "zsh"
+refused 2 usage unbaked manual nothing
+finish
