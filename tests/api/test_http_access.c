@@ -61,9 +61,25 @@ static int ask(enum who who, const char *method, const char *path, const char *f
 
 static int status_of(enum who who, const char *method, const char *path, const char *body) {
     struct buf reply;
-    int status = ask(who, method, path, "If-Match: *\r\n", body, &reply);
+    bool is_part = strncmp(path, "/v1/uploads/", 12) == 0 && strcmp(method, "PATCH") == 0;
+    int status = ask(who, method, path, is_part ? "Tus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\nContent-Length: 0\r\n"
+                     "Content-Type: application/offset+octet-stream\r\n" : "If-Match: *\r\n", body, &reply);
     buf_release(&reply);
     return status;
+}
+
+/* An upload of the user, or (thing other than OWN) of the admin; its path is the caller's. */
+static char *make_upload(enum thing thing) {
+    struct buf reply;
+    char path[128] = "/v1/uploads/00000000000000000000000000000000";
+    if (thing != NONE)
+        CHECK(ask(thing == OWN ? USER : ADMIN, "POST", "/v1/uploads",
+                  "Tus-Resumable: 1.0.0\r\nUpload-Length: 10\r\nContent-Length: 0\r\n", "", &reply) == 201);
+    const char *location = thing != NONE ? strstr(buf_text(&reply), "Location: ") : NULL;
+    CHECK(thing == NONE || (location && sscanf(location, "Location: %127[^\r]", path) == 1));
+    if (thing != NONE)
+        buf_release(&reply);
+    return mem_strdup(path);
 }
 
 /* The pattern with the thing's job and scene; the caller's. */
@@ -87,6 +103,9 @@ static char *concrete(const char *pattern, int64_t job, const char *scene) {
 
 /* What the table of users.h wants: 401, 403, 404, or 0 for anything else. */
 static int wanted_refusal(const struct route *route, enum who who, enum thing thing, bool names_thing) {
+    bool is_upload = strstr(route->pattern, "{upload}") != NULL;
+    if (is_upload && (thing == SHARED || who == VIEWER))
+        thing = thing == NONE ? NONE : OTHERS; /* they are not shared, and viewers have none */
     bool changes = route->access >= ROUTE_USER;
     if (route->access == ROUTE_PUBLIC)
         return 0;
@@ -106,13 +125,15 @@ static void test_matrix(void) {
     size_t count;
     const struct route *table = routes_table(&count);
     for (size_t i = 0; i < count; i++) {
-        bool names_thing = strstr(table[i].pattern, "{job}") || strstr(table[i].pattern, "{scene}");
+        bool is_upload = strstr(table[i].pattern, "{upload}") != NULL;
+        bool names_thing = strstr(table[i].pattern, "{job}") || strstr(table[i].pattern, "{scene}") || is_upload;
         for (int who = NOBODY; who < WHO_COUNT; who++) {
             for (int thing = NONE; thing < (names_thing ? THING_COUNT : 1); thing++) {
                 /* Fresh things each time: the allowed requests change them. */
                 int64_t me = user_of(who == VIEWER ? VIEWER : USER), she = user_of(ADMIN);
                 int64_t job = thing == NONE ? 999999 : make_job((enum thing)thing, thing == OWN ? me : she);
-                char *path = concrete(table[i].pattern, job, scenes[thing]);
+                char *path = is_upload ? make_upload((enum thing)thing)
+                                       : concrete(table[i].pattern, job, scenes[thing]);
                 /* A stream without an end would have to be cut. */
                 if (strstr(path, "/events") && !strchr(path, '?')) {
                     char *finite = mem_printf("%s?follow=0", path);
