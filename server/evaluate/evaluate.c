@@ -13,6 +13,7 @@
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/metrics.h"
+#include "server/reconstruct/views.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
@@ -26,8 +27,8 @@ struct evaluator {
     struct scene scene;
     struct recovered recovered;
     bool *emits;           /* [triangle_count] by the truth */
-    struct camera *train;  /* [train_count] */
-    size_t train_count;
+    struct segments objects;
+    struct views views;    /* straddling by the truth's objects */
     double median;         /* radiance of the training pixels */
 };
 
@@ -260,8 +261,7 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
 
 static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view,
                               struct evaluation *v, double *msre, struct error *err) {
-    struct seen seen = {e->recovered.world.accel, &e->scene.mesh, e->emits, e->train,
-                        e->train_count};
+    struct seen seen = {&e->views, e->emits};
     struct image truth = {0}, found = {0};
     char *stem = stem_of(p->name);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
@@ -315,10 +315,6 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     cJSON_Delete(problems);
     if (status != STATUS_OK)
         return status;
-    e->train = mem_array(e->scene.photograph_count, sizeof *e->train);
-    for (size_t i = 0; i < e->scene.photograph_count; i++)
-        if (!e->scene.photograph[i].is_test)
-            e->train[e->train_count++] = e->scene.photograph[i].camera;
     e->emits = mem_calloc(e->scene.mesh.triangle_count, sizeof *e->emits);
     e->median = training_median(&e->scene);
     return STATUS_OK;
@@ -338,12 +334,16 @@ enum status evaluate_outputs(const char *room, const char *outputs,
     status = settings->pictures_dir ? file_make_dirs(settings->pictures_dir, err) : STATUS_OK;
     if (status == STATUS_OK)
         status = score_objects(&e, v, err);
-    if (status == STATUS_OK)
+    if (status == STATUS_OK) {
+        segments_from_object_id(&e.objects, &e.scene.mesh);
+        views_init(&e.views, &e.scene, &e.objects, e.recovered.world.accel, pool);
         status = score_views(&e, v, err);
+        views_release(&e.views);
+        segments_release(&e.objects);
+    }
     recovered_release(&e.recovered);
 out:
     mem_free(e.emits);
-    mem_free(e.train);
     scene_release(&e.scene);
     return status;
 }

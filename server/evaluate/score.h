@@ -5,8 +5,8 @@
  *
  *   base colour  10 log10(1 / mean squared error) over channels and pixels in which no sample
  *                meets an emitter or nothing, values clamped to [0, 1]; once over pixels all of
- *                whose samples land on surface that a training view sees (the headline), once
- *                over all
+ *                whose samples land on surface that a training view sees (seen.h; the
+ *                headline), once over all
  *   roughness,   the same over seen pixels whose 3 x 3 neighbourhood is one object of the truth
  *   specular
  *   emission     intersection over union of the pixels that emit; mean over pixels and channels

@@ -1,4 +1,9 @@
-/* seen.h -- which pixels of a test view show surface that some training view sees. */
+/* seen.h -- which pixels of a test view show surface that some training view sees.
+ *
+ * A view sees a point when it projects into the picture, nothing lies between, and none of the
+ * four pixels that a look-up there reads straddles a depth edge or two objects (views.h): what
+ * such a pixel shows belongs to no surface, and surface that shows in no other is not measured.
+ * From which side the surface is seen does not matter. */
 #ifndef UNBAKE_EVALUATE_SEEN_H
 #define UNBAKE_EVALUATE_SEEN_H
 
@@ -7,23 +12,16 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
-#include "server/render/accel.h"
-#include "server/scene/camera.h"
-#include "server/scene/mesh.h"
+#include "server/reconstruct/views.h"
 
 #define SEEN_SAMPLES 16 /* jittered rays per pixel */
 
 struct seen {
-    const struct accel *accel;
-    const struct mesh *mesh;
-    const bool *emits;           /* [triangle_count] of the truth */
-    const struct camera *train;  /* [train_count] */
-    size_t train_count;
+    const struct views *views; /* by the objects of the truth */
+    const bool *emits;         /* [triangle_count] of the truth */
 };
 
-/* flags[height * width] out: SCORE_PLAIN, SCORE_SEEN (score.h) of each pixel's samples. A surface
- * point is seen by a camera when it projects into the picture and nothing lies between; from
- * which side does not matter. */
+/* flags[height * width] out: SCORE_PLAIN, SCORE_SEEN (score.h) of each pixel's samples. */
 void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool,
                 uint8_t *flags);
 

@@ -113,8 +113,9 @@ static void test_known(const char *dir, struct parallel *pool) {
     CHECK_THAT(score_psnr_db(v.score.roughness) > 50.0, "%g dB", score_psnr_db(v.score.roughness));
     CHECK_THAT(score_emission_iou(&v.score) > 0.95, "%g", score_emission_iou(&v.score));
     CHECK_THAT(v.msre < 0.1, "MSRE %g", v.msre);
-    CHECK(v.score.seen_pixels > v.score.plain_pixels / 2 &&
-          v.score.seen_pixels < v.score.plain_pixels);
+    CHECK_THAT(v.score.seen_pixels > v.score.plain_pixels / 10 &&
+                   v.score.seen_pixels < v.score.plain_pixels,
+               "%zu of %zu", v.score.seen_pixels, v.score.plain_pixels); /* photographs are small */
 
     for (size_t i = 0; i < room.inverse.valid_count; i++)
         for (int c = 0; c < 3; c++) {
