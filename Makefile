@@ -106,9 +106,10 @@ test: deps ## build and run all tests, the quick ones also under the sanitizers;
 	@+$(BUILD) tests $(if $(T),,asan-build tsan-build)
 	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
 
-bench: deps ## print the speed ratios and write build/bench.json
+bench: ## print the speed ratios and write build/bench.json; LONG=1: also what takes many minutes
+	@deploy/install-deps.sh bench
 	@+$(BUILD) all $(BENCH_BIN)
-	@tests/bench/run.sh $(B)
+	@LONG=$(LONG) tests/bench/run.sh $(B)
 
 asan: deps ## run all tests under the address and undefined-behaviour sanitizers
 	@+$(BUILD) asan-build

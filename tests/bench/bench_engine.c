@@ -72,8 +72,6 @@ static void bench_room(const char *name) {
             paths / ga * 1e-6);
     printf("ray rate over bare Embree (%s)\t%.4f\t0.75\thigher\n", name, b / p);
     printf("gradient over primal cost (%s)\t%.4f\t1.3\tlower\n", name, g / p);
-    printf("scaling over %d cores, primal (%s)\t%.4f\t0.95\thigher\n", cores, name, p / pa / cores);
-    printf("scaling over %d cores, gradient (%s)\t%.4f\t0.95\thigher\n", cores, name, g / ga / cores);
     mem_free(record.ray[0]);
     mem_free(record.ray[1]);
     work_release(&one);

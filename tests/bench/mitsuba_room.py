@@ -52,17 +52,27 @@ def make_mesh(number, vertices, faces, props):
     return mesh
 
 
-def load(folder, spp, depth):
-    room = json.load(open(folder + "/room.json"))
-    vertices, faces = read_ply(folder + "/scene.ply")
-    texture = mi.load_dict({"type": "bitmap", "filename": folder + "/base_color.exr", "raw": True,
-                            "format": "variant", "wrap_mode": "clamp"})
-    scene = {"type": "scene", "integrator": {"type": "path", "max_depth": depth, "rr_depth": 5}}
+def make_sensor(camera, spp):
+    """Camera: width, height, fx, world_from_camera (x right, y down, z forward)."""
+    to_world = np.array(camera["world_from_camera"])
+    to_world[:3, :2] *= -1  # theirs: x left, y up, z forward
+    return {
+        "type": "perspective", "fov": 2 * np.degrees(np.arctan(0.5 * camera["width"] / camera["fx"])),
+        "fov_axis": "x", "to_world": mi.ScalarTransform4f(to_world), "near_clip": 1e-3, "far_clip": 1e4,
+        "film": {"type": "hdrfilm", "width": camera["width"], "height": camera["height"],
+                 "rfilter": {"type": "box"}, "pixel_format": "rgb", "component_format": "float32"},
+        "sampler": {"type": "independent", "sample_count": spp}}
+
+
+def make_scene(ply, segments, texture):
+    """The mesh of `ply` with one base colour texture; segments[number]: roughness, specular, emission."""
+    vertices, faces = read_ply(ply)
+    scene = {"type": "scene"}
     groups = {}
-    for s, m in enumerate(room["segments"]):
+    for s, m in enumerate(segments):
         groups.setdefault((m["roughness"], m["specular"], tuple(m["emission"])), []).append(s)
-    for number, ((roughness, specular, emission), segments) in enumerate(groups.items()):
-        part = faces[np.isin(faces["segment"], segments)]
+    for number, ((roughness, specular, emission), members) in enumerate(groups.items()):
+        part = faces[np.isin(faces["segment"], members)]
         if len(part) == 0:
             continue
         props = mi.Properties()
@@ -71,15 +81,16 @@ def load(folder, spp, depth):
         if max(emission) > 0:
             props["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": emission}})
         scene[f"part{number}"] = make_mesh(number, vertices, part, props)
-    c = room["camera"]
-    to_world = np.array(c["world_from_camera"])  # x right, y down, z forward
-    to_world[:3, :2] *= -1                       # theirs: x left, y up, z forward
-    scene["sensor"] = {
-        "type": "perspective", "fov": 2 * np.degrees(np.arctan(0.5 * c["width"] / c["fx"])), "fov_axis": "x",
-        "to_world": mi.ScalarTransform4f(to_world), "near_clip": 1e-3, "far_clip": 1e4,
-        "film": {"type": "hdrfilm", "width": c["width"], "height": c["height"], "rfilter": {"type": "box"},
-                 "pixel_format": "rgb", "component_format": "float32"},
-        "sampler": {"type": "independent", "sample_count": spp}}
+    return scene
+
+
+def load(folder, spp, depth):
+    room = json.load(open(folder + "/room.json"))
+    texture = mi.load_dict({"type": "bitmap", "filename": folder + "/base_color.exr", "raw": True,
+                            "format": "variant", "wrap_mode": "clamp"})
+    scene = make_scene(folder + "/scene.ply", room["segments"], texture)
+    scene["integrator"] = {"type": "path", "max_depth": depth, "rr_depth": 5}
+    scene["sensor"] = make_sensor(room["camera"], spp)
     return mi.load_dict(scene)
 
 
@@ -120,4 +131,5 @@ def main():
         seed += 2
 
 
-main()
+if __name__ == "__main__":
+    main()
