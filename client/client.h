@@ -50,6 +50,12 @@ const struct command *command_table(size_t *count);
 /* The options that every command takes. */
 extern const struct option command_shared_options[];
 const struct command *command_find(const char *name);
+/* What main may return, in the order of the help; ends with a NULL meaning. */
+extern const struct command_exit {
+    int status;
+    const char *meaning;
+} command_exit_statuses[];
+extern const char *const command_job_states[]; /* ends with NULL */
 /* Writes the help of the program (command NULL) or of one command. */
 void command_help(const struct command *command, FILE *out);
 

@@ -14,6 +14,7 @@ static const struct option no_options[] = {{0}};
 const struct option command_shared_options[] = {
     {"server", 0, OPTION_TEXT, "URL",
      "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
+    {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
     {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
     {"quiet", 'q', OPTION_FLAG, NULL, "print only what was asked for: no progress, no remarks"},
     {"retry", 0, OPTION_SECONDS, "SEC",
@@ -72,10 +73,18 @@ static const struct command table[] = {
      "A SCENE is an id or its beginning, 8 digits or more.\n",
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes rm 3f2a91c0\n", 0, ANY_NUMBER,
      scenes_options, scenes_run},
+    {"login", "", "keep a server's token for the commands that follow",
+     "Reads the token from stdin, asks the server whose it is, and keeps it in a file that nobody else\n"
+     "can read, ~/.config/unbake/tokens. $UNBAKE_TOKEN goes before it.\n",
+     "  unbake login --server https://lab.example.org\n  unbake login <token.txt\n", 0, 0, no_options,
+     login_run},
+    {"logout", "", "forget it", "", "  unbake logout\n", 0, 0, no_options, logout_run},
     {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
      "  unbake settings\n  unbake settings texture_size\n", 0, ANY_NUMBER, no_options, settings_run},
     {"version", "", "print the versions of the client and of the server", "",
      "  unbake version --json\n", 0, 0, no_options, version_run},
+    {"manual", "PAGE", "write unbake.1, or the completion for bash or zsh", "",
+     "  unbake manual unbake.1 | man -l -\n  source <(unbake manual bash)\n", 1, 1, no_options, manual_run},
 };
 
 #define COMMAND_COUNT (sizeof table / sizeof *table)
@@ -103,18 +112,26 @@ static void print_options(const struct option *option, FILE *out) {
     }
 }
 
+const struct command_exit command_exit_statuses[] = {
+    {CLIENT_OK, "success"},
+    {CLIENT_JOB_FAILED, "the job failed or was cancelled"},
+    {CLIENT_USAGE, "the command line is wrong"},
+    {CLIENT_NOT_FOUND, "no such job, scene or output"},
+    {CLIENT_REFUSED, "the server refused, and said why"},
+    {CLIENT_UNREACHABLE, "the server cannot be reached"},
+    {CLIENT_CONFLICT, "the present state forbids it"},
+    {CLIENT_LOCAL, "a file here cannot be read or written"},
+    {CLIENT_INTERRUPTED, "interrupted; a submitted job goes on"},
+    {0, NULL},
+};
+
+const char *const command_job_states[] = {JOB_STATE_QUEUED, JOB_STATE_RUNNING, JOB_STATE_PAUSED,
+    JOB_STATE_SUCCEEDED, JOB_STATE_FAILED, JOB_STATE_CANCELLED, NULL};
+
 static void print_exit_statuses(FILE *out) {
-    fputs("exit status:\n"
-          "  0    success\n"
-          "  1    the job failed or was cancelled\n"
-          "  2    the command line is wrong\n"
-          "  3    no such job, scene or output\n"
-          "  4    the server refused, and said why\n"
-          "  5    the server cannot be reached\n"
-          "  6    the present state forbids it\n"
-          "  7    a file here cannot be read or written\n"
-          "  130  interrupted; a submitted job goes on\n",
-          out);
+    fputs("exit status:\n", out);
+    for (size_t i = 0; command_exit_statuses[i].meaning; i++)
+        fprintf(out, "  %-4d %s\n", command_exit_statuses[i].status, command_exit_statuses[i].meaning);
 }
 
 void command_help(const struct command *command, FILE *out) {

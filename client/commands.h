@@ -44,6 +44,13 @@ int scenes_run(struct client *c, const struct options *o);
 /* Prints a rejected scene's problems, each with its file. */
 void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
 
+/* login.c */
+int login_run(struct client *c, const struct options *o);
+int logout_run(struct client *c, const struct options *o);
+
+/* manual.c */
+int manual_run(struct client *c, const struct options *o);
+
 /* about.c */
 int settings_run(struct client *c, const struct options *o);
 int version_run(struct client *c, const struct options *o);

@@ -9,6 +9,8 @@ const struct option edit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job"},
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first"},
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own; they replace all that were there"},
+    {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
+    {"unshare", 0, OPTION_FLAG, NULL, "no longer"},
     {"first", 0, OPTION_FLAG, NULL, "before all waiting jobs of its priority"},
     {"last", 0, OPTION_FLAG, NULL, "after all of them"},
     {"before", 0, OPTION_TEXT, "JOB", "before that job, and with its priority"},
@@ -69,6 +71,8 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
         json_add_string(body, "name", options_text(o, "name", NULL));
     if (options_text(o, "priority", NULL))
         json_add_int(body, "priority", options_whole(o, "priority", 0));
+    if (options_flag(o, "share") || options_flag(o, "unshare"))
+        json_add_bool(body, "shared", options_flag(o, "share"));
     for (size_t i = 0; i < o->given_count && status == STATUS_OK; i++) {
         if (strcmp(o->given[i].option->name, "label") != 0)
             continue;

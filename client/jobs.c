@@ -172,6 +172,8 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
                  left);
         print_field(c, "stage", text);
     }
+    print_field(c, "owner", member_text(job, "owner"));
+    print_field(c, "shared", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "shared")) ? "yes" : "");
     print_field(c, "scene", member_text(job, "scene"));
     snprintf(text, sizeof text, "%.0f", member_number(job, "priority", 0.0));
     print_field(c, "priority", text);

@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include "client/commands.h"
+#include "client/credentials.h"
+#include "common/mem.h"
 #include "common/nearest.h"
 #include "common/protocol.h"
 
@@ -53,13 +55,31 @@ static int check_words(struct client *c, const struct command *command, size_t c
     return client_fail(c, NULL, &err);
 }
 
+/* Gives the request the token for its server, and what certificates to trust. */
+static int present_token(struct client *c, const struct options *o) {
+    struct error err;
+    const char *given = getenv("UNBAKE_TOKEN"), *ca = getenv("UNBAKE_CA");
+    char *kept = NULL;
+    ca = options_text(o, "ca", ca && *ca ? ca : NULL);
+    if (ca)
+        request_set_ca(c->request, ca);
+    if ((!given || !*given) &&
+        credentials_find(request_server(c->request), &kept, &err) != STATUS_OK)
+        return client_fail(c, NULL, &err);
+    request_set_token(c->request, kept ? kept : given && *given ? given : NULL);
+    mem_free(kept);
+    return CLIENT_OK;
+}
+
 static int run(struct client *c, const struct command *command, const struct options *o) {
     const char *server = getenv("UNBAKE_SERVER");
     server = options_text(o, "server", server && *server ? server : PROTOCOL_DEFAULT_SERVER);
     int signal_fd = block_signals();
     c->retry_sec = options_seconds(o, "retry", -1.0);
     c->request = request_new(server, c->retry_sec >= 0.0 ? c->retry_sec : CLIENT_RETRY_SEC, signal_fd);
-    int code = command->run(c, o);
+    int code = present_token(c, o);
+    if (code == CLIENT_OK)
+        code = command->run(c, o);
     request_free(c->request);
     if (signal_fd >= 0)
         close(signal_fd);

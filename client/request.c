@@ -24,6 +24,8 @@
 
 struct request {
     char *server; /* owned */
+    char *authorization; /* the header; owned; NULL: none */
+    char *ca_file;       /* owned; NULL: the system's */
     double retry_sec;
     int signal_fd; /* borrowed; -1: none */
     bool interrupted;
@@ -56,6 +58,16 @@ struct request *request_new(const char *server_url, double retry_sec, int signal
     return r;
 }
 
+void request_set_token(struct request *r, const char *token) {
+    mem_free(r->authorization);
+    r->authorization = token ? mem_printf("Authorization: Bearer %s", token) : NULL;
+}
+
+void request_set_ca(struct request *r, const char *path) {
+    mem_free(r->ca_file);
+    r->ca_file = mem_strdup(path);
+}
+
 void request_free(struct request *r) {
     if (!r)
         return;
@@ -63,6 +75,8 @@ void request_free(struct request *r) {
     curl_multi_cleanup(r->multi);
     curl_global_cleanup();
     mem_free(r->server);
+    mem_free(r->authorization);
+    mem_free(r->ca_file);
     mem_free(r);
 }
 
@@ -180,6 +194,10 @@ static bool is_loopback(const char *server) {
            strncmp(host, "[::1]", 5) == 0;
 }
 
+bool request_is_loopback(const struct request *r) {
+    return is_loopback(r->server);
+}
+
 /* Sets up the handle; the returned list of headers and the texts must live until the end. */
 static struct curl_slist *set_up(struct attempt *a, const char *url, const char *body) {
     const struct request_call *call = a->call;
@@ -198,7 +216,11 @@ static struct curl_slist *set_up(struct attempt *a, const char *url, const char 
     curl_easy_setopt(easy, CURLOPT_WRITEDATA, a);
     if (is_loopback(a->request->server))
         curl_easy_setopt(easy, CURLOPT_PROXY, "");
+    if (a->request->ca_file)
+        curl_easy_setopt(easy, CURLOPT_CAINFO, a->request->ca_file);
     struct curl_slist *headers = NULL;
+    if (a->request->authorization)
+        headers = curl_slist_append(headers, a->request->authorization);
     for (size_t i = 0; i < sizeof call->header / sizeof *call->header && call->header[i]; i++)
         headers = curl_slist_append(headers, call->header[i]);
     if (call->read) {
@@ -263,6 +285,8 @@ static enum status transport_failed(struct attempt *a, CURLcode code, const char
         return error_hint(err, "an example: --server " PROTOCOL_DEFAULT_SERVER);
     }
     error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);
+    if (code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CACERT_BADFILE)
+        return error_hint(err, "--ca FILE names the certificates to trust");
     return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
 }
 

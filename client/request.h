@@ -21,6 +21,11 @@
 struct request; /* a server and the connection to it; opaque */
 
 struct request *request_new(const char *server_url, double retry_sec, int signal_fd);
+/* Sent with every request from now on; NULL: none. Never shown anywhere. */
+void request_set_token(struct request *r, const char *token);
+/* A file of certificates to trust in place of the system's. */
+void request_set_ca(struct request *r, const char *path);
+bool request_is_loopback(const struct request *r); /* the server's address */
 void request_free(struct request *r);
 const char *request_server(const struct request *r); /* the URL, without a slash at its end */
 const char *request_library_version(void);           /* libcurl's */

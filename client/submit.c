@@ -26,6 +26,7 @@ const struct option submit_options[] = {
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first (0)"},
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
     {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"},
+    {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
     {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
     {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room; send and queue nothing"},
     {0},
@@ -71,6 +72,8 @@ static enum status describe_job(struct submission *s, const struct options *o, s
     }
     json_add(s->job, "settings", settings);
     json_add(s->job, "labels", labels);
+    if (options_flag(o, "share"))
+        json_add_bool(s->job, "shared", true);
     json_add_int(s->job, "priority", options_whole(o, "priority", 0));
     const char *name = options_text(o, "name", s->name);
     if (name)

@@ -1,0 +1,102 @@
+/* manual.c -- `manual`: the manual page and the completions, from the tables that --help is made
+ * of. */
+#include <string.h>
+
+#include "client/commands.h"
+#include "common/manual.h"
+#include "common/protocol.h"
+#include "common/settings.h"
+
+static void option_list(const struct option *option) {
+    for (; option->name; option++) {
+        char word[64];
+        if (option->letter)
+            snprintf(word, sizeof word, "-%c, --%s", option->letter, option->name);
+        else
+            snprintf(word, sizeof word, "--%s", option->name);
+        manual_item(stdout, word, option->value, option->help);
+    }
+}
+
+static void page_1(void) {
+    size_t count;
+    const struct command *table = command_table(&count);
+    manual_head(stdout, "UNBAKE", 1, "unbake", "take the light out of scanned rooms: the client");
+    manual_section(stdout, "SYNOPSIS");
+    for (size_t i = 0; i < count; i++)
+        manual_synopsis(stdout, "unbake", table[i].name, table[i].arguments, true);
+    manual_section(stdout, "DESCRIPTION");
+    manual_text(stdout, "unbake sends rooms to unbaked(8), follows its jobs and fetches what comes out. A JOB is a "
+                "number, or `last` for the newest. Results go to stdout, progress and messages to stderr.\n");
+    manual_section(stdout, "OPTIONS OF EVERY COMMAND");
+    option_list(command_shared_options);
+    manual_section(stdout, "COMMANDS");
+    for (size_t i = 0; i < count; i++) {
+        manual_subsection(stdout, table[i].name, table[i].arguments);
+        manual_sentence(stdout, table[i].summary);
+        manual_text(stdout, table[i].details);
+        option_list(table[i].options);
+        manual_example(stdout, table[i].examples);
+    }
+    manual_section(stdout, "EXIT STATUS");
+    for (size_t i = 0; command_exit_statuses[i].meaning; i++) {
+        char status[12];
+        snprintf(status, sizeof status, "%d", command_exit_statuses[i].status);
+        manual_item(stdout, status, NULL, command_exit_statuses[i].meaning);
+    }
+    manual_section(stdout, "ENVIRONMENT");
+    manual_item(stdout, "UNBAKE_SERVER", NULL, "the server's URL, else " PROTOCOL_DEFAULT_SERVER);
+    manual_item(stdout, "UNBAKE_TOKEN", NULL, "a token, in place of the one that `unbake login` kept");
+    manual_item(stdout, "UNBAKE_CA", NULL, "certificates to trust for https, as --ca");
+    manual_item(stdout, "NO_COLOR", NULL, "no colours");
+    manual_section(stdout, "SEE ALSO");
+    manual_text(stdout, "unbaked(8), unbaked.conf(5)\n");
+}
+
+static void option_words(const struct option *option) {
+    for (; option->name; option++)
+        completion_word(stdout, "--", option->name);
+}
+
+static void completion(bool zsh) {
+    size_t count;
+    const struct command *table = command_table(&count);
+    cJSON *settings = settings_describe();
+    const cJSON *setting;
+    completion_begin(stdout, "unbake", zsh);
+    for (size_t i = 0; i < count; i++) {
+        completion_words(stdout, table[i].name);
+        option_words(table[i].options);
+        option_words(command_shared_options);
+        completion_words_end(stdout);
+    }
+    completion_words(stdout, "*");
+    for (size_t i = 0; i < count; i++)
+        completion_word(stdout, table[i].name, "");
+    completion_words_end(stdout);
+    completion_values(stdout);
+    completion_words(stdout, "--set");
+    cJSON_ArrayForEach(setting, settings)
+        completion_word(stdout, member_text(setting, "name"), "=");
+    completion_words_end(stdout);
+    completion_words(stdout, "--state");
+    for (size_t i = 0; command_job_states[i]; i++)
+        completion_word(stdout, command_job_states[i], "");
+    completion_words_end(stdout);
+    completion_end(stdout, "unbake");
+    cJSON_Delete(settings);
+}
+
+int manual_run(struct client *c, const struct options *o) {
+    struct error err;
+    const char *page = o->word[0];
+    if (strcmp(page, "unbake.1") == 0) {
+        page_1();
+    } else if (strcmp(page, "bash") == 0 || strcmp(page, "zsh") == 0) {
+        completion(page[0] == 'z');
+    } else {
+        error_set(&err, STATUS_INPUT, "there is no page \"%.100s\": unbake.1, bash, zsh", page);
+        return client_fail(c, NULL, &err);
+    }
+    return CLIENT_OK;
+}
