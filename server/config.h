@@ -32,7 +32,7 @@ struct config {
     int64_t max_upload_mib, min_free_mib;
     int64_t max_connections, max_streams, body_min_bytes_per_sec;
     double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;
-    double upload_keep_hours;
+    double upload_keep_hours, job_keep_days, scene_keep_days, collect_interval_sec;
     double head_timeout_sec, idle_timeout_sec, keepalive_sec;
     bool sandbox;
 };

@@ -24,6 +24,7 @@
 #include "server/admin/folder.h"
 #include "server/commands.h"
 #include "server/http/api.h"
+#include "server/http/collector.h"
 #include "server/http/events.h"
 #include "server/http/listener.h"
 #include "server/job/scheduler.h"
@@ -70,6 +71,7 @@ struct daemon {
     struct api *api;
     struct listener *listener;
     struct admin *admin;
+    struct collector *collector;
     struct api_library libraries[LIBRARY_COUNT];
 };
 
@@ -124,6 +126,8 @@ static enum status build(struct daemon *d, struct error *err) {
         .min_free_bytes = (uint64_t)c->min_free_mib << 20,
         .max_streams = (size_t)c->max_streams,
         .upload_keep_ms = (int64_t)(c->upload_keep_hours * 3.6e6),
+        .job_keep_ms = (int64_t)(c->job_keep_days * 86.4e6),
+        .scene_keep_ms = (int64_t)(c->scene_keep_days * 86.4e6),
         .keepalive_sec = c->keepalive_sec,
         .access = read_access(c->access),
         .is_tls = *c->tls_certificate != '\0',
@@ -154,6 +158,8 @@ static enum status build(struct daemon *d, struct error *err) {
         status = listener_start(&d->listener, &network, d->api, err);
     if (status == STATUS_OK)
         status = admin_start(&d->admin, c->data_dir, d->store, on_revoked, d, err);
+    if (status == STATUS_OK)
+        status = collector_start(&d->collector, d->api, c->collect_interval_sec, err);
     return status;
 }
 
@@ -262,6 +268,7 @@ static int run_daemon(struct config *config, const char *port_file) {
         status = serve(&d, port_file, &err);
     admin_stop(d.admin);
     listener_stop(d.listener);
+    collector_stop(d.collector);
     api_free(d.api);
     scheduler_free(d.scheduler);
     store_close(d.store);

@@ -3,9 +3,11 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "common/file.h"
 #include "common/log.h"
@@ -15,6 +17,9 @@
 #include "server/http/field.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
+
+#define RESERVE_BYTES ((uint64_t)16 << 20)
+#define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
 
 static bool has_row(struct store *store, const char *folder, const char *name) {
     enum status status;
@@ -76,7 +81,10 @@ enum status api_new(struct api **out, const struct api_config *config, struct st
     api->digests = digests_new();
     api->partials = partials_new(api);
     *out = api;
-    enum status status = partials_recover(api->partials, err);
+    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
+                                    config->upload_keep_ms, err);
+    if (status == STATUS_OK)
+        status = partials_recover(api->partials, err);
     if (status == STATUS_OK)
         status = sweep(api, "uploads", true, err);
     if (status == STATUS_OK)
@@ -85,6 +93,7 @@ enum status api_new(struct api **out, const struct api_config *config, struct st
         status = sweep(api, "scenes", true, err);
     if (status == STATUS_OK)
         status = sweep(api, "jobs", true, err);
+    api_renew_reserve(api);
     if (status == STATUS_OK) {
         store_on_change(store, hub_changed, api->hub);
         return STATUS_OK;
@@ -105,13 +114,42 @@ void api_free(struct api *api) {
     mem_free(api);
 }
 
+bool api_spend_reserve(struct api *api) {
+    char *path = file_join(api->config.data_dir, "reserve");
+    bool spent = unlink(path) == 0;
+    if (spent)
+        log_warning("the disk is full: %s was given up so that something can be removed", path);
+    mem_free(path);
+    return spent;
+}
+
+void api_renew_reserve(struct api *api) {
+    char *path = file_join(api->config.data_dir, "reserve");
+    uint64_t room = 0;
+    /* Not all that there is: others need it more. */
+    if (access(path, F_OK) != 0 && file_free_bytes(api->config.data_dir, &room, NULL) == STATUS_OK &&
+        room / 8 >= RESERVE_BYTES_MIN) {
+        uint64_t bytes = room / 8 < RESERVE_BYTES ? room / 8 : RESERVE_BYTES;
+        int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        bool done = fd >= 0 && posix_fallocate(fd, 0, (off_t)bytes) == 0;
+        if (fd >= 0)
+            close(fd);
+        if (fd >= 0 && !done)
+            unlink(path);
+    }
+    mem_free(path);
+}
+
 enum status api_discard(struct api *api, const char *path, struct error *err) {
     char *from = file_join(api->config.data_dir, path);
     char *to = file_join(api->config.data_dir, "trash/XXXXXX");
     enum status status = STATUS_OK;
     /* Into a folder of its own, so that two discards of one name do not meet. */
     if (!mkdtemp(to)) {
-        status = error_set_errno(err, errno, "cannot make a folder in %s/trash", api->config.data_dir);
+        if (errno == ENOSPC || errno == EDQUOT) /* removing must work on a full disk */
+            status = file_remove_tree(from, err);
+        else
+            status = error_set_errno(err, errno, "cannot make a folder in %s/trash", api->config.data_dir);
         goto out;
     }
     char *inside = file_join(to, "it");
@@ -124,6 +162,7 @@ enum status api_discard(struct api *api, const char *path, struct error *err) {
 out:
     mem_free(from);
     mem_free(to);
+    api_renew_reserve(api);
     return status;
 }
 

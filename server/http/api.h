@@ -31,7 +31,7 @@ struct api_config {
     double keepalive_sec;
     enum api_access access;
     bool is_tls;               /* connections are encrypted by this daemon */
-    int64_t upload_keep_ms;    /* an unfinished upload is kept so long after its last byte */
+    int64_t scene_keep_ms, job_keep_ms, upload_keep_ms; /* see store/retention.h */
     const char *server_names;  /* besides loopback; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;
@@ -60,6 +60,11 @@ struct api {
 enum status api_new(struct api **api, const struct api_config *config, struct store *store,
                     struct scheduler *scheduler, struct error *err);
 void api_free(struct api *api);
+
+/* DATA/reserve is a file of nothing that is given up when the disk is full and something is to be
+ * removed: the database needs room to say so. False when it is gone already. */
+bool api_spend_reserve(struct api *api);
+void api_renew_reserve(struct api *api); /* where there is room for it again */
 
 /* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
 enum status api_discard(struct api *api, const char *path, struct error *err);

@@ -23,7 +23,11 @@ struct response *session_delete(struct api *api, struct request *r);
 struct response *scenes_list(struct api *api, struct request *r);
 struct response *scenes_add(struct api *api, struct request *r);
 struct response *scenes_get(struct api *api, struct request *r);
+struct response *scenes_patch(struct api *api, struct request *r);
 struct response *scenes_delete(struct api *api, struct request *r);
+
+/* collector.c */
+struct response *collect_now(struct api *api, struct request *r);
 
 /* uploads.c */
 struct response *uploads_options(struct api *api, struct request *r);

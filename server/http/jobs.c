@@ -5,13 +5,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "common/file.h"
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
+#include "server/http/keeping.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 
@@ -107,6 +107,7 @@ struct wish {
     int shared;   /* -1: not given */
     enum job_place place;
     int64_t before; /* with JOB_PLACE_BEFORE */
+    struct keeping keeping;
 };
 
 static void wish_release(struct wish *w) {
@@ -201,13 +202,16 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
             problem_param(params, name, NULL, "must be true or false");
         else if (!is_new && strcmp(name, "order") == 0)
             read_order(w, member, params);
+        else if (!is_new && keeping_read(&w->keeping, member, params))
+            continue;
         else if (is_new && strcmp(name, "scene") == 0)
             w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
             problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, shared"
-                                               : "there are name, priority, labels, shared, order",
+                                               : "there are name, priority, labels, shared, order, pinned, "
+                                                 "expires_at",
                           "is not known here");
     }
     if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
@@ -283,15 +287,9 @@ static struct response *add_job(struct api *api, const struct request *r, const 
     return reply;
 }
 
-static struct response *read_dry_run(const struct request *r, bool *dry_run) {
-    const char *text = target_query(&r->target, "dry_run");
-    *dry_run = text && strcmp(text, "1") == 0;
-    return text && !*dry_run && strcmp(text, "0") != 0 ? problem(r, 400, "dry_run must be 0 or 1") : NULL;
-}
-
 static struct response *check_submission(const struct request *r, bool *dry_run) {
     const char *key = request_field(r, "Idempotency-Key");
-    struct response *refusal = read_dry_run(r, dry_run);
+    struct response *refusal = keeping_dry_run(r, dry_run);
     if (refusal)
         return refusal;
     size_t length = key ? strlen(key) : 1;
@@ -371,7 +369,8 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     }
     if (!reply) {
         struct job_patch patch = {.name = w.name, .labels = w.labels, .priority = w.priority,
-                                  .shared = w.shared, .place = w.place, .before_id = w.before};
+                                  .shared = w.shared, .place = w.place, .before_id = w.before,
+                                  .keeping = w.keeping};
         enum status status = store_job_patch(api->store, id, revision, &patch, &err);
         if (status == STATUS_CONFLICT)
             reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
@@ -390,29 +389,19 @@ struct response *jobs_patch(struct api *api, struct request *r) {
 static struct response *measure_job(struct api *api, const struct request *r, int64_t id) {
     struct job job;
     struct error err;
-    uint64_t files = 0, bytes = 0;
-    enum status status = store_job_get(api->store, id, &job, &err);
-    if (status != STATUS_OK)
+    char path[40];
+    if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
-    char *path = mem_printf("%s/jobs/%lld", api->config.data_dir, (long long)id);
-    if (job.state == JOB_RUNNING)
-        status = error_set(&err, STATUS_CONFLICT, "job %lld is running", (long long)id);
-    if (status == STATUS_OK)
-        status = file_tree_size(path, &files, &bytes, &err);
-    mem_free(path);
+    snprintf(path, sizeof path, "jobs/%lld", (long long)id);
+    bool is_running = job.state == JOB_RUNNING;
     job_release(&job);
-    if (status != STATUS_OK)
-        return problem_from(r, &err);
-    cJSON *value = cJSON_CreateObject();
-    json_add_bool(value, "dry_run", true);
-    json_add_int(value, "files", (int64_t)files);
-    json_add_int(value, "bytes", (int64_t)bytes);
-    return response_json(200, value);
+    return is_running ? problem_full(r, 409, "the job is running", "Cancel it first.", NULL)
+                      : keeping_would_free(api, r, path);
 }
 
 struct response *jobs_delete(struct api *api, struct request *r) {
     bool dry_run;
-    struct response *refusal = read_dry_run(r, &dry_run);
+    struct response *refusal = keeping_dry_run(r, &dry_run);
     int64_t id = refusal ? 0 : own_job(api, r, &refusal);
     if (refusal)
         return refusal;
@@ -420,6 +409,8 @@ struct response *jobs_delete(struct api *api, struct request *r) {
         return measure_job(api, r, id);
     struct error err;
     enum status status = store_job_delete(api->store, id, &err);
+    if (status == STATUS_NO_SPACE && api_spend_reserve(api))
+        status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
         char path[40];
         snprintf(path, sizeof path, "jobs/%lld", (long long)id);

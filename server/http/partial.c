@@ -533,10 +533,8 @@ void partial_release(struct claim *claim) {
     mem_free(claim);
 }
 
-enum status partial_remove(struct partials *p, const char *id, struct error *err) {
-    enum status status = store_upload_delete(p->api->store, id, err);
-    if (status != STATUS_OK)
-        return status;
+enum status partial_forget(struct partials *p, const char *id, struct error *err) {
+    enum status status = STATUS_OK;
     pthread_mutex_lock(&p->mutex);
     struct entry *e = find(p, id);
     if (e)
@@ -553,4 +551,11 @@ enum status partial_remove(struct partials *p, const char *id, struct error *err
         status = error_set_errno(err, errno, "cannot remove %s", path);
     mem_free(path);
     return status;
+}
+
+enum status partial_remove(struct partials *p, const char *id, struct error *err) {
+    enum status status = store_upload_delete(p->api->store, id, err);
+    if (status == STATUS_NO_SPACE && api_spend_reserve(p->api))
+        status = store_upload_delete(p->api->store, id, err);
+    return status == STATUS_OK ? partial_forget(p, id, err) : status;
 }

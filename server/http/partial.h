@@ -58,5 +58,7 @@ void partial_release(struct claim *claim); /* NULL is fine; frees it */
 
 /* Removes the upload with what it holds, also while somebody writes to it. */
 enum status partial_remove(struct partials *p, const char *id, struct error *err);
+/* The same for one whose row is gone already. */
+enum status partial_forget(struct partials *p, const char *id, struct error *err);
 
 #endif

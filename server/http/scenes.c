@@ -3,19 +3,29 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/sha256.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
+#include "server/http/keeping.h"
 #include "server/http/problem.h"
 #include "server/http/upload.h"
 #include "server/http/views.h"
 
-/* Changes when the row does: a scene has no revision, but only these members ever change. */
+/* A scene has no revision: what is shown of it is its tag. */
+static void scene_tag(const struct scene_row *row, char tag[SHA256_HEX_SIZE + 2]) {
+    cJSON *view = view_scene(row);
+    char *text = json_text(view), hex[SHA256_HEX_SIZE];
+    sha256_of(text, strlen(text), hex);
+    snprintf(tag, SHA256_HEX_SIZE + 2, "\"%.32s\"", hex);
+    mem_free(text);
+    cJSON_Delete(view);
+}
+
 static struct response *tagged(const struct request *r, const struct scene_row *row) {
-    char etag[128];
-    snprintf(etag, sizeof etag, "\"%.16s-%s-%lld\"", row->id, scene_state_name(row->state),
-             (long long)row->created_ms);
-    return view_tagged(r, view_scene(row), etag);
+    char tag[SHA256_HEX_SIZE + 2];
+    scene_tag(row, tag);
+    return view_tagged(r, view_scene(row), tag);
 }
 
 struct response *scenes_get(struct api *api, struct request *r) {
@@ -77,22 +87,86 @@ struct response *scenes_add(struct api *api, struct request *r) {
     return reply;
 }
 
+/* What a PATCH asks for, checked; or *refusal. `body` keeps the name. */
+static void read_patch(const struct request *r, cJSON **body, const char **name, struct keeping *keeping,
+                       struct response **refusal) {
+    struct error err;
+    *name = NULL;
+    if (json_parse(buf_text(&r->body), r->body.length, "the request body", body, &err) != STATUS_OK) {
+        *refusal = problem(r, 400, "%s", err.message);
+        return;
+    }
+    if (!cJSON_IsObject(*body)) {
+        *refusal = problem(r, 400, "the request body is not a JSON object");
+        return;
+    }
+    cJSON *params = cJSON_CreateArray();
+    for (const cJSON *member = (*body)->child; member; member = member->next) {
+        if (strcmp(member->string, "name") == 0) {
+            *name = cJSON_GetStringValue(member);
+            if (!*name || !**name || strlen(*name) > 200)
+                problem_param(params, "name", NULL, "must be text of 1 to 200 bytes");
+        } else if (!keeping_read(keeping, member, params)) {
+            problem_param(params, member->string, "there are name, pinned, expires_at", "is not known here");
+        }
+    }
+    if (cJSON_GetArraySize(params) > 0)
+        *refusal = problem_invalid(r, "the change cannot be made", params);
+    else
+        cJSON_Delete(params);
+}
+
+struct response *scenes_patch(struct api *api, struct request *r) {
+    struct scene_row row;
+    struct error err;
+    struct keeping keeping = {0};
+    struct response *reply = NULL;
+    cJSON *body = NULL;
+    const char *name, *match = request_field(r, "If-Match");
+    char tag[SHA256_HEX_SIZE + 2];
+    if (!auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
+        return reply;
+    scene_tag(&row, tag);
+    if (match && !field_etag_listed(match, tag, false))
+        reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and look again", NULL);
+    if (!reply)
+        read_patch(r, &body, &name, &keeping, &reply);
+    if (!reply && store_scene_patch(api->store, row.id, name, &keeping, &err) != STATUS_OK)
+        reply = problem_from(r, &err);
+    char id[SCENE_ID_SIZE];
+    memcpy(id, row.id, sizeof id);
+    scene_row_release(&row);
+    cJSON_Delete(body);
+    if (reply)
+        return reply;
+    if (store_scene_get(api->store, id, &row, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    scene_tag(&row, tag);
+    reply = response_json(200, view_scene(&row));
+    response_field(reply, "ETag", "%s", tag);
+    scene_row_release(&row);
+    return reply;
+}
+
 struct response *scenes_delete(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
-    struct response *refusal = NULL;
-    bool is_gone;
-    if (!auth_scene(api, r, ACCESS_CHANGE, &row, &refusal))
-        return refusal;
+    bool is_gone, dry_run;
+    struct response *reply = keeping_dry_run(r, &dry_run);
+    if (reply || !auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
+        return reply;
+    int64_t owner_id = r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id;
     char *path = mem_printf("scenes/%s", row.id);
     pthread_mutex_lock(&api->scene_mutex);
-    enum status status = store_scene_delete(api->store, row.id,
-                                            r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id,
-                                            &is_gone, &err);
-    if (is_gone)
+    enum status status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
+    if (status == STATUS_NO_SPACE && api_spend_reserve(api))
+        status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
+    if (is_gone && !dry_run)
         status = api_discard(api, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);
+    if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
+        reply = keeping_would_free(api, r, is_gone ? path : "scenes/none");
     mem_free(path);
     scene_row_release(&row);
-    return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
+    return reply ? reply : status == STATUS_OK ? response_new(204) : problem_from(r, &err);
 }

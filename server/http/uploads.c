@@ -15,6 +15,7 @@
 #include "common/utf8.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
+#include "server/http/keeping.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
@@ -75,22 +76,22 @@ static const char *find_upload(struct api *api, const struct request *r, struct 
     return NULL;
 }
 
-static void add_expiry(struct api *api, struct response *reply, int64_t updated_ms) {
+static void add_expiry(struct response *reply, int64_t expires_ms) {
     char text[64];
     struct tm utc;
-    time_t seconds = (time_t)((updated_ms + api->config.upload_keep_ms) / 1000);
+    time_t seconds = (time_t)(expires_ms / 1000);
     gmtime_r(&seconds, &utc);
     strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* the locale is always C */
     response_field(reply, "Upload-Expires", "%s", text);
 }
 
 /* Where the upload stands, in fields. */
-static void add_place(struct api *api, struct response *reply, const struct upload_row *row) {
+static void add_place(struct response *reply, const struct upload_row *row) {
     response_field(reply, "Upload-Offset", "%" PRIu64, row->received);
     if (*row->scene_id)
         response_field(reply, "Link", "</v1/scenes/%s>; rel=\"related\"", row->scene_id);
     else
-        add_expiry(api, reply, row->updated_ms);
+        add_expiry(reply, row->expires_ms);
 }
 
 struct response *uploads_options(struct api *api, struct request *r) {
@@ -194,7 +195,7 @@ struct response *uploads_add(struct api *api, struct request *r) {
         clock_gettime(CLOCK_REALTIME, &now);
         reply = tagged(response_new(201));
         response_field(reply, "Location", "/v1/uploads/%s", row.id);
-        add_expiry(api, reply, (int64_t)now.tv_sec * 1000);
+        add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.upload_keep_ms);
     }
     upload_row_release(&row);
     return reply;
@@ -211,13 +212,13 @@ struct response *uploads_get(struct api *api, struct request *r) {
         return reply;
     if (partial_look(api->partials, id, &row, &err) != STATUS_OK)
         return refuse(r, &err);
-    reply = response_json(200, view_upload(&row, api->config.upload_keep_ms));
+    reply = response_json(200, view_upload(&row));
     mem_free(reply->fields[1].value); /* of Cache-Control */
     reply->fields[1].value = mem_strdup("no-store");
     response_field(reply, "Upload-Length", "%" PRIu64, row.length);
     if (*row.metadata)
         response_field(reply, "Upload-Metadata", "%s", row.metadata);
-    add_place(api, reply, &row);
+    add_place(reply, &row);
     upload_row_release(&row);
     return tagged(reply);
 }
@@ -240,7 +241,7 @@ struct response *uploads_list(struct api *api, struct request *r) {
     }
     cJSON *items = cJSON_CreateArray();
     for (size_t i = 0; i < count; i++) {
-        cJSON_AddItemToArray(items, view_upload(&rows[i], api->config.upload_keep_ms));
+        cJSON_AddItemToArray(items, view_upload(&rows[i]));
         upload_row_release(&rows[i]);
     }
     mem_free(rows);
@@ -352,17 +353,26 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     if (status != STATUS_OK)
         return refuse(r, &err);
     struct response *reply = tagged(response_new(204));
-    add_place(api, reply, &row);
+    add_place(reply, &row);
     upload_row_release(&row);
     return reply;
 }
 
 struct response *uploads_delete(struct api *api, struct request *r) {
+    bool dry_run = false;
     struct response *reply = check_version(r, false);
     struct error err;
+    if (!reply)
+        reply = keeping_dry_run(r, &dry_run);
     const char *id = reply ? NULL : find_upload(api, r, &reply);
     if (reply)
         return reply;
+    if (dry_run) {
+        char *path = mem_printf("uploads/%s", id);
+        reply = keeping_would_free(api, r, path);
+        mem_free(path);
+        return tagged(reply);
+    }
     if (partial_remove(api->partials, id, &err) != STATUS_OK)
         return refuse(r, &err);
     return tagged(response_new(204));

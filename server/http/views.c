@@ -55,6 +55,8 @@ cJSON *view_job(const struct job *job) {
     add_time(v, "created_at", job->created_ms);
     add_time(v, "started_at", job->started_ms);
     add_time(v, "finished_at", job->finished_ms);
+    json_add_bool(v, "pinned", job->is_pinned);
+    add_time(v, "expires_at", job->expires_ms);
     json_add_string(v, "stage", or_null(job->stage));
     json_add_number(v, "progress", job->progress);
     if (job->eta_sec >= 0)
@@ -85,6 +87,8 @@ cJSON *view_scene(const struct scene_row *row) {
     json_add_string(v, "state", scene_state_name(row->state));
     json_add_int(v, "bytes", (int64_t)row->bytes);
     add_time(v, "created_at", row->created_ms);
+    json_add_bool(v, "pinned", row->is_pinned);
+    add_time(v, "expires_at", row->expires_ms);
     add_text(v, "problems", row->problems);
     add_text(v, "facts", row->facts);
     char path[128];
@@ -93,7 +97,7 @@ cJSON *view_scene(const struct scene_row *row) {
     return v;
 }
 
-cJSON *view_upload(const struct upload_row *row, int64_t keep_ms) {
+cJSON *view_upload(const struct upload_row *row) {
     cJSON *v = cJSON_CreateObject();
     json_add_string(v, "id", row->id);
     json_add_string(v, "name", row->name);
@@ -104,7 +108,7 @@ cJSON *view_upload(const struct upload_row *row, int64_t keep_ms) {
     json_add_string(v, "scene", or_null(row->scene_id));
     add_time(v, "created_at", row->created_ms);
     add_time(v, "updated_at", row->updated_ms);
-    add_time(v, "expires_at", row->updated_ms + keep_ms);
+    add_time(v, "expires_at", row->expires_ms);
     char path[128];
     cJSON *links = cJSON_AddObjectToObject(v, "links");
     snprintf(path, sizeof path, "/v1/uploads/%s", row->id);

@@ -8,8 +8,7 @@
 
 cJSON *view_job(const struct job *job);
 cJSON *view_scene(const struct scene_row *row);
-/* keep_ms: how long an unfinished upload is kept after its last byte. */
-cJSON *view_upload(const struct upload_row *row, int64_t keep_ms);
+cJSON *view_upload(const struct upload_row *row);
 cJSON *view_output(int64_t job_id, const struct output_row *row);
 
 #define VIEW_TIME_SIZE 32

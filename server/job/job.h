@@ -69,6 +69,8 @@ struct job {
     char *stage;               /* last reported; "" before */
     char *restart_from;        /* the stage that the next attempt begins with; "": where it was */
     int memory_step;           /* how often its working set was made smaller; see job/memory.h */
+    bool is_pinned;
+    int64_t expires_ms;        /* Unix time as of now, 0: never; see store/retention.h */
     double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
     char *reason;              /* why it failed or is paused, in plain words; "" if not */

@@ -34,6 +34,18 @@ enum status store_end(struct store *store, enum status status, int64_t changed_j
 
 int64_t store_now_ms(void); /* Unix time */
 
+/* When a row may go, as SQL over its table: Unix milliseconds, 0 for never; see retention.h. States
+ * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. */
+#define JOB_EXPIRES                                                                            \
+    "(CASE WHEN pinned = 1 OR state <= 2 THEN 0 WHEN expires_ms > 0 THEN expires_ms"           \
+    " ELSE (SELECT iif(job_ms > 0, finished_ms + job_ms, 0) FROM retention) END)"
+#define SCENE_EXPIRES                                                                          \
+    "(CASE WHEN pinned = 1 OR state = 1 OR EXISTS (SELECT 1 FROM jobs WHERE"                   \
+    " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"    \
+    " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms, ifnull((SELECT"         \
+    " max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
+#define UPLOAD_EXPIRES "(updated_ms + (SELECT upload_ms FROM retention))"
+
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);
 

@@ -10,7 +10,7 @@
     "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
     " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
     " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
-    " restart_from, memory_step"
+    " restart_from, memory_step, pinned, " JOB_EXPIRES
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -38,6 +38,8 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .turn = sqlite3_column_int64(stmt, 22),
         .restart_from = sql_dup(stmt, 23),
         .memory_step = sqlite3_column_int(stmt, 24),
+        .is_pinned = sqlite3_column_int(stmt, 25) != 0,
+        .expires_ms = sqlite3_column_int64(stmt, 26),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -248,9 +250,12 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
                          "UPDATE jobs SET revision = revision + 1, name = ifnull(?, name),"
                          " labels = ifnull(?, labels),"
                          " priority = CASE WHEN ?3 = ?4 THEN priority ELSE ?3 END,"
-                         " shared = CASE WHEN ?5 < 0 THEN shared ELSE ?5 END WHERE id = ?6",
-                         "ttnnni", patch->name, patch->labels, patch->priority, INT_MIN,
-                         patch->shared, id);
+                         " shared = CASE WHEN ?5 < 0 THEN shared ELSE ?5 END,"
+                         " pinned = CASE ?7 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"
+                         " expires_ms = iif(?8, ?9, expires_ms) WHERE id = ?6",
+                         "ttnnninni", patch->name, patch->labels, patch->priority, INT_MIN,
+                         patch->shared, id, (int)patch->keeping.pin, (int)patch->keeping.sets_expiry,
+                         patch->keeping.expires_ms);
     if (status == STATUS_OK)
         status = place(store, id, patch, err);
     return store_end(store, status, id, err);

@@ -15,7 +15,7 @@
 #define COLUMNS                                                                                \
     "id, name, state, bytes, created_ms, problems, facts, (SELECT users.name FROM scene_owners" \
     " JOIN users ON users.id = user_id WHERE scene_id = scenes.id"                             \
-    " ORDER BY scene_owners.created_ms, user_id LIMIT 1)"
+    " ORDER BY scene_owners.created_ms, user_id LIMIT 1), pinned, " SCENE_EXPIRES
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                            \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"   \
@@ -30,6 +30,8 @@ static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
         .problems = sql_dup(stmt, 5),
         .facts = sql_dup(stmt, 6),
         .owner = sql_dup(stmt, 7),
+        .is_pinned = sqlite3_column_int(stmt, 8) != 0,
+        .expires_ms = sqlite3_column_int64(stmt, 9),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
 }
@@ -200,8 +202,24 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
     return status;
 }
 
-enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool *is_gone,
-                               struct error *err) {
+enum status store_scene_patch(struct store *store, const char *id, const char *name,
+                              const struct keeping *keeping, struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err,
+                     "UPDATE scenes SET name = ifnull(?1, name),"
+                     " pinned = CASE ?2 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"
+                     " expires_ms = iif(?3, ?4, expires_ms) WHERE id = ?5",
+                     "tnnit", name, (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms,
+                     id);
+    if (status == STATUS_OK && sql_changes(&store->sql) == 0)
+        status = not_found(id, err);
+    return store_end(store, status, 0, err);
+}
+
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
+                               bool *is_gone, struct error *err) {
     int64_t state = -1, others = 0, job = 0;
     *is_gone = false;
     enum status status = store_begin(store, err);
@@ -225,7 +243,9 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
         error_set(err, STATUS_CONFLICT, "a job still uses scene %s", id);
         status = error_hint(err, "Cancel the job or wait for its end.");
     }
-    if (status == STATUS_OK && others)
+    if (status == STATUS_OK && dry_run)
+        ; /* this far only */
+    else if (status == STATUS_OK && others)
         status = sql_run(&store->sql, err,
                          "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id,
                          owner_id);

@@ -20,6 +20,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "server/job/job.h"
+#include "server/store/retention.h"
 #include "server/store/users.h"
 
 struct store; /* opaque */
@@ -50,6 +51,8 @@ struct scene_row {
     int64_t created_ms;
     char *problems;         /* JSON array text: [{"file","reason"}]; "[]" if none */
     char *facts;            /* JSON object text: what the check found; "{}" before */
+    bool is_pinned;
+    int64_t expires_ms;     /* Unix time as of now, 0: never; see retention.h */
 };
 void scene_row_release(struct scene_row *row);
 
@@ -73,11 +76,14 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
                              size_t limit, struct scene_row *rows, size_t *count,
                              char next_cursor[128], struct error *err);
+/* NULL leaves the name. */
+enum status store_scene_patch(struct store *store, const char *id, const char *name,
+                              const struct keeping *keeping, struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
- * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. */
-enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool *is_gone,
-                               struct error *err);
+ * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A dry run changes nothing. */
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
+                               bool *is_gone, struct error *err);
 /* The oldest scene in `checking`; STATUS_NOT_FOUND when there is none. */
 enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
                                        struct error *err);
@@ -110,6 +116,7 @@ struct job_patch {
     int priority;              /* INT_MIN: as it is */
     int shared;                /* 0, 1; -1: as it is */
     enum job_place place;      /* among the jobs of its priority */
+    struct keeping keeping;
     int64_t before_id;         /* with JOB_PLACE_BEFORE, which takes over that job's priority */
 };
 /* expected_revision -1: any; else STATUS_CONFLICT if it differs. STATUS_INPUT when the job to go
@@ -220,7 +227,7 @@ struct upload_row {
     uint64_t length, received;     /* bytes; `received` are on disk */
     char boot[UPLOAD_BOOT_SIZE];   /* see store_upload_begin */
     char scene_id[SCENE_ID_SIZE];  /* what became of it, once all is received; "" before */
-    int64_t created_ms, updated_ms;
+    int64_t created_ms, updated_ms, expires_ms;
 };
 void upload_row_release(struct upload_row *row);
 

@@ -8,7 +8,7 @@
 
 #define COLUMNS                                                                                \
     "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash," \
-    " owner_id, (SELECT name FROM users WHERE users.id = owner_id)"
+    " owner_id, (SELECT name FROM users WHERE users.id = owner_id), " UPLOAD_EXPIRES
 
 static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
     *row = (struct upload_row){
@@ -20,6 +20,7 @@ static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
         .received = (uint64_t)sqlite3_column_int64(stmt, 5),
         .created_ms = sqlite3_column_int64(stmt, 8),
         .updated_ms = sqlite3_column_int64(stmt, 9),
+        .expires_ms = sqlite3_column_int64(stmt, 13),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
     snprintf(row->sha256, sizeof row->sha256, "%s", sql_text(stmt, 3));

@@ -17,7 +17,7 @@ static void test_scenes(void) {
     CHECK(!existed);
     OK(store_scene_next_unchecked(store, id, &err));
     CHECK_STRING(id, SCENE_A);
-    IS(store_scene_delete(store, SCENE_A, -1, &is_gone, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
     IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
     OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err)); /* checked again */
@@ -42,7 +42,7 @@ static void test_scenes(void) {
     OK(store_scene_add(store, SCENE_C, "odd", 1, 0, &existed, &err));
     IS(store_scene_find(store, NULL, "aaaa", &row, &err), STATUS_CONFLICT);
     OK(store_scene_reject(store, SCENE_C, "[]", &err));
-    OK(store_scene_delete(store, SCENE_C, -1, &is_gone, &err));
+    OK(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err));
 
     OK(store_scene_add(store, SCENE_B, "two", 1, 0, &existed, &err));
     cursor[0] = '\0';
@@ -59,9 +59,9 @@ static void test_scenes(void) {
     IS(store_scene_list(store, NULL, "1; DROP TABLE", 1, rows, &count, cursor, &err), STATUS_INPUT);
 
     int64_t job = add_job(store, SCENE_A, 0);
-    IS(store_scene_delete(store, SCENE_A, -1, &is_gone, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, job, &err));
-    OK(store_scene_delete(store, SCENE_A, -1, &is_gone, &err));
+    OK(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err));
     IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
     IS(store_job_retry(store, job, 3, NULL, &err), STATUS_CONFLICT); /* nothing to work on */
     store_close(store);

@@ -171,13 +171,13 @@ static void test_lists(void) {
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
     CHECK(existed && scenes_seen(store, &bob) == 2);
-    IS(store_scene_delete(store, SCENE_A, alice.user_id, &is_gone, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, first, &err));
-    OK(store_scene_delete(store, SCENE_A, alice.user_id, &is_gone, &err));
+    OK(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err));
     CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
-    IS(store_scene_delete(store, SCENE_A, bob.user_id, &is_gone, &err), STATUS_CONFLICT);
+    IS(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, second, &err));
-    OK(store_scene_delete(store, SCENE_A, bob.user_id, &is_gone, &err));
+    OK(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err));
     CHECK(is_gone && scenes_seen(store, &admin) == 1);
     store_close(store);
     drop_dir(dir);
