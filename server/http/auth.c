@@ -73,6 +73,8 @@ struct response *auth_check(struct api *api, struct request *r) {
         return unauthorized(r, "this daemon asks for a token");
     if (r->caller.role >= r->route->access - ROUTE_VIEWER)
         return NULL;
+    if (r->route->access == ROUTE_ADMIN)
+        return problem(r, 403, "only an admin may do that");
     return problem(r, 403, "a token of role \"%s\" may only look", role_name(r->caller.role));
 }
 

@@ -128,6 +128,7 @@ static const char step_5[] =
     "CREATE TABLE usage (owner_id INTEGER PRIMARY KEY, weight REAL NOT NULL) STRICT;"
     "DROP INDEX jobs_by_turn;"
     "CREATE INDEX jobs_by_turn ON jobs (state, owner_id, priority DESC, turn);";
+
 /* How long things are kept. */
 static const char step_6[] =
     "ALTER TABLE scenes ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
@@ -142,5 +143,5 @@ static const char step_6[] =
     ") STRICT;"
     "INSERT INTO retention VALUES (1, 0, 0, 86400000);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5};
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

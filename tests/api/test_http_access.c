@@ -111,7 +111,7 @@ static int wanted_refusal(const struct route *route, enum who who, enum thing th
         return 0;
     if (who < VIEWER)
         return 401;
-    if (who == VIEWER && changes)
+    if ((who == VIEWER && changes) || (route->access == ROUTE_ADMIN && who != ADMIN))
         return 403;
     if (!names_thing)
         return 0;
@@ -121,7 +121,7 @@ static int wanted_refusal(const struct route *route, enum who who, enum thing th
 }
 
 static void test_matrix(void) {
-    static const char *const methods[] = {"GET", "POST", "PATCH", "DELETE"};
+    static const char *const methods[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS"};
     size_t count;
     const struct route *table = routes_table(&count);
     for (size_t i = 0; i < count; i++) {
