@@ -14,6 +14,7 @@
 #define EVENT_PREVIEW "preview"
 #define EVENT_OUTPUT "output"
 #define EVENT_LOG "log"
+#define EVENT_RESYNC "resync" /* events that the reader has not seen are gone: GET tells what is so */
 
 /* Job states; see server/job/job.h for the diagram. */
 #define JOB_STATE_QUEUED "queued"

@@ -31,6 +31,8 @@ struct config {
     int64_t user_max_running, user_queue_limit, user_max_mib;
     int64_t max_upload_mib, min_free_mib;
     int64_t max_connections, max_streams, body_min_bytes_per_sec;
+    int64_t events_per_job;
+    double event_keep_hours;
     double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;
     double upload_keep_hours, job_keep_days, scene_keep_days, collect_interval_sec;
     double head_timeout_sec, idle_timeout_sec, keepalive_sec;

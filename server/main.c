@@ -113,6 +113,7 @@ static enum status build(struct daemon *d, struct error *err) {
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,
         .stop_grace_sec = c->stop_grace_sec,
+        .event_keep_sec = 3600.0 * c->event_keep_hours,
         .checkpoint_keep_sec = 3600.0 * c->checkpoint_keep_hours,
         .sandbox = c->sandbox,
     };
@@ -148,6 +149,8 @@ static enum status build(struct daemon *d, struct error *err) {
     enum status status = config_address(c->listen, address, &network.port, &is_loopback, err);
     if (status == STATUS_OK)
         status = store_open(&d->store, c->data_dir, err);
+    if (status == STATUS_OK)
+        store_keep_events(d->store, (size_t)c->events_per_job);
     if (status == STATUS_OK)
         status = check_access(d, is_loopback, err);
     if (status == STATUS_OK)

@@ -56,5 +56,8 @@ struct response *jobs_log(struct api *api, struct request *r);
 
 /* events.c */
 struct response *events_get(struct api *api, struct request *r);
+struct response *events_all(struct api *api, struct request *r);
+/* The reply to GET of a job with ?wait=; NULL where there is nothing to wait for. */
+struct response *events_wait(struct api *api, struct request *r, const struct job *job);
 
 #endif

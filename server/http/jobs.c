@@ -56,7 +56,13 @@ static struct response *show(struct api *api, const struct request *r, int64_t i
 struct response *jobs_get(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     struct job job;
-    return auth_job(api, r, ACCESS_READ, &job, &refusal) ? show_job(r, &job, 200) : refusal;
+    if (!auth_job(api, r, ACCESS_READ, &job, &refusal))
+        return refusal;
+    struct response *reply = target_query(&r->target, "wait") ? events_wait(api, r, &job) : NULL;
+    if (!reply)
+        return show_job(r, &job, 200);
+    job_release(&job);
+    return reply;
 }
 
 struct response *jobs_list(struct api *api, struct request *r) {

@@ -51,6 +51,18 @@ static void drop_old_checkpoints(const struct scheduler_config *config, struct s
     mem_free(jobs);
 }
 
+static void drop_old_events(const struct scheduler_config *config, struct store *store) {
+    int64_t before_ms = (int64_t)(((double)time(NULL) - config->event_keep_sec) * 1e3);
+    struct error err;
+    bool more = config->event_keep_sec > 0.0;
+    while (more)
+        if (store_event_prune(store, before_ms, &more, &err) != STATUS_OK) {
+            log_warning("old events cannot be removed: %s", err.message);
+            return;
+        }
+}
+
 void housekeeping_run(const struct scheduler_config *config, struct store *store) {
     drop_old_checkpoints(config, store);
+    drop_old_events(config, store);
 }

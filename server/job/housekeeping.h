@@ -4,8 +4,9 @@
 
 #include "server/job/scheduler.h"
 
-/* Removes the checkpoints of jobs that succeeded longer than checkpoint_keep_sec ago; those of all
- * others stay, since a retry goes on from them. Failures are logged. */
+/* Removes the checkpoints of jobs that succeeded longer than checkpoint_keep_sec ago (those of all
+ * others stay, since a retry goes on from them) and the events of jobs that ended longer than
+ * event_keep_sec ago. Failures are logged. */
 void housekeeping_run(const struct scheduler_config *config, struct store *store);
 
 /* Removes DIR's checkpoint. */

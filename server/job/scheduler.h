@@ -21,6 +21,7 @@ struct scheduler_config {
     double checkpoint_interval_sec;
     double stop_grace_sec;          /* SIGTERM to SIGKILL */
     double checkpoint_keep_sec;     /* of a job that has succeeded */
+    double event_keep_sec;          /* of a job that has ended */
     bool sandbox;
 };
 

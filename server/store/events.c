@@ -5,13 +5,69 @@
 #include "common/json.h"
 #include "common/protocol.h"
 #include "server/store/internal.h"
+#include "server/store/users.h"
+
+#define PRUNE_EVERY 64 /* events; until then a job has so many too many */
+
+void store_keep_events(struct store *store, size_t per_job) {
+    store->events_per_job = per_job;
+}
+
+/* Removes a job's events up to `last`, and remembers that. */
+static enum status prune_job(struct store *store, int64_t job_id, int64_t last, struct error *err) {
+    enum status status = sql_run(&store->sql, err, "DELETE FROM events WHERE job_id = ? AND id <= ?",
+                                 "ii", job_id, last);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE jobs SET pruned_id = max(pruned_id, ?) WHERE id = ?", "ii", last,
+                         job_id);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE pruned SET event_id = max(event_id, ?)", "i",
+                         last);
+    return status;
+}
+
+/* Keeps the newest events_per_job. */
+static enum status prune_excess(struct store *store, int64_t job_id, struct error *err) {
+    int64_t last;
+    enum status status = sql_int(&store->sql, 0, &last, err,
+                                 "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC"
+                                 " LIMIT 1 OFFSET ?",
+                                 "ii", job_id, (int64_t)store->events_per_job);
+    return status == STATUS_OK && last > 0 ? prune_job(store, job_id, last, err) : status;
+}
+
+enum status store_event_prune(struct store *store, int64_t before_ms, bool *more, struct error *err) {
+    int64_t job_id, last;
+    *more = false;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_int(&store->sql, 0, &job_id, err,
+                     "SELECT id FROM jobs WHERE events_gone = 0 AND finished_ms > 0"
+                     " AND finished_ms < ? ORDER BY finished_ms LIMIT 1", "i", before_ms);
+    if (status == STATUS_OK && job_id > 0) {
+        *more = true;
+        status = sql_int(&store->sql, 0, &last, err,
+                         "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC LIMIT 1 OFFSET 1",
+                         "i", job_id);
+        if (status == STATUS_OK && last > 0)
+            status = prune_job(store, job_id, last, err);
+        if (status == STATUS_OK)
+            status = sql_run(&store->sql, err, "UPDATE jobs SET events_gone = 1 WHERE id = ?", "i",
+                             job_id);
+    }
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
 
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,
                                const char *data, struct error *err) {
-    return sql_run(&store->sql, err,
-                   "INSERT INTO events (job_id, at_ms, attempt, type, data)"
-                   " VALUES (?, ?, ?, ?, ?)",
-                   "iintt", job_id, store_now_ms(), attempt, type, data);
+    enum status status = sql_run(&store->sql, err,
+                                 "INSERT INTO events (job_id, at_ms, attempt, type, data)"
+                                 " VALUES (?, ?, ?, ?, ?)",
+                                 "iintt", job_id, store_now_ms(), attempt, type, data);
+    bool is_time = status == STATUS_OK && sqlite3_last_insert_rowid(store->sql.db) % PRUNE_EVERY == 0;
+    return is_time ? prune_excess(store, job_id, err) : status;
 }
 
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err) {
@@ -94,11 +150,96 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
     return status;
 }
 
+/* What the page says of the job, where it is one that `who` may read. */
+static enum status page_of_job(struct store *store, const struct caller *who, int64_t job_id,
+                               struct event_page *page, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT state, pruned_id, revision FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
+                  "ini", job_id, who == NULL || who->role == ROLE_ADMIN, who ? who->user_id : 0);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        page->state = (enum job_state)sqlite3_column_int(stmt, 0);
+        page->pruned_id = sqlite3_column_int64(stmt, 1);
+        page->revision = sqlite3_column_int64(stmt, 2);
+        sqlite3_reset(stmt);
+    }
+    return status == STATUS_OK && !found
+               ? error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)job_id)
+               : status;
+}
+
+static enum status page_of_all(struct store *store, struct event_page *page, struct error *err) {
+    return sql_int(&store->sql, 0, &page->pruned_id, err, "SELECT event_id FROM pruned", "");
+}
+
+static enum status page_query(struct store *store, const struct caller *who, int64_t job_id,
+                              int64_t after, size_t limit, sqlite3_stmt **stmt, struct error *err) {
+    if (job_id > 0)
+        return sql_query(&store->sql, stmt, err,
+                         "SELECT id, at_ms, attempt, type, data, job_id FROM events"
+                         " WHERE job_id = ? AND id > ? ORDER BY id LIMIT ?",
+                         "iii", job_id, after, (int64_t)limit);
+    if (!who || who->role == ROLE_ADMIN)
+        return sql_query(&store->sql, stmt, err,
+                         "SELECT id, at_ms, attempt, type, data, job_id FROM events"
+                         " WHERE id > ? ORDER BY id LIMIT ?",
+                         "ii", after, (int64_t)limit);
+    return sql_query(&store->sql, stmt, err,
+                     "SELECT events.id, at_ms, events.attempt, type, data, job_id FROM events"
+                     " CROSS JOIN jobs ON jobs.id = job_id"
+                     " WHERE events.id > ? AND (owner_id = ? OR shared) ORDER BY events.id LIMIT ?",
+                     "iii", after, who->user_id, (int64_t)limit);
+}
+
+enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id,
+                             int64_t after, size_t limit, size_t byte_limit,
+                             void (*each)(void *user, const struct event_row *row), void *user,
+                             struct event_page *page, struct error *err) {
+    sqlite3_stmt *stmt;
+    size_t bytes = 0;
+    *page = (struct event_page){.last_id = after};
+    store_lock(store);
+    enum status status = job_id > 0 ? page_of_job(store, who, job_id, page, err)
+                                    : page_of_all(store, page, err);
+    if (status == STATUS_OK)
+        status = page_query(store, who, job_id, after, limit, &stmt, err);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        struct event_row event = {
+            .id = sqlite3_column_int64(stmt, 0), .job_id = sqlite3_column_int64(stmt, 5),
+            .at_ms = sqlite3_column_int64(stmt, 1), .attempt = sqlite3_column_int(stmt, 2),
+            .type = sql_text(stmt, 3), .data = sql_text(stmt, 4)};
+        bytes += strlen(event.data);
+        page->last_id = event.id;
+        page->count++;
+        each(user, &event);
+        if (bytes >= byte_limit) {
+            sqlite3_reset(stmt);
+            break;
+        }
+    }
+    page->is_full = page->count == limit || bytes >= byte_limit;
+    /* Others' events after the last of ours need not be looked at again. */
+    if (status == STATUS_OK && !page->is_full && job_id == 0)
+        status = sql_int(&store->sql, after, &page->last_id, err,
+                         "SELECT max(?, ifnull(max(id), 0)) FROM events", "i", page->last_id);
+    store_unlock(store);
+    return status;
+}
+
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err) {
     store_lock(store);
-    enum status status = sql_int(&store->sql, 0, id, err,
-                                 "SELECT ifnull(max(id), 0) FROM events WHERE job_id = ?", "i",
-                                 job_id);
+    enum status status =
+        job_id > 0 ? sql_int(&store->sql, 0, id, err,
+                             "SELECT ifnull(max(id), 0) FROM events WHERE job_id = ?", "i", job_id)
+                   : sql_int(&store->sql, 0, id, err, "SELECT ifnull(max(id), 0) FROM events", "");
     store_unlock(store);
     return status;
 }

@@ -13,6 +13,7 @@ struct store {
     struct sql sql;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
+    size_t events_per_job; /* kept */
     atomic_bool has_users;
 };
 

@@ -143,5 +143,14 @@ static const char step_6[] =
     ") STRICT;"
     "INSERT INTO retention VALUES (1, 0, 0, 86400000);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6};
+/* Old events go: those of a job up to pruned_id have; events_gone when its end is long past and
+ * only the last is left. `pruned` has the highest id that ever went so. */
+static const char step_7[] =
+    "ALTER TABLE jobs ADD COLUMN pruned_id INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE jobs ADD COLUMN events_gone INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX jobs_by_end ON jobs (events_gone, finished_ms);"
+    "CREATE TABLE pruned (id INTEGER PRIMARY KEY CHECK (id = 1), event_id INTEGER NOT NULL) STRICT;"
+    "INSERT INTO pruned VALUES (1, 0);";
+
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6, step_7};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

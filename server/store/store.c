@@ -8,6 +8,8 @@
 #include "common/mem.h"
 #include "server/store/internal.h"
 
+#define EVENTS_PER_JOB 20000
+
 int64_t store_now_ms(void) {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -69,6 +71,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     *out = NULL;
     struct store *store = mem_calloc(1, sizeof *store);
     pthread_mutex_init(&store->mutex, NULL);
+    store->events_per_job = EVENTS_PER_JOB;
     char *path = file_join(dir, "state.db");
     enum status status = sql_open(&store->sql, path, SQL_WAL, 0, err);
     if (status == STATUS_OK)

@@ -189,7 +189,32 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
                              void (*each)(void *user, int64_t id, int64_t at_ms, int attempt,
                                           const char *type, const char *data),
                              void *user, struct error *err);
-/* The id of the job's newest event, 0 when it has none: where a stream without history begins. */
+/* The next part of a stream: events with id > after of a job, or (job_id 0) of all jobs that `who`
+ * (NULL: everybody) may read, until `limit` events or byte_limit bytes of data have come; `each` as
+ * above. STATUS_NOT_FOUND when there is no such job for `who`. */
+struct event_row {
+    int64_t id, job_id, at_ms;
+    int attempt;
+    const char *type, *data;
+};
+struct event_page {
+    size_t count;
+    bool is_full;         /* there may be more */
+    int64_t last_id;      /* where the next part begins */
+    int64_t pruned_id;    /* events up to here may be gone, besides overtaken progress */
+    enum job_state state; /* of the job, before its events were looked at */
+    int64_t revision;
+};
+enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id,
+                             int64_t after, size_t limit, size_t byte_limit,
+                             void (*each)(void *user, const struct event_row *row), void *user,
+                             struct event_page *page, struct error *err);
+/* Of each job the newest `per_job` events are kept, about; before threads start. */
+void store_keep_events(struct store *store, size_t per_job);
+/* Removes all but the last event of one job that ended before that time; *more: there was one. */
+enum status store_event_prune(struct store *store, int64_t before_ms, bool *more, struct error *err);
+/* The id of the newest event of the job, or (0) of all; 0 when there is none: where a stream without
+ * history begins. */
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err);
 
 struct output_row {

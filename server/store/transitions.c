@@ -111,7 +111,7 @@ static enum status move(struct store *store, struct present *now, enum job_state
     int64_t at = store_now_ms();
     enum status status =
         sql_run(&store->sql, err,
-                "UPDATE jobs SET revision = revision + 1, state = ?, wanted = 0, attempt = ?,"
+                "UPDATE jobs SET revision = revision + 1, events_gone = 0, state = ?, wanted = 0, attempt = ?,"
                 " attempts_left = ?, reason = ?, hint = ?, finished_ms = ?, eta_sec = -1"
                 " WHERE id = ?",
                 "nnnttii", (int)to, now->attempt, now->attempts_left, reason, hint,

@@ -38,7 +38,7 @@ jq -r '.paths | to_entries[] | .key as $p | .value | keys[] | select(. != "param
 sed -n 's/^ *{METHOD_\([A-Z]*\), "\([^"]*\)".*/\1 \2/p' server/http/routes.c | sed 's/\.\.\.}/}/' | sort >"$work/table"
 diff "$work/described" "$work/table" || fail "openapi.json and the route table differ"
 while read -r method path; do
-    concrete=$(sed 's/{scene}/0123456789abcdef/; s/{job}/4242/; s/{upload}/0123456789abcdef/; s/{name}/none.exr/' <<<"$path")
+    concrete=$(sed 's/{scene}/0123456789abcdef/; s/{job}/4242/; s/{upload}/0123456789abcdef/; s/{name}/none.exr/; s|^/v1/events|&?wait=1|' <<<"$path")
     case $method in POST | PATCH) extra=(-H 'Content-Type: application/json' -H 'If-Match: *' --data-binary '{}') ;; *) extra=() ;; esac
     call "$method" "$concrete" ${extra[@]+"${extra[@]}"}
     answers=$(jq -r --arg p "$path" --arg m "${method,,}" '.paths[$p][$m].responses | keys | join(" ")' "$work/openapi")

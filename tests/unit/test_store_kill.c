@@ -1,6 +1,7 @@
 /* test_store_kill.c -- a process that writes to the store is killed at random moments, again and
  * again: every change that was acknowledged is there, nothing is there twice, the file is whole.
  * UNBAKE_KILLS sets how often (25). */
+#include <poll.h>
 #include <signal.h>
 #include <sqlite3.h>
 #include <sys/wait.h>
@@ -136,6 +137,10 @@ int main(void) {
             child(dir, next_key, ends[1]);
         }
         close(ends[1]);
+        /* Every other time it has begun its work, however slow the machine is. */
+        struct pollfd begun = {.fd = ends[0], .events = POLLIN};
+        if (round % 2 == 0)
+            poll(&begun, 1, 30000);
         random = random * 1664525u + 1013904223u;
         usleep(5000 + (random >> 8) % 35000);
         kill(pid, SIGKILL);

@@ -1,0 +1,310 @@
+/* hub.c -- the open event streams, and the text that each of them sends; see events.h. */
+#include "server/http/events.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "common/clock.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "server/http/api.h"
+#include "server/http/views.h"
+
+#define BATCH_EVENTS 64
+#define BATCH_BYTES ((size_t)64 << 10)  /* of data; a single event may have more */
+#define TEXT_BYTES ((size_t)1 << 20)
+
+struct hub {
+    pthread_mutex_t mutex; /* guards the list and its members' shared part */
+    struct subscriber *first;
+    size_t count;
+    double keepalive_sec;
+};
+
+struct subscriber {
+    struct stream base;
+    struct api *api;
+    struct subscription what; /* its `after`: events up to here were rendered */
+    struct caller caller;
+    double end_sec;       /* of a wait, as clock_sec; 0: never */
+    struct buf text;      /* rendered, not yet read */
+    size_t text_read;
+    bool has_ended;
+    bool is_listed;       /* in the hub, from the first read on: wake is set by then */
+    /* Shared, under hub->mutex: */
+    struct subscriber *next, *previous;
+    bool is_dirty;        /* the database may hold more */
+    bool is_due;          /* for a keep-alive, or the end of its wait */
+    bool is_suspect;      /* its token may have been revoked */
+    double last_sec;      /* something was last handed over */
+};
+
+struct hub *hub_new(double keepalive_sec) {
+    struct hub *hub = mem_calloc(1, sizeof *hub);
+    pthread_mutex_init(&hub->mutex, NULL);
+    hub->keepalive_sec = keepalive_sec;
+    return hub;
+}
+
+void hub_free(struct hub *hub) {
+    pthread_mutex_destroy(&hub->mutex);
+    mem_free(hub);
+}
+
+size_t hub_count(struct hub *hub) {
+    pthread_mutex_lock(&hub->mutex);
+    size_t count = hub->count;
+    pthread_mutex_unlock(&hub->mutex);
+    return count;
+}
+
+void hub_changed(void *user, int64_t job_id) {
+    struct hub *hub = user;
+    pthread_mutex_lock(&hub->mutex);
+    for (struct subscriber *s = hub->first; s; s = s->next) {
+        if ((s->what.job_id && s->what.job_id != job_id) || !job_id || s->is_dirty)
+            continue;
+        s->is_dirty = true;
+        s->base.wake(s->base.waker);
+    }
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+void hub_tick(struct hub *hub, double now_sec) {
+    pthread_mutex_lock(&hub->mutex);
+    for (struct subscriber *s = hub->first; s; s = s->next) {
+        bool is_over = s->end_sec > 0.0 && now_sec >= s->end_sec;
+        if (s->is_due || (!is_over && now_sec - s->last_sec < hub->keepalive_sec))
+            continue;
+        s->is_due = true;
+        s->base.wake(s->base.waker);
+    }
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+void hub_recheck(struct hub *hub) {
+    pthread_mutex_lock(&hub->mutex);
+    for (struct subscriber *s = hub->first; s; s = s->next) {
+        s->is_suspect = true;
+        s->base.wake(s->base.waker);
+    }
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+/* --- text -------------------------------------------------------------------------------- */
+
+/* One event; takes data, an object, which gets `at`, `job` and `attempt` where it lacks them. */
+static void render(struct subscriber *s, const struct event_row *row, cJSON *data) {
+    char at[VIEW_TIME_SIZE];
+    view_time(row->at_ms, at);
+    if (!cJSON_GetObjectItemCaseSensitive(data, "at"))
+        json_add_string(data, "at", at);
+    if (row->job_id && !cJSON_GetObjectItemCaseSensitive(data, "job"))
+        json_add_int(data, "job", row->job_id);
+    if (row->job_id && !cJSON_GetObjectItemCaseSensitive(data, "attempt"))
+        json_add_int(data, "attempt", row->attempt);
+    char *text = json_text(data);
+    if (s->what.is_ndjson)
+        buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":%s}\n", (long long)row->id, row->type,
+                   text);
+    else
+        buf_printf(&s->text, "id: %lld\nevent: %s\ndata: %s\n\n", (long long)row->id, row->type, text);
+    mem_free(text);
+    cJSON_Delete(data);
+}
+
+static void render_row(void *user, const struct event_row *row) {
+    cJSON *object = cJSON_Parse(row->data);
+    render(user, row, object ? object : cJSON_CreateObject());
+}
+
+static int64_t now_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Before anything else, with the id that the client has: keeping the last id it neither misses nor
+ * repeats an event. */
+static void render_start(struct subscriber *s) {
+    if (!s->what.is_ndjson && s->what.revision == 0)
+        buf_puts(&s->text, s->what.snapshot ? "retry: 3000\n" : "retry: 3000\n\n");
+    if (!s->what.snapshot)
+        return;
+    struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE};
+    json_add_bool(s->what.snapshot, "snapshot", true);
+    render(s, &row, s->what.snapshot);
+    s->what.snapshot = NULL;
+}
+
+/* Events after the client's last one are gone: it must look for itself, and goes on from there. */
+static void render_resync(struct subscriber *s, int64_t pruned_id) {
+    cJSON *data = cJSON_CreateObject();
+    json_add_string(data, "reason", "events up to this one are no longer kept: GET tells what is so");
+    struct event_row row = {.id = pruned_id, .at_ms = now_ms(), .type = EVENT_RESYNC};
+    render(s, &row, data);
+    s->what.after = pruned_id;
+}
+
+static void mark_dirty(struct subscriber *s) {
+    pthread_mutex_lock(&s->api->hub->mutex);
+    s->is_dirty = true;
+    pthread_mutex_unlock(&s->api->hub->mutex);
+}
+
+/* Renders what the database has after the last event; sets has_ended after the last one of a job that
+ * is in a terminal state or that is not to be followed, and when the job is gone or not to be read
+ * any more. */
+static void fetch(struct subscriber *s) {
+    struct subscription *what = &s->what;
+    struct event_page page;
+    struct store *store = s->api->store;
+    if (store_event_page(store, &s->caller, what->job_id, what->after, BATCH_EVENTS, BATCH_BYTES, render_row, s,
+                         &page, NULL) != STATUS_OK) {
+        s->has_ended = true; /* where the database is at fault the client comes back and asks again */
+        return;
+    }
+    if (page.pruned_id > what->after) {
+        buf_clear(&s->text); /* the same events come again, after the news that some are missing */
+        render_resync(s, page.pruned_id);
+        mark_dirty(s);
+        return;
+    }
+    what->after = page.last_id;
+    if (page.is_full && what->wait_sec <= 0.0)
+        mark_dirty(s);
+    else if (what->is_past || (what->job_id && job_is_terminal(page.state)) ||
+             (what->wait_sec > 0.0 && page.count > 0))
+        s->has_ended = true;
+}
+
+/* The job itself, where what was waited for has come. */
+static void fetch_job(struct subscriber *s, bool is_over) {
+    struct job job;
+    if (store_job_get(s->api->store, s->what.job_id, &job, NULL) != STATUS_OK) {
+        s->has_ended = true;
+        return;
+    }
+    bool may_read = caller_access_job(&s->caller, &job) >= ACCESS_READ;
+    bool has_come = s->what.revision > 0 ? job.revision != s->what.revision : job_is_terminal(job.state);
+    if (may_read && (has_come || is_over)) {
+        cJSON *view = view_job(&job);
+        char *text = json_text(view);
+        buf_puts(&s->text, text);
+        mem_free(text);
+        cJSON_Delete(view);
+    }
+    s->has_ended = !may_read || has_come || is_over;
+    job_release(&job);
+}
+
+static void enlist(struct subscriber *s) {
+    struct hub *hub = s->api->hub;
+    pthread_mutex_lock(&hub->mutex);
+    s->next = hub->first;
+    if (s->next)
+        s->next->previous = s;
+    hub->first = s;
+    hub->count++;
+    pthread_mutex_unlock(&hub->mutex);
+    s->is_listed = true;
+}
+
+static void delist(struct subscriber *s) {
+    struct hub *hub = s->api->hub;
+    pthread_mutex_lock(&hub->mutex);
+    if (s->next)
+        s->next->previous = s->previous;
+    if (s->previous)
+        s->previous->next = s->next;
+    else
+        hub->first = s->next;
+    hub->count--;
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+/* Whether the stream's token was revoked after the stream was opened. */
+static bool is_revoked(struct subscriber *s) {
+    pthread_mutex_lock(&s->api->hub->mutex);
+    bool is_suspect = s->is_suspect;
+    s->is_suspect = false;
+    pthread_mutex_unlock(&s->api->hub->mutex);
+    return is_suspect && s->caller.token_id && !store_token_is_valid(s->api->store, s->caller.token_id);
+}
+
+/* Renders what there is to say now, if anything. */
+static void refill(struct subscriber *s) {
+    struct hub *hub = s->api->hub;
+    /* Between batches a stream keeps no memory for text: most of them are idle most of the time. */
+    buf_release(&s->text);
+    buf_init(&s->text, TEXT_BYTES);
+    s->text_read = 0;
+    pthread_mutex_lock(&hub->mutex);
+    bool is_dirty = s->is_dirty, is_due = s->is_due;
+    s->is_dirty = s->is_due = false;
+    if (is_due)
+        s->last_sec = clock_sec();
+    pthread_mutex_unlock(&hub->mutex);
+    bool is_over = is_due && s->end_sec > 0.0 && clock_sec() >= s->end_sec;
+    if (s->has_ended)
+        return;
+    if (s->what.revision != 0 && (is_dirty || is_over))
+        fetch_job(s, is_over);
+    else if (is_dirty)
+        fetch(s);
+    if (is_over)
+        s->has_ended = true;
+    else if (s->text.length == 0 && is_due && s->what.revision == 0)
+        buf_puts(&s->text, s->what.is_ndjson ? "\n" : ": keepalive\n\n");
+}
+
+static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
+    struct subscriber *s = (struct subscriber *)base;
+    struct hub *hub = s->api->hub;
+    if (!s->is_listed)
+        enlist(s);
+    if (is_revoked(s))
+        return -1;
+    if (s->text_read == s->text.length) {
+        refill(s);
+        if (s->text.length == 0)
+            return s->has_ended ? -1 : 0;
+        if (s->text.overflowed)
+            return -1; /* a single batch of a megabyte: nothing of ours */
+    }
+    size_t count = s->text.length - s->text_read;
+    count = count < size ? count : size;
+    memcpy(to, s->text.data + s->text_read, count);
+    s->text_read += count;
+    pthread_mutex_lock(&hub->mutex);
+    s->last_sec = clock_sec();
+    pthread_mutex_unlock(&hub->mutex);
+    return (ssize_t)count;
+}
+
+static void subscriber_close(struct stream *base) {
+    struct subscriber *s = (struct subscriber *)base;
+    if (s->is_listed)
+        delist(s);
+    buf_release(&s->text);
+    cJSON_Delete(s->what.snapshot);
+    mem_free(s);
+}
+
+struct stream *hub_subscribe(struct api *api, const struct caller *caller, const struct subscription *what) {
+    struct subscriber *s = mem_calloc(1, sizeof *s);
+    s->base.read = subscriber_read;
+    s->base.close = subscriber_close;
+    s->api = api;
+    s->caller = *caller;
+    s->what = *what;
+    s->end_sec = what->wait_sec > 0.0 ? clock_sec() + what->wait_sec : 0.0;
+    s->is_dirty = true;
+    s->is_suspect = true; /* revoked between the check of the head and the first read? */
+    s->last_sec = clock_sec();
+    buf_init(&s->text, TEXT_BYTES);
+    render_start(s);
+    return &s->base;
+}
