@@ -8,6 +8,7 @@
 #include <archive.h>
 #include <cjson/cJSON.h>
 #include <errno.h>
+#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
@@ -28,6 +29,7 @@
 #include "server/http/events.h"
 #include "server/http/listener.h"
 #include "server/job/scheduler.h"
+#include "server/notify.h"
 #include "server/render/accel.h"
 #include "server/store/store.h"
 
@@ -72,6 +74,7 @@ struct daemon {
     struct listener *listener;
     struct admin *admin;
     struct collector *collector;
+    unsigned long watched_rounds; /* of the scheduler, when the watchdog was last fed */
     struct api_library libraries[LIBRARY_COUNT];
 };
 
@@ -166,22 +169,51 @@ static enum status build(struct daemon *d, struct error *err) {
     return status;
 }
 
+/* Tells systemd that the daemon lives, if it does: the scheduler has gone on since the last look,
+ * and the store answers. */
+static void feed_watchdog(struct daemon *d) {
+    unsigned long rounds = scheduler_rounds(d->scheduler);
+    store_token_is_valid(d->store, 0); /* hangs where the store does */
+    if (rounds != d->watched_rounds)
+        notify("WATCHDOG=1");
+    d->watched_rounds = rounds;
+    scheduler_wake(d->scheduler);
+}
+
+/* The next of the signals in `asked`, while the watchdog is fed. */
+static int next_signal(struct daemon *d, const sigset_t *asked) {
+    double pause_sec = notify_watchdog_sec() / 3;
+    struct timespec pause = {.tv_sec = (time_t)pause_sec,
+                             .tv_nsec = (long)(1e9 * (pause_sec - floor(pause_sec)))};
+    for (;;) {
+        int number = pause_sec > 0 ? sigtimedwait(asked, NULL, &pause) : sigwaitinfo(asked, NULL);
+        if (number > 0)
+            return number;
+        if (errno == EAGAIN)
+            feed_watchdog(d);
+    }
+}
+
+static void reload(struct daemon *d) {
+    struct error err;
+    if (listener_reload(d->listener, &err) == STATUS_OK)
+        log_info("SIGHUP: the TLS certificate was read again; options change by a restart only");
+    else
+        log_error("SIGHUP: %s; the old certificate stays in use", err.message);
+}
+
 static void *wait_for_signal(void *user) {
     struct daemon *d = user;
-    struct error err;
     sigset_t asked;
-    int number = 0;
+    int number;
     sigemptyset(&asked);
     sigaddset(&asked, SIGTERM);
     sigaddset(&asked, SIGINT);
     sigaddset(&asked, SIGHUP);
-    while (sigwait(&asked, &number) == 0 && number == SIGHUP) {
-        if (listener_reload(d->listener, &err) == STATUS_OK)
-            log_info("SIGHUP: the TLS certificate was read again; options change by a restart only");
-        else
-            log_error("SIGHUP: %s; the old certificate stays in use", err.message);
-    }
+    while ((number = next_signal(d, &asked)) == SIGHUP)
+        reload(d);
     log_info("%s: stopping", number == SIGINT ? "SIGINT" : "SIGTERM");
+    notify("STOPPING=1");
     listener_quiesce(d->listener);
     scheduler_stop(d->scheduler);
     return NULL;
@@ -245,6 +277,7 @@ static enum status serve(struct daemon *d, const char *port_file, struct error *
     int failed = pthread_create(&waiter, NULL, wait_for_signal, d);
     if (failed)
         return error_set_errno(err, failed, "cannot start the thread that waits for signals");
+    notify("READY=1");
     status = scheduler_run(d->scheduler, err);
     /* Where it ended by itself, the thread still waits. */
     pthread_kill(waiter, SIGTERM);

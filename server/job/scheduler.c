@@ -33,6 +33,7 @@ struct scheduler {
     int wake_fd; /* an eventfd: survives any number of calls before it is read */
     atomic_bool stopping;
     atomic_int running;
+    atomic_ulong rounds;
     size_t slot_count;
     struct attempt *slot; /* [slot_count] */
     bool must_retry;      /* something failed that may work later */
@@ -229,7 +230,12 @@ static int keep_deadlines(struct scheduler *s) {
     return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded down it would spin */
 }
 
+unsigned long scheduler_rounds(const struct scheduler *s) {
+    return atomic_load(&s->rounds);
+}
+
 static void wait_for_something(struct scheduler *s, int timeout_ms) {
+    atomic_fetch_add(&s->rounds, 1);
     nfds_t count = 0;
     s->poll[count++] = (struct pollfd){.fd = s->wake_fd, .events = POLLIN};
     for (size_t i = 0; i < s->slot_count; i++) {

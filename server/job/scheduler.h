@@ -36,5 +36,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err);
 void scheduler_wake(struct scheduler *s); /* from any thread: look at the store again */
 void scheduler_stop(struct scheduler *s); /* from any thread or a signal handler */
 int scheduler_running(const struct scheduler *s); /* workers alive; any thread */
+/* How often it has looked at the store; any thread. After scheduler_wake it grows, or it hangs. */
+unsigned long scheduler_rounds(const struct scheduler *s);
 
 #endif
