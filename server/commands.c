@@ -7,6 +7,7 @@
 #include "server/admin/commands.h"
 #include "server/demo/generate.h"
 #include "server/evaluate/evaluate.h"
+#include "server/evaluate/relight.h"
 #include "server/worker/worker.h"
 
 static const struct command table[] = {
@@ -38,6 +39,11 @@ static const struct command table[] = {
      "  unbaked evaluate /tmp/room /tmp/room-textures\n", NULL, evaluate_command},
     {"manual", "PAGE", "write unbaked.8, unbaked.conf.5, or the completion for bash or zsh", "",
      "  unbaked manual unbaked.8 | man -l -\n", NULL, manual_command},
+    {"relight", "OUTPUTS", "render a finished job's room from any view under any light",
+     "OUTPUTS is a folder that `unbake get` filled; nothing else of the job is needed. --help lists the\n"
+     "options.\n",
+     "  unbaked relight /tmp/room-textures --lights off --environment sky.hdr --out sky.png\n", NULL,
+     relight_command},
     {"worker", "DIR", "one attempt of a job; the daemon runs it", "", "", NULL, worker_main},
 };
 #define COMMAND_COUNT (sizeof table / sizeof *table)

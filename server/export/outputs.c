@@ -15,6 +15,7 @@
 #include "server/export/mesh_ply.h"
 #include "server/export/pictures.h"
 #include "server/export/report_html.h"
+#include "server/export/views_json.h"
 
 #define MIME_EXR "image/x-exr"
 #define MIME_PNG "image/png"
@@ -204,6 +205,19 @@ static enum status put_mesh(struct export *e, struct error *err) {
     return status;
 }
 
+static enum status put_views(struct export *e, struct error *err) {
+    cJSON *views = views_json(e->input->comparison, e->input->comparison_count);
+    char *text = json_page(views), *path = file_join(e->dir, "views.json");
+    enum status status = file_replace(path, text, strlen(text), err);
+    if (status == STATUS_OK)
+        status = tell(e, EVENT_OUTPUT, "views.json", MIME_JSON,
+                      "the cameras of the held-out views, as transforms.json has them", err);
+    mem_free(path);
+    mem_free(text);
+    cJSON_Delete(views);
+    return status;
+}
+
 static void comparison_file(char name[64], size_t i) {
     snprintf(name, 64, "compare/%03zu.png", i);
 }
@@ -220,7 +234,7 @@ static enum status put_comparisons(struct export *e, struct error *err) {
                            "held-out photograph, its re-render, their difference", err);
         image_release(&image);
     }
-    return status;
+    return count > 0 && status == STATUS_OK ? put_views(e, err) : status;
 }
 
 /* --- the report --------------------------------------------------------------------------- */

@@ -19,6 +19,7 @@
  *                    at most EXPORT_PREVIEW_SIZE texels a side
  *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
+ *   views.json       the cameras of these (views_json.h)
  *   report.json      every setting, version, stage time and metric
  *   report.html      the same for the eye; needs no other file and no network */
 #ifndef UNBAKE_EXPORT_OUTPUTS_H
@@ -31,6 +32,7 @@
 #include "common/image.h"
 #include "common/json.h"
 #include "server/scene/atlas.h"
+#include "server/scene/camera.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/mesh.h"
@@ -44,6 +46,7 @@ struct export_comparison {
     const char *name;               /* the photograph's, for labels */
     const struct image *photograph; /* saturated or masked pixels as they are */
     const struct image *render;
+    const struct camera *camera;    /* that took it */
 };
 
 /* All borrowed. */

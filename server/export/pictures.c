@@ -230,12 +230,11 @@ static int by_value(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Brings the 80th percentile of the photograph's luminance to 0.6: bright, lamps clipped. */
-static float comparison_scale(const struct image *photograph) {
-    size_t count = (size_t)photograph->width * photograph->height, used = 0;
+float picture_scale(const struct image *picture) {
+    size_t count = (size_t)picture->width * picture->height, used = 0;
     float *luminance = mem_array(count, sizeof *luminance);
     for (size_t i = 0; i < count; i++) {
-        float l = rgb_luminance(pixel_at(photograph, i));
+        float l = rgb_luminance(pixel_at(picture, i));
         if (isfinite(l))
             luminance[used++] = l;
     }
@@ -262,7 +261,7 @@ void picture_comparison(const struct export_comparison *comparison, struct image
     image_init(image, 3 * width + 2 * COMPARISON_GAP, height, 3, rgb_channel);
     for (size_t i = 0; i < (size_t)image->width * height * 3; i++)
         image->pixel[i] = 1.0f;
-    float scale = comparison_scale(photograph);
+    float scale = picture_scale(photograph);
     for (uint32_t y = 0; y < height; y++) {
         for (uint32_t x = 0; x < width; x++) {
             size_t pixel = (size_t)y * width + x;

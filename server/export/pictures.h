@@ -37,6 +37,9 @@ void picture_preview(const struct export_input *input, enum picture_kind kind,
  * at half its brightness. There must be one. */
 void picture_environment(const struct export_input *input, struct image *image);
 
+/* The factor that brings the 80th percentile of a picture's luminance to 0.6: bright, lamps clipped. */
+float picture_scale(const struct image *picture);
+
 /* Photograph | re-render | signed relative difference of luminance (red: the re-render is too
  * bright, blue: too dark, white: equal). One exposure for both pictures, chosen from the
  * photograph. */

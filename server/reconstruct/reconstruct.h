@@ -49,7 +49,8 @@ struct reconstruct_hooks {
 
 /* A held-out photograph and what the recovered room looks like from there. */
 struct held_out {
-    const char *name;                /* borrowed from the scene */
+    const char *name;                /* borrowed from the scene, both */
+    const struct camera *camera;
     struct image photograph, render; /* linear radiance, R G B, of one size; owned */
     double msre, psnr_db, ssim;
 };

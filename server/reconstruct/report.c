@@ -95,6 +95,7 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
         .seed = (uint64_t)settings_number(set, "seed") ^ REPORT_SEED,
     };
     view->name = photo->name;
+    view->camera = &photo->camera;
     photograph_radiance(photo, &view->photograph);
     render_radiance(r, &photo->camera, &path, &view->render);
     if (!photo->exposure_known) {

@@ -258,7 +258,8 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
     for (size_t i = 0; i < r->held_out_count; i++)
         comparison[i] = (struct export_comparison){.name = r->held_out[i].name,
                                                    .photograph = &r->held_out[i].photograph,
-                                                   .render = &r->held_out[i].render};
+                                                   .render = &r->held_out[i].render,
+                                                   .camera = r->held_out[i].camera};
     struct export_input input = input_of(run, r);
     input.comparison = comparison;
     input.comparison_count = r->held_out_count;

@@ -94,7 +94,7 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
     struct export_comparison *pair = mem_calloc(r->held_out_count + 1, sizeof *pair);
     for (size_t i = 0; i < r->held_out_count; i++)
         pair[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
-                                             &r->held_out[i].render};
+                                             &r->held_out[i].render, r->held_out[i].camera};
     struct export_input input = {
         .title = "room",
         .mesh = &r->scene->mesh,

@@ -172,6 +172,33 @@ static void check_parameters(void) {
     box_release(&b);
 }
 
+/* The same without a ceiling under a sky that is brighter on one side: the environment's samples take
+ * the place of most of the lamp's, whose emission now moves the choice between the two. */
+static void check_under_sky(void) {
+    static float pixel[33 * 64 * 3];
+    struct image sky = {.width = 64, .height = 33, .channel_count = 3, .pixel = pixel};
+    for (int i = 0; i < 33 * 64 * 3; i++)
+        pixel[i] = i % 192 < 96 ? 1.5f : 12.0f;
+    struct box b;
+    box_init(&b);
+    box_open(&b);
+    box_build(&b);
+    struct parallel *pool = parallel_new(1);
+    world_set_environment(&b.world, &sky, pool);
+    parallel_free(pool);
+    CHECK(b.world.lights->environment_chance > 0.2f && b.world.lights->environment_chance < 0.95f);
+    const struct parameter parameters[] = {
+        {"a texel under a sky", TEXEL, 8 * BOX_SIDE + 40, true, 7},
+        {"walls' base colour under a sky", SEGMENT_COLOR, 0, true, 2},
+        {"walls' base colour under a sky", SEGMENT_COLOR, 0, true, 7},
+        {"walls' roughness under a sky", ROUGHNESS, 0, true, 7},
+        {"lamp's emission under a sky", EMISSION, 2, false, 7},
+    };
+    for (size_t i = 0; i < sizeof parameters / sizeof *parameters; i++)
+        check_parameter(&b, &parameters[i]);
+    box_release(&b);
+}
+
 /* d/d(walls' base colour) of sum (mean radiance - target)^2 at one sample per pixel: from two
  * independent estimates without bias, from one with. */
 static void check_loss(void) {
@@ -260,6 +287,7 @@ static void check_loss(void) {
 
 int main(void) {
     check_parameters();
+    check_under_sky();
     check_loss();
     return check_result();
 }

@@ -77,6 +77,16 @@ static inline void box_init(struct box *b) {
     m->emission[2] = (rgb){9.0f, 8.0f, 6.0f};
 }
 
+/* Takes the ceiling away. */
+static inline void box_open(struct box *b) {
+    struct mesh *m = &b->mesh;
+    m->triangle_count -= 2;
+    memmove(m->index + 2, m->index + 4, (m->triangle_count - 2) * sizeof *m->index);
+    memmove(b->atlas.corner + 2, b->atlas.corner + 4, (m->triangle_count - 2) * sizeof *b->atlas.corner);
+    memmove(b->segments.of_triangle + 2, b->segments.of_triangle + 4,
+            (m->triangle_count - 2) * sizeof *b->segments.of_triangle);
+}
+
 /* After the geometry and materials are as they shall be. */
 static inline void box_build(struct box *b) {
     struct parallel *pool = parallel_new(1);

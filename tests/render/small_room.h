@@ -74,10 +74,14 @@ static inline vec3 spread(int i, float margin) {
                   margin + c * (3 - 2 * margin)};
 }
 
-/* The truth, seen by FRAMES cameras, every fifth of them held out. */
-static inline void make_scene(struct scene *scene, struct parallel *pool) {
-    *scene = (struct scene){0};
-    make_mesh(&scene->mesh);
+static inline vec3 look_anywhere(int frame) {
+    return spread(frame * 7 + 3, 0.0f);
+}
+
+/* Photographs of scene->mesh in its true colours by FRAMES cameras, which look at target(frame); every
+ * fifth of them is held out. environment may be NULL. */
+static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct image *environment,
+                                   vec3 target(int frame), struct parallel *pool) {
     struct segments segments;
     struct atlas atlas;
     struct inverse_uv inverse;
@@ -93,8 +97,8 @@ static inline void make_scene(struct scene *scene, struct parallel *pool) {
         rgb color = wall_color[segments.of_triangle[inverse.triangle[texel]]];
         memcpy(truth.base_color.texel[texel], &color, sizeof color);
     }
-    truth.emission[LAMP] = lamp_radiance;
-    CHECK(world_init(&world, &scene->mesh, &segments, &atlas, &truth, NULL, pool, &err) == STATUS_OK);
+    truth.emission[LAMP] = lamp;
+    CHECK(world_init(&world, &scene->mesh, &segments, &atlas, &truth, environment, pool, &err) == STATUS_OK);
     struct path_settings path = {.max_depth = 8, .roulette_depth = 5, .seed = 99};
     scene->photograph = mem_calloc(FRAMES, sizeof *scene->photograph);
     scene->photograph_count = FRAMES;
@@ -103,7 +107,7 @@ static inline void make_scene(struct scene *scene, struct parallel *pool) {
         *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f,
                                      .gain = {1, 1, 1}, .clip = INFINITY, .is_test = f % 5 == 4};
         photo->name = mem_printf("frame %d", f);
-        photo->camera = look(spread(f, 0.4f), spread(f * 7 + 3, 0.0f));
+        photo->camera = look(spread(f, 0.4f), target(f));
         struct image image;
         film_render(&world, &photo->camera, 64, &path, (uint32_t)f, pool, &image);
         photo->pixel = mem_array(WIDTH * HEIGHT, sizeof *photo->pixel);
@@ -118,6 +122,12 @@ static inline void make_scene(struct scene *scene, struct parallel *pool) {
     inverse_uv_release(&inverse);
     atlas_release(&atlas);
     segments_release(&segments);
+}
+
+static inline void make_scene(struct scene *scene, struct parallel *pool) {
+    *scene = (struct scene){0};
+    make_mesh(&scene->mesh);
+    photograph_mesh(scene, lamp_radiance, NULL, look_anywhere, pool);
 }
 
 #endif

@@ -10,7 +10,9 @@
 #include "server/demo/room.h"
 #include "server/export/outputs.h"
 #include "server/export/pictures.h"
+#include "server/ingest/findings.h"
 #include "server/ingest/ply.h"
+#include "server/ingest/transforms.h"
 #include "tests/check.h"
 
 struct announced {
@@ -112,7 +114,7 @@ static void test_comparison(void) {
         render.pixel[3 + c] = 1.0f;  /* second too dark */
         photograph.pixel[6 + c] = NAN;
     }
-    struct export_comparison comparison = {"a", &photograph, &render};
+    struct export_comparison comparison = {"a", &photograph, &render, NULL};
     picture_comparison(&comparison, &picture);
     CHECK(picture.width == 38 && picture.height == 1);
     const float *p = picture.pixel, *r = p + 3 * 14, *d = p + 3 * 28;
@@ -142,7 +144,7 @@ static void test_report(const char *dir, size_t segments) {
     char *path = file_join(dir, "report.json");
     CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)segments);
-    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 12);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 13);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
     cJSON_Delete(report);
     mem_free(path);
@@ -173,6 +175,32 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
             CHECK(memcmp(&mesh.position[mesh.index[t][k]], &wanted->position[wanted->index[t][k]],
                          sizeof(vec3)) == 0);
     mesh_release(&mesh);
+    mem_free(path);
+}
+
+/* views.json reads back as the camera that it was made from. */
+static void test_views(const char *dir, const struct camera *wanted) {
+    struct error err;
+    struct findings findings = {.problems = cJSON_CreateArray()};
+    struct transforms transforms;
+    struct camera camera = {0};
+    cJSON *tree = NULL;
+    char *path = file_join(dir, "views.json");
+    CHECK(json_read(path, 1 << 20, &tree, &err) == STATUS_OK);
+    transforms_read(tree, "views.json", &transforms, &findings);
+    CHECK(findings.problem_count == 0 && transforms.frame_count == 1);
+    CHECK(transforms_camera(&transforms.frame[0], wanted->width, wanted->height, &camera, &err) == STATUS_OK);
+    CHECK_STRING(transforms.frame[0].file, "images/003.exr");
+    CHECK(camera.model == wanted->model && camera.fx == wanted->fx && camera.fy == wanted->fy);
+    CHECK(camera.cx == wanted->cx && camera.cy == wanted->cy);
+    CHECK(memcmp(camera.k, wanted->k, sizeof camera.k) == 0 && memcmp(camera.p, wanted->p, sizeof camera.p) == 0);
+    for (int i = 0; i < 9; i++)
+        CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3], wanted->world_from_camera.rotation[i / 3][i % 3], 1e-6);
+    CHECK(camera.world_from_camera.translation.z == 3.0f);
+    transforms_release(&transforms);
+    findings_release(&findings);
+    cJSON_Delete(findings.problems);
+    cJSON_Delete(tree);
     mem_free(path);
 }
 
@@ -225,7 +253,11 @@ int main(void) {
     bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
     struct image photograph;
     image_init(&photograph, 16, 12, 3, names);
-    struct export_comparison comparison = {"images/003.exr", &photograph, &photograph};
+    struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.5f,
+                            .k = {0.1f, -0.02f}, .p = {0.001f, 0.002f}};
+    camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
+    camera.camera_from_world = rigid_inverse(&camera.world_from_camera);
+    struct export_comparison comparison = {"images/003.exr", &photograph, &photograph, &camera};
     cJSON *report = NULL;
     static const char text[] = "{\"seed\":1,\"stages\":[{\"name\":\"refine\",\"seconds\":2.5}],"
                                "\"series\":{\"loss\":[[0,1],[1,0.5],[2,0.02]],\"one\":[[0,1]]},"
@@ -242,10 +274,11 @@ int main(void) {
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
-    CHECK_THAT(heard.previews == 5 && heard.outputs == 9, "%d, %d", heard.previews, heard.outputs);
+    CHECK_THAT(heard.previews == 5 && heard.outputs == 10, "%d, %d", heard.previews, heard.outputs);
     CHECK_STRING(heard.last, "report.html");
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
+    test_views(dir, &camera);
     test_report(dir, room.segments.count);
     test_environment(dir, &in, &heard);
     heard.refuse = true;

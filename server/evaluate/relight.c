@@ -1,0 +1,180 @@
+/* relight.c -- see relight.h. */
+#include "server/evaluate/relight.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/evaluate/recovered.h"
+#include "server/ingest/ply.h"
+#include "server/ingest/transforms.h"
+#include "server/render/film.h"
+
+#define PI 3.14159265358979323846
+#define ROULETTE_DEPTH 5
+
+struct relight_settings relight_default_settings(void) {
+    return (struct relight_settings){.view = "0", .environment_scale = 1.0f, .up = 'y', .lights = true,
+                                     .spp = 64, .max_depth = 16, .seed = 7};
+}
+
+/* --- the camera --------------------------------------------------------------------------------- */
+
+static const struct transforms_frame *find_frame(const struct transforms *t, const char *view) {
+    char *end;
+    unsigned long number = strtoul(view, &end, 10);
+    for (size_t i = 0; i < t->frame_count; i++)
+        if (strcmp(t->frame[i].file, view) == 0)
+            return &t->frame[i];
+    for (size_t i = 0; i < t->frame_count && end != view && *end == '\0'; i++)
+        if (t->frame[i].number == number)
+            return &t->frame[i];
+    return NULL;
+}
+
+static enum status choose_camera(const struct transforms *t, const char *path, const char *view,
+                                 struct camera *camera, struct error *err) {
+    const struct transforms_frame *frame = find_frame(t, view);
+    if (!frame)
+        return error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, view,
+                         t->frame_count);
+    if (isnan(frame->lens.width) || isnan(frame->lens.height))
+        return error_set(err, STATUS_INPUT, "%s: frames[%zu] does not say how large its picture is: "
+                         "w and h are missing", path, frame->number);
+    return transforms_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, camera, err);
+}
+
+static enum status read_camera(const char *outputs, const struct relight_settings *settings,
+                               struct camera *camera, struct error *err) {
+    char *path = settings->cameras ? mem_strdup(settings->cameras) : file_join(outputs, "views.json");
+    struct findings findings = {.problems = cJSON_CreateArray()};
+    struct transforms t = {0};
+    cJSON *tree = NULL;
+    enum status status = json_read(path, TRANSFORMS_MAX_BYTES, &tree, err);
+    if (status == STATUS_OK) {
+        transforms_read(tree, path, &t, &findings);
+        const cJSON *first = cJSON_GetArrayItem(findings.problems, 0);
+        if (findings.problem_count > 0)
+            status = error_set(err, STATUS_INPUT, "%s: %s", path,
+                               cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")));
+        else
+            status = choose_camera(&t, path, settings->view, camera, err);
+    }
+    transforms_release(&t);
+    findings_release(&findings);
+    cJSON_Delete(findings.problems);
+    cJSON_Delete(tree);
+    mem_free(path);
+    return status;
+}
+
+/* --- the light ---------------------------------------------------------------------------------- */
+
+/* A direction of the room in the picture's frame, whose top is y. */
+static vec3 to_picture(vec3 d, char up, float turn) {
+    vec3 p = up == 'z' ? (vec3){d.x, d.z, -d.y} : up == 'x' ? (vec3){-d.y, d.x, d.z} : d;
+    float c = cosf(turn), s = sinf(turn);
+    return (vec3){c * p.x - s * p.z, p.y, s * p.x + c * p.z};
+}
+
+void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out) {
+    static const char *const names[] = {"R", "G", "B"};
+    struct lights *lights = lights_new(picture);
+    float turn = turn_deg * (float)(PI / 180.0);
+    image_init(out, picture->width, picture->height, 3, names);
+    for (uint32_t y = 0; y < out->height; y++) {
+        for (uint32_t x = 0; x < out->width; x++) {
+            double phi = 2.0 * PI * ((double)x + 0.5) / out->width;
+            double theta = PI * (double)y / (double)(out->height - 1), sine = sin(theta);
+            vec3 d = {(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
+            rgb value = rgb_scale(lights_environment(lights, to_picture(d, up, turn)), scale);
+            memcpy(out->pixel + 3 * ((size_t)y * out->width + x), &value, sizeof value);
+        }
+    }
+    lights_free(lights);
+}
+
+static enum status read_environment(const char *path, struct image *picture, struct error *err) {
+    struct image_info info;
+    enum status status = image_read(path, picture, &info, err);
+    if (status != STATUS_OK)
+        return status;
+    if (picture->channel_count < 3 || picture->height < 2)
+        status = error_set(err, STATUS_INPUT, "%s: a picture of %u x %u pixels in %u channels is no "
+                           "environment", path, picture->width, picture->height, picture->channel_count);
+    size_t values = (size_t)picture->width * picture->height * picture->channel_count;
+    for (size_t i = 0; i < values && info.encoding == IMAGE_SRGB; i++)
+        picture->pixel[i] = image_srgb_to_linear(picture->pixel[i]);
+    return status;
+}
+
+/* Puts the wanted environment around the world. What was recovered is in the room's frame already. */
+static enum status change_environment(struct world *world, const char *outputs,
+                                      const struct relight_settings *settings, struct parallel *pool,
+                                      struct error *err) {
+    bool is_given = settings->environment != NULL;
+    struct image picture = {0}, oriented = {0};
+    if (is_given && strcmp(settings->environment, "none") == 0) {
+        world_set_environment(world, NULL, pool);
+        return STATUS_OK;
+    }
+    if (!is_given && !(world->lights->width > 0))
+        return STATUS_OK;
+    char *path = is_given ? mem_strdup(settings->environment) : file_join(outputs, "environment.exr");
+    enum status status = read_environment(path, &picture, err);
+    if (status == STATUS_OK) {
+        relight_orient(&picture, is_given ? settings->up : 'y', is_given ? settings->turn_deg : 0.0f,
+                       settings->environment_scale, &oriented);
+        world_set_environment(world, &oriented, pool);
+    }
+    image_release(&oriented);
+    image_release(&picture);
+    mem_free(path);
+    return status;
+}
+
+/* --- the picture -------------------------------------------------------------------------------- */
+
+static void take_colors(const struct image *film, struct image *image) {
+    static const char *const names[] = {"R", "G", "B"};
+    image_init(image, film->width, film->height, 3, names);
+    for (size_t i = 0; i < (size_t)film->width * film->height; i++)
+        memcpy(image->pixel + 3 * i, film->pixel + film->channel_count * i, 3 * sizeof *image->pixel);
+}
+
+enum status relight(const char *outputs, const struct relight_settings *settings, struct parallel *pool,
+                    struct image *image, struct error *err) {
+    struct path_settings path = {.max_depth = (int)settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
+                                 .seed = settings->seed};
+    struct mesh mesh = {0};
+    struct recovered room = {0};
+    struct camera camera;
+    struct image film;
+    char *scene = file_join(outputs, "scene.ply");
+    *image = (struct image){0};
+    enum status status = read_camera(outputs, settings, &camera, err);
+    if (status == STATUS_OK)
+        status = ply_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
+    if (status != STATUS_OK)
+        goto out;
+    status = recovered_load(outputs, &mesh, pool, &room, err);
+    if (status != STATUS_OK)
+        goto out;
+    status = change_environment(&room.world, outputs, settings, pool, err);
+    if (status == STATUS_OK) {
+        for (size_t s = 0; s < room.segments.count && !settings->lights; s++)
+            room.materials.emission[s] = rgb_gray(0.0f);
+        world_update_lights(&room.world);
+        film_render(&room.world, &camera, settings->spp, &path, 0, pool, &film);
+        take_colors(&film, image);
+        image_release(&film);
+    }
+    recovered_release(&room);
+out:
+    mesh_release(&mesh);
+    mem_free(scene);
+    return status;
+}

@@ -1,0 +1,39 @@
+/* relight.h -- a finished job's room from any camera under any light. */
+#ifndef UNBAKE_EVALUATE_RELIGHT_H
+#define UNBAKE_EVALUATE_RELIGHT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "common/image.h"
+#include "common/parallel.h"
+
+struct relight_settings {
+    const char *cameras;     /* a transforms.json; NULL: the outputs' views.json */
+    const char *view;        /* number in that file, from 0, or the name of its picture */
+    const char *environment; /* a latitude-longitude picture in the place of the recovered distant
+                              * light; NULL: keep that; "none": darkness */
+    float environment_scale; /* factor on its radiance */
+    float turn_deg;          /* turns it around the upward axis, counter-clockwise from above */
+    char up;                 /* axis of the room that is the picture's top: 'x', 'y' or 'z' */
+    bool lights;             /* whether emitters shine */
+    uint32_t spp, max_depth;
+    uint64_t seed;
+};
+
+struct relight_settings relight_default_settings(void);
+
+/* Renders the room of the folder `outputs`; nothing else of the job is needed. *image: R G B, linear
+ * radiance; the caller's. */
+enum status relight(const char *outputs, const struct relight_settings *settings, struct parallel *pool,
+                    struct image *image, struct error *err);
+
+/* Puts a picture whose layout is that of world.h but whose top is the axis `up` into the room's frame,
+ * turned and scaled. *out, of the same size, is the caller's. */
+void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out);
+
+/* `unbaked relight OUTPUTS [options]`: returns the exit status; argv[0] is "relight". */
+int relight_command(int argc, char **argv);
+
+#endif

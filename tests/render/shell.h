@@ -1,0 +1,91 @@
+/* shell.h -- surroundings of a reconstruction in a test: a checkpoint in memory, and a stop when
+ * it is asked for often enough. */
+#ifndef UNBAKE_TESTS_RENDER_SHELL_H
+#define UNBAKE_TESTS_RENDER_SHELL_H
+
+#include "common/mem.h"
+#include "server/reconstruct/reconstruct.h"
+#include "tests/check.h"
+
+struct shell {
+    long polls_until_stop; /* negative: never */
+    unsigned char *saved[32];
+    size_t saved_count;
+    bool has_checkpoint;
+};
+
+static inline bool shell_stop_requested(void *user) {
+    struct shell *s = user;
+    return s->polls_until_stop >= 0 && s->polls_until_stop-- == 0;
+}
+static inline void shell_ignore_stage(void *user, const char *stage) { (void)user, (void)stage; }
+static inline void shell_ignore_progress(void *user, const char *stage, double done, double total, double eta) {
+    (void)user, (void)stage, (void)done, (void)total, (void)eta;
+}
+static inline void shell_ignore_metric(void *user, const char *series, long step, double value) {
+    (void)user, (void)series, (void)step, (void)value;
+}
+static inline void shell_ignore_log(void *user, const char *message) { (void)user, (void)message; }
+static inline bool shell_never(void *user) {
+    (void)user;
+    return false;
+}
+static inline enum status shell_save(void *user, long iteration, const struct state_array *array, size_t count,
+                        struct error *err) {
+    struct shell *s = user;
+    (void)iteration, (void)err;
+    for (size_t i = 0; i < count; i++) {
+        if (!s->has_checkpoint)
+            s->saved[i] = mem_alloc(array[i].bytes);
+        memcpy(s->saved[i], array[i].data, array[i].bytes);
+    }
+    s->saved_count = count;
+    s->has_checkpoint = true;
+    return STATUS_OK;
+}
+static inline enum status shell_load(void *user, struct state_array *array, size_t count, bool *found,
+                        struct error *err) {
+    struct shell *s = user;
+    (void)err;
+    *found = s->has_checkpoint;
+    for (size_t i = 0; *found && i < count; i++)
+        memcpy(array[i].data, s->saved[i], array[i].bytes);
+    return STATUS_OK;
+}
+static inline enum status shell_no_preview(void *user, const struct reconstruction *r, struct error *err) {
+    (void)user, (void)r, (void)err;
+    return STATUS_OK;
+}
+
+static inline enum status shell_run(struct scene *scene, const struct settings *settings, int threads,
+                       struct shell *shell, struct reconstruction *r) {
+    struct reconstruct_hooks hooks = {shell, shell_stop_requested, shell_ignore_stage, shell_ignore_progress,
+                                      shell_ignore_metric, shell_ignore_log, shell_never, shell_never, shell_save, shell_load,
+                                      shell_no_preview};
+    struct parallel *pool = parallel_new(threads);
+    struct error err = {0};
+    enum status status = reconstruct_run(scene, settings, pool, &hooks, r, &err);
+    if (status != STATUS_OK && status != STATUS_CANCELLED)
+        fprintf(stderr, "%s\n", err.message);
+    parallel_free(pool);
+    r->pool = NULL;
+    return status;
+}
+
+static inline void shell_release(struct shell *s) {
+    for (size_t i = 0; i < s->saved_count; i++)
+        mem_free(s->saved[i]);
+}
+
+static inline struct settings shell_settings(const char *json) {
+    struct settings s;
+    struct error err = {0};
+    cJSON *object = NULL;
+    settings_init(&s);
+    CHECK(json_parse(json, strlen(json), "settings", &object, &err) == STATUS_OK);
+    CHECK_THAT(settings_apply(&s, object, NULL, &err) == STATUS_OK, "%s", err.message);
+    cJSON_Delete(object);
+    return s;
+}
+
+#endif

@@ -1,0 +1,473 @@
+/* environment.h, fill.h, reach.h, relight.h: a room with a window, lit by a sky alone. The sky is
+ * found in the photographs, lights the room, and can be replaced. */
+#include "common/file.h"
+#include "common/sha256.h"
+#include "server/evaluate/relight.h"
+#include "server/export/outputs.h"
+#include "server/reconstruct/environment.h"
+#include "server/reconstruct/reconstruct.h"
+#include "tests/render/small_room.h"
+#include "tests/render/shell.h"
+
+#define PI 3.14159265358979323846
+#define SKY_WIDTH 256
+
+/* Blue above, brown below, a sun of some degrees in view of the window (which looks along -z). */
+static rgb sky_at(vec3 d) {
+    vec3 sun = vec3_normalize((vec3){-0.1f, 0.25f, -1.0f});
+    if (vec3_dot(d, sun) > 0.992f)
+        return (rgb){120.0f, 110.0f, 90.0f};
+    float up = 0.5f + 0.5f * d.y;
+    return d.y > 0.0f ? (rgb){6.0f - 3.0f * up, 7.0f - 2.0f * up, 8.0f + 2.0f * d.x}
+                      : (rgb){2.0f, 1.5f + 0.5f * d.x, 1.0f};
+}
+
+static vec3 direction_of(const struct image *map, uint32_t x, uint32_t y) {
+    double phi = 2.0 * PI * ((double)x + 0.5) / map->width, theta = PI * (double)y / (double)(map->height - 1);
+    return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+}
+
+static void make_sky(struct image *sky) {
+    static const char *const names[] = {"R", "G", "B"};
+    image_init(sky, SKY_WIDTH, SKY_WIDTH / 2, 3, names);
+    for (uint32_t i = 0; i < sky->width * sky->height; i++) {
+        rgb value = sky_at(direction_of(sky, i % sky->width, i / sky->width));
+        memcpy(sky->pixel + 3 * i, &value, sizeof value);
+    }
+}
+
+/* The small room with a window of `width` x 1.4 m in the wall at z = 0. */
+static void make_open_mesh(struct mesh *m, float width) {
+    make_mesh(m);
+    m->position = mem_realloc_array(m->position, 4 * (OBJECTS + 3), sizeof *m->position);
+    m->index = mem_realloc_array(m->index, 2 * (OBJECTS + 3), sizeof *m->index);
+    m->face = mem_realloc_array(m->face, 2 * (OBJECTS + 3), sizeof *m->face);
+    m->object_id = mem_realloc_array(m->object_id, 2 * (OBJECTS + 3), sizeof *m->object_id);
+    /* What was the wall becomes the part below the window. */
+    float left = 2.0f - 0.5f * width, right = 2.0f + 0.5f * width;
+    m->position[4 * 4 + 2].y = m->position[4 * 4 + 3].y = 0.8f;
+    add_quad(m, 4, (vec3){0, 2.2f, 0}, (vec3){4, 0, 0}, (vec3){0, 0.8f, 0});
+    add_quad(m, 4, (vec3){0, 0.8f, 0}, (vec3){left, 0, 0}, (vec3){0, 1.4f, 0});
+    add_quad(m, 4, (vec3){right, 0.8f, 0}, (vec3){4 - right, 0, 0}, (vec3){0, 1.4f, 0});
+}
+
+/* Every other camera looks through the window. */
+static vec3 look_out_often(int frame) {
+    vec3 anywhere = look_anywhere(frame);
+    return frame % 2 ? anywhere : (vec3){0.8f + 0.6f * anywhere.x, 0.8f + 0.5f * anywhere.y, -0.5f};
+}
+
+/* What environment_make needs of a scene. */
+struct rig {
+    struct scene *scene;
+    struct segments segments;
+    struct accel *accel;
+    struct views views;
+    struct parallel *pool;
+};
+
+static void rig_init(struct rig *r, struct scene *scene, int threads) {
+    struct error err;
+    r->scene = scene;
+    r->pool = parallel_new(threads);
+    segments_from_object_id(&r->segments, &scene->mesh);
+    CHECK(accel_new(&r->accel, &scene->mesh, r->pool, &err) == STATUS_OK);
+    views_init(&r->views, scene, &r->segments, r->accel, r->pool);
+}
+
+static void rig_release(struct rig *r) {
+    views_release(&r->views);
+    accel_free(r->accel);
+    segments_release(&r->segments);
+    parallel_free(r->pool);
+}
+
+static void digest(const struct environment *e, char hex[SHA256_HEX_SIZE]) {
+    struct sha256 sha;
+    size_t cells = (size_t)e->map.width * e->map.height;
+    sha256_init(&sha);
+    sha256_update(&sha, e->map.pixel, cells * 3 * sizeof(float));
+    sha256_update(&sha, e->confidence.pixel, cells * 2 * sizeof(float));
+    sha256_hex(&sha, hex);
+}
+
+/* Relative error of the luminance where the sky was seen: the median, and of the mean. Cells at the
+ * sun's rim are left out of the first: a pixel there holds both. */
+static void compare_with_sky(const struct environment *e, double *median, double *mean) {
+    size_t count = 0, cells = (size_t)e->map.width * e->map.height;
+    float *error = mem_array(cells, sizeof *error);
+    double found = 0.0, wanted = 0.0;
+    for (uint32_t i = 0; i < cells; i++) {
+        if (e->confidence.pixel[2 * i] == 0.0f)
+            continue;
+        const float *p = e->map.pixel + 3 * i;
+        vec3 d = direction_of(&e->map, i % e->map.width, i / e->map.width);
+        float ours = rgb_luminance((rgb){p[0], p[1], p[2]}), truth = rgb_luminance(sky_at(d));
+        double angle = sqrt(1.0 - (double)(d.y * d.y));
+        found += angle * (double)ours;
+        wanted += angle * (double)truth;
+        error[count++] = fabsf(ours / truth - 1.0f);
+    }
+    for (size_t i = 1; i < count; i++) /* insertion: few cells */
+        for (size_t k = i; k > 0 && error[k] < error[k - 1]; k--) {
+            float swap = error[k];
+            error[k] = error[k - 1];
+            error[k - 1] = swap;
+        }
+    *median = count ? (double)error[count / 2] : 1.0;
+    *mean = found / wanted - 1.0;
+    mem_free(error);
+}
+
+/* What was filled in is finite, smooth, around the seam too, and within the range of what was seen. */
+static void check_fill(const struct environment *e) {
+    uint32_t w = e->map.width, h = e->map.height;
+    float worst = 0.0f;
+    for (uint32_t y = 0; y < h; y++) {
+        for (uint32_t x = 0; x < w; x++) {
+            size_t at = (size_t)y * w + x, beside = (size_t)y * w + (x + 1) % w;
+            float a = e->map.pixel[3 * at + 1], b = e->map.pixel[3 * beside + 1];
+            CHECK(isfinite(a) && a >= 0.0f);
+            if (e->confidence.pixel[2 * at] > 0.0f || e->confidence.pixel[2 * beside] > 0.0f)
+                continue;
+            CHECK(a > 0.5f && a < 40.0f); /* the sun does not spread */
+            worst = fmaxf(worst, fabsf(a - b) / fmaxf(a, b));
+            if (y == 0 || y == h - 1)
+                CHECK(a == b);
+        }
+    }
+    CHECK_THAT(worst < 0.3f, "filled neighbours differ by %g", (double)worst);
+    printf("fill: neighbours differ by %.3f at most\n", (double)worst);
+}
+
+static void test_recovers_sky(struct scene *scene) {
+    struct environment e;
+    char first[SHA256_HEX_SIZE], hex[SHA256_HEX_SIZE];
+    const int threads[] = {1, 2, 5};
+    for (int i = 0; i < 3; i++) {
+        struct rig rig;
+        rig_init(&rig, scene, threads[i]);
+        CHECK(environment_make(&e, &rig.views, rig.pool));
+        digest(&e, i == 0 ? first : hex);
+        if (i > 0)
+            CHECK_STRING(hex, first);
+        if (i < 2)
+            environment_release(&e);
+        rig_release(&rig);
+    }
+    double median, mean;
+    compare_with_sky(&e, &median, &mean);
+    printf("sky: %u x %u, %.1f %% of the sphere by %zu photographs, median error %.4f, mean %+.4f, spread %.4f\n",
+           e.map.width, e.map.height, 100.0 * e.seen_share, e.photograph_count, median, mean, e.median_spread);
+    CHECK(e.map.width == 128 && e.map.height == 64); /* 2 pi 30 pixels around */
+    CHECK(e.seen_share > 0.05 && e.seen_share < 0.5 && e.saturated_share == 0.0);
+    CHECK_THAT(median < 0.01, "median error %g", median);
+    CHECK_THAT(fabs(mean) < 0.05, "mean error %g", mean);
+    CHECK_THAT(e.median_spread < 0.05, "spread %g", e.median_spread);
+    check_fill(&e);
+    environment_release(&e);
+}
+
+/* Exposures that cycle, clipped at 1: a saturated value is a lower bound, not a value. Where only
+ * long exposures look the sun is known from below, and the figures say so. */
+static void test_exposures(const struct scene *scene, bool only_long) {
+    struct scene sdr = *scene;
+    struct rig rig;
+    struct environment e;
+    sdr.photograph = mem_array(scene->photograph_count, sizeof *sdr.photograph);
+    for (size_t f = 0; f < scene->photograph_count; f++) {
+        struct photograph *photo = &sdr.photograph[f];
+        *photo = scene->photograph[f];
+        size_t pixels = (size_t)photo->camera.width * photo->camera.height;
+        photo->is_hdr = false;
+        photo->clip = 1.0f;
+        photo->exposure = only_long || f / 2 % 2 == 0 ? 0.09f : 0.09f / 16.66f;
+        photo->pixel = mem_array(pixels, sizeof *photo->pixel);
+        for (size_t i = 0; i < 3 * pixels; i++) {
+            float value = photo->exposure * image_float_from_half(scene->photograph[f].pixel[i / 3][i % 3]);
+            float code = roundf(255.0f * image_linear_to_srgb(fminf(value, 1.0f)));
+            photo->pixel[i / 3][i % 3] = image_half_from_float(image_srgb_to_linear(code / 255.0f));
+        }
+    }
+    rig_init(&rig, &sdr, 2);
+    CHECK(environment_make(&e, &rig.views, rig.pool));
+    double median, mean;
+    compare_with_sky(&e, &median, &mean);
+    printf("%s exposures: median error %.4f, mean %+.4f, saturated %.3f of it\n",
+           only_long ? "long" : "cycling", median, mean, e.saturated_share);
+    CHECK_THAT(median < 0.03, "median error %g", median);
+    if (only_long) {
+        CHECK(e.saturated_share > 0.001 && mean < -0.2);
+    } else {
+        CHECK_THAT(fabs(mean) < 0.12, "mean error %g", mean);
+    }
+    environment_release(&e);
+    rig_release(&rig);
+    for (size_t f = 0; f < scene->photograph_count; f++)
+        mem_free(sdr.photograph[f].pixel);
+    mem_free(sdr.photograph);
+}
+
+/* A few frames show something else in the same directions, brighter or darker: it changes little. */
+static void test_outliers(const struct scene *scene) {
+    struct scene other = *scene;
+    struct rig rig;
+    struct environment e;
+    other.photograph = mem_array(scene->photograph_count, sizeof *other.photograph);
+    memcpy(other.photograph, scene->photograph, scene->photograph_count * sizeof *other.photograph);
+    for (size_t f = 0; f < scene->photograph_count; f += 6)
+        other.photograph[f].gain = rgb_gray(f % 12 == 0 ? 0.1f : 5.0f);
+    rig_init(&rig, &other, 2);
+    CHECK(environment_make(&e, &rig.views, rig.pool));
+    double median, mean;
+    compare_with_sky(&e, &median, &mean);
+    printf("with outliers: median error %.4f, spread %.3f\n", median, e.median_spread);
+    CHECK_THAT(median < 0.03, "median error %g", median);
+    CHECK(e.median_spread > 0.1);
+    environment_release(&e);
+    rig_release(&rig);
+    mem_free(other.photograph);
+}
+
+/* A closed room has none, and neither has one whose openings are masked. */
+static void test_nothing(struct scene *masked, struct parallel *pool) {
+    struct scene closed;
+    struct environment e;
+    struct rig rig;
+    make_scene(&closed, pool);
+    rig_init(&rig, &closed, 1);
+    CHECK(!environment_make(&e, &rig.views, rig.pool) && e.map.pixel == NULL);
+    rig_release(&rig);
+    scene_release(&closed);
+    rig_init(&rig, masked, 1);
+    CHECK(!environment_make(&e, &rig.views, rig.pool));
+    environment_release(&e);
+    rig_release(&rig);
+}
+
+static double mean_variance(const struct world *world, const struct camera *camera, struct parallel *pool) {
+    struct path_settings path = {.max_depth = 6, .roulette_depth = 99, .seed = 3};
+    struct image film;
+    double sum = 0.0;
+    film_render(world, camera, 64, &path, 0, pool, &film);
+    size_t pixels = (size_t)film.width * film.height;
+    for (size_t i = 0; i < pixels; i++)
+        sum += pow((double)film.pixel[film.channel_count * i + 4], 2.0) / (double)pixels;
+    image_release(&film);
+    return sum;
+}
+
+/* Samples that go where light finds a way in are less noisy than samples by luminance alone, and
+ * the lamp keeps its share. */
+static void test_reach(struct parallel *pool, const struct image *sky) {
+    struct mesh mesh;
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+    struct error err;
+    make_open_mesh(&mesh, 0.8f);
+    segments_from_object_id(&segments, &mesh);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, &err) == STATUS_OK);
+    inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
+    materials_init(&materials, &inverse, OBJECTS, rgb_gray(0.6f), 1.0f, 0.0f);
+    materials.emission[LAMP] = rgb_gray(2.0f);
+    CHECK(world_init(&world, &mesh, &segments, &atlas, &materials, sky, pool, &err) == STATUS_OK);
+    struct camera camera = look((vec3){3.5f, 1.5f, 2.8f}, (vec3){1, 1, 1.5f});
+    double with = mean_variance(&world, &camera, pool);
+    float chance = world.lights->environment_chance;
+    lights_set_environment(world.lights, sky, NULL);
+    double without = mean_variance(&world, &camera, pool);
+    printf("variance with the reach over without: %.3f; chance of the environment %.3f\n", with / without,
+           (double)chance);
+    CHECK_THAT(with < 0.7 * without, "%g of the variance", with / without);
+    CHECK(world.lights->environment_chance == 0.5f && chance > 0.05f && chance < 0.95f);
+    world_release(&world);
+    materials_release(&materials);
+    inverse_uv_release(&inverse);
+    atlas_release(&atlas);
+    segments_release(&segments);
+    mesh_release(&mesh);
+}
+
+/* --- a whole reconstruction ------------------------------------------------------------------- */
+
+/* Root mean square error of the walls' base colour over what two photographs see; how many segments
+ * were found to emit. */
+static double wall_error(const struct reconstruction *r, int *emitters) {
+    double sum = 0.0, count = 0.0;
+    *emitters = 0;
+    for (int o = 0; o < OBJECTS; o++)
+        *emitters += !rgb_is_black(r->materials.emission[o]);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = r->segments.of_triangle[r->inverse.triangle[texel]];
+        const float *t = r->materials.base_color.texel[texel];
+        const rgb *c = &wall_color[segment];
+        if (r->observed.count[texel] < 2.0f || segment == LAMP)
+            continue;
+        sum += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) + pow((double)(t[2] - c->b), 2);
+        count += 3.0;
+    }
+    return sqrt(sum / count);
+}
+
+static enum status hear(void *user, const char *type, const char *name, const char *content_type,
+                        struct error *err) {
+    (void)user, (void)type, (void)name, (void)content_type, (void)err;
+    return STATUS_OK;
+}
+
+static void write_outputs(const char *dir, const struct reconstruction *r) {
+    struct export_comparison comparison[FRAMES];
+    struct error err;
+    for (size_t i = 0; i < r->held_out_count; i++)
+        comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
+                                                   &r->held_out[i].render, r->held_out[i].camera};
+    struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
+                              r->observed.count, r->observed.spread, r->is_emitter, &r->environment.map,
+                              &r->environment.confidence, r->held_out_count, comparison, r->report};
+    CHECK_THAT(export_outputs(dir, &in, hear, NULL, &err) == STATUS_OK, "%s", err.message);
+}
+
+static double mean_of(const struct image *image) {
+    double sum = 0.0;
+    size_t values = (size_t)image->width * image->height * 3;
+    for (size_t i = 0; i < values; i++)
+        sum += (double)image->pixel[i] / (double)values;
+    return sum;
+}
+
+/* From the folder alone: the report's view again; darkness; twice the light; another sky. */
+static void test_relight(const struct reconstruction *r, struct parallel *pool) {
+    char dir[] = "/tmp/unbake-relight-XXXXXX";
+    struct relight_settings s = relight_default_settings();
+    struct image image;
+    struct error err;
+    CHECK(mkdtemp(dir) != NULL);
+    write_outputs(dir, r);
+    s.view = "2";
+    CHECK_THAT(relight(dir, &s, pool, &image, &err) == STATUS_OK, "%s", err.message);
+    double plain = mean_of(&image);
+    CHECK_NEAR(plain / mean_of(&r->held_out[2].render), 1.0, 0.05);
+    image_release(&image);
+    s.environment_scale = 2.0f;
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    CHECK_NEAR(mean_of(&image) / plain, 2.0, 0.05); /* nothing but the sky shines here */
+    image_release(&image);
+    s.environment = "none";
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK && mean_of(&image) == 0.0);
+    image_release(&image);
+    char *red = file_join(dir, "red.exr");
+    static float pixel[16 * 8 * 3];
+    for (int i = 0; i < 16 * 8; i++)
+        pixel[3 * i] = 5.0f;
+    struct image sky = {16, 8, 3, (char[3][64]){"R", "G", "B"}, pixel};
+    CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    s.environment = red;
+    s.lights = false;
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    CHECK(image.pixel[0] > 0.0f && image.pixel[1] == 0.0f && image.pixel[2] == 0.0f);
+    image_release(&image);
+    s.view = "99";
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_NOT_FOUND);
+    mem_free(red);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+}
+
+static void test_reconstruction(struct scene *scene, struct scene *masked, struct parallel *pool) {
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":250,\"report_samples\":32,"
+                                       "\"texels_per_iteration\":512,\"max_depth\":8}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    int emitters;
+    CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
+    double with = wall_error(&r, &emitters);
+    printf("base colour off by %.4f, %d emitters\n", with, emitters);
+    CHECK_THAT(with < 0.1, "base colour off by %g", with);
+    CHECK(emitters == 0 && cJSON_GetObjectItem(r.report, "environment") != NULL);
+    test_relight(&r, pool);
+    reconstruct_release(&r);
+    shell_release(&shell);
+
+    /* Where the openings are masked light seems to come from nowhere: that must show. */
+    shell = (struct shell){.polls_until_stop = -1};
+    CHECK(shell_run(masked, &s, 0, &shell, &r) == STATUS_OK);
+    double without = wall_error(&r, &emitters);
+    printf("without distant light: %.4f, %d emitters\n", without, emitters);
+    CHECK_THAT(without > 2.0 * with || emitters > 2, "base colour off by %g, %d emitters", without, emitters);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
+/* --- relight_orient ----------------------------------------------------------------------------- */
+
+/* A single bright patch, looked for in the room's frame. */
+static vec3 brightest(const struct image *map) {
+    size_t best = 0;
+    for (size_t i = 0; i < (size_t)map->width * map->height; i++)
+        if (map->pixel[3 * i] > map->pixel[3 * best])
+            best = i;
+    return direction_of(map, (uint32_t)(best % map->width), (uint32_t)(best / map->width));
+}
+
+static void test_orient(void) {
+    static const char *const names[] = {"R", "G", "B"};
+    struct image picture, out;
+    image_init(&picture, 64, 33, 3, names);
+    picture.pixel[3 * (16 * 64)] = 1.0f; /* half a cell from -z, on the horizon */
+    const struct {
+        char up;
+        float turn;
+        vec3 wanted;
+    } cases[] = {{'y', 0, {0, 0, -1}}, {'y', 90, {-1, 0, 0}}, {'z', 0, {0, 1, 0}}, {'z', 90, {-1, 0, 0}},
+                 {'x', 0, {0, 0, -1}}, {'x', 90, {0, 1, 0}}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        relight_orient(&picture, cases[i].up, cases[i].turn, 2.0f, &out);
+        float cosine = vec3_dot(brightest(&out), cases[i].wanted);
+        CHECK_THAT(cosine > 0.98f, "up %c, turned by %g: cosine %g", cases[i].up, (double)cases[i].turn,
+                   (double)cosine);
+        image_release(&out);
+    }
+    image_release(&picture);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    struct image sky;
+    struct scene scene = {0}, masked;
+    make_sky(&sky);
+    make_open_mesh(&scene.mesh, 2.4f);
+    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_out_often, pool);
+    /* The same with all pixels masked that look out. */
+    struct rig rig;
+    masked = scene;
+    masked.photograph = mem_array(scene.photograph_count, sizeof *masked.photograph);
+    memcpy(masked.photograph, scene.photograph, scene.photograph_count * sizeof *masked.photograph);
+    rig_init(&rig, &scene, 1);
+    for (size_t t = 0; t < rig.views.train_count; t++) {
+        uint8_t *mask = mem_array(WIDTH * HEIGHT, 1);
+        for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+            mask[i] = rig.views.shows[t][i] != VIEWS_OPEN;
+        masked.photograph[rig.views.train[t]].mask = mask;
+    }
+    rig_release(&rig);
+
+    test_orient();
+    test_recovers_sky(&scene);
+    test_exposures(&scene, false);
+    test_exposures(&scene, true);
+    test_outliers(&scene);
+    test_nothing(&masked, pool);
+    test_reach(pool, &sky);
+    test_reconstruction(&scene, &masked, pool);
+
+    for (size_t f = 0; f < scene.photograph_count; f++)
+        mem_free(masked.photograph[f].mask);
+    mem_free(masked.photograph);
+    scene_release(&scene);
+    image_release(&sky);
+    parallel_free(pool);
+    return check_result();
+}
