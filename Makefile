@@ -46,7 +46,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps demo test tests bench chaos soak asan tsan asan-build tsan-build fuzz install clean
+.PHONY: all help deps demo test tests bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -94,7 +94,8 @@ $(B)/unbake: $(call obj,client/main.c $(CLIENT_LIB_SRC) $(CLIENT_COMMON_SRC))
 
 $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommon.a
 	@mkdir -p $(@D)
-	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl
+	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
+$(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
 tests: all $(TEST_BIN) $(FUZZ_BIN)
 
@@ -110,6 +111,15 @@ bench: ## print the speed ratios and write build/bench.json; LONG=1: also what t
 	@deploy/install-deps.sh bench
 	@+$(BUILD) all $(BENCH_BIN)
 	@LONG=$(LONG) tests/bench/run.sh $(B)
+
+fidelity: deps ## compare with the truth of known rooms, 10 minutes each; FIDELITY_SEC, FIDELITY_ROOMS
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
+	@tests/bench/fidelity.sh $(B)
+
+paper: ## repeat the paper's experiments (hours; PAPER=short: minutes, to see that they run), write build/paper.json
+	@deploy/install-deps.sh bench
+	@+$(BUILD) all $(B)/tests/bench/reconstruct_room $(B)/tests/bench/perturb_mesh
+	@tests/bench/paper.sh $(B)
 
 asan: deps ## run all tests under the address and undefined-behaviour sanitizers
 	@+$(BUILD) asan-build

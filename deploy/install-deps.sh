@@ -9,7 +9,7 @@ set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
 libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev libcurl4-openssl-dev libseccomp-dev
 zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
-bench_packages="libllvm19 python3-venv"
+bench_packages="libllvm19 python3-venv libmeshoptimizer-dev"
 
 # install PACKAGE...: those that are missing
 install() {

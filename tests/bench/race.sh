@@ -10,8 +10,9 @@
 # better". usage: race.sh BUILD PYTHON
 set -u
 build=$1 python=$2
+. tests/bench/lib.sh
 limit=${RACE_SEC:-600} wanted=${RACE_DB:-25}
-room=${UNBAKE_TEST_DATA:-../shared/data}/rooms/staircase2
+room=$data/rooms/staircase2
 dir=$build/bench/race
 if [ ! -d "$room" ]; then
     echo "no test data: the line on time to a quality is left out"
@@ -20,21 +21,14 @@ fi
 rm -rf "$dir"
 mkdir -p "$dir"
 
-psnr() { # OUTPUTS
-    "$build/unbaked" evaluate "$room" "$1" --spp 0 --json | jq .base_color_psnr_db
-}
-reached() { # PSNR
-    awk -v a="$1" -v b="$wanted" 'BEGIN { exit !(a + 0 >= b + 0) }'
-}
-
 ours=$limit our_note=" (not reached)"
 for ((seconds = 10; seconds <= limit; seconds *= 2)); do
-    "$build/tests/bench/reconstruct_room" "$room" "$dir/ours" texture_size=2048 report_samples=1 \
-        "time_limit_sec=$seconds" >"$dir/ours.log" 2>&1 || { tail -n 3 "$dir/ours.log"; exit 1; }
-    took=$(jq '[.stages[] | select(.name != "report") | .seconds] | add' "$dir/ours/report.json")
-    quality=$(psnr "$dir/ours")
+    reconstruct "$room" "$dir/ours" texture_size=2048 report_samples=1 "time_limit_sec=$seconds" || exit 1
+    evaluate "$room" "$dir/ours" --spp 0 || exit 1
+    took=$(working_sec "$dir/ours")
+    quality=$(figure "$dir/ours" base_color_psnr_db)
     printf 'ours: %.0f s: %.2f dB\n' "$took" "$quality"
-    if reached "$quality"; then
+    if at_least "$quality" "$wanted"; then
         ours=$took our_note=
         break
     fi
@@ -45,14 +39,15 @@ theirs=$limit their_note=" (not reached: an upper bound)"
     >"$dir/theirs.log" 2>&1 || { tail -n 3 "$dir/theirs.log"; exit 1; }
 for snapshot in "$dir"/snapshots/*.exr; do
     cp "$snapshot" "$dir/ours/base_color.exr" # the rest of the outputs has no part in this figure
-    quality=$(psnr "$dir/ours")
+    evaluate "$room" "$dir/ours" --spp 0 || exit 1
+    quality=$(figure "$dir/ours" base_color_psnr_db)
     seconds=$((10#$(basename "$snapshot" .exr)))
     printf 'Mitsuba: %d s: %.2f dB\n' "$seconds" "$quality"
-    if reached "$quality"; then
+    if at_least "$quality" "$wanted"; then
         theirs=$seconds their_note=
         break
     fi
 done
 rm -rf "$dir/snapshots"
-awk -v a="$ours" -v b="$theirs" -v name="time to $wanted dB$our_note over a Mitsuba 3 script's$their_note" \
-    'BEGIN { printf "%s\t%.4f\t0.1\tlower\n", name, a / b }'
+printf '%s\t%s\t0.1\tlower\n' "time to $wanted dB$our_note over a Mitsuba 3 script's$their_note" \
+    "$(quotient "$ours" "$theirs")"

@@ -56,13 +56,5 @@ else
     echo "left out: peak memory, time to a quality against Mitsuba 3 (make bench LONG=1)" >&2
 fi
 
-awk -F '\t' '
-    BEGIN { print "[" }
-    { printf "%s{\"name\": \"%s\", \"value\": %s, \"goal\": %s, \"better\": \"%s\"}", (NR > 1 ? ",\n" : ""), $1, $2, $3, $4 }
-    END { print "\n]" }' "$rows" >"$build/bench.json"
-printf '\n%-72s %10s %10s\n' what value goal
-awk -F '\t' '{
-    met = ($4 == "higher") ? ($2 + 0 >= $3 + 0) : ($2 + 0 <= $3 + 0)
-    printf "%-72s %10.3f %7s %-2s %s\n", $1, $2, $3, ($4 == "higher" ? "+" : "-"), (met ? "" : "not met")
-}' "$rows"
+tests/bench/table.sh "$rows" "$build/bench.json"
 rm -f "$rows"

@@ -1,0 +1,73 @@
+#!/bin/bash
+# How near the default method comes to the truth of rooms that another renderer made: each room from
+# its HDR frames and from its 8-bit frames of cycling exposure, 2048 x 2048, everything recovered
+# together. Prints a table, writes BUILD/fidelity.json and, under BUILD/fidelity/ROOM-KIND, the outputs
+# (out/), and of each held-out view base_color_NNN.png (true | recovered) and view_NNN.png
+# (photograph | re-render). The figures are those of `unbaked evaluate`; MSRE is taken against the
+# HDR photographs in both cases.
+#
+# FIDELITY_SEC    working time of a reconstruction (600)
+# FIDELITY_ROOMS  names under the test data's rooms/, or paths ("staircase2 bathroom")
+# FIDELITY_KINDS  "hdr sdr"
+#
+# usage: fidelity.sh BUILD
+set -u
+build=$1
+seconds=${FIDELITY_SEC:-600}
+. tests/bench/lib.sh
+rows=$build/fidelity.tsv
+: >"$rows"
+
+# Goals of base colour PSNR, roughness PSNR, emission overlap, its log error, MSRE. Of the room
+# bathroom also for rooms that are not named here.
+goals() { # ROOM KIND
+    case $1-$2 in
+    staircase2-hdr) echo 30 26 0.97 0.005 0.02 ;;
+    staircase2-sdr) echo 29 25 0.96 0.01 0.03 ;;
+    *-hdr) echo 29 25 0.97 0.005 0.03 ;;
+    *) echo 28 24 0.96 0.01 0.04 ;;
+    esac
+}
+
+row() { # WHAT VALUE GOAL BETTER
+    printf '%s (%s)\t%s\t%s\t%s\n' "$1" "$label" "$2" "$3" "$4" >>"$rows"
+}
+
+measure() { # ROOM KIND
+    local name=${1##*/} dir room label transforms=transforms.json color roughness overlap log_error msre
+    room=$1
+    [ "$name" = "$1" ] && room=$data/rooms/$1
+    dir=$build/fidelity/$name-$2
+    label="$name, $2"
+    [ "$2" = sdr ] && transforms=transforms_sdr.json
+    if [ ! -e "$room/$transforms" ] || [ ! -d "$room/truth" ]; then
+        echo "$label: no $room with $transforms and truth: left out" >&2
+        return
+    fi
+    rm -rf "$dir"
+    mkdir -p "$dir"
+    echo "== $label" >&2
+    reconstruct "$room" "$dir/out" texture_size=2048 "time_limit_sec=$seconds" \
+        "transforms=$transforms" report_samples=1 &&
+        evaluate "$room" "$dir/out" --pictures "$dir" &&
+        jq -r '[.stages[] | "\(.name) \(.seconds | round) s"] | join(", ")' "$dir/out/report.json" >&2
+    # Where that failed the figures are null, and no goal is met.
+    value() { figure "$dir/out" "$1"; }
+    read -r color roughness overlap log_error msre < <(goals "$name" "$2")
+    row "base colour PSNR of seen surface, dB" "$(value base_color_psnr_db)" "$color" higher
+    row "base colour PSNR of all surface, dB" "$(value base_color_psnr_all_db)" $((color - 3)) higher
+    row "roughness PSNR, dB" "$(value roughness_psnr_db)" "$roughness" higher
+    row "specular PSNR, dB" "$(value specular_psnr_db)" - higher
+    row "emission, intersection over union" "$(value emission_iou)" "$overlap" higher
+    row "emission, log error" "$(value emission_log_error)" "$log_error" lower
+    row "MSRE of held-out views" "$(value msre)" "$msre" lower
+}
+
+for room in ${FIDELITY_ROOMS:-staircase2 bathroom}; do
+    for kind in ${FIDELITY_KINDS:-hdr sdr}; do
+        measure "${room%/}" "$kind"
+    done
+done
+tests/bench/table.sh "$rows" "$build/fidelity.json"
+echo "pictures: $build/fidelity/ROOM-KIND/*.png"
+rm -f "$rows"

@@ -1,0 +1,215 @@
+#!/bin/bash
+# The experiments of the paper (Nimier-David et al. 2021) with this implementation, on the demo room,
+# which is its section 6 rebuilt, and on the room staircase2 where the test data is. Prints a table,
+# writes BUILD/paper.json and under BUILD/paper all outputs with side-by-sides.
+#
+# PAPER       short: small photographs and textures, seconds instead of minutes, to see that
+#             everything runs. Its figures say little. Otherwise the long form: hours.
+# PAPER_SEC   working time of one reconstruction (600; short: 5)
+# PAPER_ONLY  some of "fig7 fig8 table1 fig5 speed ablations"
+#
+# usage: paper.sh BUILD
+set -u
+build=$1
+. tests/bench/lib.sh
+dir=$build/paper
+rows=$build/paper.tsv
+if [ "${PAPER:-}" = short ]; then
+    seconds=${PAPER_SEC:-5} samples=4 size=512 edge=0.2
+    views=(--width 80 --height 60 --frames 24 --test-frames 6 --spp 16 --test-spp 32)
+else
+    seconds=${PAPER_SEC:-600} samples=64 size=2048 edge=0.1
+    views=(--width 320 --height 240 --frames 80 --test-frames 30 --spp 64 --test-spp 256)
+fi
+mkdir -p "$dir"
+: >"$rows"
+
+row() { # NAME VALUE GOAL BETTER
+    printf '%s\t%s\t%s\t%s\n' "$@" >>"$rows"
+}
+
+# The demo room with given radiance of the emitters on the wall and at the ceiling: $room is set.
+demo_room() { # WALL CEILING
+    room=$dir/room-$1-$2
+    local made
+    made="$1 $2 ${views[*]}"
+    [ "$(cat "$room.made" 2>/dev/null)" = "$made" ] && return
+    rm -rf "$room"
+    "$build/unbaked" demo-room "$room" --wall-radiance "$1" --ceiling-radiance "$2" "${views[@]}" >/dev/null &&
+        echo "$made" >"$room.made"
+}
+
+# As lib.sh has it, with this form's size, samples and time; later settings win.
+run() { # ROOM OUT [name=value ...]
+    local from=$1 to=$2
+    shift 2
+    reconstruct "$from" "$to" "texture_size=$size" "report_samples=$samples" "time_limit_sec=$seconds" "$@"
+}
+
+# MSRE of the held-out views as the reconstruction itself reports it, on the mesh that it was given.
+reported_msre() { # OUT
+    jq .metrics.msre "$1/report.json" 2>/dev/null || echo null
+}
+
+# Root of the mean square from a PSNR of values up to 1.
+root_mean_square() {
+    awk -v db="$1" 'BEGIN { if (db == "null") print db; else print 10 ^ (-db / 20) }'
+}
+
+# Fig. 7: the same room and cameras under three lightings. Base colour, roughness, specular: root of
+# the mean squared error over the pixels of the held-out views. Emission: mean squared error of
+# log(1 + radiance).
+fig7() {
+    local light wall ceiling base rough spec emission first=null third=null out name error
+    while read -r wall ceiling base rough spec emission; do
+        light="($wall, $ceiling)"
+        demo_room "$wall" "$ceiling" || return
+        out=$dir/fig7-$wall-$ceiling
+        run "$room" "$out" && evaluate "$room" "$out" --spp 0 --pictures "$out/pictures"
+        error=$(root_mean_square "$(figure "$out" base_color_psnr_db)")
+        [ "$wall" = 15 ] && first=$error
+        [ "$wall" = 25 ] && third=$error
+        name="Fig. 7, wall and ceiling $light"
+        row "$name: base colour, L2 error" "$error" "$base" lower
+        row "$name: roughness, L2 error" "$(figure "$out" roughness_rms_error)" "$rough" lower
+        row "$name: specular, L2 error" "$(figure "$out" specular_rms_error)" "$spec" lower
+        row "$name: emission, log error" "$(figure "$out" emission_log_error)" "$emission" lower
+    done <<<"15 15 0.0859 0.0308 0.1183 0.0003
+0 20 0.1312 0.0342 0.1147 0.0002
+25 3 0.1184 0.0648 0.1338 0.0002"
+    row "Fig. 7: base colour error of (25, 3) over that of (15, 15)" "$(quotient "$third" "$first")" 1.1 lower
+}
+
+# Fig. 8: everything at once; then, in the long form, 8192 x 8192.
+fig8() {
+    local out=$dir/fig8 memory total
+    demo_room 15 15 || return
+    run "$room" "$out" && evaluate "$room" "$out" --spp "$samples" --pictures "$out/pictures"
+    row "Fig. 8: emitters found, of 2" "$(figure "$out" emitters_found)" 2 higher
+    row "Fig. 8: other objects that emit" "$(figure "$out" emitters_false)" 0 lower
+    row "Fig. 8: base colour PSNR of seen surface, dB" "$(figure "$out" base_color_psnr_db)" - higher
+    row "Fig. 8: roughness PSNR, dB" "$(figure "$out" roughness_psnr_db)" - higher
+    row "Fig. 8: specular PSNR, dB" "$(figure "$out" specular_psnr_db)" - higher
+    row "Fig. 8: MSRE" "$(figure "$out" msre)" - lower
+    [ "${PAPER:-}" = short ] && return
+    out=$dir/fig8-8192
+    run "$room" "$out" texture_size=8192
+    read -r memory total < <(awk '/^peak memory/ { print $3 / 1024, $6 / 60 }' "$out.log")
+    row "Fig. 8, 8192 x 8192: minutes" "${total:-null}" 30 lower
+    row "Fig. 8, 8192 x 8192: GiB" "${memory:-null}" 8 lower
+}
+
+# Table 1: MSRE on spoiled geometry over that on the unspoiled. All meshes, the unspoiled too, have
+# their long edges halved and no shading normals. Decimation starts from a mesh with 0.5 mm of
+# noise, since no scan is flat to the last bit, and is compared with that.
+table1() {
+    local what noise keep goal out flat=null rough=null base msre spoiled=$dir/spoiled
+    demo_room 15 15 || return
+    while IFS=, read -r what noise keep goal; do
+        rm -rf "$spoiled"
+        cp -al "$room" "$spoiled" && rm -rf "$spoiled/truth" "$spoiled/mesh.ply"
+        "$build/tests/bench/perturb_mesh" "$room/mesh.ply" "$spoiled/mesh.ply" "$edge" "$noise" "$keep" >/dev/null || {
+            echo "Table 1: $what: left out" >&2
+            continue
+        }
+        out=$dir/table1-$noise-$keep
+        run "$spoiled" "$out"
+        msre=$(reported_msre "$out")
+        case $what in
+        flat) flat=$msre ;;
+        rough) rough=$msre ;;
+        *)
+            base=$flat
+            [ "$keep" = 1 ] || base=$rough
+            row "Table 1, $what: MSRE over the unspoiled" "$(quotient "$msre" "$base")" "$goal" lower
+            ;;
+        esac
+    done <<<"flat,0,1,-
+noise of 0.5 cm,0.005,1,1.01
+noise of 1 cm,0.01,1,1.02
+noise of 3 cm,0.03,1,1.31
+rough,0.0005,1,-
+decimated to 75 %,0.0005,0.75,1.01
+decimated to 50 %,0.0005,0.5,1.02
+decimated to 10 %,0.0005,0.1,1.03"
+    rm -rf "$spoiled"
+}
+
+# Fig. 5: segments found from the shape against those of the mesh.
+fig5() {
+    local given=$dir/fig5-given automatic=$dir/fig5-automatic
+    demo_room 15 15 || return
+    run "$room" "$given" segmentation=given
+    run "$room" "$automatic" segmentation=automatic
+    row "Fig. 5: MSRE with automatic over that with given segments" \
+        "$(quotient "$(reported_msre "$automatic")" "$(reported_msre "$given")")" 1.02 lower
+}
+
+# The room for comparisons of methods: staircase2, else the demo room.
+other_room() {
+    room=$data/rooms/staircase2
+    [ -d "$room" ] || demo_room 15 15
+}
+
+has_setting() { # NAME
+    "$build/unbake" settings "$1" >/dev/null 2>&1
+}
+
+# The time in which the default method comes to the base colour that the published one has at last.
+speed() {
+    local out=$dir/speed wanted took published=(method=listing1) limit note=" (not reached)"
+    other_room || return
+    has_setting guided && published+=(guided=false)
+    run "$room" "$out-published" report_samples=1 "${published[@]}" &&
+        evaluate "$room" "$out-published" --spp 0
+    wanted=$(figure "$out-published" base_color_psnr_db)
+    took=$(working_sec "$out-published")
+    echo "published: $took s: $wanted dB" >&2
+    for ((limit = seconds / 64 > 0 ? seconds / 64 : 1; limit <= seconds; limit *= 2)); do
+        run "$room" "$out-default" report_samples=1 "time_limit_sec=$limit" || return
+        evaluate "$room" "$out-default" --spp 0
+        echo "default: $(working_sec "$out-default") s: $(figure "$out-default" base_color_psnr_db) dB" >&2
+        if at_least "$(figure "$out-default" base_color_psnr_db)" "$wanted"; then
+            note=
+            break
+        fi
+    done
+    row "time of the default method over the published one's, to its base colour$note" \
+        "$(quotient "$(working_sec "$out-default")" "$took")" 0.1 lower
+}
+
+# What each part is worth: the default without it, in the same time.
+ablations() {
+    local what change out
+    other_room || return
+    while IFS=, read -r what change; do
+        if [ -n "$change" ] && ! has_setting "${change%%=*}"; then
+            continue
+        fi
+        out=$dir/ablation-${change:-none}
+        # shellcheck disable=SC2086
+        run "$room" "$out" report_samples=1 $change || continue
+        evaluate "$room" "$out" --spp "$samples"
+        row "ablation, $what: base colour PSNR, dB" "$(figure "$out" base_color_psnr_db)" - higher
+        row "ablation, $what: MSRE" "$(figure "$out" msre)" - lower
+    done <<<"nothing left out,
+the published steps,guided=false
+no coarse levels,coarse_levels=0
+exposures and gains as given,calibrate=false
+one photograph a visit,cameras_per_texel=1
+paths of 8 segments,max_depth=8
+direct light alone,max_depth=2"
+}
+
+for part in ${PAPER_ONLY:-fig7 fig8 table1 fig5 speed ablations}; do
+    case $part in
+    fig7 | fig8 | table1 | fig5 | speed | ablations)
+        echo "== $part ($SECONDS s)" >&2
+        "$part"
+        ;;
+    *) echo "paper.sh: PAPER_ONLY has no '$part'" >&2 ;;
+    esac
+done
+tests/bench/table.sh "$rows" "$build/paper.json"
+echo "outputs and pictures: $dir"
+rm -f "$rows"
