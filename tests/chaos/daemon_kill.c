@@ -99,6 +99,8 @@ static void remove_oldest(struct client *c, const char *folder) {
     }
     if (status == 204 || status == 404)
         m->known = GONE;
+    else if (status == 0) /* it may be gone */
+        m->known = UNSURE;
     c->acknowledged += status == 204;
     buf_release(&body);
 }
