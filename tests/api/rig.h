@@ -31,7 +31,9 @@ static inline void rig_must(enum status status, const struct error *err, const c
     exit(1);
 }
 
-static inline void rig_start(struct rig *rig, const struct guard_limits *limits, double keepalive_sec) {
+/* Room for so many connections, and event streams. */
+static inline void rig_start_large(struct rig *rig, const struct guard_limits *limits, double keepalive_sec,
+                                   unsigned connection_max, size_t stream_max) {
     struct error err;
     memset(rig, 0, sizeof *rig);
     snprintf(rig->dir, sizeof rig->dir, "/tmp/unbake-rig-XXXXXX");
@@ -43,11 +45,15 @@ static inline void rig_start(struct rig *rig, const struct guard_limits *limits,
         .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     rig_must(scheduler_new(&rig->scheduler, &work, rig->store, &err), &err, "scheduler_new");
     struct api_config config = {.data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
-        .max_upload_bytes = 8 << 20, .max_streams = 60, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
+        .max_upload_bytes = 8 << 20, .max_streams = stream_max, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
         .server_names = "lab.example.org"};
     rig_must(api_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "api_new");
-    struct listener_config network = {.address = "127.0.0.1", .connection_max = 200, .limits = *limits};
+    struct listener_config network = {.address = "127.0.0.1", .connection_max = connection_max, .limits = *limits};
     rig_must(listener_start(&rig->listener, &network, rig->api, &err), &err, "listener_start");
+}
+
+static inline void rig_start(struct rig *rig, const struct guard_limits *limits, double keepalive_sec) {
+    rig_start_large(rig, limits, keepalive_sec, 200, 60);
 }
 
 static inline void rig_stop(struct rig *rig) {
