@@ -13,7 +13,7 @@ WARNINGS = -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-pro
 # -fno-math-errno lets loops with sqrtf vectorise; -ffp-contract=off keeps results the same on
 # machines with and without fused multiply-add.
 ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -I. $(WARNINGS) -fno-math-errno -ffp-contract=off \
-             -fstack-protector-strong -pthread $(SANITIZE) $(EXR_CFLAGS) $(CFLAGS)
+             -fstack-protector-strong -pthread $(SANITIZE) $(EXR_CFLAGS) $(CPPFLAGS) $(CFLAGS)
 ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
 
 # deploy/install-deps.sh puts these in place; the variables are only expanded when a compiler runs.
@@ -46,7 +46,8 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps demo test tests bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz install clean
+.PHONY: all help deps man deb demo test tests bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
+        install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -152,10 +153,42 @@ fuzz: deps ## search for crashes for FUZZ_SECONDS (60) with each fuzz program, u
 	        $$program || [ $$? -eq 77 ] || exit 1; \
 	done
 
-install: all ## install under PREFIX (/usr/local)
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/unbake
+# Manual pages and completions come out of the programs, from the tables of their --help.
+MANUALS = $(B)/man/unbake.1 $(B)/man/unbaked.8 $(B)/man/unbaked.conf.5
+COMPLETIONS = $(foreach p,unbake unbaked,$(B)/completion/$(p).bash $(B)/completion/$(p).zsh)
+$(B)/man/unbake.1: $(B)/unbake
+	@mkdir -p $(@D)
+	$< manual $(@F) > $@
+$(B)/man/unbaked.%: $(B)/unbaked
+	@mkdir -p $(@D)
+	$< manual $(@F) > $@
+$(B)/completion/%.bash: $(B)/%
+	@mkdir -p $(@D)
+	$< manual bash > $@
+$(B)/completion/%.zsh: $(B)/%
+	@mkdir -p $(@D)
+	$< manual zsh > $@
+
+man: $(MANUALS) ## write the manual pages to build/man
+
+SHARE = $(DESTDIR)$(PREFIX)/share
+BASH_COMPLETIONS ?= $(PREFIX)/share/bash-completion/completions
+ZSH_COMPLETIONS ?= $(PREFIX)/share/zsh/site-functions
+install: all $(MANUALS) $(COMPLETIONS) ## install under PREFIX (/usr/local)
+	install -d $(DESTDIR)$(PREFIX)/bin $(SHARE)/unbake $(SHARE)/man/man1 $(SHARE)/man/man5 $(SHARE)/man/man8 \
+	    $(DESTDIR)$(BASH_COMPLETIONS) $(DESTDIR)$(ZSH_COMPLETIONS)
 	install -m 755 $(B)/unbaked $(B)/unbake $(DESTDIR)$(PREFIX)/bin
-	install -m 644 config/unbaked.conf $(DESTDIR)$(PREFIX)/share/unbake/unbaked.conf
+	install -m 644 config/unbaked.conf $(SHARE)/unbake/unbaked.conf
+	install -m 644 $(B)/man/unbake.1 $(SHARE)/man/man1
+	install -m 644 $(B)/man/unbaked.conf.5 $(SHARE)/man/man5
+	install -m 644 $(B)/man/unbaked.8 $(SHARE)/man/man8
+	for p in unbake unbaked; do \
+	    install -m 644 $(B)/completion/$$p.bash $(DESTDIR)$(BASH_COMPLETIONS)/$$p && \
+	    install -m 644 $(B)/completion/$$p.zsh $(DESTDIR)$(ZSH_COMPLETIONS)/_$$p || exit 1; done
+
+VERSION = $(shell sed -n 's/^\#define UNBAKE_VERSION "\(.*\)"/\1/p' common/protocol.h)
+deb: ## build the Debian packages into build/deb (needs the packages that deploy/deb.sh names)
+	@deploy/deb.sh $(B)/deb $(VERSION)
 
 clean: ## remove what was built
 	rm -rf build

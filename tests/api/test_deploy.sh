@@ -1,0 +1,46 @@
+#!/bin/bash
+# What deploy/ says against the tree: dependencies in three places, what is installed against what
+# the packages take, shells' syntax of the completions.
+set -u
+build=${1:-${UNBAKE_BUILD:-build}}
+case $build in *asan | *tsan) echo "nothing in it for a sanitizer"; exit 77 ;; esac
+work=$(mktemp -d "${TMPDIR:-/tmp}/unbake-deploy-XXXXXX")
+trap 'rm -rf "$work"' EXIT
+failures=0
+fail() { echo "$*"; failures=$((failures + 1)); }
+
+# --- every library that a build needs is named wherever a build is described ---
+libraries=$(sed -n '/^packages="/,/"$/p' deploy/install-deps.sh | grep -o '[a-z0-9.+-]*-dev\b' | grep -v '^libc6-dev$')
+[ "$(wc -w <<<"$libraries")" -gt 8 ] || fail "install-deps.sh names only: $libraries"
+for library in $libraries; do
+    name=${library/62-turbo/} # the package has it by its virtual name
+    grep -qw -- "$name" deploy/debian/control || fail "deploy/debian/control lacks $name"
+    grep -qw -- "$library" deploy/Dockerfile || fail "deploy/Dockerfile lacks $library"
+done
+
+# --- installing ---
+make -s install B="$build" PREFIX=/usr ZSH_COMPLETIONS=/usr/share/zsh/vendor-completions DESTDIR="$work/root" \
+    >"$work/out" 2>&1 || fail "make install: $(tail -n 5 "$work/out")"
+start=$(sed -n 's/^ExecStart=\([^ ]*\).*/\1/p' deploy/unbaked.service)
+[ -x "$work/root$start" ] || fail "the unit starts $start, which is not what is installed"
+"$work/root$start" check-config config/unbaked.conf >/dev/null || fail "what is installed does not run"
+(cd "$work/root" && find . -type f | sed 's|^\./||') | grep -v '^usr/share/unbake/' | sort >"$work/installed"
+while read -r file; do
+    grep -qE "^${file%\*}(/|\$)" "$work/installed" || [ "$file" = etc/unbaked.conf ] || fail "a package takes $file, which is not installed"
+done < <(cat deploy/debian/*.install)
+while read -r file; do
+    cat deploy/debian/*.install | while read -r taken; do
+        [[ $file == "$taken" || $file == "$taken"/* ]] && echo "$file"
+    done | grep -q . || fail "no package takes $file"
+done <"$work/installed"
+
+# --- completions ---
+for file in "$work"/root/usr/share/bash-completion/completions/*; do
+    bash -n "$file" || fail "bash does not read $file"
+done
+if command -v zsh >/dev/null; then
+    for file in "$work"/root/usr/share/zsh/vendor-completions/*; do
+        zsh -n "$file" || fail "zsh does not read $file"
+    done
+fi
+exit $((failures > 0))
