@@ -5,7 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/mem.h"
 #include "server/reconstruct/calibrate_light.h"
+#include "server/reconstruct/calibrate_poses.h"
 
 static void say_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {
@@ -30,39 +32,89 @@ static cJSON *gain_array(rgb gain) {
     return cJSON_CreateDoubleArray((double[]){(double)gain.r, (double)gain.g, (double)gain.b}, 3);
 }
 
-/* One entry for each training photograph that is not as it was claimed. */
-static cJSON *photographs_found(const struct views *views) {
+/* One entry for each training photograph that is not as it was claimed. `shift` is in pixels. */
+static cJSON *photographs_found(const struct views *views, const float *shift) {
     cJSON *list = cJSON_CreateArray();
     for (size_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         bool gained = photo->gain.r != 1.0f || photo->gain.g != 1.0f || photo->gain.b != 1.0f;
-        if (photo->exposure_known && !gained)
+        if (photo->exposure_known && !gained && shift[t] == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", photo->name);
         json_add_number(entry, "exposure", (double)photo->exposure);
         json_add(entry, "gain", gain_array(photo->gain));
+        json_add_number(entry, "shift_px", (double)shift[t]);
         cJSON_AddItemToArray(list, entry);
     }
     return list;
 }
 
+/* Moves the cameras whose poses are wrong; true when there was one. */
+static bool find_poses(struct reconstruction *r, struct views *views, const struct reconstruct_hooks *hooks,
+                       struct poses_found *found) {
+    struct tracks tracks;
+    char line[160];
+    tracks_make(&tracks, views, r->pool);
+    calibrate_poses(r->scene, &tracks, r->pool, found);
+    tracks_release(&tracks);
+    if (found->moved_count == 0)
+        return false;
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        if (found->shift[t] > 0.0f)
+            views_update_edges(views, &r->segments, t, r->pool);
+    }
+    snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)",
+             found->moved_count, found->shift_px);
+    hooks->log(hooks->user, line);
+    return true;
+}
+
+/* Exposure, gain and vignette as the capture claims them. */
+static struct photograph *save_claims(const struct scene *scene) {
+    struct photograph *claim = mem_array(scene->photograph_count + 1, sizeof *claim);
+    memcpy(claim, scene->photograph, scene->photograph_count * sizeof *claim);
+    return claim;
+}
+
+static void restore_claims(struct scene *scene, const struct photograph *claim) {
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        scene->photograph[i].exposure = claim[i].exposure;
+        scene->photograph[i].gain = claim[i].gain;
+        memcpy(scene->photograph[i].vignette, claim[i].vignette, sizeof claim[i].vignette);
+    }
+}
+
 void calibrate(struct reconstruction *r, struct views *views, const struct reconstruct_hooks *hooks) {
     bool faults = settings_bool(r->settings, "calibrate");
+    struct photograph *claim = save_claims(r->scene);
     struct light_found light;
+    struct poses_found poses = {.shift = mem_calloc(views->train_count + 1, sizeof *poses.shift)};
     calibrate_light(r->scene, views, &r->atlas, &r->inverse, faults, r->pool, &light);
     views_update_median(views);
+    double spread_before = light.spread_before;
+    if (faults) {
+        poses_found_release(&poses);
+        if (find_poses(r, views, hooks, &poses)) { /* places that were mixed up told lies about light */
+            restore_claims(r->scene, claim);
+            calibrate_light(r->scene, views, &r->atlas, &r->inverse, faults, r->pool, &light);
+            views_update_median(views);
+        }
+    }
+    light.spread_before = spread_before;
     say_light(r, &light, hooks);
     cJSON *report = cJSON_AddObjectToObject(r->report, "calibration");
     json_add_int(report, "exposures_solved", (int64_t)light.exposures_solved);
     json_add_bool(report, "exposure_drift", light.drift);
     json_add_bool(report, "white_balance_drift", light.white_balance);
-    if (light.vignette) {
-        const float *v = r->scene->photograph[0].vignette;
-        json_add(report, "vignette",
-                 cJSON_CreateDoubleArray((double[]){(double)v[0], (double)v[1], (double)v[2]}, 3));
-    }
+    const float *v = r->scene->photograph[0].vignette;
+    json_add(report, "vignette", light.vignette ? cJSON_CreateDoubleArray((double[]){
+        (double)v[0], (double)v[1], (double)v[2]}, 3) : cJSON_CreateNull());
+    json_add_int(report, "poses_moved", (int64_t)poses.moved_count);
+    json_add_number(report, "pose_shift_px", poses.shift_px);
     json_add_number(report, "spread_before", light.spread_before);
     json_add_number(report, "spread_after", light.spread_after);
-    json_add(report, "photographs", photographs_found(views));
+    json_add(report, "photographs", photographs_found(views, poses.shift));
+    poses_found_release(&poses);
+    mem_free(claim);
 }

@@ -114,6 +114,12 @@ void views_update_median(struct views *v) {
     mem_free(value);
 }
 
+void views_update_edges(struct views *v, const struct segments *segments, uint32_t train,
+                        struct parallel *pool) {
+    struct edge_job job = {.views = v, .segments = segments, .train = train};
+    parallel_for(pool, v->scene->photograph[v->train[train]].camera.height, mark_row, &job);
+}
+
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
                 const struct accel *accel, struct parallel *pool) {
     *v = (struct views){.scene = scene, .accel = accel};
@@ -126,8 +132,7 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct camera *camera = &scene->photograph[v->train[t]].camera;
         v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
-        struct edge_job job = {.views = v, .segments = segments, .train = t};
-        parallel_for(pool, camera->height, mark_row, &job);
+        views_update_edges(v, segments, t, pool);
     }
     views_update_median(v);
 }

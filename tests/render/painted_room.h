@@ -135,6 +135,51 @@ static inline void painted_spoil(struct photograph *photo, rgb gain, float vigne
     }
 }
 
+/* Turns a camera about its axes and moves it along them, all evenly distributed up to the given
+ * radians and metres. */
+static inline void painted_misplace(struct camera *camera, uint64_t frame, float turn, float move) {
+    struct rigid *m = &camera->world_from_camera;
+    float w[3], v[3];
+    for (uint64_t k = 0; k < 3; k++) {
+        w[k] = turn * painted_random(frame, 100 + k);
+        v[k] = move * painted_random(frame, 200 + k);
+    }
+    vec3 x = {m->rotation[0][0], m->rotation[1][0], m->rotation[2][0]};
+    vec3 y = {m->rotation[0][1], m->rotation[1][1], m->rotation[2][1]};
+    vec3 z = {m->rotation[0][2], m->rotation[1][2], m->rotation[2][2]};
+    vec3 nx = vec3_normalize(vec3_sub(vec3_mad(x, w[2], y), vec3_scale(z, w[1])));
+    vec3 nz = vec3_sub(vec3_mad(z, w[1], x), vec3_scale(y, w[0]));
+    nz = vec3_normalize(vec3_mad(nz, -vec3_dot(nz, nx), nx));
+    vec3 ny = vec3_cross(nz, nx);
+    vec3 to = vec3_mad(vec3_mad(vec3_mad(m->translation, v[0], x), v[1], y), v[2], z);
+    *m = (struct rigid){{{nx.x, ny.x, nz.x}, {nx.y, ny.y, nz.y}, {nx.z, ny.z, nz.z}}, to};
+    camera->camera_from_world = rigid_inverse(m);
+}
+
+/* Root of the mean squared distance, in pixels, between where a camera should see points of the
+ * surface and where it does, over the training frames. */
+static inline double painted_shift(const struct painted *room) {
+    double squares = 0.0, count = 0.0;
+    for (size_t t = 0; t < room->views.train_count; t++) {
+        uint32_t f = room->views.train[t];
+        const struct camera *truth = &room->clean[f].camera, *found = &room->scene.photograph[f].camera;
+        for (int k = 0; k < 64; k++) {
+            float x = PAINTED_WIDTH * ((float)(k % 8) + 0.5f) / 8.0f, u, depth_m;
+            float y = PAINTED_HEIGHT * ((float)(k / 8) + 0.5f) / 8.0f, v;
+            vec3 direction;
+            struct accel_hit hit;
+            if (!camera_direction(truth, x, y, &direction) ||
+                !accel_intersect(room->accel, camera_origin(truth), direction, 0.0f, INFINITY, &hit) ||
+                !camera_project(found, vec3_mad(camera_origin(truth), hit.distance_m, direction), &u, &v,
+                                &depth_m))
+                continue;
+            squares += (double)((u - x) * (u - x) + (v - y) * (v - y));
+            count += 1.0;
+        }
+    }
+    return sqrt(squares / count);
+}
+
 /* Fuses the photographs at an even choice of texels and compares with the truth: rms of the
  * logarithm's error, all channels, after the mean error (a matter of units) is taken off. */
 static inline double painted_error(const struct painted *room) {

@@ -1,0 +1,73 @@
+/* calibrate_poses.h: cameras are moved by a few pixels and found again; a capture whose poses are right
+ * is left alone. */
+#include "server/reconstruct/calibrate_poses.h"
+
+#include "tests/render/painted_room.h"
+
+static struct poses_found run(struct painted *room, struct parallel *pool) {
+    struct tracks tracks;
+    struct poses_found found;
+    views_release(&room->views);
+    views_init(&room->views, &room->scene, &room->segments, room->accel, pool);
+    tracks_make(&tracks, &room->views, pool);
+    calibrate_poses(&room->scene, &tracks, pool, &found);
+    tracks_release(&tracks);
+    return found;
+}
+
+static void test_clean(struct painted *room) {
+    painted_reset(room);
+    struct poses_found found = run(room, room->pool);
+    CHECK(found.moved_count == 0 && found.shift_px == 0.0);
+    for (int f = 0; f < PAINTED_FRAMES; f++)
+        CHECK(memcmp(&room->scene.photograph[f].camera, &room->clean[f].camera, sizeof(struct camera)) == 0);
+    poses_found_release(&found);
+}
+
+static void misplace(struct painted *room, float turn, float move, size_t every) {
+    painted_reset(room);
+    for (size_t f = 0; f < PAINTED_FRAMES; f += every)
+        painted_misplace(&room->scene.photograph[f].camera, f, turn, move);
+}
+
+/* Every so many-th frame is misplaced. */
+static void test_misplaced(struct painted *room, float turn, float move, size_t every) {
+    misplace(room, turn, move, every);
+    double shift_before = painted_shift(room), before = painted_error(room);
+    struct poses_found found = run(room, room->pool);
+    double shift_after = painted_shift(room), after = painted_error(room);
+    printf("every %zu misplaced: %zu moved, off by %.3f px -> %.3f px, fused error %.4f -> %.4f\n", every,
+           found.moved_count, shift_before, shift_after, before, after);
+    CHECK(shift_before > 1.0);
+    CHECK(shift_after < 0.25 * shift_before);
+    CHECK(after < 0.6 * before);
+    poses_found_release(&found);
+}
+
+static void test_threads(struct painted *room) {
+    struct camera first[PAINTED_FRAMES];
+    for (int k = 0; k < 2; k++) {
+        misplace(room, 0.02f, 0.02f, 1);
+        struct parallel *pool = parallel_new(1 + 2 * k);
+        struct poses_found found = run(room, pool);
+        poses_found_release(&found);
+        for (int f = 0; f < PAINTED_FRAMES; f++) {
+            if (k == 0)
+                first[f] = room->scene.photograph[f].camera;
+            else
+                CHECK(memcmp(&first[f], &room->scene.photograph[f].camera, sizeof first[f]) == 0);
+        }
+        parallel_free(pool);
+    }
+}
+
+int main(void) {
+    struct painted room;
+    painted_make(&room, 0);
+    test_clean(&room);
+    test_misplaced(&room, 0.02f, 0.02f, 1);
+    test_misplaced(&room, 0.03f, 0.03f, 4);
+    test_threads(&room);
+    painted_release(&room);
+    return check_result();
+}
