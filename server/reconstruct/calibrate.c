@@ -32,88 +32,113 @@ static cJSON *gain_array(rgb gain) {
     return cJSON_CreateDoubleArray((double[]){(double)gain.r, (double)gain.g, (double)gain.b}, 3);
 }
 
-/* One entry for each training photograph that is not as it was claimed. `shift` is in pixels. */
+/* One entry for each training photograph that is not as it was claimed. `shift` is in pixels,
+ * or NULL. */
 static cJSON *photographs_found(const struct views *views, const float *shift) {
     cJSON *list = cJSON_CreateArray();
     for (size_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         bool gained = photo->gain.r != 1.0f || photo->gain.g != 1.0f || photo->gain.b != 1.0f;
-        if (photo->exposure_known && !gained && shift[t] == 0.0f)
+        float moved = shift ? shift[t] : 0.0f;
+        if (photo->exposure_known && !gained && moved == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", photo->name);
         json_add_number(entry, "exposure", (double)photo->exposure);
         json_add(entry, "gain", gain_array(photo->gain));
-        json_add_number(entry, "shift_px", (double)shift[t]);
+        json_add_number(entry, "shift_px", (double)moved);
         cJSON_AddItemToArray(list, entry);
     }
     return list;
 }
 
-/* Moves the cameras whose poses are wrong; true when there was one. */
-static bool find_poses(struct reconstruction *r, struct views *views, const struct reconstruct_hooks *hooks,
-                       struct poses_found *found) {
-    struct tracks tracks;
-    char line[160];
-    tracks_make(&tracks, views, r->pool);
-    calibrate_poses(r->scene, &tracks, r->pool, found);
-    tracks_release(&tracks);
-    if (found->moved_count == 0)
-        return false;
-    for (uint32_t t = 0; t < views->train_count; t++) {
-        if (found->shift[t] > 0.0f)
-            views_update_edges(views, &r->segments, t, r->pool);
-    }
-    snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)",
-             found->moved_count, found->shift_px);
-    hooks->log(hooks->user, line);
-    return true;
-}
-
-/* Exposure, gain and vignette as the capture claims them. */
+/* Exposure, gain, vignette and camera as the capture claims them. */
 static struct photograph *save_claims(const struct scene *scene) {
     struct photograph *claim = mem_array(scene->photograph_count + 1, sizeof *claim);
     memcpy(claim, scene->photograph, scene->photograph_count * sizeof *claim);
     return claim;
 }
 
-static void restore_claims(struct scene *scene, const struct photograph *claim) {
-    for (size_t i = 0; i < scene->photograph_count; i++) {
-        scene->photograph[i].exposure = claim[i].exposure;
-        scene->photograph[i].gain = claim[i].gain;
-        memcpy(scene->photograph[i].vignette, claim[i].vignette, sizeof claim[i].vignette);
+static void find_light(struct reconstruction *r, struct views *views, const struct photograph *claim,
+                       struct light_found *found) {
+    for (size_t i = 0; i < r->scene->photograph_count; i++) {
+        struct photograph *photo = &r->scene->photograph[i];
+        photo->exposure = claim[i].exposure;
+        photo->gain = claim[i].gain;
+        memcpy(photo->vignette, claim[i].vignette, sizeof photo->vignette);
+    }
+    calibrate_light(r->scene, views, &r->atlas, &r->inverse, settings_bool(r->settings, "calibrate"),
+                    r->pool, found);
+    views_update_median(views);
+}
+
+static void update_edges(struct reconstruction *r, struct views *views, const struct poses_found *found) {
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        if (found->shift[t] > 0.0f)
+            views_update_edges(views, &r->segments, t, r->pool);
     }
 }
 
+/* Moves the cameras whose poses are wrong and finds the light anew: points that were mixed up told
+ * lies about it. Points that had no say in the poses have the last word: unless photographs agree
+ * better there too, all cameras stay. */
+static void find_poses(struct reconstruction *r, struct views *views, const struct photograph *claim,
+                       struct light_found *light, struct poses_found *found) {
+    struct tracks tracks;
+    double spread = light->spread_after;
+    tracks_make(&tracks, views, r->pool);
+    calibrate_poses(r->scene, &tracks, r->pool, found);
+    tracks_release(&tracks);
+    if (found->moved_count == 0)
+        return;
+    update_edges(r, views, found);
+    find_light(r, views, claim, light);
+    if (light->spread_after < spread)
+        return;
+    for (size_t i = 0; i < r->scene->photograph_count; i++)
+        r->scene->photograph[i].camera = claim[i].camera;
+    update_edges(r, views, found);
+    find_light(r, views, claim, light);
+    memset(found->shift, 0, views->train_count * sizeof *found->shift);
+    found->moved_count = 0;
+    found->shift_px = 0.0;
+}
+
+static void say_poses(const struct poses_found *found, const struct reconstruct_hooks *hooks) {
+    char line[160];
+    if (found->moved_count == 0)
+        return;
+    snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)",
+             found->moved_count, found->shift_px);
+    hooks->log(hooks->user, line);
+}
+
+static void report_light(const struct reconstruction *r, const struct light_found *found, cJSON *report) {
+    const float *v = r->scene->photograph[0].vignette;
+    const double vignette[3] = {(double)v[0], (double)v[1], (double)v[2]};
+    json_add_int(report, "exposures_solved", (int64_t)found->exposures_solved);
+    json_add_bool(report, "exposure_drift", found->drift);
+    json_add_bool(report, "white_balance_drift", found->white_balance);
+    json_add(report, "vignette", found->vignette ? cJSON_CreateDoubleArray(vignette, 3) : cJSON_CreateNull());
+    json_add_number(report, "spread_before", found->spread_before);
+    json_add_number(report, "spread_after", found->spread_after);
+}
+
 void calibrate(struct reconstruction *r, struct views *views, const struct reconstruct_hooks *hooks) {
-    bool faults = settings_bool(r->settings, "calibrate");
     struct photograph *claim = save_claims(r->scene);
     struct light_found light;
-    struct poses_found poses = {.shift = mem_calloc(views->train_count + 1, sizeof *poses.shift)};
-    calibrate_light(r->scene, views, &r->atlas, &r->inverse, faults, r->pool, &light);
-    views_update_median(views);
+    struct poses_found poses = {0};
+    find_light(r, views, claim, &light);
     double spread_before = light.spread_before;
-    if (faults) {
-        poses_found_release(&poses);
-        if (find_poses(r, views, hooks, &poses)) { /* places that were mixed up told lies about light */
-            restore_claims(r->scene, claim);
-            calibrate_light(r->scene, views, &r->atlas, &r->inverse, faults, r->pool, &light);
-            views_update_median(views);
-        }
-    }
+    if (settings_bool(r->settings, "calibrate"))
+        find_poses(r, views, claim, &light, &poses);
     light.spread_before = spread_before;
     say_light(r, &light, hooks);
+    say_poses(&poses, hooks);
     cJSON *report = cJSON_AddObjectToObject(r->report, "calibration");
-    json_add_int(report, "exposures_solved", (int64_t)light.exposures_solved);
-    json_add_bool(report, "exposure_drift", light.drift);
-    json_add_bool(report, "white_balance_drift", light.white_balance);
-    const float *v = r->scene->photograph[0].vignette;
-    json_add(report, "vignette", light.vignette ? cJSON_CreateDoubleArray((double[]){
-        (double)v[0], (double)v[1], (double)v[2]}, 3) : cJSON_CreateNull());
+    report_light(r, &light, report);
     json_add_int(report, "poses_moved", (int64_t)poses.moved_count);
     json_add_number(report, "pose_shift_px", poses.shift_px);
-    json_add_number(report, "spread_before", light.spread_before);
-    json_add_number(report, "spread_after", light.spread_after);
     json_add(report, "photographs", photographs_found(views, poses.shift));
     poses_found_release(&poses);
     mem_free(claim);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/views.h"
 
 /* Stored value below which an ordinary photograph's pixel is mostly noise. */
 #define DARK_VALUE 0.005f
@@ -62,10 +63,10 @@ static void smooth(float *value, uint32_t width, uint32_t height) {
     mem_free(above);
 }
 
-static void cut_edges(float *value, uint32_t width, uint32_t height, const uint8_t *edge) {
+static void cut_edges(float *value, uint32_t width, uint32_t height, const uint8_t *shows) {
     long w = (long)width, h = (long)height;
     for (long i = 0; i < w * h; i++) {
-        if (!edge[i])
+        if (shows[i] == VIEWS_SURFACE || shows[i] == VIEWS_SEAM)
             continue;
         long x0 = i % w - EDGE_DISTANCE, x1 = i % w + EDGE_DISTANCE;
         long y0 = i / w - EDGE_DISTANCE, y1 = i / w + EDGE_DISTANCE;
@@ -75,7 +76,7 @@ static void cut_edges(float *value, uint32_t width, uint32_t height, const uint8
     }
 }
 
-void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *edge, size_t pixels,
+void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
                   float floor) {
     uint32_t w = photo->camera.width, h = photo->camera.height;
     *p = (struct pyramid){.scale = 1.0f};
@@ -83,7 +84,7 @@ void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8
     for (uint32_t y = 0; y < h; y++)
         for (uint32_t x = 0; x < w; x++)
             raw[(size_t)y * w + x] = gray_of(photo, x, y, floor);
-    cut_edges(raw, w, h, edge);
+    cut_edges(raw, w, h, shows);
     while ((size_t)w * h > pixels && w > 1 && h > 1) {
         float *half = halve(raw, &w, &h);
         mem_free(raw);

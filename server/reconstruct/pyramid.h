@@ -1,11 +1,12 @@
-/* pyramid.h -- a photograph as logarithms of its gray radiance, at three scales, for comparing
+/* pyramid.h -- a photograph as logarithms of its gray radiance, at two scales, for comparing
  * photographs with each other.
  *
  * Logarithms make a wrong exposure an offset. Level 0 is the photograph (halved as often as its
  * budget asks) smoothed by the binomial 1 2 1 in both directions, so that a place between pixels
- * is not much smoother than one on a pixel; each further level has half the size. What a pixel
+ * is not much smoother than one on a pixel; the next level has half the size. What a pixel
  * does not tell (masked, saturated, nearly black) and what lies within a few pixels of a depth
- * edge is NaN, and so is what was smoothed with it. */
+ * edge is NaN, and so is what was smoothed with it. Where surfaces meet without one behind the
+ * other a picture's edge lies on them, and is kept. */
 #ifndef UNBAKE_RECONSTRUCT_PYRAMID_H
 #define UNBAKE_RECONSTRUCT_PYRAMID_H
 
@@ -15,7 +16,7 @@
 
 #include "server/scene/photograph.h"
 
-#define PYRAMID_LEVELS 3
+#define PYRAMID_LEVELS 2
 
 struct pyramid {
     float scale;  /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */
@@ -23,9 +24,9 @@ struct pyramid {
     float *value[PYRAMID_LEVELS]; /* [height][width] of each; owned */
 };
 
-/* `edge` [height][width] of the photograph is not 0 where not just one surface is seen (views.shows). Level 0
- * has at most `pixels` pixels. `floor` is the radiance that is added before the logarithm. */
-void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *edge, size_t pixels,
+/* `shows` [height][width] is what views.shows says of the photograph. Level 0 has at most `pixels` pixels.
+ * `floor` is the radiance that is added before the logarithm. */
+void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
                   float floor);
 void pyramid_release(struct pyramid *p);
 

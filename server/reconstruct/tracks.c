@@ -91,7 +91,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
         float distance = vec3_length(to);
         if (other != t && distance < DISTANCE_RATIO * hit.distance_m &&
             hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > LEAST_COSINE * distance &&
-            views_sees(views, other, track->point, normal, &view) && views_clean(views, &view))
+            views_sees(views, other, track->point, normal, &view))
             track->other[track->other_count++] = other;
     }
     return track->other_count >= 2;

@@ -15,6 +15,8 @@
  * relative slack for rounding, before the pixel counts as a depth edge. */
 #define EDGE_FOOTPRINTS 3.0f
 #define EDGE_RELATIVE 0.002f
+/* Corners of a pixel that mixes surfaces lie no further apart where those meet. */
+#define SEAM_FOOTPRINTS 10.0f
 
 #define NO_SURFACE UINT32_MAX
 
@@ -63,6 +65,13 @@ static bool differ(const struct corner *a, const struct corner *b, float focal) 
     return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
 }
 
+/* Whether the difference of two corners, if there is any, is only that two surfaces meet. */
+static bool meet(const struct corner *a, const struct corner *b, float focal) {
+    if (a->segment == NO_SURFACE || b->segment == NO_SURFACE)
+        return a->segment == b->segment;
+    return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
+}
+
 /* One row of pixels; the corners of a row are traced twice, which a parallel loop over rows
  * makes simpler than sharing them. */
 static void mark_row(void *user, size_t row, int thread) {
@@ -79,7 +88,9 @@ static void mark_row(void *user, size_t row, int thread) {
         struct corner low = trace_corner(job, camera, x + 1, y + 1);
         bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
                      differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
-        out[x] = mixed ? VIEWS_MIXED : VIEWS_SURFACE;
+        bool seam = mixed && meet(&left_top, &top, camera->fx) && meet(&left_top, &left_low, camera->fx) &&
+                    meet(&left_top, &low, camera->fx) && meet(&top, &left_low, camera->fx);
+        out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
         /* What is thinner than a pixel may hide between the corners. */
         if (!mixed && low.segment == NO_SURFACE)
             out[x] = hits_centre(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;

@@ -19,8 +19,8 @@
 
 #define VIEWS_PICK_MAX 64
 
-/* What a pixel shows. */
-enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN };
+/* What a pixel shows: one surface; several, one behind the other; nothing; several that meet there. */
+enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };
 
 struct views {
     const struct scene *scene;  /* borrowed */

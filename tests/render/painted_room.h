@@ -156,28 +156,36 @@ static inline void painted_misplace(struct camera *camera, uint64_t frame, float
     camera->camera_from_world = rigid_inverse(m);
 }
 
-/* Root of the mean squared distance, in pixels, between where a camera should see points of the
- * surface and where it does, over the training frames. */
-static inline double painted_shift(const struct painted *room) {
+/* Root of the mean squared distance, in pixels, between where a frame's camera should see points of the
+ * surface and where it does. */
+static inline double painted_frame_shift(const struct painted *room, uint32_t frame) {
     double squares = 0.0, count = 0.0;
-    for (size_t t = 0; t < room->views.train_count; t++) {
-        uint32_t f = room->views.train[t];
-        const struct camera *truth = &room->clean[f].camera, *found = &room->scene.photograph[f].camera;
-        for (int k = 0; k < 64; k++) {
-            float x = PAINTED_WIDTH * ((float)(k % 8) + 0.5f) / 8.0f, u, depth_m;
-            float y = PAINTED_HEIGHT * ((float)(k / 8) + 0.5f) / 8.0f, v;
-            vec3 direction;
-            struct accel_hit hit;
-            if (!camera_direction(truth, x, y, &direction) ||
-                !accel_intersect(room->accel, camera_origin(truth), direction, 0.0f, INFINITY, &hit) ||
-                !camera_project(found, vec3_mad(camera_origin(truth), hit.distance_m, direction), &u, &v,
-                                &depth_m))
-                continue;
-            squares += (double)((u - x) * (u - x) + (v - y) * (v - y));
-            count += 1.0;
-        }
+    const struct camera *truth = &room->clean[frame].camera, *found = &room->scene.photograph[frame].camera;
+    for (int k = 0; k < 64; k++) {
+        float x = PAINTED_WIDTH * ((float)(k % 8) + 0.5f) / 8.0f, u, depth_m;
+        float y = PAINTED_HEIGHT * ((float)(k / 8) + 0.5f) / 8.0f, v;
+        vec3 direction;
+        struct accel_hit hit;
+        if (!camera_direction(truth, x, y, &direction) ||
+            !accel_intersect(room->accel, camera_origin(truth), direction, 0.0f, INFINITY, &hit))
+            continue;
+        vec3 point = vec3_mad(camera_origin(truth), hit.distance_m, direction);
+        if (!camera_project(found, point, &u, &v, &depth_m))
+            continue;
+        squares += (double)((u - x) * (u - x) + (v - y) * (v - y));
+        count += 1.0;
     }
-    return sqrt(squares / count);
+    return sqrt(squares / fmax(count, 1.0));
+}
+
+/* The same over all training frames. */
+static inline double painted_shift(const struct painted *room) {
+    double squares = 0.0;
+    for (size_t t = 0; t < room->views.train_count; t++) {
+        double shift = painted_frame_shift(room, room->views.train[t]);
+        squares += shift * shift;
+    }
+    return sqrt(squares / (double)room->views.train_count);
 }
 
 /* Fuses the photographs at an even choice of texels and compares with the truth: rms of the

@@ -30,17 +30,21 @@ static void misplace(struct painted *room, float turn, float move, size_t every)
         painted_misplace(&room->scene.photograph[f].camera, f, turn, move);
 }
 
-/* Every so many-th frame is misplaced. */
+/* Every so many-th frame is misplaced. Two frames look at what hardly any other does: they may stay. */
 static void test_misplaced(struct painted *room, float turn, float move, size_t every) {
     misplace(room, turn, move, every);
     double shift_before = painted_shift(room), before = painted_error(room);
     struct poses_found found = run(room, room->pool);
     double shift_after = painted_shift(room), after = painted_error(room);
-    printf("every %zu misplaced: %zu moved, off by %.3f px -> %.3f px, fused error %.4f -> %.4f\n", every,
-           found.moved_count, shift_before, shift_after, before, after);
-    CHECK(shift_before > 1.0);
-    CHECK(shift_after < 0.25 * shift_before);
-    CHECK(after < 0.6 * before);
+    size_t close = 0;
+    for (uint32_t t = 0; t < room->views.train_count; t++)
+        close += painted_frame_shift(room, room->views.train[t]) < 0.4;
+    printf("every %zu misplaced: %zu moved, off by %.3f px -> %.3f px, %zu of %zu within 0.4 px, fused error "
+           "%.4f -> %.4f\n", every, found.moved_count, shift_before, shift_after, close,
+           room->views.train_count, before, after);
+    CHECK(shift_before > 1.5);
+    CHECK(close + 2 >= room->views.train_count);
+    CHECK(after < 0.5 * before);
     poses_found_release(&found);
 }
 
