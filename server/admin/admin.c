@@ -334,7 +334,13 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
 /* Root acts as the folder's owner, lest the daemon find files that it cannot open. */
 static enum status become_owner(const char *dir, struct error *err) {
     struct stat info;
-    if (geteuid() != 0 || stat(dir, &info) != 0 || info.st_uid == 0)
+    if (geteuid() != 0)
+        return STATUS_OK;
+    if (stat(dir, &info) != 0) { /* whose it is to be, only the daemon knows */
+        error_set_errno(err, errno, "cannot look at the data folder %s", dir);
+        return error_hint(err, "start the daemon once, or make the folder for its user");
+    }
+    if (info.st_uid == 0)
         return STATUS_OK;
     if (setegid(info.st_gid) == 0 && seteuid(info.st_uid) == 0)
         return STATUS_OK;

@@ -160,9 +160,13 @@ struct response *session_get(struct api *api, struct request *r) {
     return describe(api, &r->caller);
 }
 
-static void set_cookie(const struct api *api, struct response *reply, const char *token, int age_sec) {
+/* Over TLS, ours or (as it says) a proxy's, the cookie stays there. */
+static void set_cookie(const struct api *api, const struct request *r, struct response *reply,
+                       const char *token, int age_sec) {
+    const char *scheme = request_field(r, "X-Forwarded-Proto");
+    bool is_tls = api->config.is_tls || (scheme && strcmp(scheme, "https") == 0);
     response_field(reply, "Set-Cookie", COOKIE_NAME "=%s; Path=/; Max-Age=%d; HttpOnly; SameSite=Strict%s",
-                   token, age_sec, api->config.is_tls ? "; Secure" : "");
+                   token, age_sec, is_tls ? "; Secure" : "");
 }
 
 struct response *session_add(struct api *api, struct request *r) {
@@ -187,15 +191,14 @@ struct response *session_add(struct api *api, struct request *r) {
         reply = problem_from(r, &err);
     if (!reply) {
         reply = describe(api, &caller);
-        set_cookie(api, reply, token, COOKIE_AGE_SEC);
+        set_cookie(api, r, reply, token, COOKIE_AGE_SEC);
     }
     cJSON_Delete(body);
     return reply;
 }
 
 struct response *session_delete(struct api *api, struct request *r) {
-    (void)r;
     struct response *reply = response_new(204);
-    set_cookie(api, reply, "", 0);
+    set_cookie(api, r, reply, "", 0);
     return reply;
 }

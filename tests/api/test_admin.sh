@@ -14,6 +14,8 @@ refused() { # WANTED-STATUS PART-OF-THE-MESSAGE COMMAND...
 }
 
 # --- tokens without a daemon ---
+[ "$(id -u)" -ne 0 ] || refused 1 "make the folder for its user" unbaked token add alice --data "$data"
+mkdir -m 750 "$data"
 alice=$(unbaked token add alice --data "$data") || fail "token add: $(cat "$work/err")"
 [[ $alice =~ ^unbake_1_[0-9a-f]{48}$ ]] || fail "the token is '$alice'"
 equal "$(unbaked token list --data "$data" | awk 'NR > 1 {print $1, $2, $3}')" "1 alice user" "token list"
@@ -77,7 +79,7 @@ grep -q '^FAIL *tokens' "$work/out" || fail "doctor: $(cat "$work/out")"
 data=$work/open start_daemon --set access=tokens
 call GET /v1/jobs; expect 401 "access = tokens without any"
 stop_daemon
-data=$work/open2; unbaked token add eve --data "$data" >/dev/null
+data=$work/open2; mkdir "$data"; unbaked token add eve --data "$data" >/dev/null
 start_daemon --set access=open --set log_format=logfmt
 call GET /v1/jobs; expect 200 "access = open"
 stop_daemon

@@ -8,6 +8,7 @@ command -v openssl >/dev/null || { echo "there is no openssl"; exit 77; }
 
 openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 2 -subj /CN=lab \
     -addext 'subjectAltName=IP:127.0.0.1' -keyout "$work/key.pem" -out "$work/cert.pem" 2>/dev/null
+mkdir -m 750 "$data"
 token=$("$build/unbaked" token add alice --data "$data" 2>/dev/null)
 printf 'Authorization: Bearer %s\n' "$token" >"$work/token"
 start_daemon --set access=tokens --set server_names=lab.example.org --set keepalive_sec=1
@@ -42,6 +43,9 @@ call GET /v1/jobs --cacert "$work/cert.pem"; expect 401 "without a token"
 call GET /healthz --cacert "$work/cert.pem" -H 'Host: lab.example.org'; expect 200 "by its public name"
 over GET /v1/session; expect 200; equal "$(field .user)" alice "who asks"
 grep -qi '^x-request-id: [0-9a-f]\{32\}' "$work/head" || fail "the request id is not nginx's"
+
+call POST /v1/session --cacert "$work/cert.pem" -H 'Content-Type: application/json' -d "{\"token\":\"$token\"}"; expect 200
+grep -qi '^set-cookie: .*; Secure' "$work/head" || fail "the cookie is not kept to TLS"
 
 # --- an upload: the daemon has the first bytes while the last are not sent yet ---
 head -c 3000000 /dev/urandom >"$work/junk"
