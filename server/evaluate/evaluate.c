@@ -13,7 +13,6 @@
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/metrics.h"
-#include "server/reconstruct/views.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
@@ -27,8 +26,7 @@ struct evaluator {
     struct scene scene;
     struct recovered recovered;
     bool *emits;           /* [triangle_count] by the truth */
-    struct segments objects;
-    struct views views;    /* straddling by the truth's objects */
+    struct seen seen;
     double median;         /* radiance of the training pixels */
 };
 
@@ -261,7 +259,6 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
 
 static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view,
                               struct evaluation *v, double *msre, struct error *err) {
-    struct seen seen = {&e->views, e->emits};
     struct image truth = {0}, found = {0};
     char *stem = stem_of(p->name);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
@@ -270,7 +267,7 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
         goto out;
     film_render_first_hits(&e->recovered.world, &p->camera, e->settings->samples,
                            e->settings->seed, e->pool, &found);
-    seen_flags(&seen, &p->camera, e->pool, flags);
+    seen_flags(&e->seen, &p->camera, e->pool, flags);
     mark_by_truth(&truth, flags);
     score_add(&v->score, &found, &truth, flags);
     if (e->settings->pictures_dir)
@@ -335,11 +332,9 @@ enum status evaluate_outputs(const char *room, const char *outputs,
     if (status == STATUS_OK)
         status = score_objects(&e, v, err);
     if (status == STATUS_OK) {
-        segments_from_object_id(&e.objects, &e.scene.mesh);
-        views_init(&e.views, &e.scene, &e.objects, e.recovered.world.accel, pool);
+        seen_init(&e.seen, &e.scene, e.recovered.world.accel, e.emits, pool);
         status = score_views(&e, v, err);
-        views_release(&e.views);
-        segments_release(&e.objects);
+        seen_release(&e.seen);
     }
     recovered_release(&e.recovered);
 out:

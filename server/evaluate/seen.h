@@ -1,9 +1,12 @@
 /* seen.h -- which pixels of a test view show surface that some training view sees.
  *
  * A view sees a point when it projects into the picture, nothing lies between, and none of the
- * four pixels that a look-up there reads straddles a depth edge or two objects (views.h): what
- * such a pixel shows belongs to no surface, and surface that shows in no other is not measured.
- * From which side the surface is seen does not matter. */
+ * four pixels that a look-up there reads straddles an edge: its four corners meet one object, and
+ * no depth edge of it. What a pixel on an edge shows belongs to no surface, and surface that shows
+ * in no other pixel is not measured. From which side it is seen does not matter.
+ *
+ * On purpose this shares nothing with how the reconstruction chooses what it trusts (views.h): a
+ * measure stays as it is when the method changes. */
 #ifndef UNBAKE_EVALUATE_SEEN_H
 #define UNBAKE_EVALUATE_SEEN_H
 
@@ -12,14 +15,24 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
-#include "server/reconstruct/views.h"
+#include "server/render/accel.h"
+#include "server/scene/scene.h"
 
 #define SEEN_SAMPLES 16 /* jittered rays per pixel */
 
 struct seen {
-    const struct views *views; /* by the objects of the truth */
+    const struct scene *scene; /* borrowed, all three */
+    const struct accel *accel;
     const bool *emits;         /* [triangle_count] of the truth */
+    size_t train_count;
+    uint32_t *train;           /* [train_count] photographs; owned */
+    uint8_t **straddles;       /* [train_count][height * width] 1: the pixel lies on an edge; owned */
 };
+
+/* The mesh of the scene has object_id. */
+void seen_init(struct seen *seen, const struct scene *scene, const struct accel *accel,
+               const bool *emits, struct parallel *pool);
+void seen_release(struct seen *seen);
 
 /* flags[height * width] out: SCORE_PLAIN, SCORE_SEEN (score.h) of each pixel's samples. */
 void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool,

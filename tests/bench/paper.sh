@@ -39,11 +39,14 @@ demo_room() { # WALL CEILING
         echo "$made" >"$room.made"
 }
 
-# As lib.sh has it, with this form's size, samples and time; later settings win.
+# As lib.sh has it, with this form's size, samples and time where none are given.
 run() { # ROOM OUT [name=value ...]
-    local from=$1 to=$2
+    local from=$1 to=$2 default
     shift 2
-    reconstruct "$from" "$to" "texture_size=$size" "report_samples=$samples" "time_limit_sec=$seconds" "$@"
+    for default in "texture_size=$size" "report_samples=$samples" "time_limit_sec=$seconds"; do
+        [[ " $* " == *" ${default%%=*}="* ]] || set -- "$@" "$default"
+    done
+    reconstruct "$from" "$to" "$@"
 }
 
 # MSRE of the held-out views as the reconstruction itself reports it, on the mesh that it was given.
@@ -178,22 +181,24 @@ speed() {
         "$(quotient "$(working_sec "$out-default")" "$took")" 0.1 lower
 }
 
-# What each part is worth: the default without it, in the same time.
+# What each part is worth: the default without it, in the same time. Lines of settings that this
+# version does not have are passed over.
 ablations() {
-    local what change out
+    local what changes change out known
     other_room || return
-    while IFS=, read -r what change; do
-        if [ -n "$change" ] && ! has_setting "${change%%=*}"; then
-            continue
-        fi
-        out=$dir/ablation-${change:-none}
+    while IFS=, read -r what changes; do
+        known=1
+        for change in $changes; do
+            has_setting "${change%%=*}" || known=
+        done
+        [ -n "$known" ] || continue
+        out=$dir/ablation-${what// /-}
         # shellcheck disable=SC2086
-        run "$room" "$out" report_samples=1 $change || continue
-        evaluate "$room" "$out" --spp "$samples"
+        run "$room" "$out" report_samples=1 $changes && evaluate "$room" "$out" --spp "$samples"
         row "ablation, $what: base colour PSNR, dB" "$(figure "$out" base_color_psnr_db)" - higher
         row "ablation, $what: MSRE" "$(figure "$out" msre)" - lower
     done <<<"nothing left out,
-the published steps,guided=false
+the published method,method=listing1 guided=false
 no coarse levels,coarse_levels=0
 exposures and gains as given,calibrate=false
 one photograph a visit,cameras_per_texel=1
