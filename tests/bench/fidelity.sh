@@ -61,6 +61,7 @@ measure() { # ROOM KIND
     row "emission, intersection over union" "$(value emission_iou)" "$overlap" higher
     row "emission, log error" "$(value emission_log_error)" "$log_error" lower
     row "MSRE of held-out views" "$(value msre)" "$msre" lower
+    row "time of all stages but the report, minutes" "$(quotient "$(working_sec "$dir/out")" 60)" - lower
 }
 
 for room in ${FIDELITY_ROOMS:-staircase2 bathroom}; do

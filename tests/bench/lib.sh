@@ -15,7 +15,7 @@ reconstruct() {
 
 # working_sec OUT: seconds of all stages but the report.
 working_sec() {
-    jq '[.stages[] | select(.name != "report") | .seconds] | add' "$1/report.json"
+    jq '[.stages[] | select(.name != "report") | .seconds] | add' "$1/report.json" 2>/dev/null || echo null
 }
 
 # evaluate ROOM OUT [option ...]: compares with the truth, into OUT.evaluation.json.

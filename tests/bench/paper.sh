@@ -155,7 +155,7 @@ other_room() {
 }
 
 has_setting() { # NAME
-    "$build/unbake" settings "$1" >/dev/null 2>&1
+    "$build/unbake" settings "$1" -q --retry 0 --server http://127.0.0.1:1 >/dev/null 2>&1
 }
 
 # The time in which the default method comes to the base colour that the published one has at last.
