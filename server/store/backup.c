@@ -6,7 +6,7 @@
 #include "common/file.h"
 #include "server/store/internal.h"
 
-#define PAGES_AT_ONCE 256
+#define PAGES_AT_ONCE 1024
 
 /* SQLite's word for it is enough: the copy is a file of its own, and nothing else is touched. */
 static enum status failed(sqlite3 *to, const char *path, struct error *err) {
