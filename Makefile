@@ -31,7 +31,7 @@ CLIENT_COMMON_SRC = $(filter-out common/image.c common/exr.c common/png.c common
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
-EMBEDDED = server/http/openapi.json
+EMBEDDED = server/http/openapi.json server/web/index.html server/web/page.css server/web/page.js
 CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
 TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c tests/chaos/*.c \
                       tests/soak/*.c)

@@ -7,4 +7,8 @@
 extern const unsigned char embedded_openapi_json[];
 extern const size_t embedded_openapi_json_size; /* bytes; not NUL-terminated */
 
+/* The web page: server/web/. */
+extern const unsigned char embedded_index_html[], embedded_page_css[], embedded_page_js[];
+extern const size_t embedded_index_html_size, embedded_page_css_size, embedded_page_js_size;
+
 #endif

@@ -7,6 +7,8 @@
 
 /* system.c */
 struct response *system_root(struct api *api, struct request *r);
+struct response *system_page_css(struct api *api, struct request *r);
+struct response *system_page_js(struct api *api, struct request *r);
 struct response *system_healthz(struct api *api, struct request *r);
 struct response *system_readyz(struct api *api, struct request *r);
 struct response *system_metrics(struct api *api, struct request *r);

@@ -122,6 +122,8 @@ static struct response *send_file(struct api *api, const struct request *r, int 
         reply->fd = fd;
         reply->length = size;
         response_field(reply, "Content-Type", "%s", content_type);
+        /* A worker wrote it, from what a stranger uploaded: in a browser it must not act as its reader. */
+        response_field(reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
         response_field(reply, "Repr-Digest", "%s", digest);
         apply_range(r, etag, size, &reply);
     }

@@ -15,6 +15,8 @@
 
 static const struct route table[] = {
     {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, false, ""},
+    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, false, ""},
+    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, false, ""},
     {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, false, ""},
     {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, true, ""},
     {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, false, ""},

@@ -8,12 +8,43 @@
 #include "common/settings.h"
 #include "server/http/embedded.h"
 #include "server/http/events.h"
+#include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
 
-struct response *system_root(struct api *api, struct request *r) {
+/* --- the web page -------------------------------------------------------------------------- */
+
+/* A file of the page: it runs what comes from here and nothing else, and nobody frames it. */
+static struct response *page_part(const char *content_type, const void *text, size_t length) {
+    struct response *reply = response_static(content_type, text, length);
+    response_field(reply, "Content-Security-Policy",
+                   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:;"
+                   " connect-src 'self'; form-action 'self'; frame-ancestors 'none'; base-uri 'none'");
+    response_field(reply, "Referrer-Policy", "no-referrer");
+    response_field(reply, "Cache-Control", "no-cache");
+    return reply;
+}
+
+struct response *system_page_css(struct api *api, struct request *r) {
     (void)api, (void)r;
+    return page_part("text/css; charset=utf-8", embedded_page_css, embedded_page_css_size);
+}
+
+struct response *system_page_js(struct api *api, struct request *r) {
+    (void)api, (void)r;
+    return page_part("text/javascript; charset=utf-8", embedded_page_js, embedded_page_js_size);
+}
+
+/* A page for browsers, which name text/html; links for all others. */
+struct response *system_root(struct api *api, struct request *r) {
+    (void)api;
+    const char *accept = request_field(r, "Accept");
+    if (accept && field_accepts(accept, "text/html")) {
+        struct response *page = page_part("text/html; charset=utf-8", embedded_index_html, embedded_index_html_size);
+        response_field(page, "Vary", "Accept");
+        return page;
+    }
     static const char *const links[][2] = {
         {"openapi", "/openapi.json"}, {"version", "/v1/version"}, {"settings", "/v1/settings"},
         {"scenes", "/v1/scenes"},     {"uploads", "/v1/uploads"}, {"jobs", "/v1/jobs"},
@@ -25,8 +56,12 @@ struct response *system_root(struct api *api, struct request *r) {
     cJSON *object = cJSON_AddObjectToObject(value, "links");
     for (size_t i = 0; i < sizeof links / sizeof *links; i++)
         json_add_string(object, links[i][0], links[i][1]);
-    return response_json(200, value);
+    struct response *reply = response_json(200, value);
+    response_field(reply, "Vary", "Accept");
+    return reply;
 }
+
+/* --- health and descriptions --------------------------------------------------------------- */
 
 static struct response *status_reply(const char *word) {
     cJSON *value = cJSON_CreateObject();

@@ -115,6 +115,7 @@ static void check_serving(struct rig *rig) {
     check_field(&reply, "ETag", etag);
     check_field(&reply, "Content-Type", "image/x-exr");
     check_field(&reply, "Accept-Ranges", "bytes");
+    check_field(&reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
     check_field(&reply, "Repr-Digest", "sha-256=:hNiYd/DUBB77a/kaFvAkjy/Vc+avBcGflr7bn4gveII=:");
     buf_release(&reply);
     static const char *const same[] = {"outputs/preview/b_c.png", "outputs/preview%2Fb_c.png",

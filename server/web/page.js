@@ -1,0 +1,308 @@
+// page.js -- the web page: the jobs of a server as they go on, and one of them closely.
+//
+// What comes from the server is put into the page as text, never as markup. The token is in a
+// cookie that this script cannot read; every request simply carries it.
+
+const $ = (id) => document.getElementById(id);
+const TERMINAL = ["succeeded", "failed", "cancelled"];
+const ACTIONS = {
+  queued: ["pause", "cancel"], running: ["pause", "cancel"], paused: ["resume", "cancel"],
+  failed: ["retry"], cancelled: ["retry"], succeeded: [],
+};
+
+let me = null;          // {user, role, open}
+let jobs = new Map();   // by number, newest first when shown
+let chosen = null;      // the number of the job that is looked at closely
+let stream = null;      // events of all jobs
+let curve = new Map();  // loss by iteration, of the chosen job
+
+async function ask(path, options = {}) {
+  const reply = await fetch(path, options);
+  if (reply.status === 401) {
+    showSignIn();
+    throw new Error("a token is needed");
+  }
+  if (!reply.ok) {
+    const problem = await reply.json().catch(() => ({}));
+    const params = (problem.invalid_params ?? []).map((p) => `${p.name} ${p.reason}`).join("; ");
+    throw new Error([problem.detail ?? `${path}: ${reply.status}`, params, problem.hint].filter(Boolean).join(". "));
+  }
+  return reply;
+}
+const get = async (path) => (await ask(path)).json();
+const post = (path, body) => ask(path, {
+  method: "POST",
+  headers: body === undefined ? {} : { "Content-Type": "application/json" },
+  body: body === undefined ? undefined : JSON.stringify(body),
+});
+
+function element(name, text, attributes = {}) {
+  const made = document.createElement(name);
+  if (text !== null) made.textContent = text;
+  return Object.assign(made, attributes);
+}
+
+const bytes = (n) => n < 1024 ? `${n} B` : n < 2 ** 20 ? `${(n / 1024).toFixed(0)} KiB` : `${(n / 2 ** 20).toFixed(1)} MiB`;
+const duration = (s) => s < 90 ? `${Math.round(s)} s` : s < 5400 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
+
+// --- signing in -----------------------------------------------------------------------------
+
+function showSignIn() {
+  stream?.close();
+  stream = null;
+  $("work").hidden = true;
+  $("sign-in").hidden = false;
+  $("sign-out").hidden = true;
+  $("who").textContent = "";
+  $("token").focus();
+}
+
+$("sign-in").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const reply = await fetch("v1/session", {
+    method: "POST", headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ token: $("token").value.trim() }),
+  });
+  $("sign-in-problem").textContent = reply.ok ? "" : (await reply.json()).detail;
+  $("token").value = "";
+  if (reply.ok) start();
+});
+
+$("sign-out").addEventListener("click", async () => {
+  await fetch("v1/session", { method: "DELETE" });
+  jobs.clear();
+  choose(null);
+  start();
+});
+
+// --- all jobs -------------------------------------------------------------------------------
+
+function showJobs() {
+  const rows = [...jobs.values()].sort((a, b) => b.id - a.id).map((job) => {
+    const row = element("tr", null, { className: job.id === chosen ? "chosen" : "" });
+    const link = element("button", job.id, { onclick: () => choose(job.id) });
+    const number = element("td", null);
+    number.append(link);
+    const bar = element("td", null);
+    if (job.state === "running") bar.append(element("progress", null, { max: 1, value: job.progress }));
+    row.append(number, element("td", job.state), bar, element("td", job.name), element("td", job.owner ?? ""));
+    return row;
+  });
+  $("jobs").replaceChildren(...rows);
+  $("no-jobs").hidden = rows.length > 0;
+}
+
+// One request for a job however many events about it come at once.
+const asked = new Set();
+function refresh(id) {
+  if (asked.has(id)) return;
+  asked.add(id);
+  setTimeout(async () => {
+    asked.delete(id);
+    try {
+      jobs.set(id, await get(`v1/jobs/${id}`));
+    } catch {
+      jobs.delete(id); // gone, or no longer shared
+    }
+    showJobs();
+    if (id === chosen) showJob();
+  }, 200);
+}
+
+function follow() {
+  stream?.close();
+  stream = new EventSource("v1/events");
+  for (const type of ["state", "progress"])
+    stream.addEventListener(type, (event) => refresh(JSON.parse(event.data).job));
+  stream.addEventListener("metric", (event) => {
+    const data = JSON.parse(event.data);
+    if (data.job === chosen && data.series === "loss") addToCurve(data);
+  });
+  for (const type of ["preview", "output"])
+    stream.addEventListener(type, (event) => {
+      if (JSON.parse(event.data).job === chosen) showOutputs();
+    });
+  stream.addEventListener("resync", loadJobs);
+  stream.onerror = () => get("v1/session").catch(() => {}); // signed out, or revoked?
+}
+
+async function loadJobs() {
+  const page = await get("v1/jobs?limit=100");
+  jobs = new Map(page.items.map((job) => [job.id, job]));
+  showJobs();
+}
+
+// --- one job --------------------------------------------------------------------------------
+
+async function choose(id) {
+  chosen = id;
+  curve = new Map();
+  $("job").hidden = id === null;
+  showJobs();
+  if (id === null) return;
+  $("pictures").replaceChildren();
+  $("curve-figure").hidden = true;
+  showJob();
+  showOutputs();
+  showLog();
+  const past = await ask(`v1/jobs/${id}/events?after=0&follow=0`, { headers: { Accept: "application/x-ndjson" } });
+  if (past.status !== 200) return;
+  for (const line of (await past.text()).split("\n").filter(Boolean)) {
+    const { event, data } = JSON.parse(line);
+    if (event === "metric" && data.series === "loss" && id === chosen) curve.set(data.step, data.value);
+  }
+  drawCurve();
+}
+
+function showJob() {
+  const job = jobs.get(chosen);
+  if (!job) return choose(null);
+  $("job-name").textContent = `${job.id}: ${job.name}`;
+  $("job-state").textContent = job.state + (job.wanted === "run" || TERMINAL.includes(job.state) ? "" : `, to ${job.wanted}`);
+  $("job-stage").textContent = job.state !== "running" ? "" :
+    [job.stage, job.eta_sec !== null ? `${duration(job.eta_sec)} left` : ""].filter(Boolean).join(", ");
+  $("job-progress").value = job.state === "succeeded" ? 1 : job.progress;
+  $("job-reason").textContent = [job.reason, job.hint].filter(Boolean).join(". ");
+  const mine = me.role === "admin" || (me.role === "user" && job.owner === me.user);
+  const buttons = (mine ? ACTIONS[job.state] ?? [] : []).map((action) =>
+    element("button", action, { onclick: () => act(`v1/jobs/${job.id}/${action}`) }));
+  if (mine && !me.open)
+    buttons.push(element("button", job.shared ? "unshare" : "share", { onclick: () => share(job) }));
+  $("actions").replaceChildren(...buttons.flatMap((b) => [b, " "]));
+}
+
+async function act(path) {
+  try {
+    await post(path);
+  } catch (problem) {
+    $("job-reason").textContent = problem.message;
+  }
+  refresh(chosen);
+}
+
+async function share(job) {
+  await ask(`v1/jobs/${job.id}`, {
+    method: "PATCH", headers: { "Content-Type": "application/json", "If-Match": "*" },
+    body: JSON.stringify({ shared: !job.shared }),
+  }).catch((problem) => { $("job-reason").textContent = problem.message; });
+  refresh(job.id);
+}
+
+function addToCurve({ step, value }) {
+  curve.set(step, value);
+  drawCurve();
+}
+
+// Logarithmic in the loss; a thousand points are plenty for 400 pixels.
+function drawCurve() {
+  const points = [...curve].filter(([, value]) => value > 0).sort((a, b) => a[0] - b[0]);
+  $("curve-figure").hidden = points.length < 2;
+  if (points.length < 2) return;
+  const every = Math.ceil(points.length / 1000);
+  const shown = points.filter((_, i) => i % every === 0 || i === points.length - 1);
+  const logs = shown.map(([, value]) => Math.log(value));
+  const low = Math.min(...logs), high = Math.max(...logs), last = shown.at(-1)[0] || 1;
+  const path = shown.map(([step], i) =>
+    `${i ? "L" : "M"}${(400 * step / last).toFixed(1)} ${(115 - 110 * (logs[i] - low) / (high - low || 1)).toFixed(1)}`);
+  const drawn = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  drawn.setAttribute("d", path.join(""));
+  $("curve").replaceChildren(drawn);
+  $("curve-caption").textContent = `loss ${points.at(-1)[1].toPrecision(3)} at iteration ${points.at(-1)[0]}`;
+}
+
+// By fetch, since an image whose URL stays the same is not loaded again when its content changes.
+async function load(image, path) {
+  const reply = await ask(path).catch(() => null); // it may be replaced just now: the next event tells
+  if (!reply) return;
+  URL.revokeObjectURL(image.src);
+  image.src = URL.createObjectURL(await reply.blob());
+}
+
+async function showOutputs() {
+  const id = chosen;
+  const { items } = await get(`v1/jobs/${id}/outputs`);
+  if (id !== chosen) return;
+  const pictures = items.filter((o) => o.content_type === "image/png");
+  for (const output of pictures) { // changed in place: no flicker
+    let figure = $("pictures").querySelector(`[data-name="${CSS.escape(output.name)}"]`);
+    if (!figure) {
+      figure = element("figure", null);
+      figure.dataset.name = output.name;
+      figure.append(element("img", null, { alt: output.name }),
+                    element("figcaption", output.name.replace(/^preview\//, "")));
+      $("pictures").append(figure);
+    }
+    if (figure.dataset.sha256 !== output.sha256) {
+      figure.dataset.sha256 = output.sha256;
+      load(figure.firstChild, output.href.slice(1));
+    }
+  }
+  $("files").replaceChildren(...items.map((output) => {
+    const row = element("tr", null), cell = element("td", null);
+    cell.append(element("a", output.name, { href: output.href.slice(1) }));
+    row.append(cell, element("td", bytes(output.bytes)));
+    return row;
+  }));
+}
+
+async function showLog() {
+  if (chosen === null || !$("log-details").open) return;
+  $("log").textContent = await (await ask(`v1/jobs/${chosen}/log?bytes=65536`)).text();
+}
+$("log-details").addEventListener("toggle", showLog);
+
+// --- submitting -----------------------------------------------------------------------------
+
+// XMLHttpRequest, since fetch does not tell how much has been sent.
+function send(file) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    const name = file.name.replace(/\.(zip|tar|tar\.gz|tgz|tar\.zst)$/, "").slice(0, 100) || "room";
+    request.open("POST", `v1/scenes?name=${encodeURIComponent(name)}`);
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    request.upload.onprogress = (event) => { $("sent").value = event.loaded / event.total; };
+    request.onerror = () => reject(new Error("the connection broke off"));
+    request.onload = () => {
+      let body = {};
+      try { body = JSON.parse(request.responseText); } catch { /* told by its status */ }
+      if (request.status < 300) resolve(body);
+      else reject(new Error(body.detail ?? `the server answered ${request.status}`));
+    };
+    request.send(file);
+  });
+}
+
+$("submit").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const button = event.submitter;
+  button.disabled = true;
+  $("sent").hidden = false;
+  $("submit-problem").textContent = "";
+  try {
+    const scene = await send($("archive").files[0]);
+    const job = await (await post("v1/jobs", { scene: scene.id, settings: { time_limit_sec: 60 * $("minutes").valueAsNumber } })).json();
+    jobs.set(job.id, job);
+    $("archive").value = "";
+    choose(job.id);
+  } catch (problem) {
+    $("submit-problem").textContent = problem.message;
+  }
+  $("sent").hidden = true;
+  button.disabled = false;
+});
+
+// --- start ----------------------------------------------------------------------------------
+
+async function start() {
+  me = await get("v1/session").catch(() => null);
+  if (!me) return;
+  $("sign-in").hidden = true;
+  $("work").hidden = false;
+  $("sign-out").hidden = me.open;
+  $("submit").hidden = me.role === "viewer";
+  $("who").textContent = me.user ? `${me.user} (${me.role})` : "open to everybody who reaches it";
+  await loadJobs();
+  follow();
+}
+
+start();
