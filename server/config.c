@@ -66,9 +66,9 @@ static const struct option table[] = {
     INT(max_connections, "connections", 8, 100000, "1000", "Open HTTP connections; more have to wait."),
     INT(max_streams, "streams", 1, 100000, "500", "Open event streams; more are refused with 503."),
     REAL(head_timeout_sec, "s", 1, 600, "10", "Time for the whole head of a request to arrive."),
-    REAL(idle_timeout_sec, "s", 1, 3600, "30", "Silence after which a connection is closed."),
+    REAL(idle_timeout_sec, "s", 1, 3600, "30", "Silence after which a connection is closed; time for a whole body that is no upload."),
     INT(body_min_bytes_per_sec, "bytes/s", 0, 1073741824, "1024",
-        "A body that arrives more slowly over idle_timeout_sec is cut off. 0: any speed will do."),
+        "A body or a reply that moves more slowly over idle_timeout_sec is cut off. 0: any speed will do."),
     REAL(keepalive_sec, "s", 1, 300, "15", "Longest silence in an event stream."),
 };
 #define TABLE_COUNT (sizeof table / sizeof *table)

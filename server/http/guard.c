@@ -1,8 +1,13 @@
 /* guard.c -- see guard.h. */
 #include "server/http/guard.h"
 
+#include <linux/sockios.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
 #include <pthread.h>
 #include <stdbool.h>
+#include <stddef.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <time.h>
 
@@ -12,8 +17,10 @@
 struct guarded {
     int fd;
     enum guard_phase phase;
-    double since_sec;       /* start of the phase, or of the window in GUARD_BODY */
-    uint64_t window_bytes;  /* arrived in the window */
+    double phase_sec;       /* start of the phase */
+    double since_sec;       /* start of the window */
+    uint64_t window_bytes;  /* arrived in the window; in GUARD_REPLY: taken before it */
+    bool has_backlog;       /* GUARD_REPLY: there is a window */
     bool is_shut;
     struct guarded *next, *previous;
 };
@@ -31,12 +38,42 @@ struct guard {
     pthread_t thread;
 };
 
+/* How many bytes the other side has taken in all; false when none wait for it, or it is no TCP. */
+static bool look_at_backlog(int fd, uint64_t *taken) {
+    struct tcp_info info = {0};
+    socklen_t size = sizeof info;
+    int waiting = 0;
+    if (ioctl(fd, SIOCOUTQ, &waiting) != 0 || waiting == 0 ||
+        getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 ||
+        size < offsetof(struct tcp_info, tcpi_bytes_acked) + sizeof info.tcpi_bytes_acked)
+        return false;
+    *taken = info.tcpi_bytes_acked;
+    return true;
+}
+
+static bool reader_is_late(const struct guard *g, struct guarded *c, double now_sec) {
+    uint64_t taken;
+    bool had_backlog = c->has_backlog;
+    c->has_backlog = look_at_backlog(c->fd, &taken);
+    if (!c->has_backlog || (had_backlog && now_sec - c->since_sec < g->limits.window_sec))
+        return false;
+    double age = now_sec - c->since_sec;
+    bool late = had_backlog && (double)(taken - c->window_bytes) < g->limits.body_bytes_per_sec * age;
+    c->since_sec = now_sec;
+    c->window_bytes = taken;
+    return late;
+}
+
 static bool is_late(const struct guard *g, struct guarded *c, double now_sec) {
     double age = now_sec - c->since_sec;
     switch (c->phase) {
     case GUARD_HEAD: return age > g->limits.head_sec;
     case GUARD_IDLE: return age > g->limits.idle_sec + g->limits.head_sec;
-    case GUARD_REPLY: return false;
+    case GUARD_REPLY: return reader_is_late(g, c, now_sec);
+    case GUARD_SHORT_BODY:
+        if (now_sec - c->phase_sec > g->limits.idle_sec)
+            return true;
+        break;
     case GUARD_BODY: break;
     }
     if (age < g->limits.window_sec)
@@ -150,8 +187,9 @@ void guard_remove(struct guard *g, struct guarded *c) {
 void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase) {
     pthread_mutex_lock(&g->mutex);
     c->phase = phase;
-    c->since_sec = clock_sec();
+    c->phase_sec = c->since_sec = clock_sec();
     c->window_bytes = 0;
+    c->has_backlog = false;
     pthread_mutex_unlock(&g->mutex);
 }
 

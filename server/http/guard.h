@@ -5,7 +5,10 @@
  *                    └────────────────^          could not be seen: IDLE covers both)
  *
  * 1. HEAD: the whole head within head_sec. IDLE: within idle_sec + head_sec of the last reply.
- *    BODY: at least body_bytes_per_sec, over each window of window_sec. REPLY: no deadline here.
+ *    BODY: at least body_bytes_per_sec, over each window of window_sec, so that a body of known
+ *    length has a deadline; SHORT_BODY, which no upload is: that, and the whole within idle_sec.
+ *    REPLY: while there are bytes that the other side has not taken, it must take body_bytes_per_sec
+ *    over each window. What we take for the reply itself is not its fault.
  * 2. A late connection's socket is shut down under the mutex that guard_remove takes too, so
  *    never one that was closed and given to somebody else. */
 #ifndef UNBAKE_HTTP_GUARD_H
@@ -21,7 +24,7 @@ struct guard_limits {
     double body_bytes_per_sec;
 };
 
-enum guard_phase { GUARD_HEAD, GUARD_BODY, GUARD_REPLY, GUARD_IDLE };
+enum guard_phase { GUARD_HEAD, GUARD_BODY, GUARD_SHORT_BODY, GUARD_REPLY, GUARD_IDLE };
 
 struct guard;   /* opaque; thread-safe */
 struct guarded; /* one connection; opaque */

@@ -311,7 +311,7 @@ static struct response *begin(struct exchange *x, const char *method, const char
     if (refusal && r->has_body)
         refusal->must_close = true; /* nobody will read the body */
     if (!refusal && r->has_body)
-        guard_enter(l->guard, x->guarded, GUARD_BODY);
+        guard_enter(l->guard, x->guarded, r->upload || r->patch ? GUARD_BODY : GUARD_SHORT_BODY);
     return refusal;
 }
 
