@@ -84,11 +84,18 @@ static bool is_late(const struct guard *g, struct guarded *c, double now_sec) {
     return late;
 }
 
+void guard_forsake(struct guarded *c) {
+    struct linger none = {.l_onoff = 1};
+    setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
+}
+
 void guard_look(struct guard *g, double now_sec) {
     pthread_mutex_lock(&g->mutex);
     for (struct guarded *c = g->first; c; c = c->next) {
         if (c->is_shut || !is_late(g, c, now_sec))
             continue;
+        if (c->phase == GUARD_REPLY)
+            guard_forsake(c);
         c->is_shut = true;
         g->shut_count++;
         shutdown(c->fd, SHUT_RDWR);

@@ -409,6 +409,8 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     response_free(x->reply); /* closes the stream: after this nobody wakes x */
     if (was_stream)
         count_stream(l, -1);
+    if (code == MHD_REQUEST_TERMINATED_TIMEOUT_REACHED)
+        guard_forsake(x->guarded);
     guard_enter(l->guard, x->guarded, GUARD_IDLE);
     request_release(&x->request);
     mem_free(x);
