@@ -44,6 +44,11 @@ int scenes_run(struct client *c, const struct options *o);
 /* Prints a rejected scene's problems, each with its file. */
 void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
 
+/* uploads.c */
+extern const struct option uploads_options[], collect_options[];
+int uploads_run(struct client *c, const struct options *o);
+int collect_run(struct client *c, const struct options *o);
+
 /* login.c */
 int login_run(struct client *c, const struct options *o);
 int logout_run(struct client *c, const struct options *o);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "client/commands.h"
+#include "client/keeping.h"
 #include "common/mem.h"
 
 const struct option edit_options[] = {
@@ -11,6 +12,7 @@ const struct option edit_options[] = {
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own; they replace all that were there"},
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
     {"unshare", 0, OPTION_FLAG, NULL, "no longer"},
+    KEEPING_OPTIONS,
     {"first", 0, OPTION_FLAG, NULL, "before all waiting jobs of its priority"},
     {"last", 0, OPTION_FLAG, NULL, "after all of them"},
     {"before", 0, OPTION_TEXT, "JOB", "before that job, and with its priority"},
@@ -80,6 +82,8 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
             labels = cJSON_AddObjectToObject(body, "labels");
         status = label_add(labels, o->given[i].text, err);
     }
+    if (status == STATUS_OK)
+        status = keeping_describe(o, body, err);
     if (status == STATUS_OK)
         status = describe_order(c, o, body, reply, err);
     if (status == STATUS_OK && !body->child) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "client/commands.h"
+#include "client/keeping.h"
 #include "common/nearest.h"
 #include "client/table.h"
 #include "client/view.h"
@@ -47,12 +48,13 @@ static double percent_done(const cJSON *job) {
 }
 
 static void print_jobs(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", "name"};
+    static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", ">expires",
+                                           "name"};
     struct table t;
     const cJSON *job;
-    table_init(&t, 7, headings);
+    table_init(&t, 8, headings);
     cJSON_ArrayForEach(job, items) {
-        char age[16];
+        char age[16], expires[16];
         const char *state = member_text(job, "state");
         bool running = strcmp(state, JOB_STATE_RUNNING) == 0;
         double eta = member_number(job, "eta_sec", -1.0);
@@ -68,7 +70,9 @@ static void print_jobs(struct client *c, const cJSON *items) {
         }
         format_duration(age, time_since(member_text(job, "created_at")));
         table_set(&t, 5, COLOUR_NONE, "%s", age);
-        table_set(&t, 6, COLOUR_NONE, "%s", member_text(job, "name"));
+        keeping_text(expires, job);
+        table_set(&t, 6, COLOUR_NONE, "%s", expires);
+        table_set(&t, 7, COLOUR_NONE, "%s", member_text(job, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);
@@ -185,6 +189,8 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     print_field(c, "created", member_text(job, "created_at"));
     print_field(c, "started", member_text(job, "started_at"));
     print_field(c, "finished", member_text(job, "finished_at"));
+    print_field(c, "expires", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "pinned"))
+                                  ? "never: pinned" : member_text(job, "expires_at"));
     print_outputs(c, outputs);
 }
 

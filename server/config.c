@@ -56,6 +56,8 @@ static const struct option table[] = {
     INT(max_upload_mib, "MiB", 1, 16777216, "65536", "Largest upload; a larger one is refused with 413."),
     INT(min_free_mib, "MiB", 0, 16777216, "1024",
          "Space of the disk that uploads leave free; below it they are refused with 507."),
+    INT(low_disk_mib, "MiB", 0, 16777216, "512",
+        "Free space of the disk below which jobs stop at a checkpoint and wait for more. 0: never."),
     REAL(upload_keep_hours, "h", 0.0001, 87600, "24",
          "Time after its last byte for which an unfinished upload can be resumed."),
     REAL(job_keep_days, "days", 0, 36500, "0",

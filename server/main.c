@@ -118,6 +118,7 @@ static enum status build(struct daemon *d, struct error *err) {
         .stop_grace_sec = c->stop_grace_sec,
         .event_keep_sec = 3600.0 * c->event_keep_hours,
         .checkpoint_keep_sec = 3600.0 * c->checkpoint_keep_hours,
+        .low_disk_bytes = (uint64_t)c->low_disk_mib << 20,
         .sandbox = c->sandbox,
     };
     struct api_config limits = {

@@ -79,10 +79,12 @@ struct response *system_readyz(struct api *api, struct request *r) {
     if (store_probe(api->store, &err) != STATUS_OK)
         return problem_full(r, 503, err.message, err.hint, NULL);
     struct response *full = api_check_room(api, r, 0);
-    if (!full)
+    bool waits = scheduler_waits_for_disk(api->scheduler);
+    if (!full && !waits)
         return status_reply("ready");
     response_free(full);
-    return problem_full(r, 503, "the disk of the data folder is nearly full",
+    return problem_full(r, 503, waits ? "the disk of the data folder is nearly full: jobs wait"
+                                      : "the disk of the data folder is nearly full",
                         "delete jobs or scenes that nobody needs", NULL);
 }
 

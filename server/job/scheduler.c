@@ -21,6 +21,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
+#include "server/job/disk.h"
 #include "server/job/housekeeping.h"
 
 #define HOUSEKEEPING_SEC 600.0
@@ -38,6 +39,8 @@ struct scheduler {
     struct attempt *slot; /* [slot_count] */
     bool must_retry;      /* something failed that may work later */
     double housekeeping_at; /* as clock_sec */
+    struct disk_watch disk;
+    atomic_bool waits_for_disk; /* disk.is_low, for other threads */
     struct pollfd *poll;  /* [1 + 2 * slot_count] */
 };
 
@@ -51,6 +54,7 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     s->config = *config;
     s->store = store;
     s->wake_fd = fd;
+    disk_init(&s->disk, config->low_disk_bytes);
     if (s->config.thread_count <= 0) {
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
@@ -87,6 +91,10 @@ int scheduler_running(const struct scheduler *s) {
     return atomic_load(&s->running);
 }
 
+bool scheduler_waits_for_disk(const struct scheduler *s) {
+    return atomic_load(&s->waits_for_disk);
+}
+
 /* Something failed that is not the job's fault: say so once per round and try again. */
 static void retry_later(struct scheduler *s, const char *what, const struct error *err) {
     if (!s->must_retry)
@@ -117,6 +125,8 @@ static void charge_all(struct scheduler *s) {
 }
 
 static void start_jobs(struct scheduler *s) {
+    if (s->disk.is_low)
+        return;
     for (size_t i = 0; i + 1 < s->slot_count; i++) {
         struct error err;
         /* A job that came to nothing has left the queue: look at the next one. */
@@ -211,9 +221,32 @@ static void follow_wishes(struct scheduler *s) {
     mem_free(ids);
 }
 
+static bool any_alive(const struct scheduler *s) {
+    for (size_t i = 0; i < s->slot_count; i++)
+        if (s->slot[i].phase == ATTEMPT_ALIVE)
+            return true;
+    return false;
+}
+
+/* While the disk is nearly full, jobs are stopped at a checkpoint, and those that wait say why. */
+static void watch_disk(struct scheduler *s) {
+    struct error err;
+    bool changed = disk_look(&s->disk, s->config.data_dir);
+    atomic_store(&s->waits_for_disk, s->disk.is_low);
+    if (!changed && !s->disk.is_low)
+        return;
+    for (size_t i = 0; s->disk.is_low && i + 1 < s->slot_count; i++)
+        ask_to_stop(s, &s->slot[i]);
+    if (store_job_explain(s->store, s->disk.is_low ? s->disk.reason : "", DISK_REASON,
+                          s->disk.is_low ? DISK_HINT : "", &err) != STATUS_OK)
+        retry_later(s, "cannot say why jobs wait", &err);
+}
+
 /* Kills whose time is up; returns how long poll may sleep, in ms. */
 static int keep_deadlines(struct scheduler *s) {
     double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
+    if (any_alive(s) || s->disk.is_low)
+        sleep = fmin(sleep, fmax(s->disk.looked_at + DISK_LOOK_SEC - now, 0.01));
     if (!atomic_load(&s->stopping))
         sleep = fmin(sleep, fmax(s->housekeeping_at - now, 0.0));
     for (size_t i = 0; i < s->slot_count; i++) {
@@ -264,13 +297,6 @@ static void listen_and_settle(struct scheduler *s) {
     atomic_store(&s->running, running);
 }
 
-static bool any_alive(const struct scheduler *s) {
-    for (size_t i = 0; i < s->slot_count; i++)
-        if (s->slot[i].phase == ATTEMPT_ALIVE)
-            return true;
-    return false;
-}
-
 static void keep_house(struct scheduler *s) {
     if (clock_sec() < s->housekeeping_at)
         return;
@@ -295,6 +321,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
             if (!any_alive(s))
                 break;
         } else {
+            watch_disk(s);
             start_check(s);
             start_jobs(s);
             keep_house(s);

@@ -22,6 +22,7 @@ struct scheduler_config {
     double stop_grace_sec;          /* SIGTERM to SIGKILL */
     double checkpoint_keep_sec;     /* of a job that has succeeded */
     double event_keep_sec;          /* of a job that has ended */
+    uint64_t low_disk_bytes;        /* with less free space, work waits; 0: never */
     bool sandbox;
 };
 
@@ -35,6 +36,7 @@ void scheduler_free(struct scheduler *s);
 enum status scheduler_run(struct scheduler *s, struct error *err);
 void scheduler_wake(struct scheduler *s); /* from any thread: look at the store again */
 void scheduler_stop(struct scheduler *s); /* from any thread or a signal handler */
+bool scheduler_waits_for_disk(const struct scheduler *s); /* any thread */
 int scheduler_running(const struct scheduler *s); /* workers alive; any thread */
 /* How often it has looked at the store; any thread. After scheduler_wake it grows, or it hangs. */
 unsigned long scheduler_rounds(const struct scheduler *s);

@@ -171,6 +171,10 @@ enum status store_job_stop(struct store *store, int64_t id, int attempt, const c
 /* The attempt cannot go on until somebody acts (disk full): paused. */
 enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason,
                             const char *hint, struct error *err);
+/* Gives every queued job that reason, where it has another one; where `reason` is "", takes those
+ * away that begin with `prefix`. Each change is a state event. */
+enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
+                              const char *hint, struct error *err);
 /* At start: whatever claims to run is queued again (or paused, cancelled, as was wished). It does
  * not count as a failed attempt: the job is not at fault when the daemon or the machine dies. */
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);

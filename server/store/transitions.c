@@ -306,6 +306,37 @@ enum status store_job_block(struct store *store, int64_t id, int attempt, const 
     return finish(store, id, attempt, JOB_PAUSED, reason, hint, err);
 }
 
+enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
+                              const char *hint, struct error *err) {
+    for (;;) {
+        int64_t id;
+        struct present now;
+        store_lock(store);
+        enum status status =
+            sql_int(&store->sql, 0, &id, err,
+                    "SELECT id FROM jobs WHERE state = ?1 AND reason <> ?2"
+                    " AND (?2 <> '' OR substr(reason, 1, length(?3)) = ?3) LIMIT 1",
+                    "ntt", (int)JOB_QUEUED, reason, prefix);
+        store_unlock(store);
+        if (status != STATUS_OK || id == 0)
+            return status;
+        status = job_begin(store, id, &now, err);
+        if (status == STATUS_NOT_FOUND)
+            continue; /* its user was faster */
+        if (status != STATUS_OK)
+            return status;
+        if (now.state == JOB_QUEUED)
+            status = sql_run(&store->sql, err,
+                             "UPDATE jobs SET revision = revision + 1, reason = ?, hint = ? WHERE id = ?",
+                             "tti", reason, hint, id);
+        if (status == STATUS_OK && now.state == JOB_QUEUED)
+            status = append_state(store, &now, reason, hint, err);
+        status = store_end(store, status, id, err);
+        if (status != STATUS_OK)
+            return status;
+    }
+}
+
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err) {
     *requeued = 0;
     for (;;) {

@@ -1,0 +1,35 @@
+/* keeping.c -- see keeping.h. */
+#include "client/keeping.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+enum status keeping_describe(const struct options *o, cJSON *body, struct error *err) {
+    bool pin = options_flag(o, "pin"), unpin = options_flag(o, "unpin");
+    if (pin && unpin)
+        return error_set(err, STATUS_INPUT, "only one of --pin and --unpin can be so");
+    if (pin || unpin)
+        json_add_bool(body, "pinned", pin);
+    if (!options_text(o, "keep-days", NULL))
+        return STATUS_OK;
+    double days = options_seconds(o, "keep-days", 0.0);
+    if (days > 36500.0)
+        return error_set(err, STATUS_INPUT, "--keep-days takes at most 36500");
+    char text[32];
+    time_t at = time(NULL) + (time_t)(days * 86400.0);
+    struct tm utc;
+    gmtime_r(&at, &utc);
+    strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    json_add_string(body, "expires_at", days > 0.0 ? text : NULL);
+    return STATUS_OK;
+}
+
+void keeping_text(char out[16], const cJSON *thing) {
+    double at = time_parse(member_text(thing, "expires_at"));
+    out[0] = '\0';
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned")))
+        strcpy(out, "pinned");
+    else if (!isnan(at))
+        format_duration(out, fmax(at - (double)time(NULL), 0.0));
+}

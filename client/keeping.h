@@ -1,0 +1,19 @@
+/* keeping.h -- how long the server keeps things, as options and columns. */
+#ifndef UNBAKE_CLIENT_KEEPING_H
+#define UNBAKE_CLIENT_KEEPING_H
+
+#include "client/client.h"
+
+/* For tables of options. */
+#define KEEPING_OPTIONS                                                                        \
+    {"pin", 0, OPTION_FLAG, NULL, "keep it for good"},                                         \
+    {"unpin", 0, OPTION_FLAG, NULL, "no longer"},                                              \
+    {"keep-days", 0, OPTION_SECONDS, "N", "remove it N days from now; 0: as the server's rules say"}
+
+/* Adds what those options ask for to the body of a PATCH. */
+enum status keeping_describe(const struct options *o, cJSON *body, struct error *err);
+
+/* "pinned", the time that is left ("3d 4h"), or "" where a job, scene or upload is kept for ever. */
+void keeping_text(char out[16], const cJSON *thing);
+
+#endif

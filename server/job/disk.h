@@ -1,0 +1,28 @@
+/* disk.h -- whether the disk of the data folder is so full that work must wait.
+ *
+ *      enough ──(less than low_bytes free)──> low ──(a quarter more than that free)──> enough
+ */
+#ifndef UNBAKE_JOB_DISK_H
+#define UNBAKE_JOB_DISK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define DISK_LOOK_SEC 2.0
+
+struct disk_watch {
+    uint64_t low_bytes;  /* 0: never low */
+    bool is_low;
+    bool was_seen;       /* it was looked at once */
+    double looked_at;    /* as clock_sec */
+    char reason[128];    /* for jobs that wait; the same text as long as low_bytes is the same */
+};
+
+#define DISK_REASON "the disk is nearly full" /* how every such reason begins */
+#define DISK_HINT "It goes on by itself when there is room: delete jobs or scenes that nobody needs."
+
+void disk_init(struct disk_watch *w, uint64_t low_bytes);
+/* Looks at most every DISK_LOOK_SEC. True when is_low has changed, and the first time. */
+bool disk_look(struct disk_watch *w, const char *dir);
+
+#endif
