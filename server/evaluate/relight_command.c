@@ -53,7 +53,8 @@ static bool read_number(const char *option, const char *text, double low, double
     return false;
 }
 
-static bool read_word(const char *option, const char *text, const char *one, const char *other, bool *is_one) {
+static bool read_word(const char *option, const char *text, const char *one, const char *other,
+                      bool *is_one) {
     *is_one = strcmp(text, one) == 0;
     if (*is_one || strcmp(text, other) == 0)
         return true;

@@ -155,8 +155,8 @@ static enum status put_environment(struct export *e, struct error *err) {
     if (status == STATUS_OK)
         status = put_image(e, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
                            FORMAT_EXR_FLOAT,
-                           "photographs by direction, 0 where it was filled in, and the spread of what they show",
-                           err);
+                           "photographs by direction, 0 where it was filled in, and the spread of what "
+                           "they show", err);
     return status;
 }
 

@@ -244,6 +244,11 @@ static void spread_add(struct spread *s, const struct value value[3]) {
     s->square += x * x;
 }
 
+static float spread_of(const struct spread *s) {
+    double squares = s->count > 1.0 ? s->square - s->sum * s->sum / s->count : 0.0;
+    return squares > 0.0 ? (float)sqrt(squares / (s->count - 1.0)) : 0.0f;
+}
+
 static void gather_cell(struct gather *g, size_t column, size_t row, struct value *scratch) {
     struct environment *e = g->e;
     size_t count = 0, at = row * e->map.width + column;
@@ -268,9 +273,7 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct valu
         is_bound |= only_bound;
     }
     e->confidence.pixel[2 * at] = (float)count;
-    if (spread.count > 1.0)
-        e->confidence.pixel[2 * at + 1] =
-            (float)sqrt(fmax(0.0, (spread.square - spread.sum * spread.sum / spread.count) / (spread.count - 1.0)));
+    e->confidence.pixel[2 * at + 1] = spread_of(&spread);
     double angle = row_angle(e, row);
     g->seen[row].angle += angle;
     g->seen[row].saturated += is_bound ? angle : 0.0;
@@ -328,7 +331,8 @@ static void note_figures(struct environment *e) {
 }
 
 bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
-    static const char *const map_channels[] = {"R", "G", "B"}, *const confidence_channels[] = {"count", "spread"};
+    static const char *const map_channels[] = {"R", "G", "B"};
+    static const char *const confidence_channels[] = {"count", "spread"};
     struct gather g = {.views = views, .e = e};
     struct seen seen = {0.0, 0.0};
     *e = (struct environment){0};

@@ -81,7 +81,8 @@ static float cell_light(const struct lights *l, size_t x, size_t y) {
 
 /* The reach of a cell of the map. */
 static float cell_share(const struct lights *l, const struct reach *reach, size_t x, size_t y) {
-    return reach ? reach_share(reach, ((double)x + 1.0) / l->width, ((double)y + 0.5) / (l->height - 1)) : 1.0f;
+    double column = ((double)x + 1.0) / l->width, row = ((double)y + 0.5) / (l->height - 1);
+    return reach ? reach_share(reach, column, row) : 1.0f;
 }
 
 /* Cells of a block. */
@@ -252,9 +253,8 @@ static void sample_environment(const struct lights *l, float pick, float u, floa
                                struct light_sample *s) {
     uint32_t block = light_table_pick(&l->blocks, pick);
     uint32_t left = block % l->block_columns * l->grain, top = block / l->block_columns * l->grain;
-    float x = (float)left + u * (float)block_width(l, block), y = (float)top + v * (float)block_height(l, block);
-    x = fminf(x, (float)l->width * 0x1.fffffep-1f);
-    y = fminf(y, (float)(l->height - 1) * 0x1.fffffep-1f);
+    float x = fminf((float)left + u * (float)block_width(l, block), (float)l->width * 0x1.fffffep-1f);
+    float y = fminf((float)top + v * (float)block_height(l, block), (float)(l->height - 1) * 0x1.fffffep-1f);
     double phi = 2.0 * PI * ((double)x + 0.5) / (double)l->width;
     double theta = PI * (double)y / (double)(l->height - 1);
     double sine = sin(theta);

@@ -4,8 +4,9 @@
  * times luminance, and a point on it uniformly; it emits from its front side only. The
  * environment is a latitude-longitude map, picked by luminance times solid angle and, where that
  * was measured, by how much of the direction's light finds a way in (reach.h), constant within a
- * cell of the map (of a large map: a block of cells, so that the table stays in the cache). With both present samples are shared out by power: what emitters send out, and
- * what of the environment arrives. */
+ * cell of the map (of a large map: a block of cells, so that the table stays in the cache). With
+ * both present samples are shared out by power: what emitters send out, and what of the environment
+ * arrives. */
 #ifndef UNBAKE_RENDER_LIGHT_H
 #define UNBAKE_RENDER_LIGHT_H
 

@@ -47,9 +47,10 @@ static void measure_bin(void *user, size_t bin, int thread) {
         vec3 direction = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
         size_t t = triangle_at(m, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
         vec3 normal = vec3_normalize(mesh_cross(m->mesh, t));
-        float cosine = vec3_dot(normal, direction), root = sqrtf(number(bin, i, 3)), along = number(bin, i, 4);
+        float cosine = vec3_dot(normal, direction);
         if (!(cosine > 0.0f))
             continue;
+        float root = sqrtf(number(bin, i, 3)), along = number(bin, i, 4);
         vec3 point = mesh_point(m->mesh, t, root * (1.0f - along), root * along);
         vec3 origin = accel_offset(point, normal, direction);
         if (!accel_occluded(m->accel, origin, direction, 0.0f, INFINITY))

@@ -19,7 +19,8 @@ static inline bool shell_stop_requested(void *user) {
     return s->polls_until_stop >= 0 && s->polls_until_stop-- == 0;
 }
 static inline void shell_ignore_stage(void *user, const char *stage) { (void)user, (void)stage; }
-static inline void shell_ignore_progress(void *user, const char *stage, double done, double total, double eta) {
+static inline void shell_ignore_progress(void *user, const char *stage, double done, double total,
+                                         double eta) {
     (void)user, (void)stage, (void)done, (void)total, (void)eta;
 }
 static inline void shell_ignore_metric(void *user, const char *series, long step, double value) {
@@ -30,8 +31,8 @@ static inline bool shell_never(void *user) {
     (void)user;
     return false;
 }
-static inline enum status shell_save(void *user, long iteration, const struct state_array *array, size_t count,
-                        struct error *err) {
+static inline enum status shell_save(void *user, long iteration, const struct state_array *array,
+                                     size_t count, struct error *err) {
     struct shell *s = user;
     (void)iteration, (void)err;
     for (size_t i = 0; i < count; i++) {
@@ -43,8 +44,8 @@ static inline enum status shell_save(void *user, long iteration, const struct st
     s->has_checkpoint = true;
     return STATUS_OK;
 }
-static inline enum status shell_load(void *user, struct state_array *array, size_t count, bool *found,
-                        struct error *err) {
+static inline enum status shell_load(void *user, struct state_array *array, size_t count,
+                                     bool *found, struct error *err) {
     struct shell *s = user;
     (void)err;
     *found = s->has_checkpoint;
@@ -52,16 +53,27 @@ static inline enum status shell_load(void *user, struct state_array *array, size
         memcpy(array[i].data, s->saved[i], array[i].bytes);
     return STATUS_OK;
 }
-static inline enum status shell_no_preview(void *user, const struct reconstruction *r, struct error *err) {
+static inline enum status shell_no_preview(void *user, const struct reconstruction *r,
+                                           struct error *err) {
     (void)user, (void)r, (void)err;
     return STATUS_OK;
 }
 
 static inline enum status shell_run(struct scene *scene, const struct settings *settings, int threads,
-                       struct shell *shell, struct reconstruction *r) {
-    struct reconstruct_hooks hooks = {shell, shell_stop_requested, shell_ignore_stage, shell_ignore_progress,
-                                      shell_ignore_metric, shell_ignore_log, shell_never, shell_never, shell_save, shell_load,
-                                      shell_no_preview};
+                                    struct shell *shell, struct reconstruction *r) {
+    struct reconstruct_hooks hooks = {
+        .user = shell,
+        .stop_requested = shell_stop_requested,
+        .stage = shell_ignore_stage,
+        .progress = shell_ignore_progress,
+        .metric = shell_ignore_metric,
+        .log = shell_ignore_log,
+        .checkpoint_due = shell_never,
+        .preview_due = shell_never,
+        .checkpoint_save = shell_save,
+        .checkpoint_load = shell_load,
+        .preview = shell_no_preview,
+    };
     struct parallel *pool = parallel_new(threads);
     struct error err = {0};
     enum status status = reconstruct_run(scene, settings, pool, &hooks, r, &err);

@@ -23,7 +23,8 @@ static rgb sky_at(vec3 d) {
 }
 
 static vec3 direction_of(const struct image *map, uint32_t x, uint32_t y) {
-    double phi = 2.0 * PI * ((double)x + 0.5) / map->width, theta = PI * (double)y / (double)(map->height - 1);
+    double phi = 2.0 * PI * ((double)x + 0.5) / map->width;
+    double theta = PI * (double)y / (double)(map->height - 1);
     return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
 }
 
@@ -157,8 +158,9 @@ static void test_recovers_sky(struct scene *scene) {
     }
     double median, mean;
     compare_with_sky(&e, &median, &mean);
-    printf("sky: %u x %u, %.1f %% of the sphere by %zu photographs, median error %.4f, mean %+.4f, spread %.4f\n",
-           e.map.width, e.map.height, 100.0 * e.seen_share, e.photograph_count, median, mean, e.median_spread);
+    printf("sky: %u x %u, %.1f %% of the sphere by %zu photographs, median error %.4f, mean %+.4f, "
+           "spread %.4f\n", e.map.width, e.map.height, 100.0 * e.seen_share, e.photograph_count, median,
+           mean, e.median_spread);
     CHECK(e.map.width == 128 && e.map.height == 64); /* 2 pi 30 pixels around */
     CHECK(e.seen_share > 0.05 && e.seen_share < 0.5 && e.saturated_share == 0.0);
     CHECK_THAT(median < 0.01, "median error %g", median);

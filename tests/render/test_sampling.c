@@ -131,14 +131,17 @@ static void check_environment(uint32_t width, uint32_t height, bool has_reach) {
     map.pixel = mem_array((size_t)map.width * map.height * 3, sizeof(float));
     for (uint32_t i = 0; i < map.width * map.height; i++) {
         uint32_t patch = i / width * 32 / width * 32 + i % width * 32 / width;
-        for (uint32_t c = 0; c < 3; c++)
-            map.pixel[3 * i + c] = powf(number(3, 3 * patch + c, 0), 8.0f) * ((3 * patch + c) % 5 == 0 ? 0.0f : 3.0f);
+        for (uint32_t c = 0; c < 3; c++) {
+            uint32_t which = 3 * patch + c;
+            map.pixel[3 * i + c] = which % 5 == 0 ? 0.0f : 3.0f * powf(number(3, which, 0), 8.0f);
+        }
     }
     struct lights *lights = lights_new(&map);
     struct reach *reach = mem_calloc(1, sizeof *reach);
     reach->area = 2.0;
-    for (int i = 0; i < REACH_ROWS * REACH_COLUMNS; i++)
-        reach->share[i / REACH_COLUMNS][i % REACH_COLUMNS] = i % REACH_COLUMNS < REACH_COLUMNS / 2 ? 0.0f : 0.25f;
+    for (int y = 0; y < REACH_ROWS; y++)
+        for (int x = 0; x < REACH_COLUMNS; x++)
+            reach->share[y][x] = x < REACH_COLUMNS / 2 ? 0.0f : 0.25f;
     if (has_reach)
         lights_set_environment(lights, &map, reach);
     mem_free(reach);

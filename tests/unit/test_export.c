@@ -193,9 +193,11 @@ static void test_views(const char *dir, const struct camera *wanted) {
     CHECK_STRING(transforms.frame[0].file, "images/003.exr");
     CHECK(camera.model == wanted->model && camera.fx == wanted->fx && camera.fy == wanted->fy);
     CHECK(camera.cx == wanted->cx && camera.cy == wanted->cy);
-    CHECK(memcmp(camera.k, wanted->k, sizeof camera.k) == 0 && memcmp(camera.p, wanted->p, sizeof camera.p) == 0);
+    CHECK(memcmp(camera.k, wanted->k, sizeof camera.k) == 0);
+    CHECK(memcmp(camera.p, wanted->p, sizeof camera.p) == 0);
     for (int i = 0; i < 9; i++)
-        CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3], wanted->world_from_camera.rotation[i / 3][i % 3], 1e-6);
+        CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3],
+                   wanted->world_from_camera.rotation[i / 3][i % 3], 1e-6);
     CHECK(camera.world_from_camera.translation.z == 3.0f);
     transforms_release(&transforms);
     findings_release(&findings);
