@@ -28,7 +28,8 @@
 struct entry {
     char id[UPLOAD_ID_SIZE];
     struct partials *partials;
-    unsigned users; /* under partials->mutex */
+    unsigned users; /* under partials->mutex, and so are: */
+    unsigned long tended; /* the round of partials_tend that last saw to it */
     struct entry *next;
     pthread_mutex_t mutex; /* guards what follows */
     bool is_loaded, is_gone;
@@ -46,6 +47,7 @@ struct partials {
     char boot[UPLOAD_BOOT_SIZE];
     pthread_mutex_t mutex; /* guards the list and `users` */
     struct entry *first;
+    unsigned long round;
     pthread_mutex_t finishing; /* one upload becomes a scene at a time */
 };
 
@@ -285,24 +287,24 @@ struct partials *partials_new(struct api *api) {
 }
 
 void partials_tend(struct partials *p) {
+    pthread_mutex_lock(&p->mutex);
+    unsigned long round = ++p->round;
     for (;;) {
-        pthread_mutex_lock(&p->mutex);
         struct entry *e = p->first; /* without users it is there because it is dirty */
-        while (e && e->users > 0)
+        while (e && (e->users > 0 || e->tended == round))
             e = e->next;
-        if (e)
-            e->users++;
-        pthread_mutex_unlock(&p->mutex);
         if (!e)
-            return;
+            break;
+        e->users++;
+        e->tended = round;
+        pthread_mutex_unlock(&p->mutex);
         struct error err;
-        enum status status = settle(e, &err);
-        if (status != STATUS_OK)
+        if (settle(e, &err) != STATUS_OK)
             log_warning("upload %s: %s", e->id, err.message);
         put(e);
-        if (status != STATUS_OK)
-            return; /* next time */
+        pthread_mutex_lock(&p->mutex);
     }
+    pthread_mutex_unlock(&p->mutex);
 }
 
 void partials_free(struct partials *p) {
