@@ -18,7 +18,7 @@ static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03",
      "first step size of base colour; it falls over the run"},
     {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true",
-     "look for faults of the capture (exposure, colour, vignette, poses) and put them right"},
+     "look for faults of the capture (exposure, colour, vignette, poses, blur) and put them right"},
     {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "2",
      "photographs that one visit of a texel is compared with"},
     {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "5",

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/calibrate_blur.h"
 #include "server/reconstruct/calibrate_light.h"
 #include "server/reconstruct/calibrate_poses.h"
 
@@ -40,13 +41,14 @@ static cJSON *photographs_found(const struct views *views, const float *shift) {
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         bool gained = photo->gain.r != 1.0f || photo->gain.g != 1.0f || photo->gain.b != 1.0f;
         float moved = shift ? shift[t] : 0.0f;
-        if (photo->exposure_known && !gained && moved == 0.0f)
+        if (photo->exposure_known && !gained && moved == 0.0f && photo->blur_px == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", photo->name);
         json_add_number(entry, "exposure", (double)photo->exposure);
         json_add(entry, "gain", gain_array(photo->gain));
         json_add_number(entry, "shift_px", (double)moved);
+        json_add_number(entry, "blur_px", (double)photo->blur_px);
         cJSON_AddItemToArray(list, entry);
     }
     return list;
@@ -82,13 +84,11 @@ static void update_edges(struct reconstruction *r, struct views *views, const st
 /* Moves the cameras whose poses are wrong and finds the light anew: points that were mixed up told
  * lies about it. Points that had no say in the poses have the last word: unless photographs agree
  * better there too, all cameras stay. */
-static void find_poses(struct reconstruction *r, struct views *views, const struct photograph *claim,
-                       struct light_found *light, struct poses_found *found) {
-    struct tracks tracks;
+static void find_poses(struct reconstruction *r, struct views *views, const struct tracks *tracks,
+                       const struct photograph *claim, struct light_found *light,
+                       struct poses_found *found) {
     double spread = light->spread_after;
-    tracks_make(&tracks, views, r->pool);
-    calibrate_poses(r->scene, &tracks, r->pool, found);
-    tracks_release(&tracks);
+    calibrate_poses(r->scene, tracks, r->pool, found);
     if (found->moved_count == 0)
         return;
     update_edges(r, views, found);
@@ -104,13 +104,19 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
     found->shift_px = 0.0;
 }
 
-static void say_poses(const struct poses_found *found, const struct reconstruct_hooks *hooks) {
+static void say_places(const struct poses_found *poses, const struct blur_found *blur,
+                       const struct reconstruct_hooks *hooks) {
     char line[160];
-    if (found->moved_count == 0)
-        return;
-    snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)",
-             found->moved_count, found->shift_px);
-    hooks->log(hooks->user, line);
+    if (poses->moved_count > 0) {
+        snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)",
+                 poses->moved_count, poses->shift_px);
+        hooks->log(hooks->user, line);
+    }
+    if (blur->blurred_count > 0) {
+        snprintf(line, sizeof line, "calibration: %zu photographs are blurred, by %.1f px; they count less",
+                 blur->blurred_count, blur->blur_px);
+        hooks->log(hooks->user, line);
+    }
 }
 
 static void report_light(const struct reconstruction *r, const struct light_found *found, cJSON *report) {
@@ -128,17 +134,25 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     struct photograph *claim = save_claims(r->scene);
     struct light_found light;
     struct poses_found poses = {0};
+    struct blur_found blur = {0};
     find_light(r, views, claim, &light);
     double spread_before = light.spread_before;
-    if (settings_bool(r->settings, "calibrate"))
-        find_poses(r, views, claim, &light, &poses);
+    if (settings_bool(r->settings, "calibrate")) {
+        struct tracks tracks;
+        tracks_make(&tracks, views, r->pool);
+        find_poses(r, views, &tracks, claim, &light, &poses);
+        calibrate_blur(r->scene, &tracks, &blur);
+        tracks_release(&tracks);
+    }
     light.spread_before = spread_before;
     say_light(r, &light, hooks);
-    say_poses(&poses, hooks);
+    say_places(&poses, &blur, hooks);
     cJSON *report = cJSON_AddObjectToObject(r->report, "calibration");
     report_light(r, &light, report);
     json_add_int(report, "poses_moved", (int64_t)poses.moved_count);
     json_add_number(report, "pose_shift_px", poses.shift_px);
+    json_add_int(report, "blurred", (int64_t)blur.blurred_count);
+    json_add_number(report, "blur_px", blur.blur_px);
     json_add(report, "photographs", photographs_found(views, poses.shift));
     poses_found_release(&poses);
     mem_free(claim);

@@ -3,7 +3,8 @@
  *
  * Exposures that nobody told are solved. With the setting `calibrate` faults of the capture are
  * looked for and, where the evidence is clear, put right: exposure that drifts, white balance that
- * changes, a vignette (calibrate_light.h), poses off by a few pixels (calibrate_poses.h). A capture without faults is left exactly as it is. */
+ * changes, a vignette (calibrate_light.h), poses off by a few pixels (calibrate_poses.h),
+ * motion blur (calibrate_blur.h). A capture without faults is left exactly as it is. */
 #ifndef UNBAKE_RECONSTRUCT_CALIBRATE_H
 #define UNBAKE_RECONSTRUCT_CALIBRATE_H
 

@@ -9,6 +9,7 @@
 
 #define ROUNDS 6             /* at each level */
 #define LAST_ROUNDS 4        /* after the first judgement, at the finest level */
+#define COARSEST_PX 150      /* width of a picture below which it tells more lies than truth */
 #define STEP_PX 1.5          /* of a level, that a round moves a photograph at most */
 #define COMMON_SCALE 0.05    /* for comparing the agreement of all photographs */
 
@@ -20,7 +21,8 @@
 
 /* Root of the mean squared distance, in pixels, between the places of a frame's own tracks in two
  * cameras. */
-static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a, const struct camera *b) {
+static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a,
+                       const struct camera *b) {
     double squares = 0.0;
     size_t count = 0;
     for (size_t i = 0; i < s->tracks->count[f]; i++) {
@@ -81,7 +83,8 @@ static void collect_evidence(const struct pose_solver *s, struct evidence *evide
 
 static bool convinces(const struct evidence *e) {
     double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
-    return e->count >= POSE_LEAST_SIGHTS / POSE_HELD_BACK_EVERY && e->sum > LEAST_SIGNIFICANCE * error && e->sum > LEAST_GAIN * e->total;
+    return e->count >= POSE_LEAST_SIGHTS / POSE_HELD_BACK_EVERY &&
+           e->sum > LEAST_SIGNIFICANCE * error && e->sum > LEAST_GAIN * e->total;
 }
 
 /* Puts back where they were the frames whose correction is small or does not convince. */
@@ -143,6 +146,15 @@ static bool all_convince(const double *before, const double *now, size_t count) 
 
 /* --- the whole -------------------------------------------------------------------------------- */
 
+static int coarsest_level(const struct tracks *tracks) {
+    int level = 0;
+    for (size_t f = 0; f < tracks->views->train_count; f++) {
+        while (level + 1 < PYRAMID_LEVELS && tracks->pyramid[f].width[level + 1] >= COARSEST_PX)
+            level++;
+    }
+    return level;
+}
+
 void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct parallel *pool,
                      struct poses_found *found) {
     struct pose_solver s;
@@ -151,7 +163,7 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     size_t held_back = s.track_count / POSE_HELD_BACK_EVERY + 1;
     double *before = mem_calloc(2 * held_back, sizeof *before), *now = before + held_back;
     costs_now(&s, pool, before);
-    for (int level = PYRAMID_LEVELS - 1; level >= 0; level--)
+    for (int level = coarsest_level(tracks); level >= 0; level--)
         run_rounds(&s, level, ROUNDS, pool);
     costs_now(&s, pool, now);
     bool convincing = all_convince(before, now, held_back - 1);

@@ -128,7 +128,8 @@ static bool derive(const struct pose_frame *frame, vec3 point, const float g[2],
     for (int k = 0; k < 3; k++) {
         const float *axis = camera->camera_from_world.rotation[k];
         float u, v;
-        if (!camera_project(camera, vec3_mad(point, step, (vec3){axis[0], axis[1], axis[2]}), &u, &v, &depth_m))
+        vec3 moved = vec3_mad(point, step, (vec3){axis[0], axis[1], axis[2]});
+        if (!camera_project(camera, moved, &u, &v, &depth_m))
             return false;
         by_p[k] = (g[0] * (u - x) + g[1] * (v - y)) / (step * focal);
     }
@@ -195,7 +196,8 @@ static bool track_look(const struct pose_solver *s, size_t track, const double *
 }
 
 /* Robust weights of a track's sights, by their distance from what they agree on. */
-void pose_weigh_track(const struct pose_solver *s, size_t track, double *look, double weight[POSE_SIGHTS_MAX]) {
+void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
+                      double weight[POSE_SIGHTS_MAX]) {
     const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
     size_t count = pose_sight_count(s->track[track]);
     for (size_t k = 0; k < count; k++) {

@@ -129,7 +129,8 @@ static void preconditioner_release(struct preconditioner *p) {
     mem_free(p->diagonal);
 }
 
-static void precondition(const struct preconditioner *p, const struct pose_solver *s, const double *r, double *z) {
+static void precondition(const struct preconditioner *p, const struct pose_solver *s, const double *r,
+                         double *z) {
     for (size_t f = 0; f < s->frames; f++) {
         const double(*a)[POSE_UNKNOWNS] = (const double(*)[POSE_UNKNOWNS])p->block[f];
         double *b = z + POSE_UNKNOWNS * f;

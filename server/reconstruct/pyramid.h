@@ -1,9 +1,9 @@
-/* pyramid.h -- a photograph as logarithms of its gray radiance, at two scales, for comparing
+/* pyramid.h -- a photograph as logarithms of its gray radiance, at three scales, for comparing
  * photographs with each other.
  *
  * Logarithms make a wrong exposure an offset. Level 0 is the photograph (halved as often as its
  * budget asks) smoothed by the binomial 1 2 1 in both directions, so that a place between pixels
- * is not much smoother than one on a pixel; the next level has half the size. What a pixel
+ * is not much smoother than one on a pixel; each further level has half the size. What a pixel
  * does not tell (masked, saturated, nearly black) and what lies within a few pixels of a depth
  * edge is NaN, and so is what was smoothed with it. Where surfaces meet without one behind the
  * other a picture's edge lies on them, and is kept. */
@@ -16,7 +16,7 @@
 
 #include "server/scene/photograph.h"
 
-#define PYRAMID_LEVELS 2
+#define PYRAMID_LEVELS 3
 
 struct pyramid {
     float scale;  /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */

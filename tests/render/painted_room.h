@@ -18,6 +18,7 @@
 #define PAINTED_TEXTURE 256
 
 struct painted {
+    bool tiles;
     struct parallel *pool;
     struct scene scene;
     struct segments segments;
@@ -33,12 +34,15 @@ static inline float painted_random(uint64_t frame, uint64_t what) {
     return 2.0f * rng_to_float((uint32_t)rng_key(frame, what, 7)) - 1.0f;
 }
 
-/* Radiance without the part that depends on the view. */
-static inline rgb painted_radiance(int64_t object, vec3 p) {
+/* Radiance without the part that depends on the view: waves, or tiles with sharp edges. */
+static inline rgb painted_radiance(const struct painted *room, int64_t object, vec3 p) {
     float shade = 0.6f + 0.15f * p.x + 0.1f * p.y + 0.05f * p.z;
     float wave = sinf(5.0f * p.x + 3.0f * p.y + 1.0f) * sinf(4.0f * p.z - 2.0f * p.y + 6.0f * p.x);
     float fine = sinf(17.0f * p.x + 5.0f * p.z) * sinf(15.0f * p.y + 9.0f * p.z + 0.5f);
-    return rgb_scale(wall_color[object], shade * (1.0f + 0.35f * wave + 0.35f * fine));
+    int tile = (int)floorf(2.3f * p.x + 0.37f) + (int)floorf(2.3f * p.y + 0.37f) +
+               (int)floorf(2.3f * p.z + 0.37f);
+    float paint = room->tiles ? (tile & 1 ? 1.3f : 0.7f) : 1.0f + 0.35f * wave + 0.35f * fine;
+    return rgb_scale(wall_color[object], shade * paint);
 }
 
 static inline void painted_take(struct painted *room, int frame) {
@@ -54,7 +58,7 @@ static inline void painted_take(struct painted *room, int frame) {
             if (!camera_direction(&photo->camera, x, y, &direction) ||
                 !accel_intersect(room->accel, origin, direction, 0.0f, INFINITY, &hit))
                 continue;
-            rgb value = painted_radiance(room->scene.mesh.object_id[hit.triangle],
+            rgb value = painted_radiance(room, room->scene.mesh.object_id[hit.triangle],
                                          vec3_mad(origin, hit.distance_m, direction));
             float gloss = 1.0f + 0.03f * direction.x;
             sum = rgb_mad(sum, gloss / 4.0f, value);
@@ -67,10 +71,10 @@ static inline void painted_take(struct painted *room, int frame) {
     }
 }
 
-/* A capture without faults: HDR frames of exposure 1, every eighth of them held out. */
-static inline void painted_make(struct painted *room, int threads) {
+/* A capture without faults of waves or of tiles: HDR frames of exposure 1, every eighth of them held out. */
+static inline void painted_make(struct painted *room, int threads, bool tiles) {
     struct error err = {0};
-    *room = (struct painted){.pool = parallel_new(threads)};
+    *room = (struct painted){.pool = parallel_new(threads), .tiles = tiles};
     make_mesh(&room->scene.mesh);
     segments_from_object_id(&room->segments, &room->scene.mesh);
     CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, &err) ==
@@ -132,6 +136,26 @@ static inline void painted_spoil(struct photograph *photo, rgb gain, float vigne
             float value = image_float_from_half(photo->pixel[i][c]) * g[c] * falloff;
             photo->pixel[i][c] = image_half_from_float(fminf(value, photo->clip));
         }
+    }
+}
+
+/* A horizontal smear over 2 `reach` + 1 pixels, as a camera that turned leaves it. */
+static inline void painted_smear(struct photograph *photo, int reach) {
+    float row[PAINTED_WIDTH][3];
+    for (int y = 0; y < PAINTED_HEIGHT; y++) {
+        uint16_t(*pixel)[3] = photo->pixel + y * PAINTED_WIDTH;
+        for (int x = 0; x < PAINTED_WIDTH; x++) {
+            for (int c = 0; c < 3; c++) {
+                row[x][c] = 0.0f;
+                for (int k = x - reach; k <= x + reach; k++) {
+                    int from = k < 0 ? 0 : k < PAINTED_WIDTH ? k : PAINTED_WIDTH - 1;
+                    row[x][c] += image_float_from_half(pixel[from][c]) / (float)(2 * reach + 1);
+                }
+            }
+        }
+        for (int x = 0; x < PAINTED_WIDTH; x++)
+            for (int c = 0; c < 3; c++)
+                pixel[x][c] = image_half_from_float(row[x][c]);
     }
 }
 
@@ -200,7 +224,7 @@ static inline double painted_error(const struct painted *room) {
             continue;
         vec3 point = mesh_point(&room->scene.mesh, triangle, b1, b2);
         vec3 normal = vec3_normalize(mesh_cross(&room->scene.mesh, triangle));
-        rgb truth = painted_radiance(room->scene.mesh.object_id[triangle], point);
+        rgb truth = painted_radiance(room, room->scene.mesh.object_id[triangle], point);
         double fused[3] = {0}, weight = 0.0;
         for (uint32_t t = 0; t < room->views.train_count; t++) {
             struct view view;

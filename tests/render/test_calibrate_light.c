@@ -114,7 +114,7 @@ static void test_threads(struct painted *room) {
 
 int main(void) {
     struct painted room;
-    painted_make(&room, 1);
+    painted_make(&room, 1, false);
     test_clean(&room);
     test_unknown(&room);
     test_faults(&room, 0.15f, 0.0f, 0.0f, 1.5);

@@ -67,7 +67,7 @@ static void test_threads(struct painted *room) {
 
 int main(void) {
     struct painted room;
-    painted_make(&room, 0);
+    painted_make(&room, 0, false);
     test_clean(&room);
     test_misplaced(&room, 0.02f, 0.02f, 1);
     test_misplaced(&room, 0.03f, 0.03f, 4);
