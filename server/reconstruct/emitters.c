@@ -5,9 +5,14 @@
 #include <stdlib.h>
 
 #include "common/mem.h"
+#include "server/scene/surface.h"
 
 #define TEXELS_PER_SEGMENT 256
 #define VIEWS_PER_TEXEL 4
+/* Looks that a class of distance from an edge must have for its median to count. */
+#define LEAST_LOOKS 12
+#define RING_PIXELS 4.0f
+#define OUTSHINES 1.3f
 /* Part of the looks that must have measured something for their median to count. */
 #define MEASURED_PART 0.1f
 /* Part of the shown radiance that must be beyond reflection. Specular reflection and noise stay
@@ -82,6 +87,11 @@ struct channel_values {
     float bound;
 };
 
+/* What the looks of one class of distance from an edge (views_edge) show. */
+struct shown_values {
+    struct channel_values channel[3];
+};
+
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
     if (!saturated) {
         v->value[v->count++] = radiance;
@@ -100,34 +110,60 @@ static float median(struct channel_values *v) {
     return v->count ? v->value[v->count / 2] : 0.0f;
 }
 
+/* Whether a pixel that mixes surfaces is clearly brighter than all around it: then what is bright
+ * in it is the surface looked for and not the lamp or window behind. */
+static bool outshines(const struct photograph *photo, float x, float y, rgb radiance) {
+    for (int i = 0; i < 8; i++) {
+        static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+        struct photograph_sample beside;
+        float px = x + RING_PIXELS * along[i][0], py = y + RING_PIXELS * along[i][1];
+        if (px < 0.0f || py < 0.0f || px >= (float)photo->camera.width || py >= (float)photo->camera.height)
+            continue;
+        if (photograph_sample(photo, px, py, &beside) && OUTSHINES * rgb_mean(beside.radiance) > rgb_mean(radiance))
+            return false;
+    }
+    return true;
+}
+
+static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
+    const struct reconstruction *r = job->r;
+    struct surface_point at;
+    struct view view[VIEWS_PER_TEXEL];
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return;
+    size_t seen = views_pick(job->views, at.position, at.normal, texel, VIEWS_PER_TEXEL, view);
+    for (size_t k = 0; k < seen; k++) {
+        struct photograph_sample sample;
+        const struct photograph *photo = &r->scene->photograph[job->views->train[view[k].train]];
+        int edge = views_edge(job->views, &view[k]);
+        if (!photograph_sample(photo, view[k].x, view[k].y, &sample) ||
+            (edge == VIEWS_EDGE && !outshines(photo, view[k].x, view[k].y, sample.radiance)))
+            continue;
+        struct channel_values *channel = shown[edge].channel;
+        add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
+        add_value(&channel[1], sample.radiance.g, sample.saturated[1]);
+        add_value(&channel[2], sample.radiance.b, sample.saturated[2]);
+    }
+}
+
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
-    const struct reconstruction *r = job->r;
-    struct channel_values red = {.count = 0}, green = {.count = 0}, blue = {.count = 0};
+    struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
     size_t wanted = texel_count(&job->texels, segment, TEXELS_PER_SEGMENT);
-    for (size_t i = 0; i < wanted; i++) {
-        uint32_t texel = spaced_texel(&job->texels, segment, i, wanted), triangle;
-        float b1, b2;
-        if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)(texel % r->atlas.width) + 0.5f,
-                               (float)(texel / r->atlas.width) + 0.5f, &triangle, &b1, &b2))
-            continue;
-        vec3 normal = vec3_normalize(mesh_cross(&r->scene->mesh, triangle));
-        vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
-        struct view view[VIEWS_PER_TEXEL];
-        size_t seen = views_pick(job->views, point, normal, texel, VIEWS_PER_TEXEL, view);
-        for (size_t k = 0; k < seen; k++) {
-            struct photograph_sample sample;
-            const struct photograph *photo =
-                &r->scene->photograph[job->views->train[view[k].train]];
-            if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
-                continue;
-            add_value(&red, sample.radiance.r, sample.saturated[0]);
-            add_value(&green, sample.radiance.g, sample.saturated[1]);
-            add_value(&blue, sample.radiance.b, sample.saturated[2]);
-        }
+    for (size_t i = 0; i < wanted; i++)
+        observe_texel(job, spaced_texel(&job->texels, segment, i, wanted), shown);
+    /* The looks farthest from edges, as soon as there are some. */
+    struct shown_values *best = shown;
+    for (int edge = 1; edge <= VIEWS_EDGE; edge++) {
+        const struct channel_values *red = &best->channel[0];
+        if (red->count + red->saturated_count < LEAST_LOOKS)
+            best = &shown[edge];
     }
-    job->evidence[segment].shown = rgb_make(median(&red), median(&green), median(&blue));
+    job->evidence[segment].mixed = best >= &shown[VIEWS_EDGE - 1];
+    job->evidence[segment].shown =
+        rgb_make(median(&best->channel[0]), median(&best->channel[1]), median(&best->channel[2]));
+    mem_free(shown);
 }
 
 void emitters_observe(const struct reconstruction *r, const struct views *views,

@@ -24,12 +24,7 @@
 /* Parts of the run, as fractions of it. The levels of the coarse part get equal time; the decision
  * about emitters falls into the first of them. */
 #define DECISION_AT 0.08
-#define PLAIN_COARSE_PART 0.4
-#define GUIDED_COARSE_PART 0.75
-/* The guided steps end with blocks of this level: within them the photographs tell more than paths
- * can, whose noise at single texels is far above the detail. */
-#define GUIDED_FINEST 2
-
+#define COARSE_PART 0.4
 /* The neutral start of emission. Of what the photographs show of a segment the part
  * q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) is its own light, q being how many times brighter it is than
  * the median of the room; the rest is reflected. A segment that no photograph shows does not emit. */
@@ -59,7 +54,6 @@ struct refine {
     struct params params;
     struct chooser chooser;
     struct counters counters;
-    struct emitter_evidence *evidence; /* [segment_count] */
     struct path_settings path;
     struct gradient *gradient;
     size_t chunk_count;
@@ -72,7 +66,7 @@ struct refine {
     uint64_t iteration_limit;  /* 0: by time */
     double time_limit_sec;
     int coarse_levels;
-    bool guided;
+    bool solved;               /* it starts from solved materials and corrects what is smooth in them */
 };
 
 /* What a look found. d_emission is the derivative of its loss by the emission of the segment that
@@ -83,7 +77,7 @@ struct refine {
 struct seen {
     uint32_t segment, texel;
     rgb d_emission;
-    struct loss_match match; /* what a guided step goes by */
+    struct loss_match match; /* what a step from the solved start goes by */
     float trust;
 };
 
@@ -141,11 +135,11 @@ static double fraction_done(const struct refine *f) {
 }
 
 static int level_at(const struct refine *f, double fraction) {
-    int finest = f->guided && f->coarse_levels > GUIDED_FINEST ? GUIDED_FINEST : 0;
-    double part = f->guided ? GUIDED_COARSE_PART : PLAIN_COARSE_PART;
-    if (fraction >= part)
-        return finest;
-    return f->coarse_levels - (int)(fraction / part * (f->coarse_levels - finest));
+    if (f->solved || f->coarse_levels == 0)
+        return f->coarse_levels;
+    if (fraction >= COARSE_PART)
+        return 0;
+    return f->coarse_levels - (int)(fraction / COARSE_PART * f->coarse_levels);
 }
 
 static struct params_rates rates_at(const struct refine *f, double fraction) {
@@ -154,53 +148,24 @@ static struct params_rates rates_at(const struct refine *f, double fraction) {
     float fall = (float)(1.0 / (1.0 + RATE_FALL * since));
     return (struct params_rates){
         .base_color = fall * (float)settings_number(set, "base_color_rate"),
-        .roughness = fall * (float)settings_number(set, "roughness_rate"),
-        .specular = fall * (float)settings_number(set, "specular_rate"),
+        .roughness = f->solved ? 0.0f : fall * (float)settings_number(set, "roughness_rate"),
+        .specular = f->solved ? 0.0f : fall * (float)settings_number(set, "specular_rate"),
         .emission = fall * (float)settings_number(set, "emission_rate"),
-        .skip_base_color = f->guided,
+        .skip_base_color = f->solved,
     };
 }
 
-/* Gives every block of the coarsest level a mid grey on average and, when guided, within it the
- * detail that the photographs show: light hardly changes over a few texels, so their ratios are
- * the surface's. */
 static void start_base_color(struct refine *f) {
     struct texture *texture = &f->r->materials.base_color;
-    const struct observed *o = &f->r->observed;
-    uint32_t side = 1u << f->coarse_levels;
     for (size_t i = 0; i < f->r->inverse.valid_count; i++) {
         float *value = texture->texel[f->r->inverse.valid[i]];
         value[0] = value[1] = value[2] = NEUTRAL_BASE_COLOR;
-    }
-    if (!f->guided)
-        return;
-    for (uint32_t y0 = 0; y0 < texture->height; y0 += side) {
-        for (uint32_t x0 = 0; x0 < texture->width; x0 += side) {
-            double sum[3] = {0}, count = 0.0;
-            for (int pass = 0; pass < 2; pass++) {
-                for (uint32_t y = y0; y < y0 + side && y < texture->height; y++) {
-                    for (uint32_t x = x0; x < x0 + side && x < texture->width; x++) {
-                        size_t texel = (size_t)y * texture->width + x;
-                        if (texture->texel[texel][3] == 0.0f || o->radiance[texel][0] == 0)
-                            continue;
-                        count += pass == 0;
-                        for (int c = 0; c < 3; c++) {
-                            double value = log((double)image_float_from_half(o->radiance[texel][c]));
-                            if (pass == 0)
-                                sum[c] += value;
-                            else
-                                texture->texel[texel][c] *= (float)exp(value - sum[c] / count);
-                        }
-                    }
-                }
-            }
-        }
     }
 }
 
 static void decide_emitters(struct refine *f) {
     struct reconstruction *r = f->r;
-    emitters_decide(r, f->views, f->batch, f->evidence);
+    emitters_decide(r, f->views, f->batch, f->r->evidence);
     /* A part of a segment's median light may have been more than all of its dark parts': what base
      * colour did about that is worth nothing. */
     start_base_color(f);
@@ -251,7 +216,7 @@ static double iterate(struct refine *f, double fraction) {
     gradient_reduce(f->gradient, f->log, f->chunk_count, f->r->pool);
     reduce_seen_emission(f);
     struct params_rates rates = rates_at(f, fraction);
-    if (f->guided)
+    if (f->solved)
         match_blocks(f);
     params_step(&f->params, f->gradient, &rates, f->r->pool);
     double loss = 0.0;
@@ -284,7 +249,7 @@ static size_t state_arrays(struct refine *f, struct state_array *array) {
     ADD("specular", m->specular, segments * sizeof *m->specular);
     ADD("emission", m->emission, segments * sizeof *m->emission);
     ADD("emission.log", p->log_emission, segments * sizeof *p->log_emission);
-    ADD("emission.evidence", f->evidence, segments * sizeof *f->evidence);
+    ADD("emission.evidence", f->r->evidence, segments * sizeof *f->r->evidence);
     ADD("emission.is_emitter", f->r->is_emitter, segments * sizeof *f->r->is_emitter);
     ADD_ADAM("base_color", &p->base_color);
     ADD_ADAM("roughness", &p->roughness);
@@ -315,18 +280,30 @@ static void redraw_curve(struct refine *f) {
     c->planned = planned;
 }
 
-static enum status load(struct refine *f, struct error *err) {
+enum status listing1_load(struct refine *f, bool *found, struct error *err) {
     struct state_array array[24];
     size_t count = state_arrays(f, array);
-    bool found;
-    enum status status = f->hooks->checkpoint_load(f->hooks->user, array, count, &found, err);
+    enum status status = f->hooks->checkpoint_load(f->hooks->user, array, count, found, err);
     redraw_curve(f);
-    if (status == STATUS_OK && found) {
-        params_set_level(&f->params, f->counters.level);
-        if (f->counters.decided)
-            params_fix_emitters(&f->params, f->r->is_emitter);
-    }
-    return status;
+    if (status != STATUS_OK || !*found)
+        return status;
+    char line[128];
+    snprintf(line, sizeof line, "resumed at iteration %llu", (unsigned long long)f->counters.iteration);
+    f->hooks->log(f->hooks->user, line);
+    params_set_level(&f->params, f->counters.level);
+    if (f->counters.decided)
+        params_fix_emitters(&f->params, f->r->is_emitter);
+    return STATUS_OK;
+}
+
+enum status listing1_start_solved(struct refine *f, double seconds, struct error *err) {
+    struct reconstruction *r = f->r;
+    params_fix_emitters(&f->params, r->is_emitter);
+    for (size_t s = 0; s < r->segments.count; s++)
+        params_set_emission(&f->params, s, r->materials.emission[s]);
+    f->counters.decided = 1;
+    f->counters.elapsed_sec = seconds;
+    return save(f, err);
 }
 
 static enum status loop(struct refine *f, struct error *err) {
@@ -361,8 +338,6 @@ static enum status loop(struct refine *f, struct error *err) {
                 return status;
         }
     }
-    if (f->guided)
-        params_fill_unseen(&f->params, f->r->observed.count);
     return save(f, err);
 }
 
@@ -379,13 +354,13 @@ static void count_rays(struct refine *f) {
 static cJSON *emitter_list(const struct refine *f) {
     cJSON *list = cJSON_CreateArray();
     for (size_t s = 0; s < f->r->segments.count; s++) {
-        if (!f->r->is_emitter[s] && f->evidence[s].share < REPORTED_SHARE)
+        if (!f->r->is_emitter[s] && f->r->evidence[s].share < REPORTED_SHARE)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s);
         json_add_int(entry, "object_id", f->r->segments.id[s]);
         json_add_bool(entry, "is_emitter", f->r->is_emitter[s]);
-        json_add_number(entry, "share_beyond_reflection", (double)f->evidence[s].share);
+        json_add_number(entry, "share_beyond_reflection", (double)f->r->evidence[s].share);
         const rgb *e = &f->r->materials.emission[s];
         const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));
@@ -422,9 +397,19 @@ static float neutral_share(rgb shown, float median) {
     return q * q / (q * q + NEUTRAL_BRIGHTNESS * NEUTRAL_BRIGHTNESS);
 }
 
-static void refine_init(struct refine *f, struct reconstruction *r, const struct views *views,
-                        const struct reconstruct_hooks *hooks) {
+static void start_neutral(struct refine *f) {
+    struct reconstruction *r = f->r;
+    start_base_color(f);
+    emitters_observe(r, f->views, r->evidence);
+    for (size_t s = 0; s < r->segments.count; s++)
+        r->materials.emission[s] =
+            rgb_scale(r->evidence[s].shown, neutral_share(r->evidence[s].shown, f->views->median_radiance));
+}
+
+struct refine *listing1_new(struct reconstruction *r, const struct views *views,
+                            const struct reconstruct_hooks *hooks) {
     const struct settings *set = r->settings;
+    struct refine *f = mem_alloc(sizeof *f);
     *f = (struct refine){.r = r, .views = views, .hooks = hooks};
     f->coarse_levels = (int)settings_number(set, "coarse_levels");
     f->iteration_limit = (uint64_t)settings_number(set, "iterations");
@@ -435,13 +420,9 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
         .seed = (uint64_t)settings_number(set, "seed"),
     };
     f->counters.level = f->coarse_levels;
-    f->guided = settings_bool(set, "guided");
-    start_base_color(f);
-    f->evidence = mem_calloc(r->segments.count, sizeof *f->evidence);
-    emitters_observe(r, views, f->evidence);
-    for (size_t s = 0; s < r->segments.count; s++)
-        r->materials.emission[s] =
-            rgb_scale(f->evidence[s].shown, neutral_share(f->evidence[s].shown, views->median_radiance));
+    f->solved = settings_is(set, "method", "solve");
+    if (!f->solved)
+        start_neutral(f);
     params_init(&f->params, &r->materials, &r->inverse, &r->segments, f->coarse_levels);
     chooser_init(&f->chooser, r->inverse.valid_count,
                  (size_t)settings_number(set, "texels_per_iteration"), f->path.seed);
@@ -459,9 +440,10 @@ static void refine_init(struct refine *f, struct reconstruction *r, const struct
                         (int)settings_number(set, "samples_per_camera"), CHUNK_TEXELS);
     f->look_capacity = f->batch[0].look_capacity;
     f->seen = mem_calloc(f->chunk_count * f->look_capacity, sizeof *f->seen);
+    return f;
 }
 
-static void refine_release(struct refine *f) {
+void listing1_free(struct refine *f) {
     for (int t = 0; t < parallel_thread_count(f->r->pool); t++)
         look_batch_release(&f->batch[t]);
     mem_free(f->batch);
@@ -472,26 +454,14 @@ static void refine_release(struct refine *f) {
         gradient_log_free(f->log[c]);
     mem_free(f->log);
     gradient_free(f->gradient);
-    mem_free(f->evidence);
     params_release(&f->params);
+    mem_free(f);
 }
 
-enum status listing1_run(struct reconstruction *r, const struct views *views,
-                         const struct reconstruct_hooks *hooks, struct error *err) {
-    struct refine f;
-    refine_init(&f, r, views, hooks);
-    enum status status = load(&f, err);
-    if (status == STATUS_OK && f.counters.iteration > 0) {
-        char line[128];
-        snprintf(line, sizeof line, "resumed at iteration %llu",
-                 (unsigned long long)f.counters.iteration);
-        hooks->log(hooks->user, line);
-    }
+enum status listing1_run(struct refine *f, struct error *err) {
+    enum status status = loop(f, err);
+    count_rays(f);
     if (status == STATUS_OK)
-        status = loop(&f, err);
-    count_rays(&f);
-    if (status == STATUS_OK)
-        report(&f);
-    refine_release(&f);
+        report(f);
     return status;
 }

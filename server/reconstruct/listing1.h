@@ -10,20 +10,34 @@
  * from then on the emission of all others is exactly 0. Base colour is solved coarse to fine: at
  * level L all texels of a block of 2^L x 2^L move by a common factor, at level 0 each by itself.
  *
- * With guided=false that is all. With guided=true (the default) blocks start with the detail that
- * the photographs show (observe.h) and keep it, base colour moves by the ratio of what was shown
- * to what was rendered (params_match) and not by its noisier gradient, and the finest level is
- * blocks of 4 x 4: more base colour for the same paths, by far. Roughness, specular and emission
- * move by Adam on the derivatives in both. */
+ * After `solve` (method=solve) it starts from what that found instead, and corrects only what is
+ * smooth in it: blocks of 2^coarse_levels texels a side keep their detail and move by the ratio of
+ * what was shown to what was rendered with all bounces (params_match), against a prior for what was
+ * solved; the emitters move as above; roughness and specular stay. */
 #ifndef UNBAKE_RECONSTRUCT_LISTING1_H
 #define UNBAKE_RECONSTRUCT_LISTING1_H
+
+#include <stdbool.h>
 
 #include "server/reconstruct/reconstruct.h"
 #include "server/reconstruct/views.h"
 
-/* Works on r->materials, r->world and r->is_emitter, from a checkpoint where there is one. Adds
- * "refine" and the loss curve to r->report. STATUS_CANCELLED when stopped. */
-enum status listing1_run(struct reconstruction *r, const struct views *views,
-                         const struct reconstruct_hooks *hooks, struct error *err);
+struct refine; /* opaque */
+
+/* Works on r->materials, r->world, r->is_emitter and r->evidence; without method=solve they get the
+ * neutral start here. Borrows all. */
+struct refine *listing1_new(struct reconstruction *r, const struct views *views,
+                            const struct reconstruct_hooks *hooks);
+void listing1_free(struct refine *f);
+
+/* Takes up the newest checkpoint where there is one. */
+enum status listing1_load(struct refine *f, bool *found, struct error *err);
+
+/* Tells that `solve` has filled the materials, in so many seconds of the time limit; saves a checkpoint. */
+enum status listing1_start_solved(struct refine *f, double seconds, struct error *err);
+
+/* Iterates to the end. Adds "refine" and the loss curve to r->report. STATUS_CANCELLED when
+ * stopped (a checkpoint was saved). */
+enum status listing1_run(struct refine *f, struct error *err);
 
 #endif

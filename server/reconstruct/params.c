@@ -24,8 +24,9 @@
 #define BLOCK_RATE 2.0f
 #define BLOCK_MIN 0.002f
 
-/* Looks that the state before the first one counts for, at the coarsest level. */
-#define MATCH_PRIOR 12.0f
+/* Looks that the solved state counts for. One look is off by a third (16 paths, one pixel), the
+ * solved light of a block by 4 %: (.33 / .04)^2. */
+#define MATCH_PRIOR 64.0f
 
 #define CHUNK 1024 /* touched texels a work item */
 #define AHEAD 16   /* texels under way to the cache */
@@ -47,7 +48,7 @@ void params_init(struct params *p, struct materials *materials, const struct inv
                  const struct segments *segments, int level) {
     size_t count = materials->segment_count;
     *p = (struct params){
-        .materials = materials, .inverse = inverse, .segments = segments, .coarsest = level, .level = level};
+        .materials = materials, .inverse = inverse, .segments = segments, .level = level};
     adam_init(&p->base_color, block_count(p, 0), 3, BASE_BETA1, BASE_BETA2);
     adam_init(&p->roughness, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
     adam_init(&p->specular, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
@@ -239,8 +240,7 @@ void params_match(struct params *p, uint32_t texel, const struct loss_match *mat
     size_t across = blocks_across(texture->width, p->level);
     size_t bx = texel % texture->width >> p->level, by = texel / texture->width >> p->level;
     float *looks = &adam_record(&p->base_color, by * across + bx)[0];
-    float prior = MATCH_PRIOR * (float)(1 << (p->coarsest - p->level));
-    float step = 2.0f * trust / (*looks + prior);
+    float step = trust / (*looks + MATCH_PRIOR);
     *looks += 1.0f;
     step *= slowdown(p, texel);
     float factor[3];
@@ -270,30 +270,4 @@ void params_set_emission(struct params *p, size_t segment, rgb emission) {
     p->log_emission[segment][1] = log_emission(emission.g);
     p->log_emission[segment][2] = log_emission(emission.b);
     adam_reset(&p->emission, segment, 1);
-}
-
-void params_fill_unseen(struct params *p, const float *count) {
-    struct texture *texture = &p->materials->base_color;
-    const struct inverse_uv *inverse = p->inverse;
-    size_t segments = p->materials->segment_count, across = blocks_across(texture->width, p->level);
-    double (*sum)[4] = mem_calloc(segments, sizeof *sum);
-    for (size_t i = 0; i < inverse->valid_count; i++) {
-        uint32_t texel = inverse->valid[i];
-        double *s = sum[p->segments->of_triangle[inverse->triangle[texel]]];
-        const float *value = texture->texel[texel];
-        for (int c = 0; c < 3 && count[texel] > 0.0f; c++)
-            s[c] += (double)value[c];
-        s[3] += count[texel] > 0.0f;
-    }
-    for (size_t i = 0; i < inverse->valid_count; i++) {
-        uint32_t texel = inverse->valid[i];
-        const double *s = sum[p->segments->of_triangle[inverse->triangle[texel]]];
-        size_t block = (texel / texture->width >> p->level) * across +
-                       (texel % texture->width >> p->level);
-        if (count[texel] > 0.0f || adam_touches(&p->base_color, block) > 0.0f || !(s[3] > 0.0))
-            continue;
-        for (int c = 0; c < 3; c++)
-            texture->texel[texel][c] = (float)(s[c] / s[3]);
-    }
-    mem_free(sum);
 }

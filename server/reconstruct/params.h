@@ -37,7 +37,6 @@ struct params {
     struct adam base_color;      /* an entry a texel, or a block at coarse levels */
     struct adam roughness, specular, emission; /* an entry a segment */
     float (*log_emission)[3];    /* [segment_count]; owned */
-    int coarsest;                /* the level that it began at */
     int level;                   /* blocks of 2^level texels a side move by a common factor */
     /* Scratch of the coarse levels; NULL at level 0; owned. */
     float (*block_sum)[3];       /* [blocks at level 1] zero between steps */
@@ -61,11 +60,11 @@ void params_set_level(struct params *p, int level);
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool);
 
-/* The guided step of base colour, after one look at a texel: scales the texel's block, by channel,
+/* The step of base colour from a solved start, after one look at a texel: scales the texel's block, by channel,
  * by the ratio of what was shown to what was rendered, averaged over the block's past looks.
  *
  * Stochastic approximation (Robbins & Monro 1951) of the fixed point rendered = shown with a step of
- * 2 / (looks + prior). To first order a surface's radiance is its base colour times
+ * 1 / (looks + prior), the prior being what the solved start is worth. To first order a surface's radiance is its base colour times
  * its light, so the ratio is the Newton step; its noise is that of one estimate, where the
  * gradient's is that of a product of two. The prior keeps interreflection (all blocks that scale
  * together change the light as well) from overshooting, and grows from level to level: a finer
@@ -75,10 +74,6 @@ void params_match(struct params *p, uint32_t texel, const struct loss_match *mat
 /* Tells the emitters from now on (borrowed): all other segments emit exactly 0, for good, and the
  * reflectance of an emitter, which its own light hides, moves slowly. */
 void params_fix_emitters(struct params *p, const bool *is_emitter);
-
-/* Gives blocks that no look reached their segment's mean base colour over the texels that were
- * seen (count[texel] > 0). */
-void params_fill_unseen(struct params *p, const float *count);
 
 /* Sets a segment's emission, with moments that start anew. */
 void params_set_emission(struct params *p, size_t segment, rgb emission);

@@ -8,8 +8,10 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/reconstruct/calibrate.h"
+#include "server/reconstruct/emitters.h"
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/report.h"
+#include "server/reconstruct/solve.h"
 #include "server/reconstruct/views.h"
 
 /* Where every surface starts: a mid grey, half rough, half glossy. */
@@ -23,7 +25,8 @@ struct run {
     struct reconstruction *r;
     const struct reconstruct_hooks *hooks;
     struct views views;
-    cJSON *stages; /* owned by the report */
+    struct refine *refine; /* owned */
+    cJSON *stages;         /* owned by the report */
 };
 
 /* Announces a stage, runs it, notes its time. */
@@ -83,6 +86,7 @@ static enum status prepare(struct run *run, struct error *err) {
     materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR),
                    NEUTRAL_ROUGHNESS, NEUTRAL_SPECULAR);
     r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
+    r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
     status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
     if (status != STATUS_OK)
         return status;
@@ -114,15 +118,36 @@ static void make_environment(struct run *run) {
     json_add(r->report, "environment", environment_figures(&r->environment));
 }
 
-static enum status observe(struct run *run, struct error *err) {
+static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
     make_environment(run);
-    observed_make(&run->r->observed, &run->views, &run->r->atlas, &run->r->inverse, run->r->pool);
+    fuse(&run->r->fused, &run->views, &run->r->atlas, &run->r->inverse, run->r->pool);
     return STATUS_OK;
 }
 
+static enum status solve(struct run *run, struct error *err) {
+    double begin = clock_sec();
+    enum status status = solve_run(run->r, &run->views, run->hooks, err);
+    if (status == STATUS_OK)
+        status = listing1_start_solved(run->refine, clock_sec() - begin, err);
+    return status;
+}
+
 static enum status refine(struct run *run, struct error *err) {
-    return listing1_run(run->r, &run->views, run->hooks, err);
+    return listing1_run(run->refine, err);
+}
+
+/* The stages that a checkpoint holds: those that are done are not done again. */
+static enum status run_resumable(struct run *run, struct error *err) {
+    bool found = false, solves = settings_is(run->r->settings, "method", "solve");
+    run->refine = listing1_new(run->r, &run->views, run->hooks);
+    enum status status = listing1_load(run->refine, &found, err);
+    if (status == STATUS_OK && solves && !found)
+        status = run_stage(run, "solve", solve, err);
+    if (status == STATUS_OK)
+        status = run_stage(run, "refine", refine, err);
+    listing1_free(run->refine);
+    return status;
 }
 
 static enum status report(struct run *run, struct error *err) {
@@ -142,9 +167,9 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
     run.stages = cJSON_AddArrayToObject(r->report, "stages");
     enum status status = run_stage(&run, "prepare", prepare, err);
     if (status == STATUS_OK)
-        status = run_stage(&run, "observe", observe, err);
+        status = run_stage(&run, "fuse", fuse_photographs, err);
     if (status == STATUS_OK)
-        status = run_stage(&run, "refine", refine, err);
+        status = run_resumable(&run, err);
     if (status == STATUS_OK)
         status = run_stage(&run, "report", report, err);
     views_release(&run.views);
@@ -158,8 +183,9 @@ void reconstruct_release(struct reconstruction *r) {
     }
     mem_free(r->held_out);
     mem_free(r->is_emitter);
+    mem_free(r->evidence);
     environment_release(&r->environment);
-    observed_release(&r->observed);
+    fused_release(&r->fused);
     world_release(&r->world);
     materials_release(&r->materials);
     inverse_uv_release(&r->inverse);

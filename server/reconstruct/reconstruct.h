@@ -18,13 +18,14 @@
 #include "common/settings.h"
 #include "server/reconstruct/environment.h"
 #include "server/reconstruct/state.h"
-#include "server/reconstruct/observe.h"
+#include "server/reconstruct/fuse.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
 
 struct reconstruction; /* the present state, for previews and outputs */
+struct emitter_evidence;
 
 /* What the surroundings offer. All are called from the thread that runs reconstruct_run. */
 struct reconstruct_hooks {
@@ -64,9 +65,10 @@ struct reconstruction {
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    struct observed observed;        /* what the photographs show of each texel */
     struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
+    struct fused fused;              /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
+    struct emitter_evidence *evidence; /* [segment_count] why; owned */
     size_t held_out_count;
     struct held_out *held_out;       /* [held_out_count]; owned */
     cJSON *report;                   /* object: figures of each stage, filled as they are known; owned */

@@ -18,6 +18,9 @@
 /* Corners of a pixel that mixes surfaces lie no further apart where those meet. */
 #define SEAM_FOOTPRINTS 10.0f
 
+/* Surfaces that meet at an edge sharper than this (cosine between normals) are lit differently. */
+#define CREASE_COSINE 0.8f
+
 #define NO_SURFACE UINT32_MAX
 
 struct corner {
@@ -60,6 +63,8 @@ static bool differ(const struct corner *a, const struct corner *b, float focal) 
         return true;
     if (a->segment == NO_SURFACE)
         return false;
+    if (vec3_dot(a->normal, b->normal) < CREASE_COSINE)
+        return true;
     vec3 between = vec3_sub(b->point, a->point);
     float slack = a->distance_m * (EDGE_FOOTPRINTS / focal + EDGE_RELATIVE);
     return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
@@ -99,6 +104,29 @@ static void mark_row(void *user, size_t row, int thread) {
     }
 }
 
+/* Gives each pixel beside one of class `of` at least class of - 1. */
+static void spread_class(uint8_t *edge, long width, long height, uint8_t of) {
+    for (long y = 0; y < height; y++) {
+        for (long x = 0; x < width; x++) {
+            if (edge[y * width + x] != of)
+                continue;
+            for (long j = y > 0 ? y - 1 : 0; j <= y + 1 && j < height; j++) {
+                for (long i = x > 0 ? x - 1 : 0; i <= x + 1 && i < width; i++) {
+                    uint8_t *beside = &edge[j * width + i];
+                    *beside = *beside < of - 1 ? (uint8_t)(of - 1) : *beside;
+                }
+            }
+        }
+    }
+}
+
+static void make_edges(uint8_t *edge, const uint8_t *shows, uint32_t width, uint32_t height) {
+    for (size_t i = 0; i < (size_t)width * height; i++)
+        edge[i] = shows[i] == VIEWS_MIXED || shows[i] == VIEWS_SEAM ? VIEWS_EDGE : 0;
+    for (uint8_t of = VIEWS_EDGE; of > 1; of--)
+        spread_class(edge, (long)width, (long)height, of);
+}
+
 static int compare_floats(const void *a, const void *b) {
     float x = *(const float *)a, y = *(const float *)b;
     return (x > y) - (x < y);
@@ -127,8 +155,10 @@ void views_update_median(struct views *v) {
 
 void views_update_edges(struct views *v, const struct segments *segments, uint32_t train,
                         struct parallel *pool) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
     struct edge_job job = {.views = v, .segments = segments, .train = train};
-    parallel_for(pool, v->scene->photograph[v->train[train]].camera.height, mark_row, &job);
+    parallel_for(pool, camera->height, mark_row, &job);
+    make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
 
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
@@ -136,6 +166,7 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
     *v = (struct views){.scene = scene, .accel = accel};
     v->train = mem_array(scene->photograph_count, sizeof *v->train);
     v->shows = mem_array(scene->photograph_count, sizeof *v->shows);
+    v->edge = mem_array(scene->photograph_count, sizeof *v->edge);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
             v->train[v->train_count++] = (uint32_t)i;
@@ -143,20 +174,29 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct camera *camera = &scene->photograph[v->train[t]].camera;
         v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        v->edge[t] = mem_array((size_t)camera->height * camera->width, 1);
         views_update_edges(v, segments, t, pool);
     }
     views_update_median(v);
 }
 
 void views_release(struct views *v) {
-    for (size_t t = 0; t < v->train_count; t++)
+    for (size_t t = 0; t < v->train_count; t++) {
         mem_free(v->shows[t]);
+        mem_free(v->edge[t]);
+    }
     mem_free(v->shows);
+    mem_free(v->edge);
     mem_free(v->train);
     *v = (struct views){0};
 }
 
-bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+vec3 views_direction(const struct views *v, uint32_t train, vec3 point) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    return vec3_normalize(vec3_sub(camera_origin(camera), point));
+}
+
+bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
     const struct photograph *photo = &v->scene->photograph[v->train[train]];
     const struct camera *camera = &photo->camera;
     vec3 to_camera = vec3_sub(camera_origin(camera), point);
@@ -167,13 +207,39 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, 
     if (!(cosine > MIN_COSINE * distance) ||
         !camera_project(camera, point, &view->x, &view->y, &depth_m))
         return false;
-    vec3 direction = vec3_scale(to_camera, 1.0f / distance);
-    vec3 origin = accel_offset(point, normal, direction);
-    if (accel_occluded(v->accel, origin, direction, 0.0f, distance))
-        return false;
     view->train = train;
     view->weight = cosine / (squared * distance) * photograph_trust(photo);
     return true;
+}
+
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+    if (!views_faces(v, train, point, normal, view))
+        return false;
+    vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
+    float distance = vec3_length(to_camera);
+    vec3 direction = vec3_scale(to_camera, 1.0f / distance);
+    return !accel_occluded(v->accel, accel_offset(point, normal, direction), direction, 0.0f, distance);
+}
+
+int views_edge(const struct views *v, const struct view *view) {
+    const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
+    const uint8_t *edge = v->edge[view->train];
+    long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
+    int nearest = 0;
+    for (long y = y0; y < y0 + 2; y++) {
+        for (long x = x0; x < x0 + 2; x++) {
+            if (x < 0 || y < 0 || x >= (long)camera->width || y >= (long)camera->height)
+                continue;
+            int here = edge[y * (long)camera->width + x];
+            nearest = here > nearest ? here : nearest;
+        }
+    }
+    return nearest;
+}
+
+float views_trust(const struct views *v, const struct view *view) {
+    static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f};
+    return trust[views_edge(v, view)];
 }
 
 /* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show

@@ -22,12 +22,17 @@
 /* What a pixel shows: one surface; several, one behind the other; nothing; several that meet there. */
 enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };
 
+/* The class of a pixel that mixes surfaces in views.edge. */
+#define VIEWS_EDGE 3
+
 struct views {
     const struct scene *scene;  /* borrowed */
     const struct accel *accel;  /* borrowed */
     size_t train_count;
     uint32_t *train;            /* [train_count] photographs that may be used; owned */
     uint8_t **shows;            /* [train_count][height * width] VIEWS_SURFACE: one surface, ...; owned */
+    uint8_t **edge;             /* [train_count][height * width] VIEWS_EDGE where the pixel mixes surfaces,
+                                 * one less for every pixel further from such a one, down to 0; owned */
     float median_radiance;      /* of the training pixels (mean of the channels) */
 };
 
@@ -51,6 +56,19 @@ void views_update_median(struct views *v);
  * visibility ray. */
 bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
                 struct view *view);
+
+/* The same but for the visibility ray. */
+bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
+                 struct view *view);
+
+/* Unit direction from a point to where training photograph `train` was taken. */
+vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
+
+/* The greatest class of `edge` among the four pixels that a look-up at the view's place reads, and
+ * how far such a look-up is to be trusted, in (0, 1]: lenses and reconstruction filters carry light
+ * a pixel or two beyond an edge. */
+int views_edge(const struct views *v, const struct view *view);
+float views_trust(const struct views *v, const struct view *view);
 
 /* Whether all four pixels that a look-up at the view's place reads are clean. */
 bool views_clean(const struct views *v, const struct view *view);

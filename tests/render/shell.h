@@ -9,6 +9,7 @@
 
 struct shell {
     long polls_until_stop; /* negative: never */
+    bool spares_solve;     /* polls count from the first checkpoint on */
     unsigned char *saved[32];
     size_t saved_count;
     bool has_checkpoint;
@@ -16,6 +17,8 @@ struct shell {
 
 static inline bool shell_stop_requested(void *user) {
     struct shell *s = user;
+    if (s->spares_solve && !s->has_checkpoint)
+        return false;
     return s->polls_until_stop >= 0 && s->polls_until_stop-- == 0;
 }
 static inline void shell_ignore_stage(void *user, const char *stage) { (void)user, (void)stage; }

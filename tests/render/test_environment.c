@@ -330,7 +330,7 @@ static double wall_error(const struct reconstruction *r, int *emitters) {
         uint32_t texel = r->inverse.valid[i], segment = r->segments.of_triangle[r->inverse.triangle[texel]];
         const float *t = r->materials.base_color.texel[texel];
         const rgb *c = &wall_color[segment];
-        if (r->observed.count[texel] < 2.0f || segment == LAMP)
+        if (r->fused.count[texel] < 2.0f || segment == LAMP)
             continue;
         sum += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) + pow((double)(t[2] - c->b), 2);
         count += 3.0;
@@ -351,7 +351,7 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
         comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
                                                    &r->held_out[i].render, r->held_out[i].camera};
     struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
-                              r->observed.count, r->observed.spread, r->is_emitter, &r->environment.map,
+                              r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
                               &r->environment.confidence, r->held_out_count, comparison, r->report};
     CHECK_THAT(export_outputs(dir, &in, hear, NULL, &err) == STATUS_OK, "%s", err.message);
 }

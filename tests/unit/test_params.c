@@ -31,7 +31,7 @@ static void test_match(void) {
     materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
     m.base_color.texel[1][0] = 0.25f; /* detail: half as red as its neighbours */
     params_init(&p, &m, &inverse, &segments, 2);
-    for (int look = 0; look < 600; look++) {
+    for (int look = 0; look < 3000; look++) {
         float *red = &m.base_color.texel[0][0];
         struct loss_match match;
         for (int c = 0; c < 3; c++) {
@@ -46,25 +46,6 @@ static void test_match(void) {
     CHECK_NEAR(m.base_color.texel[1][0] / m.base_color.texel[0][0], 0.5, 1e-4);
     CHECK_NEAR(m.base_color.texel[3 * SIDE + 3][1], m.base_color.texel[0][1], 1e-6);
     CHECK(m.base_color.texel[4][0] == 0.5f && m.base_color.texel[4 * SIDE][0] == 0.5f);
-    params_release(&p);
-    materials_release(&m);
-}
-
-/* Blocks that no look reached take their segment's mean; what was seen stays. */
-static void test_fill(void) {
-    struct materials m;
-    struct params p;
-    float count[TEXELS] = {0};
-    materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
-    params_init(&p, &m, &inverse, &segments, 1);
-    count[0] = 3.0f;
-    count[1] = 1.0f;
-    m.base_color.texel[0][0] = 0.2f;
-    m.base_color.texel[1][0] = 0.4f;
-    params_fill_unseen(&p, count);
-    CHECK(m.base_color.texel[0][0] == 0.2f && m.base_color.texel[1][0] == 0.4f);
-    CHECK_NEAR(m.base_color.texel[7 * SIDE][0], 0.3, 1e-6);
-    CHECK(m.base_color.texel[7 * SIDE + 5][0] == 0.5f); /* nothing is known of the other segment */
     params_release(&p);
     materials_release(&m);
 }
@@ -113,7 +94,6 @@ static void test_step(void) {
 int main(void) {
     make_surface();
     test_match();
-    test_fill();
     test_step();
     return check_result();
 }

@@ -1,0 +1,107 @@
+/* fuse.c -- see fuse.h. */
+#include "server/reconstruct/fuse.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/reconstruct/robust.h"
+#include "server/scene/surface.h"
+
+/* Radiance that is added before a logarithm, as a share of the median: black stays finite. */
+#define LOG_FLOOR 0.01f
+/* Difference of logarithms from the median at which a look-up has half its weight. */
+#define OUTLIER_SCALE 0.3f
+#define MAX_LOOKS 256
+#define CHUNK 1024 /* valid texels a work item */
+
+struct fuse_job {
+    struct fused *f;
+    const struct views *views;
+    const struct atlas *atlas;
+    const struct inverse_uv *inverse;
+};
+
+/* What the photographs show of a texel, the measured ones first. */
+struct looks {
+    size_t count, measured, clean;
+    struct robust_sample look[MAX_LOOKS];
+};
+
+static void add_look(struct looks *l, const struct photograph_sample *s, float weight, float floor_radiance) {
+    struct robust_sample *last = &l->look[l->count++];
+    *last = (struct robust_sample){
+        s->radiance, logf(fmaxf(rgb_mean(s->radiance), 0.0f) + floor_radiance), weight};
+    if (s->saturated[0] || s->saturated[1] || s->saturated[2])
+        return;
+    struct robust_sample measured = *last;
+    *last = l->look[l->measured];
+    l->look[l->measured++] = measured;
+}
+
+static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {
+    const struct views *v = job->views;
+    l->count = l->measured = l->clean = 0;
+    for (uint32_t t = 0; t < v->train_count && l->count < MAX_LOOKS; t++) {
+        struct view view;
+        struct photograph_sample s;
+        if (views_sees(v, t, p->position, p->normal, &view) &&
+            photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
+            l->clean += views_clean(v, &view);
+            add_look(l, &s, view.weight * views_trust(v, &view), LOG_FLOOR * v->median_radiance);
+        }
+    }
+}
+
+static float spread_of(const struct looks *l) {
+    double sum = 0.0, squares = 0.0, n = (double)l->count;
+    for (size_t i = 0; i < l->count; i++) {
+        double gray = (double)l->look[i].gray;
+        sum += gray;
+        squares += gray * gray;
+    }
+    return n > 1.0 ? (float)sqrt(fmax(0.0, (squares - sum * sum / n) / (n - 1.0))) : 0.0f;
+}
+
+static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
+    struct surface_point p;
+    struct looks l;
+    if (!surface_at_texel(&job->views->scene->mesh, job->atlas, job->inverse, texel, &p))
+        return;
+    look_all(job, &p, &l);
+    if (l.count == 0)
+        return;
+    job->f->count[texel] = (float)l.clean;
+    job->f->spread[texel] = spread_of(&l);
+    rgb mean = robust_mean(l.look, l.measured > 0 ? l.measured : l.count, OUTLIER_SCALE);
+    const float channel[3] = {mean.r, mean.g, mean.b};
+    for (int c = 0; c < 3; c++)
+        job->f->radiance[texel][c] = image_half_from_float(fmaxf(channel[c], 0.0f));
+}
+
+static void fuse_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct fuse_job *job = user;
+    size_t end = (chunk + 1) * CHUNK;
+    end = end < job->inverse->valid_count ? end : job->inverse->valid_count;
+    for (size_t i = chunk * CHUNK; i < end; i++)
+        fuse_texel(job, job->inverse->valid[i]);
+}
+
+void fuse(struct fused *f, const struct views *views, const struct atlas *atlas,
+          const struct inverse_uv *inverse, struct parallel *pool) {
+    size_t texels = (size_t)inverse->width * inverse->height;
+    *f = (struct fused){.width = inverse->width, .height = inverse->height};
+    f->radiance = mem_calloc_large(texels, sizeof *f->radiance);
+    f->count = mem_calloc_large(texels, sizeof *f->count);
+    f->spread = mem_calloc_large(texels, sizeof *f->spread);
+    struct fuse_job job = {f, views, atlas, inverse};
+    parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, fuse_chunk, &job);
+}
+
+void fused_release(struct fused *f) {
+    mem_free(f->radiance);
+    mem_free(f->count);
+    mem_free(f->spread);
+    *f = (struct fused){0};
+}

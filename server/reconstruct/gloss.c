@@ -1,0 +1,306 @@
+/* gloss.c -- see gloss.h. */
+#include "server/reconstruct/gloss.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+#include "server/reconstruct/highlight.h"
+#include "server/render/sampler.h"
+#include "server/scene/surface.h"
+
+/* Texels of a segment that are looked at, so that all segments together have about so many. */
+#define POINTS_IN_ALL 24000
+#define POINTS_LEAST 24
+#define POINTS_MOST 256
+/* With fewer than these, pixels nearer to edges are taken as well. */
+#define POINTS_ENOUGH 32
+#define TRIES 16 /* texels tried for one that is looked at */
+#define VIEWS 10
+#define VIEWS_ASKED 40 /* of which those far from edges are taken */
+#define VIEWS_LEAST 3
+#define SAMPLES 384 /* directions a (texel, view), over all roughness levels */
+#define LIGHT_SAMPLES 128
+#define KEY_GLOSS 17 /* keeps these random numbers apart from others of the texel */
+/* A photograph is read at PATCH x PATCH places over this many texels around, which takes out its
+ * noise; their base colour may differ, it is the same in all photographs. */
+#define PATCH 5
+#define PATCH_TEXELS 8
+#define PATCH_COSINE 0.98f /* between its normals */
+/* Misfit at which a look has a quarter of its influence: parts of the texel's radiance and of the
+ * median of the room. */
+#define SCALE_RELATIVE 0.06f
+#define SCALE_MEDIAN 0.005f
+/* Gloss must explain this part of the misfit that remains without, and by so many standard errors
+ * over the texels; else the segment is called matt. */
+#define GAIN_LEAST 0.06
+#define GAIN_ERRORS 4.0
+/* Rougher highlights cannot be told from matt reflection. */
+#define GLOSS_ROUGHEST 0.7f
+/* Dielectrics are near an index of refraction of 1.5, specular .5: the misfit of others counts this
+ * much more, times the square of the difference. */
+#define PRIOR_SPECULAR 0.5f
+#define PRIOR_WEIGHT 1.0f
+
+#define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
+#define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
+
+static const struct highlight_levels levels = {
+    .roughness_count = HIGHLIGHT_ROUGHNESSES,
+    .specular_count = HIGHLIGHT_SPECULARS,
+    .roughness = {0.05f, 0.1f, 0.15f, 0.2f, 0.25f, 0.3f, 0.375f, 0.45f, 0.55f, 0.65f, 0.8f, 1.0f},
+    .specular = {0.125f, 0.25f, 0.5f, 0.75f, 1.0f},
+};
+static const float specular_of[SPECULARS] = {0.0f, 0.125f, 0.25f, 0.5f, 0.75f, 1.0f};
+
+/* One texel as one photograph shows it, and what each candidate sends there. */
+struct gloss_look {
+    rgb shown;
+    rgb white[ROUGHNESSES]; /* of base colour 1 */
+    struct highlight highlight;
+};
+
+struct gloss_point {
+    size_t count;
+    struct gloss_look look[VIEWS];
+    float misfit[ROUGHNESSES][SPECULARS];
+};
+
+struct gloss_job {
+    struct reconstruction *r;
+    const struct views *views;
+    const struct probes *probes;
+    const struct light_field *field;
+    uint32_t *first, *texel;   /* the valid texels by segment: [segment_count + 1], [valid_count] */
+    size_t points;             /* at most so many a segment */
+    struct gloss_point *point; /* [threads][points] */
+    struct incident *scratch;  /* [threads] */
+};
+
+/* --- looking ------------------------------------------------------------------------------------ */
+
+/* Points of the surface around a texel, of its chart and alike in their normals. */
+static size_t patch_around(const struct reconstruction *r, uint32_t texel, const struct surface_point *at,
+                           vec3 patch[PATCH * PATCH]) {
+    uint32_t chart = r->atlas.chart_of_triangle[at->triangle];
+    float x0 = (float)(texel % r->atlas.width) + 0.5f, y0 = (float)(texel / r->atlas.width) + 0.5f;
+    size_t count = 0;
+    for (int i = 0; i < PATCH * PATCH; i++) {
+        struct surface_point p;
+        float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
+        if (surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x0 + PATCH_TEXELS * dx,
+                       y0 + PATCH_TEXELS * dy, &p) &&
+            r->atlas.chart_of_triangle[p.triangle] == chart &&
+            vec3_dot(p.shading, at->shading) > PATCH_COSINE)
+            patch[count++] = p.position;
+    }
+    return count;
+}
+
+/* What a photograph shows of the patch on average; false unless all of it was measured, no nearer
+ * to edges than `edge`. */
+static bool patch_shown(const struct views *views, const struct view *view, const vec3 *patch, size_t count,
+                        int edge, rgb *shown) {
+    const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
+    *shown = rgb_gray(0.0f);
+    for (size_t i = 0; i < count; i++) {
+        struct view place = *view;
+        struct photograph_sample s;
+        float depth_m;
+        if (!camera_project(&photo->camera, patch[i], &place.x, &place.y, &depth_m) ||
+            views_edge(views, &place) > edge || !photograph_sample(photo, place.x, place.y, &s) ||
+            s.saturated[0] || s.saturated[1] || s.saturated[2])
+            return false;
+        *shown = rgb_mad(*shown, 1.0f / (float)count, s.radiance);
+    }
+    return count > 0;
+}
+
+static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge, struct incident *scratch,
+                          struct gloss_point *point) {
+    const struct reconstruction *r = job->r;
+    struct surface_point at;
+    struct probe_mix mix;
+    struct irradiance light;
+    struct view view[VIEWS_ASKED];
+    vec3 patch[PATCH * PATCH];
+    point->count = 0;
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return false;
+    size_t patch_count = patch_around(r, texel, &at, patch), shown_count = 0;
+    size_t seen = views_pick(job->views, at.position, at.normal, texel, VIEWS_ASKED, view);
+    for (size_t i = 0; i < seen && shown_count < VIEWS; i++) {
+        if (patch_shown(job->views, &view[i], patch, patch_count, edge, &point->look[shown_count].shown))
+            view[shown_count++] = view[i];
+    }
+    if (shown_count < VIEWS_LEAST)
+        return false;
+    probes_mix(job->probes, &r->atlas, &r->fused, texel, &at, &mix);
+    probes_irradiance(job->probes, &mix, &light);
+    for (size_t i = 0; i < shown_count; i++) {
+        struct gloss_look *look = &point->look[i];
+        vec3 wo = views_direction(job->views, view[i].train, at.position);
+        for (size_t k = 0; k < ROUGHNESSES; k++)
+            look->white[k] = irradiance_diffuse(&light, at.shading, levels.roughness[k], wo);
+        highlight_gather(&look->highlight, scratch, job->field, &at, wo, &levels,
+                         sampler_key(KEY_GLOSS, texel, view[i].train), SAMPLES, LIGHT_SAMPLES);
+    }
+    point->count = shown_count;
+    return true;
+}
+
+/* Looks at up to job->points texels of a segment; returns their number. */
+static size_t look_at_segment(const struct gloss_job *job, size_t segment, int edge, int thread) {
+    struct gloss_point *point = &job->point[(size_t)thread * job->points];
+    uint32_t texels = job->first[segment + 1] - job->first[segment];
+    const uint32_t *texel = &job->texel[job->first[segment]];
+    size_t tries = TRIES * job->points, count = 0;
+    bool all = texels <= tries;
+    tries = all ? texels : tries;
+    for (size_t i = 0; i < tries && count < job->points; i++) {
+        /* Spread evenly over the segment wherever the sequence is cut off. */
+        size_t at = all ? i : rng_below(sampler_reverse((uint32_t)i), texels);
+        count += look_at_texel(job, texel[at], edge, &job->scratch[thread], &point[count]);
+    }
+    return count;
+}
+
+/* --- fitting ------------------------------------------------------------------------------------ */
+
+/* Robust misfit of one channel of a texel's photographs under roughness k and specular m, with the
+ * base colour that fits them best (iteratively reweighted; Geman and McClure's function). */
+static float misfit_channel(const struct gloss_point *p, size_t k, size_t m, int channel, float median) {
+    float shown[VIEWS], white[VIEWS], weight[VIEWS], mean = 0.0f, misfit = 0.0f;
+    for (size_t i = 0; i < p->count; i++) {
+        const struct gloss_look *l = &p->look[i];
+        float gloss = m == 0 ? 0.0f : (&l->highlight.radiance[k][m - 1].r)[channel];
+        shown[i] = (&l->shown.r)[channel] - gloss;
+        white[i] = (&l->white[k].r)[channel];
+        weight[i] = 1.0f;
+        mean += (&l->shown.r)[channel] / (float)p->count;
+    }
+    float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
+    for (int sweep = 0; sweep < 4; sweep++) {
+        float over = 0.0f, under = 1e-20f;
+        for (size_t i = 0; i < p->count; i++) {
+            over += weight[i] * white[i] * shown[i];
+            under += weight[i] * white[i] * white[i];
+        }
+        float base = clampf(over / under, 0.0f, 1.0f);
+        misfit = 0.0f;
+        for (size_t i = 0; i < p->count; i++) {
+            float e = (shown[i] - base * white[i]) / scale, influence = 1.0f / (1.0f + e * e);
+            weight[i] = influence * influence;
+            misfit += e * e * influence;
+        }
+    }
+    return misfit;
+}
+
+static float prior(size_t m) {
+    float off = m == 0 ? 0.0f : specular_of[m] - PRIOR_SPECULAR;
+    return 1.0f + PRIOR_WEIGHT * off * off;
+}
+
+/* Fills the sums over the texels, weighted by the prior. */
+static void misfits(struct gloss_point *point, size_t count, float median, double sum[ROUGHNESSES][SPECULARS]) {
+    for (size_t k = 0; k < ROUGHNESSES; k++) {
+        for (size_t m = 0; m < SPECULARS; m++) {
+            sum[k][m] = 0.0;
+            for (size_t i = 0; i < count; i++) {
+                float *misfit = &point[i].misfit[k][m];
+                *misfit = 0.0f;
+                for (int c = 0; c < 3; c++)
+                    *misfit += misfit_channel(&point[i], k, m, c, median);
+                sum[k][m] += (double)(*misfit * prior(m));
+            }
+        }
+    }
+}
+
+/* Whether gloss explains more of what the photographs show than chance would. */
+static bool is_significant(const struct gloss_point *point, size_t count, size_t k, size_t m) {
+    double total = 0.0, gain = 0.0, squares = 0.0, n = (double)count;
+    for (size_t i = 0; i < count; i++) {
+        double without = (double)point[i].misfit[ROUGHNESSES - 1][0];
+        double d = without - (double)point[i].misfit[k][m];
+        total += without;
+        gain += d;
+        squares += d * d;
+    }
+    double error = sqrt(fmax(0.0, squares - gain * gain / n));
+    return gain > GAIN_LEAST * total && gain > GAIN_ERRORS * error;
+}
+
+/* Offset in [-0.5, 0.5] of a parabola's least through three values of which the middle is least. */
+static double between(double left, double middle, double right) {
+    double bend = left - 2.0 * middle + right, offset = bend > 0.0 ? 0.5 * (left - right) / bend : 0.0;
+    return offset < -0.5 ? -0.5 : offset > 0.5 ? 0.5 : offset;
+}
+
+static float interpolate(const float *value, size_t at, double offset) {
+    float beside = offset < 0.0 ? value[at] - value[at - 1] : offset > 0.0 ? value[at + 1] - value[at] : 0.0f;
+    return value[at] + (float)offset * beside;
+}
+
+static void fit_segment(void *user, size_t segment, int thread) {
+    const struct gloss_job *job = user;
+    struct materials *materials = &job->r->materials;
+    struct gloss_point *point = &job->point[(size_t)thread * job->points];
+    double sum[ROUGHNESSES][SPECULARS];
+    size_t count = 0, k = ROUGHNESSES - 1, m = 0;
+    materials->roughness[segment] = 1.0f;
+    materials->specular[segment] = 0.0f;
+    if (job->r->is_emitter[segment])
+        return; /* its own light hides it */
+    for (int edge = 0; edge < VIEWS_EDGE && count < POINTS_ENOUGH; edge++)
+        count = look_at_segment(job, segment, edge, thread);
+    if (count == 0)
+        return;
+    misfits(point, count, job->views->median_radiance, sum);
+    for (size_t i = 0; i < ROUGHNESSES * SPECULARS; i++) {
+        size_t other_k = i / SPECULARS, other_m = i % SPECULARS;
+        if (sum[other_k][other_m] < sum[k][m] && (other_m == 0 || levels.roughness[other_k] <= GLOSS_ROUGHEST))
+            k = other_k, m = other_m;
+    }
+    if (m == 0 || !is_significant(point, count, k, m))
+        return;
+    double along = 0.0, across = 0.0;
+    if (k > 0 && k + 1 < ROUGHNESSES)
+        along = between(sum[k - 1][m], sum[k][m], sum[k + 1][m]);
+    if (m + 1 < SPECULARS)
+        across = between(sum[k][m - 1], sum[k][m], sum[k][m + 1]);
+    materials->roughness[segment] = interpolate(levels.roughness, k, along);
+    materials->specular[segment] = interpolate(specular_of, m, across);
+}
+
+/* A counting sort; count[] is shifted by two while it counts and by one while it places. */
+static void sort_by_segment(struct gloss_job *job) {
+    const struct reconstruction *r = job->r;
+    size_t segments = r->segments.count, valid = r->inverse.valid_count;
+    uint32_t *count = mem_calloc(segments + 2, sizeof *count);
+    job->texel = mem_array(valid + 1, sizeof *job->texel);
+    for (size_t i = 0; i < valid; i++)
+        count[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]] + 2]++;
+    for (size_t s = 2; s < segments + 2; s++)
+        count[s] += count[s - 1];
+    for (size_t i = 0; i < valid; i++)
+        job->texel[count[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]] + 1]++] =
+            r->inverse.valid[i];
+    job->first = count;
+}
+
+void gloss_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
+               const struct light_field *field) {
+    struct gloss_job job = {.r = r, .views = views, .probes = probes, .field = field};
+    size_t threads = (size_t)parallel_thread_count(r->pool), points = POINTS_IN_ALL / r->segments.count;
+    job.points = points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
+    job.point = mem_array(threads * job.points, sizeof *job.point);
+    job.scratch = mem_array(threads, sizeof *job.scratch);
+    sort_by_segment(&job);
+    parallel_for(r->pool, r->segments.count, fit_segment, &job);
+    mem_free(job.first);
+    mem_free(job.texel);
+    mem_free(job.scratch);
+    mem_free(job.point);
+}

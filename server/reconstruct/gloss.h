@@ -1,0 +1,21 @@
+/* gloss.h -- roughness and specular of each segment, from how its texels change with the view.
+ *
+ * At a few hundred texels of a segment, each seen by several photographs, the highlight of every
+ * candidate material is gathered (highlight.h); what remains must be base colour times what the
+ * diffuse lobe sends, with one base colour for all views of a texel. The candidate with the least
+ * robust misfit wins, and is then placed between its neighbours by a parabola. */
+#ifndef UNBAKE_RECONSTRUCT_GLOSS_H
+#define UNBAKE_RECONSTRUCT_GLOSS_H
+
+#include <stdint.h>
+
+#include "common/parallel.h"
+#include "server/reconstruct/probes.h"
+#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/views.h"
+
+/* Writes r->materials.roughness and .specular. */
+void gloss_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
+               const struct light_field *field);
+
+#endif

@@ -1,0 +1,238 @@
+/* solve.c -- see solve.h. */
+#include "server/reconstruct/solve.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/reconstruct/divide.h"
+#include "server/reconstruct/emitters.h"
+#include "server/reconstruct/gloss.h"
+#include "server/reconstruct/probes.h"
+
+#define PASSES 2
+/* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
+#define SPACING_AT_2048 8
+#define LEAST_SPACING 4
+/* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
+#define FIRST_PASS_PART 0.25
+/* Segments this many times brighter than the median of the room are sampled as lights before it is
+ * known whether they emit. */
+#define BRIGHT 4.0f
+/* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter: white
+ * walls stay below it by their reflectance of .9 or less and the noise of what arrives, which is a few percent. More is
+ * asked where only pixels that mix surfaces speak. */
+#define EMITTER_SHARE 0.15f
+#define EMITTER_SHARE_MIXED 0.3f
+#define NEUTRAL_BASE_COLOR 0.5f
+#define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
+#define SLICE_PROBES 1024 /* work between two questions whether to stop */
+#define SLICE_TEXELS 65536
+
+struct solve {
+    struct reconstruction *r;
+    const struct views *views;
+    const struct reconstruct_hooks *hooks;
+    struct light_field field;
+    struct probes probes;
+    struct divide divide;
+    uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
+    double work_done, work_total;
+};
+
+/* --- progress and stopping ---------------------------------------------------------------------- */
+
+/* Notes a part of the work as done; false when the run is to stop. */
+static bool advance(struct solve *s, double work) {
+    s->work_done += work;
+    s->hooks->progress(s->hooks->user, "solve", s->work_done, s->work_total, -1.0);
+    return !s->hooks->stop_requested(s->hooks->user);
+}
+
+/* Rays are the measure of work: about so many a texel when its highlights are gathered. */
+#define RAYS_A_TEXEL 100.0
+
+static size_t samples_of(const struct solve *s, int pass) {
+    double samples = settings_number(s->r->settings, "gather_samples");
+    return (size_t)(pass + 1 == PASSES ? samples : ceil(samples * FIRST_PASS_PART));
+}
+
+static void plan_work(struct solve *s) {
+    for (int pass = 0; pass < PASSES; pass++)
+        s->work_total += (double)s->probes.count * (double)samples_of(s, pass) +
+                         RAYS_A_TEXEL * (double)s->r->inverse.valid_count;
+}
+
+static bool gather(struct solve *s, int pass) {
+    const struct reconstruction *r = s->r;
+    uint64_t seed = (uint64_t)settings_number(r->settings, "seed") + (uint64_t)pass;
+    size_t samples = samples_of(s, pass);
+    for (size_t first = 0; first < s->probes.count; first += SLICE_PROBES) {
+        size_t count = s->probes.count - first < SLICE_PROBES ? s->probes.count - first : SLICE_PROBES;
+        probes_gather(&s->probes, &s->field, &r->scene->mesh, &r->atlas, &r->inverse, seed, samples, first,
+                      count, r->pool);
+        if (!advance(s, (double)(count * samples)))
+            return false;
+    }
+    return true;
+}
+
+static bool divide_all(struct solve *s) {
+    size_t valid = s->r->inverse.valid_count;
+    for (size_t first = 0; first < valid; first += SLICE_TEXELS) {
+        size_t count = valid - first < SLICE_TEXELS ? valid - first : SLICE_TEXELS;
+        divide_texels(&s->divide, first, count);
+        if (!advance(s, RAYS_A_TEXEL * (double)count))
+            return false;
+    }
+    return true;
+}
+
+/* --- emitters ----------------------------------------------------------------------------------- */
+
+/* Lights are sampled by what is shown of them, own and reflected light together: that is what they
+ * send out. */
+static void set_lights(struct solve *s, bool decided) {
+    struct reconstruction *r = s->r;
+    for (size_t i = 0; i < r->segments.count; i++) {
+        rgb shown = r->evidence[i].shown;
+        bool shines = decided ? r->is_emitter[i] : rgb_mean(shown) > BRIGHT * s->views->median_radiance;
+        r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
+    }
+    world_update_lights(&r->world);
+}
+
+/* Fills `arrived`: the mean over a segment's texels of what a white surface there would send out. */
+static void average_arrived(const struct solve *s) {
+    const struct reconstruction *r = s->r;
+    double(*sum)[4] = mem_calloc(r->segments.count, sizeof *sum);
+    for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
+        uint32_t texel = r->inverse.valid[i];
+        rgb white;
+        if (!(r->fused.count[texel] > 0.0f) || !divide_white(&s->divide, texel, &white))
+            continue;
+        double *to = sum[r->segments.of_triangle[r->inverse.triangle[texel]]];
+        to[0] += (double)white.r;
+        to[1] += (double)white.g;
+        to[2] += (double)white.b;
+        to[3] += 1.0;
+    }
+    for (size_t i = 0; i < r->segments.count; i++) {
+        struct emitter_evidence *e = &r->evidence[i];
+        e->arrived = e->shown; /* without evidence a segment reflects what it shows */
+        if (sum[i][3] > 0.0)
+            e->arrived = rgb_make((float)(sum[i][0] / sum[i][3]), (float)(sum[i][1] / sum[i][3]),
+                                  (float)(sum[i][2] / sum[i][3]));
+    }
+    mem_free(sum);
+}
+
+static void decide_emitters(struct solve *s) {
+    struct reconstruction *r = s->r;
+    average_arrived(s);
+    for (size_t i = 0; i < r->segments.count; i++) {
+        struct emitter_evidence *e = &r->evidence[i];
+        float shown = rgb_mean(e->shown);
+        e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
+        r->is_emitter[i] = e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE);
+    }
+}
+
+/* An emitter's own light: what is shown less what a neutral base colour reflects. */
+static void set_emission(struct solve *s) {
+    struct reconstruction *r = s->r;
+    for (size_t i = 0; i < r->segments.count; i++) {
+        const struct emitter_evidence *e = &r->evidence[i];
+        rgb own = rgb_mad(e->shown, -NEUTRAL_BASE_COLOR, e->arrived);
+        r->materials.emission[i] = r->is_emitter[i]
+                                       ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))
+                                       : rgb_gray(0.0f);
+    }
+    world_update_lights(&r->world);
+}
+
+/* --- the whole ----------------------------------------------------------------------------------- */
+
+static uint32_t spacing_for(const struct atlas *atlas) {
+    uint32_t side = atlas->width > atlas->height ? atlas->width : atlas->height;
+    uint32_t spacing = side * SPACING_AT_2048 / 2048;
+    return spacing < LEAST_SPACING ? LEAST_SPACING : spacing;
+}
+
+static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views,
+                       const struct reconstruct_hooks *hooks) {
+    size_t texels = (size_t)r->atlas.width * r->atlas.height;
+    *s = (struct solve){.r = r, .views = views, .hooks = hooks};
+    s->radiance = mem_calloc_large(texels, sizeof *s->radiance);
+    memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
+    probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
+    s->divide = (struct divide){.r = r, .views = views, .probes = &s->probes, .field = &s->field};
+    s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
+    s->divide.known = mem_calloc(texels, sizeof *s->divide.known);
+    for (size_t i = 0; i < r->segments.count; i++) {
+        r->materials.roughness[i] = 1.0f;
+        r->materials.specular[i] = 0.0f;
+    }
+    plan_work(s);
+}
+
+static void solve_release(struct solve *s) {
+    mem_free(s->divide.known);
+    mem_free(s->divide.scratch);
+    probes_release(&s->probes);
+    mem_free(s->radiance);
+}
+
+static bool solve_pass(struct solve *s, int pass) {
+    set_lights(s, pass > 0);
+    if (!gather(s, pass))
+        return false;
+    decide_emitters(s);
+    gloss_fit(s->r, s->views, &s->probes, &s->field);
+    if (!divide_all(s))
+        return false;
+    divide_fill(&s->divide, s->radiance);
+    return true;
+}
+
+/* What each segment was found to be. */
+static cJSON *segment_list(const struct reconstruction *r) {
+    cJSON *list = cJSON_CreateArray();
+    for (size_t i = 0; i < r->segments.count; i++) {
+        cJSON *entry = cJSON_CreateObject();
+        json_add_int(entry, "object_id", r->segments.id[i]);
+        json_add_number(entry, "roughness", (double)r->materials.roughness[i]);
+        json_add_number(entry, "specular", (double)r->materials.specular[i]);
+        cJSON_AddItemToArray(list, entry);
+    }
+    return list;
+}
+
+static void report(const struct solve *s) {
+    size_t known = 0;
+    for (size_t i = 0; i < s->r->inverse.valid_count; i++)
+        known += s->divide.known[s->r->inverse.valid[i]];
+    cJSON *figures = cJSON_AddObjectToObject(s->r->report, "solve");
+    json_add_int(figures, "probes", (int64_t)s->probes.count);
+    json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
+    json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASSES - 1));
+    json_add(figures, "segments", segment_list(s->r));
+    json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);
+}
+
+enum status solve_run(struct reconstruction *r, const struct views *views,
+                      const struct reconstruct_hooks *hooks, struct error *err) {
+    struct solve s;
+    bool going = true;
+    solve_init(&s, r, views, hooks);
+    emitters_observe(r, views, r->evidence);
+    for (int pass = 0; pass < PASSES && going; pass++)
+        going = solve_pass(&s, pass);
+    if (going) {
+        set_emission(&s);
+        report(&s);
+    }
+    solve_release(&s);
+    return going ? STATUS_OK : error_set(err, STATUS_CANCELLED, "stopped while solving");
+}

@@ -1,0 +1,28 @@
+/* surface.c -- see surface.h. */
+#include "server/scene/surface.h"
+
+static vec3 shading_normal(const struct mesh *mesh, const struct surface_point *p) {
+    if (!mesh->normal)
+        return p->normal;
+    const uint32_t *v = mesh->index[p->triangle];
+    vec3 n = vec3_scale(mesh->normal[v[0]], 1.0f - p->b1 - p->b2);
+    n = vec3_mad(n, p->b1, mesh->normal[v[1]]);
+    n = vec3_normalize(vec3_mad(n, p->b2, mesh->normal[v[2]]));
+    return vec3_dot(n, p->normal) > 0.0f ? n : p->normal;
+}
+
+bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
+                float x, float y, struct surface_point *p) {
+    if (!inverse_uv_lookup(inverse, atlas, x, y, &p->triangle, &p->b1, &p->b2))
+        return false;
+    p->position = mesh_point(mesh, p->triangle, p->b1, p->b2);
+    p->normal = vec3_normalize(mesh_cross(mesh, p->triangle));
+    p->shading = shading_normal(mesh, p);
+    return true;
+}
+
+bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas,
+                      const struct inverse_uv *inverse, uint32_t texel, struct surface_point *p) {
+    return surface_at(mesh, atlas, inverse, (float)(texel % inverse->width) + 0.5f,
+                      (float)(texel / inverse->width) + 0.5f, p);
+}
