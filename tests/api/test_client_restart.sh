@@ -57,4 +57,30 @@ sort -nu "$work/ids" | cmp -s - "$work/ids" || fail "events came twice or out of
 curl -sN -H 'Accept: application/x-ndjson' "$url/v1/jobs/1/events?after=0" |
     jq -c 'select(.event != "progress" and (.data.snapshot | not)) | .id' >"$work/stored"
 cmp -s "$work/stored" "$work/ids" || fail "$(diff "$work/stored" "$work/ids" | head -n 5)"
+
+# --- an upload that another process has begun: this one sends what is missing, and no more ----------
+make_room "$work/second" 5
+head -c 400000 /dev/urandom >"$work/second/notes.bin"
+(cd "$work/second" && find . -type f -printf '%P\n' | LC_ALL=C sort |
+    tar --format=gnu --owner=0 --group=0 --numeric-owner --mode=0644 --mtime=@0 -b1 -cf "$work/second.tar" -T -)
+length=$(stat -c %s "$work/second.tar")
+sha=$(sha256sum <"$work/second.tar" | cut -c 1-64)
+upload=$(curl -s -D - -o /dev/null -X POST -H 'Tus-Resumable: 1.0.0' -H "Upload-Length: $length" \
+    -H "Upload-Metadata: sha256 $(printf %s "$sha" | base64 -w 0)" "$url/v1/uploads" | sed -n 's/^Location: \(.*\)\r$/\1/p')
+head -c 150000 "$work/second.tar" | curl -s -o /dev/null -X PATCH -H 'Tus-Resumable: 1.0.0' -H 'Upload-Offset: 0' \
+    -H 'Content-Type: application/offset+octet-stream' --data-binary @- "$url$upload"
+received() { curl -s "$url/metrics" | sed -n 's/^unbaked_uploaded_bytes_total //p'; }
+before=$(received)
+run 0 submit "$work/second" $long
+has "$err" "are on the server already: going on from there"
+has "$err" "sent second"
+equal "$(($(received) - before))" $((length - 150000)) "bytes that were sent"
+equal "$(sha256sum <"$data/scenes/$sha/archive" | cut -c 1-64)" "$sha" "the hash of what is there"
+run 0 cancel last
+
+# The daemon goes away for good in the middle: the client says so and ends, and what is there stays.
+make_room "$work/third" 4
+head -c 3000000 /dev/urandom >"$work/third/notes.bin"
+daemon_end TERM || fail "the daemon did not end with 0"
+run 5 submit "$work/third" $long --retry 1
 finish
