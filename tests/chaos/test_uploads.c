@@ -16,9 +16,9 @@
 #define OWN_BYTES 65536 /* of each room; the rest is the same for all */
 
 struct proxy {
-    struct daemon *daemon;
+    atomic_int daemon_port;
     int listener, port;
-    bool is_rough;          /* connections are reset, not ended */
+    atomic_bool is_rough;   /* connections are reset, not ended */
     double mean_budget;     /* bytes of a body that a connection carries before it is dropped */
     atomic_ullong body_bytes; /* of PATCH requests, on the way to the daemon */
     atomic_uint drops, connections;
@@ -77,7 +77,7 @@ static void reset(int fd) {
 static void drop_link(struct link *l) {
     char chunk[4096];
     atomic_fetch_add(&l->proxy->drops, 1);
-    if (l->proxy->is_rough) {
+    if (atomic_load(&l->proxy->is_rough)) {
         reset(l->client);
         reset(l->server);
         return;
@@ -91,7 +91,7 @@ static void drop_link(struct link *l) {
 static void *carry(void *user) {
     struct link *l = user;
     char *chunk = mem_alloc(65536);
-    l->server = http_connect(l->proxy->daemon->port);
+    l->server = http_connect(atomic_load(&l->proxy->daemon_port));
     buf_init(&l->head, 1 << 20);
     while (l->server >= 0) {
         struct pollfd ends[2] = {{.fd = l->client, .events = POLLIN}, {.fd = l->server, .events = POLLIN}};
@@ -147,11 +147,11 @@ static void *accept_all(void *user) {
     return NULL;
 }
 
-static void proxy_start(struct proxy *p, struct daemon *d, double mean_budget) {
+static void proxy_start(struct proxy *p, const struct daemon *d, double mean_budget) {
     struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t size = sizeof address;
     pthread_t thread;
-    p->daemon = d;
+    atomic_store(&p->daemon_port, d->port);
     p->mean_budget = mean_budget;
     p->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     CHECK(bind(p->listener, (struct sockaddr *)&address, size) == 0 && listen(p->listener, 512) == 0);
@@ -241,6 +241,7 @@ static double run_round(struct daemon *d, struct proxy *p, const char *build, in
             usleep(10000);
         daemon_signal(d, SIGKILL);
         daemon_start(d);
+        atomic_store(&p->daemon_port, d->port);
     }
     for (int i = 0; i < count; i++) {
         int status = 0;
@@ -299,7 +300,7 @@ int main(void) {
     figure("uploads over dropped connections that differ from what was sent", wrong, 0, "lower");
     figure("bytes sent twice over dropped connections, per cent", 100.0 * ((double)sent / (double)whole - 1.0), 0, "lower");
 
-    p.is_rough = true;
+    atomic_store(&p.is_rough, true);
     make_rooms(&d, 2, others, bytes);
     took = run_round(&d, &p, build, 2, others, kills);
     int lost = 0;
