@@ -93,6 +93,33 @@ static void test_faults(struct painted *room, float drift, float color, float vi
     CHECK_THAT(before > factor * after, "%.4f, then %.4f", before, after);
 }
 
+/* Ordinary frames that clip what is bright at their exposure, which nobody told, and in each of which a
+ * highlight that no other frame shows covers a sixteenth of the picture: clipped pixels are lower
+ * bounds, and neither they nor their absence may move what is found. */
+static void test_clipped(struct painted *room) {
+    rgb truth[PAINTED_FRAMES];
+    painted_reset(room);
+    for (uint64_t f = 0; f < PAINTED_FRAMES; f++) {
+        struct photograph *photo = &room->scene.photograph[f];
+        truth[f] = rgb_gray(powf(2.0f, painted_random(f, 1)));
+        photo->is_hdr = photo->exposure_known = false;
+        photo->clip = 0.75f; /* exact as a half */
+        painted_spoil(photo, truth[f], 0.0f);
+        size_t left = (size_t)(60.0f * (1.0f + painted_random(f, 4)));
+        size_t top = (size_t)(45.0f * (1.0f + painted_random(f, 5)));
+        for (size_t y = top; y < top + 30; y++)
+            for (size_t x = left; x < left + 40; x++)
+                for (int c = 0; c < 3; c++)
+                    photo->pixel[y * PAINTED_WIDTH + x][c] = image_half_from_float(photo->clip);
+    }
+    struct light_found found = run(room, true);
+    printf("clipped: gains within %.4f, fused error %.4f\n", worst_gain(room, truth), painted_error(room));
+    CHECK(found.exposures_solved == room->views.train_count);
+    CHECK(!found.white_balance && !found.vignette);
+    CHECK(worst_gain(room, truth) < 0.06);
+    CHECK(painted_error(room) < 0.03);
+}
+
 /* The photographs as the last test left them, calibrated again by another number of threads. */
 static void test_threads(struct painted *room) {
     struct light_found found;
@@ -122,6 +149,7 @@ int main(void) {
     test_faults(&room, 0.0f, 0.0f, 0.4f, 2.0);
     test_faults(&room, 0.15f, 0.15f, 0.4f, 2.0);
     test_threads(&room);
+    test_clipped(&room);
     painted_release(&room);
     return check_result();
 }
