@@ -31,10 +31,14 @@ const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print th
 
 enum verdict { GOOD, WARN, BAD };
 
-static int bad_count;
+struct doctor {
+    const struct config *config;
+    bool is_loopback; /* what the daemon listens on */
+    int bad_count;
+};
 
-__attribute__((format(printf, 3, 4)))
-static void tell(enum verdict verdict, const char *what, const char *format, ...) {
+__attribute__((format(printf, 4, 5)))
+static void tell(struct doctor *d, enum verdict verdict, const char *what, const char *format, ...) {
     static const char *const words[] = {"ok", "warn", "FAIL"};
     char text[1200];
     va_list args;
@@ -42,40 +46,43 @@ static void tell(enum verdict verdict, const char *what, const char *format, ...
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     printf("%-5s %-12s %s\n", words[verdict], what, text);
-    bad_count += verdict == BAD;
+    d->bad_count += verdict == BAD;
 }
 
 /* --- the machine ----------------------------------------------------------------------------- */
 
-static void check_limits(const struct config *c) {
+static void check_limits(struct doctor *d) {
+    const struct config *c = d->config;
     struct rlimit files;
     int64_t wanted = 2 * c->max_connections + 100; /* a connection and the file that it is sent */
     if (getrlimit(RLIMIT_NOFILE, &files) != 0)
-        tell(WARN, "limits", "the limit of open files cannot be read: %s", strerror(errno));
+        tell(d, WARN, "limits", "the limit of open files cannot be read: %s", strerror(errno));
     else if (files.rlim_max < (rlim_t)wanted)
-        tell(WARN, "limits", "%llu open files allowed, %lld wanted for max_connections = %lld (LimitNOFILE=)",
+        tell(d, WARN, "limits", "%llu open files allowed, %lld wanted for max_connections = %lld (LimitNOFILE=)",
              (unsigned long long)files.rlim_max, (long long)wanted, (long long)c->max_connections);
     else
-        tell(GOOD, "limits", "%llu open files allowed", (unsigned long long)files.rlim_max);
+        tell(d, GOOD, "limits", "%llu open files allowed", (unsigned long long)files.rlim_max);
 }
 
-static void check_processors(const struct config *c) {
+static void check_processors(struct doctor *d) {
+    const struct config *c = d->config;
     long count = sysconf(_SC_NPROCESSORS_ONLN), pages = sysconf(_SC_PHYS_PAGES);
     uint64_t memory = (uint64_t)pages * (uint64_t)sysconf(_SC_PAGESIZE) >> 20;
     uint64_t wanted = (uint64_t)c->worker_memory_mib * (uint64_t)c->max_running;
     enum verdict verdict = wanted > memory || c->threads > count ? WARN : GOOD;
-    tell(verdict, "machine", "%ld processors, %llu MiB of memory; jobs use %lld threads (0: all) and %s", count,
+    tell(d, verdict, "machine", "%ld processors, %llu MiB of memory; jobs use %lld threads (0: all) and %s", count,
          (unsigned long long)memory, (long long)c->threads,
          wanted == 0 ? "as much memory as they ask for" : wanted > memory ? "may use more memory than there is"
                                                                            : "have room");
 }
 
 /* Tries the sandbox in a child, where it does no harm. */
-static void check_sandbox(const struct config *c) {
+static void check_sandbox(struct doctor *d) {
+    const struct config *c = d->config;
     struct sandbox_result result = {.text = ""};
     int channel[2];
     if (!c->sandbox) {
-        tell(WARN, "sandbox", "sandbox = no: jobs read strangers' files with all the daemon's rights");
+        tell(d, WARN, "sandbox", "sandbox = no: jobs read strangers' files with all the daemon's rights");
         return;
     }
     pid_t child = pipe2(channel, O_CLOEXEC) == 0 ? fork() : -1;
@@ -91,12 +98,12 @@ static void check_sandbox(const struct config *c) {
         _exit(!sent);
     }
     if (child < 0 || read(channel[0], &result, sizeof result) != (ssize_t)sizeof result) {
-        tell(BAD, "sandbox", "a process in the sandbox does not even start");
+        tell(d, BAD, "sandbox", "a process in the sandbox does not even start");
     } else {
-        tell(result.files ? GOOD : WARN, "sandbox", "Landlock %s", result.files
+        tell(d, result.files ? GOOD : WARN, "sandbox", "Landlock %s", result.files
              ? "keeps jobs from files that are not theirs"
              : "is missing (Linux 5.13, lsm=landlock): jobs may read files that are not theirs");
-        tell(result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s", result.system_calls
+        tell(d, result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s", result.system_calls
              ? "keeps jobs from the network and from new programs"
              : "is missing: jobs may use the network");
     }
@@ -118,7 +125,7 @@ static bool is_remote(const char *dir) {
            type == 0xFF534D42UL /* CIFS */ || type == 0x65735546UL /* FUSE: who knows */;
 }
 
-static bool check_writable(const char *dir) {
+static bool check_writable(struct doctor *d, const char *dir) {
     char *path = file_join(dir, "doctor-XXXXXX");
     int fd = mkostemp(path, O_CLOEXEC);
     bool good = fd >= 0 && write(fd, "x", 1) == 1 && fsync(fd) == 0;
@@ -129,32 +136,33 @@ static bool check_writable(const char *dir) {
     }
     mem_free(path);
     if (!good)
-        tell(BAD, "data", "user %d cannot write to %s: %s", (int)geteuid(), dir, strerror(number));
+        tell(d, BAD, "data", "user %d cannot write to %s: %s", (int)geteuid(), dir, strerror(number));
     return good;
 }
 
-static void check_disk(const struct config *c) {
+static void check_disk(struct doctor *d) {
+    const struct config *c = d->config;
     uint64_t room;
     struct error err;
     struct stat info;
     const char *dir = c->data_dir;
     if (stat(dir, &info) != 0) {
-        tell(WARN, "data", "%s is not there; the daemon makes it where it may", dir);
+        tell(d, WARN, "data", "%s is not there; the daemon makes it where it may", dir);
         return;
     }
     if (geteuid() == 0 && info.st_uid != 0 && seteuid(info.st_uid) != 0) { /* the daemon is its owner */
-        tell(BAD, "data", "cannot act as the owner of %s: %s", dir, strerror(errno));
+        tell(d, BAD, "data", "cannot act as the owner of %s: %s", dir, strerror(errno));
         return;
     }
-    if (check_writable(dir))
-        tell(info.st_mode & 07 ? WARN : GOOD, "data", "%s can be written%s", dir,
+    if (check_writable(d, dir))
+        tell(d, info.st_mode & 07 ? WARN : GOOD, "data", "%s can be written%s", dir,
              info.st_mode & 07 ? ", and others can look into it: chmod o= it" : "");
     if (is_remote(dir))
-        tell(BAD, "data", "%s lies on a network file system, where SQLite's locks cannot be relied on", dir);
+        tell(d, BAD, "data", "%s lies on a network file system, where SQLite's locks cannot be relied on", dir);
     if (file_free_bytes(dir, &room, &err) != STATUS_OK)
-        tell(BAD, "disk", "%s", err.message);
+        tell(d, BAD, "disk", "%s", err.message);
     else
-        tell(room >> 20 < (uint64_t)c->min_free_mib ? BAD : GOOD, "disk", "%llu MiB free; min_free_mib = %lld",
+        tell(d, room >> 20 < (uint64_t)c->min_free_mib ? BAD : GOOD, "disk", "%llu MiB free; min_free_mib = %lld",
              (unsigned long long)(room >> 20), (long long)c->min_free_mib);
 }
 
@@ -170,7 +178,9 @@ static bool daemon_runs(const char *dir) {
     return runs;
 }
 
-static void check_tokens(const struct config *c, bool runs, bool is_loopback) {
+static void check_tokens(struct doctor *d, bool runs) {
+    const struct config *c = d->config;
+    bool is_loopback = d->is_loopback;
     struct error err;
     char *path = file_join(c->data_dir, "state.db");
     int fd, count = 0;
@@ -180,41 +190,43 @@ static void check_tokens(const struct config *c, bool runs, bool is_loopback) {
         if (admin_call(c->data_dir, request, &reply, &fd, &err) == STATUS_OK)
             count = cJSON_GetArraySize(cJSON_GetObjectItem(reply, "items"));
         else
-            tell(BAD, "database", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
+            tell(d, BAD, "database", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
         cJSON_Delete(request);
         cJSON_Delete(reply);
     }
     mem_free(path);
     if (count > 0)
-        tell(GOOD, "tokens", "%d", count);
+        tell(d, GOOD, "tokens", "%d", count);
     else if (strcmp(c->access, "open") == 0)
-        tell(is_loopback ? GOOD : WARN, "tokens", "access = open: whoever reaches %s may do everything", c->listen);
+        tell(d, is_loopback ? GOOD : WARN, "tokens", "access = open: whoever reaches %s may do everything", c->listen);
     else if (is_loopback)
-        tell(GOOD, "tokens", "none: whoever has an account on this machine may do everything");
+        tell(d, GOOD, "tokens", "none: whoever has an account on this machine may do everything");
     else
-        tell(BAD, "tokens", "none, and %s is no loopback address: `unbaked token add NAME --role admin`", c->listen);
+        tell(d, BAD, "tokens", "none, and %s is no loopback address: `unbaked token add NAME --role admin`", c->listen);
 }
 
-static void check_tls(const struct config *c, bool is_loopback) {
+static void check_tls(struct doctor *d) {
+    const struct config *c = d->config;
+    bool is_loopback = d->is_loopback;
     struct tls *tls;
     struct error err;
     struct stat info;
     double days = 0;
     if (!*c->tls_certificate) {
-        tell(is_loopback ? GOOD : WARN, "tls", is_loopback ? "none, on loopback"
+        tell(d, is_loopback ? GOOD : WARN, "tls", is_loopback ? "none, on loopback"
              : "none: tokens and scenes cross the network unencrypted");
         return;
     }
     if (tls_new(&tls, c->tls_certificate, c->tls_key, &err) != STATUS_OK ||
         tls_days_left(c->tls_certificate, &days, &err) != STATUS_OK) {
-        tell(BAD, "tls", "%s", err.message);
+        tell(d, BAD, "tls", "%s", err.message);
         return;
     }
     tls_free(tls);
-    tell(days < 0 ? BAD : days < 14 ? WARN : GOOD, "tls", "the certificate %s %.0f days",
+    tell(d, days < 0 ? BAD : days < 14 ? WARN : GOOD, "tls", "the certificate %s %.0f days",
          days < 0 ? "has expired, for" : "is good for", days < 0 ? -days : days);
     if (stat(c->tls_key, &info) == 0 && info.st_mode & 07)
-        tell(WARN, "tls", "everybody here can read the key: chmod o= %s", c->tls_key);
+        tell(d, WARN, "tls", "everybody here can read the key: chmod o= %s", c->tls_key);
 }
 
 int doctor_command(int argc, char **argv) {
@@ -222,26 +234,25 @@ int doctor_command(int argc, char **argv) {
     struct error err;
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port;
-    bool is_loopback = true;
     int code = invocation_read(&in, argc, argv, doctor_flags, CONFIG_FILE_DEFAULT);
     if (code < 0 && (invocation_has(&in, "--help") || in.word_count > 0)) {
         code = in.word_count > 0 ? EXIT_USAGE : EXIT_SUCCESS;
         command_help(command_find("doctor"), in.word_count > 0 ? stderr : stdout);
     }
     if (code < 0) {
-        const struct config *c = &in.config;
-        bool runs = daemon_runs(c->data_dir);
+        struct doctor doctor = {.config = &in.config}, *d = &doctor;
+        bool runs = daemon_runs(in.config.data_dir);
         log_set_level(LOG_ERROR);
-        config_address(c->listen, address, &port, &is_loopback, &err); /* was checked with the rest */
-        tell(GOOD, "program", "unbaked " UNBAKE_VERSION "; a daemon %s on %s", runs ? "runs" : "does not run",
-             c->data_dir);
-        check_processors(c);
-        check_limits(c);
-        check_sandbox(c);
-        check_tls(c, is_loopback);
-        check_tokens(c, runs, is_loopback);
-        check_disk(c);
-        code = bad_count > 0;
+        config_address(in.config.listen, address, &port, &d->is_loopback, &err); /* was checked with the rest */
+        tell(d, GOOD, "program", "unbaked " UNBAKE_VERSION "; a daemon %s on %s", runs ? "runs" : "does not run",
+             in.config.data_dir);
+        check_processors(d);
+        check_limits(d);
+        check_sandbox(d);
+        check_tls(d);
+        check_tokens(d, runs);
+        check_disk(d);
+        code = d->bad_count > 0;
     }
     invocation_release(&in);
     return code;
