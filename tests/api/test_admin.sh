@@ -99,7 +99,8 @@ certificate() {
 if command -v openssl >/dev/null; then
     certificate first; cp "$work/cert.pem" "$work/first.pem"
     data=$work/tls
-    start_daemon --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem" --set max_upload_mib=1
+    start_daemon --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem" --set max_upload_mib=1 \
+        --set keepalive_sec=1
     url=https://${url#http://}
     equal "$(cat "$work/stdout")" "$url" "what it prints"
     call GET /healthz --cacert "$work/first.pem"; expect 200 "over TLS"
@@ -119,8 +120,12 @@ if command -v openssl >/dev/null; then
     call GET /healthz --cacert "$work/first.pem"; equal "$status" 000 "the old certificate, after a reload"
     unbaked doctor --data "$data" --set min_free_mib=1 --set tls_certificate="$work/cert.pem" --set tls_key="$work/first.pem" \
         >"$work/out" && fail "doctor takes a certificate for a key"
-    stop_daemon
+    curl -sN -m 60 --cacert "$work/cert.pem" "$url/v1/events" >"$work/stream" & background=$!
+    wait_for 20 grep -q keepalive "$work/stream"
+    stop_daemon # with the stream open
     equal "$daemon_status" 0 "exit status with TLS"
+    wait "$background"
+    background=
     refused 1 'key.pem' "$build/unbaked" --data "$data" --listen 127.0.0.1:0 \
         --set tls_certificate="$work/first.pem" --set tls_key="$work/key.pem"
 fi
