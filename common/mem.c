@@ -70,6 +70,7 @@ void *mem_calloc_large(size_t count, size_t size) {
 }
 
 char *mem_strndup(const char *text, size_t length) {
+    length = strnlen(text, length); /* as strndup: a shorter text ends it */
     char *copy = mem_alloc(length + 1);
     memcpy(copy, text, length);
     copy[length] = '\0';

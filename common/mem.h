@@ -19,7 +19,7 @@ void *mem_realloc_array(void *old, size_t count, size_t size);
  * offers them: for arrays of many megabytes that are read at random. */
 void *mem_calloc_large(size_t count, size_t size);
 char *mem_strdup(const char *text);
-char *mem_strndup(const char *text, size_t length);
+char *mem_strndup(const char *text, size_t length);  /* at most `length` bytes of it */
 /* A formatted string of its own; never NULL. */
 char *mem_printf(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void mem_free(void *pointer);
