@@ -62,6 +62,7 @@ struct shade_block {
     float distance_m[LANES];
     float pdf[LANES];                /* of the direction by solid angle; 0: a camera ray */
     float brought[LANES];            /* greatest channel of what the path has brought so far */
+    struct lanes3 worth;             /* beta as roulette takes it: of base colours at least `least_color` */
     float area_density[LANES];       /* of light samples on this segment */
     /* The triangle. */
     struct lanes3 normal;            /* geometric */
@@ -89,7 +90,7 @@ struct shade_block {
     uint32_t shadow_wanted[LANES];   /* 1: the shadow ray decides */
     struct lanes3 gain;              /* radiance that it would bring */
     struct lanes3 way_origin, way;
-    struct lanes3 way_beta;
+    struct lanes3 way_beta, way_worth;
     float way_pdf[LANES];
     uint32_t way_open[LANES];        /* 1: the path goes on */
 };

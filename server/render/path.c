@@ -32,11 +32,17 @@
 #include "server/render/shade.h"
 
 #define MAX_DEPTH 32
+#define MIN_CHANCE 0.05f
+#define MAX_CHANCE 0.95f
+#define MIN_LIGHT_CHANCE 0.1f
+#ifndef EARLY_WORTH
+#define EARLY_WORTH 4.0f
+#endif
 
 /* A path under way to its next surface. */
 struct flight {
     uint32_t path, parent;
-    rgb beta;
+    rgb beta, worth; /* see struct shade_block */
     float pdf; /* of its direction by solid angle; 0 for a camera ray */
 };
 
@@ -168,6 +174,7 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->parent[lane] = f->parent;
     lanes3_set_rgb(&v->beta, lane, f->beta);
     s->pdf[lane] = f->pdf;
+    lanes3_set_rgb(&s->worth, lane, f->worth);
     s->brought[lane] = rgb_max(radiance[f->path]);
     s->key[lane] = b->key[f->path];
     s->sample[lane] = b->sample[f->path];
@@ -273,11 +280,25 @@ static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32
         b->ray[flights] =
             (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f, lanes3_get(&s->way, i), INFINITY};
         b->flight[flights] = (struct flight){v->path[i], first + (uint32_t)i,
-                                             lanes3_rgb(&s->way_beta, i), s->way_pdf[i]};
+                                             lanes3_rgb(&s->way_beta, i), lanes3_rgb(&s->way_worth, i),
+                                             s->way_pdf[i]};
         flights += s->way_open[i];
     }
     b->shadow_count = shadows;
     b->flight_count = flights;
+}
+
+/* Before roulette_depth only paths that are worth little may end. */
+static struct shade_roulette roulette_at(const struct path_settings *settings, int segment) {
+    bool any = settings->roulette_depth <= settings->max_depth;
+    bool all = any && segment >= settings->roulette_depth;
+    return (struct shade_roulette){
+        .scale = all ? 1.0f : EARLY_WORTH,
+        .least = any ? MIN_CHANCE : 1.0f,
+        .most = all ? MAX_CHANCE : 1.0f,
+        .least_light = any ? MIN_LIGHT_CHANCE : 1.0f,
+        .least_color = settings->least_color,
+    };
 }
 
 /* Shades the `count` vertices loaded into a block of this depth. */
@@ -300,8 +321,7 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
         sample_environment(s, v, world->lights, count);
     gather_texels(v, s, texture, count);
     shade_texture(v, s);
-    shade_scatter(v, s, depth + 2 >= settings->roulette_depth,
-                  settings->roulette_depth <= settings->max_depth);
+    shade_scatter(v, s, roulette_at(settings, depth + 2));
     send_rays(b, v, (uint32_t)block * LANES, count);
 }
 
@@ -356,7 +376,7 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     for (size_t i = 0; i < count; i++) {
         b->key[i] = sampler_key(settings->seed, key[i].index, key[i].iteration);
         b->sample[i] = key[i].sample;
-        b->flight[i] = (struct flight){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, 0.0f};
+        b->flight[i] = (struct flight){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, {1.0f, 1.0f, 1.0f}, 0.0f};
         b->ray[i] = (struct accel_ray){ray[i].origin, 0.0f, ray[i].direction, INFINITY};
         radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
     }

@@ -23,6 +23,8 @@ struct path_settings {
                          * at most max_depth, light samples that can bring only little play too;
                          * otherwise nothing is left to chance */
     uint64_t seed;
+    float least_color;  /* roulette takes no base colour for darker than this: derivatives by base
+                         * colour are no smaller where it is dark. 0 where only pictures are wanted */
 };
 
 /* Names the random numbers of one path: a pure function of these and the seed. Consecutive

@@ -5,9 +5,6 @@
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 
-#define MIN_CHANCE 0.05f
-#define MAX_CHANCE 0.95f
-#define MIN_LIGHT_CHANCE 0.1f
 #define LIGHT_SHARE 0.1f /* of the path's radiance so far: smaller gains are a gamble */
 
 /* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
@@ -136,6 +133,10 @@ KERNEL void shade_light(struct shade_block *restrict s) {
     }
 }
 
+static inline float greatest(rgb c) {
+    return bsdf_max(c.r, bsdf_max(c.g, c.b));
+}
+
 static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
     return (rgb){(base_color.r * f.diffuse + f.specular) * light.r,
                  (base_color.g * f.diffuse + f.specular) * light.g,
@@ -143,9 +144,7 @@ static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
 }
 
 KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
-                          bool path_roulette, bool light_roulette) {
-    float least = path_roulette ? MIN_CHANCE : 1.0f, most = path_roulette ? MAX_CHANCE : 1.0f;
-    float least_worth = light_roulette ? MIN_LIGHT_CHANCE : 1.0f;
+                          struct shade_roulette roulette) {
     FOR_LANES {
         vec3 n = lanes3_get(&s->frame_normal, i), a, b;
         vec3_frame(n, &a, &b);
@@ -163,11 +162,14 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         rgb gain = rgb_mul(beta, reflect(f, base_color, possible));
         /* A light sample that can bring only a little, by what the path has brought already, is
          * seldom worth a shadow ray: roulette (Veach 1997, section 10.4.1). */
-        float most_gain = bsdf_max(gain.r, bsdf_max(gain.g, gain.b));
-        float worth = most_gain / bsdf_max(LIGHT_SHARE * s->brought[i], 1e-30f);
-        worth = clamp_flat(worth, least_worth, 1.0f);
-        bool wanted = lit && s->light_roulette[i] < worth;
-        float kept = wanted ? 1.0f / worth : 0.0f;
+        rgb path_worth = lanes3_rgb(&s->worth, i), color = {bsdf_max(base_color.r, roulette.least_color),
+                                                           bsdf_max(base_color.g, roulette.least_color),
+                                                           bsdf_max(base_color.b, roulette.least_color)};
+        float most_gain = greatest(rgb_mul(path_worth, reflect(f, color, possible)));
+        float chance = most_gain / bsdf_max(LIGHT_SHARE * s->brought[i], 1e-30f);
+        chance = clamp_flat(chance, roulette.least_light, 1.0f);
+        bool wanted = lit && s->light_roulette[i] < chance;
+        float kept = wanted ? 1.0f / chance : 0.0f;
         lanes3_set(&v->light, i, light);
         lanes3_set_rgb(&v->incident, i, rgb_scale(possible, kept));
         v->light_factor[i] = factor * kept;
@@ -178,8 +180,9 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         f = bsdf_eval(&bsdf, wo, wi);
         float scale = f.pdf > 0.0f ? 1.0f / bsdf_max(f.pdf, 1e-30f) : 0.0f;
         rgb onward = rgb_scale(reflect(f, base_color, beta), scale);
-        float largest = bsdf_max(onward.r, bsdf_max(onward.g, onward.b));
-        float chance = clamp_flat(largest, least, most), over = 1.0f / chance;
+        rgb worth = rgb_scale(reflect(f, color, path_worth), scale);
+        chance = clamp_flat(roulette.scale * greatest(worth), roulette.least, roulette.most);
+        float over = 1.0f / chance;
         bool open = f.pdf > 0.0f && s->roulette[i] < chance;
         v->scale[i] = open ? scale * over : 0.0f;
         lanes3_set(&v->wi, i, wi);
@@ -187,6 +190,7 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         lanes3_set(&s->way, i, way);
         lanes3_set(&s->way_origin, i, offset(lanes3_get(&s->point, i), lanes3_get(&s->normal, i), way));
         lanes3_set_rgb(&s->way_beta, i, rgb_scale(onward, over));
+        lanes3_set_rgb(&s->way_worth, i, rgb_scale(worth, over));
         s->way_pdf[i] = f.pdf;
         s->way_open[i] = open ? 1 : 0;
     }

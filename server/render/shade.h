@@ -4,8 +4,6 @@
 #ifndef UNBAKE_RENDER_SHADE_H
 #define UNBAKE_RENDER_SHADE_H
 
-#include <stdbool.h>
-
 #include "server/render/lanes.h"
 
 /* From the hit and the triangle: point, frame, wo, weight of the emission. */
@@ -20,9 +18,16 @@ void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict
 /* From the chosen triangles: direction, distance and density of the light samples. */
 void shade_light(struct shade_block *restrict s);
 
+/* How roulette is played at a depth: chance = clamp(scale * worth, least, most). */
+struct shade_roulette {
+    float scale, least, most;
+    float least_light; /* chance of a light sample to be traced */
+    float least_color; /* see struct path_settings */
+};
+
 /* Reflection towards the light samples and on along the path. */
-void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, bool path_roulette,
-                   bool light_roulette);
+void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
+                   struct shade_roulette roulette);
 
 /* Derivatives of everything at a vertex, and the radiance that leaves it. */
 void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d);
