@@ -170,7 +170,7 @@ void film_render_first_hits(const struct world *world, const struct camera *came
         "base_color.R", "base_color.G", "base_color.B", "roughness", "specular", "emission.R",
         "emission.G",   "emission.B",   "segment",      "depth",     "coverage"};
     image_init(image, camera->width, camera->height, CHANNELS, names);
-    struct path_settings settings = {1, 1, seed};
+    struct path_settings settings = {.max_depth = 1, .roulette_depth = 1, .seed = seed};
     struct film film = {world, camera, &settings, spp, 0, image, NULL};
     parallel_for(pool, camera->height, first_hit_row, &film);
 }

@@ -63,7 +63,7 @@ struct shade_block {
     float pdf[LANES];                /* of the direction by solid angle; 0: a camera ray */
     float brought[LANES];            /* greatest channel of what the path has brought so far */
     struct lanes3 worth;             /* beta as roulette takes it: of base colours at least `least_color` */
-    float area_density[LANES];       /* of light samples on this segment */
+    float area_density[LANES];       /* of light samples here, as the vertex before takes them */
     /* The triangle. */
     struct lanes3 normal;            /* geometric */
     float plane[LANES];
@@ -72,6 +72,8 @@ struct shade_block {
     /* Derived. */
     struct lanes3 point;
     struct lanes3 frame_normal;      /* shading normal on the viewer's side */
+    int32_t cell[LANES];             /* of the guide */
+    uint32_t guide_row[LANES];
     float filter[4][LANES];          /* weights of valid texels, not normalised */
     float filter_sum[LANES];
     /* Random numbers. */

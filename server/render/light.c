@@ -172,8 +172,12 @@ static void release_triangles(struct lights *l) {
     mem_free(l->triangle);
     mem_free(l->emission);
     mem_free(l->area_density);
+    mem_free(l->first_of);
     table_release(&l->triangles);
     l->triangle = NULL;
+    l->emission = NULL;
+    l->area_density = NULL;
+    l->first_of = NULL;
     l->triangle_count = 0;
 }
 
@@ -186,34 +190,95 @@ void lights_free(struct lights *l) {
     mem_free(l);
 }
 
-void lights_update(struct lights *l, const struct mesh *mesh, const struct segments *segments,
-                   const struct materials *materials) {
-    release_triangles(l);
-    l->segment_count = segments->count;
-    l->emission = mem_array(segments->count, sizeof *l->emission);
-    memcpy(l->emission, materials->emission, segments->count * sizeof *l->emission);
-    l->area_density = mem_calloc(segments->count, sizeof *l->area_density);
-    for (size_t i = 0; i < mesh->triangle_count; i++)
-        l->triangle_count += rgb_luminance(l->emission[segments->of_triangle[i]]) > 0.0f;
-    float *power = mem_array(l->triangle_count, sizeof *power);
-    l->triangle = mem_calloc_large(l->triangle_count, sizeof *l->triangle);
-    size_t at = 0;
+static float cross_area(vec3 edge1, vec3 edge2) {
+    return 0.5f * vec3_length(vec3_cross(edge1, edge2));
+}
+
+/* Writes the parts of a triangle, in the order of lights_part; returns how many. */
+static size_t cut(const struct light_triangle *whole, struct light_triangle *part) {
+    uint32_t n = UINT32_C(1) << whole->level;
+    vec3 step1 = vec3_scale(whole->edge1, 1.0f / (float)n), step2 = vec3_scale(whole->edge2, 1.0f / (float)n);
+    size_t count = 0;
+    for (uint32_t i = 0; i < n; i++) {
+        for (uint32_t j = 0; j + i < n; j++) {
+            struct light_triangle p = *whole;
+            p.corner = vec3_mad(vec3_mad(whole->corner, (float)i, step1), (float)j, step2);
+            p.edge1 = step1;
+            p.edge2 = step2;
+            part[count++] = p;
+            if (i + j + 1 == n)
+                continue;
+            p.corner = vec3_add(vec3_add(p.corner, step1), step2);
+            p.edge1 = vec3_neg(step1);
+            p.edge2 = vec3_neg(step2);
+            part[count++] = p;
+        }
+    }
+    return count;
+}
+
+static struct light_triangle whole_triangle(const struct mesh *mesh, size_t triangle) {
+    const uint32_t *v = mesh->index[triangle];
+    vec3 a = mesh->position[v[0]];
+    return (struct light_triangle){.corner = a, .edge1 = vec3_sub(mesh->position[v[1]], a),
+                                   .edge2 = vec3_sub(mesh->position[v[2]], a)};
+}
+
+/* Lists the triangles of the segments that emit, large ones in parts. */
+static void find_triangles(struct lights *l, const struct mesh *mesh, const struct segments *segments) {
+    l->first_of = mem_array(mesh->triangle_count, sizeof *l->first_of);
+    double total = 0.0;
+    for (size_t i = 0; i < mesh->triangle_count; i++) {
+        struct light_triangle t = whole_triangle(mesh, i);
+        if (rgb_luminance(l->emission[segments->of_triangle[i]]) > 0.0f)
+            total += (double)cross_area(t.edge1, t.edge2);
+    }
+    size_t capacity = 0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         uint32_t segment = segments->of_triangle[i];
-        float luminance = rgb_luminance(l->emission[segment]);
-        if (!(luminance > 0.0f))
+        if (!(rgb_luminance(l->emission[segment]) > 0.0f))
             continue;
-        vec3 a = mesh->position[mesh->index[i][0]];
-        vec3 edge1 = vec3_sub(mesh->position[mesh->index[i][1]], a);
-        vec3 edge2 = vec3_sub(mesh->position[mesh->index[i][2]], a);
-        vec3 cross = vec3_cross(edge1, edge2);
-        power[at] = 0.5f * vec3_length(cross) * luminance;
-        l->triangle[at++] = (struct light_triangle){
-            .corner = a, .edge1 = edge1, .edge2 = edge2, .radiance = l->emission[segment], .segment = segment};
+        struct light_triangle t = whole_triangle(mesh, i);
+        double part = (double)cross_area(t.edge1, t.edge2);
+        for (; t.level < LIGHT_MAX_LEVEL && part > total / LIGHT_PARTS; t.level++)
+            part *= 0.25;
+        t.segment = segment;
+        size_t needed = l->triangle_count + ((size_t)1 << 2 * t.level);
+        if (needed > capacity) {
+            capacity = needed + capacity / 2;
+            l->triangle = mem_realloc_array(l->triangle, capacity, sizeof *l->triangle);
+        }
+        l->first_of[i] = (uint32_t)l->triangle_count;
+        l->triangle_count += cut(&t, l->triangle + l->triangle_count);
+    }
+}
+
+bool lights_update(struct lights *l, const struct mesh *mesh, const struct segments *segments,
+                   const struct materials *materials) {
+    bool same = l->segment_count == segments->count && l->first_of;
+    for (size_t s = 0; s < segments->count && same; s++)
+        same = (rgb_luminance(l->emission[s]) > 0.0f) == (rgb_luminance(materials->emission[s]) > 0.0f);
+    if (!same)
+        release_triangles(l);
+    table_release(&l->triangles);
+    if (!l->emission) {
+        l->segment_count = segments->count;
+        l->emission = mem_array(segments->count, sizeof *l->emission);
+        l->area_density = mem_calloc(segments->count, sizeof *l->area_density);
+    }
+    memcpy(l->emission, materials->emission, segments->count * sizeof *l->emission);
+    if (!same)
+        find_triangles(l, mesh, segments);
+    float *power = mem_array(l->triangle_count, sizeof *power);
+    for (size_t i = 0; i < l->triangle_count; i++) {
+        struct light_triangle *t = &l->triangle[i];
+        t->radiance = l->emission[t->segment];
+        power[i] = cross_area(t->edge1, t->edge2) * rgb_luminance(t->radiance);
     }
     table_make(&l->triangles, l->triangle_count, power);
     share_samples(l);
     mem_free(power);
+    return !same;
 }
 
 /* Column and row of a direction in the map, in units of cells, which lie between pixel centres. As

@@ -21,6 +21,10 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
+/* Triangles larger than this part of all that emits are cut into quarters until they are not. */
+#define LIGHT_PARTS 32
+#define LIGHT_MAX_LEVEL 4
+
 #define LIGHT_ENVIRONMENT UINT32_MAX /* in the place of an emitter's segment */
 
 /* One cache line. The front side is that of edge1 x edge2. */
@@ -29,7 +33,8 @@ struct light_triangle {
     rgb radiance;
     float density; /* by area, with which its points are picked */
     uint32_t segment;
-    uint32_t pad[2];
+    uint32_t level;   /* cut out of a triangle of the mesh of 4^level parts */
+    uint32_t pad;
 };
 
 /* A distribution over [0, count): monotone inversion of the cumulative sum, by a table that
@@ -46,6 +51,7 @@ struct lights {
     size_t triangle_count;
     struct light_triangle *triangle; /* owned */
     struct light_table triangles;
+    uint32_t *first_of;      /* [triangles of the mesh] the first part of those that emit; owned */
     size_t segment_count;
     rgb *emission;           /* [segment_count] owned copy: what the tables were made from */
     float *area_density;     /* [segment_count] density by area with which a point on a front face
@@ -91,20 +97,40 @@ void lights_free(struct lights *lights);
 void lights_set_environment(struct lights *lights, const struct image *environment,
                             const struct reach *reach);
 
-/* Rebuilds the tables of triangles; call after emission changed. */
-void lights_update(struct lights *lights, const struct mesh *mesh, const struct segments *segments,
+/* Takes over changed emission. The mesh and its segments are those of the last call. True when other
+ * segments emit than before, and the list of triangles is a new one. */
+bool lights_update(struct lights *lights, const struct mesh *mesh, const struct segments *segments,
                    const struct materials *materials);
+
+/* The part of a triangle of the mesh, which must emit, in which (b1, b2) lie. Parts are in rows
+ * along the second edge, those that stand on their heads between the others. */
+static inline uint32_t lights_part(const struct lights *lights, uint32_t mesh_triangle, float b1, float b2) {
+    uint32_t first = lights->first_of[mesh_triangle], n = UINT32_C(1) << lights->triangle[first].level;
+    if (n == 1)
+        return first;
+    float x = b1 * (float)n, y = b2 * (float)n;
+    uint32_t i = (uint32_t)x, j = (uint32_t)y;
+    i = i < n ? i : n - 1;
+    j = j < n - i ? j : n - i - 1;
+    uint32_t turned = x - (float)i + y - (float)j > 1.0f && i + j + 1 < n ? 1 : 0;
+    return first + i * (2 * n - i) + 2 * j + turned;
+}
 
 /* True when anything shines. */
 static inline bool lights_any(const struct lights *lights) {
     return lights->triangles.total > 0.0 || lights->environment_chance > 0.0f;
 }
 
-/* The triangle for a number in [0, 1) that did not choose the environment (at or above
- * environment_chance); there must be one. */
-static inline const struct light_triangle *lights_pick(const struct lights *lights, float pick) {
+/* Of a number in [0, 1) that did not choose the environment (at or above environment_chance): where
+ * in what is left, in [0, 1). */
+static inline float lights_rescale(const struct lights *lights, float pick) {
     float at = (pick - lights->environment_chance) / (1.0f - lights->environment_chance);
-    return &lights->triangle[light_table_pick(&lights->triangles, at < 0x1.fffffep-1f ? at : 0x1.fffffep-1f)];
+    return at < 0x1.fffffep-1f ? at : 0x1.fffffep-1f;
+}
+
+/* The triangle for such a number, by power; there must be one. */
+static inline const struct light_triangle *lights_pick(const struct lights *lights, float pick) {
+    return &lights->triangle[light_table_pick(&lights->triangles, lights_rescale(lights, pick))];
 }
 
 /* Picks a direction as seen from `point` for numbers in [0, 1). */

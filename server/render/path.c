@@ -35,14 +35,13 @@
 #define MIN_CHANCE 0.05f
 #define MAX_CHANCE 0.95f
 #define MIN_LIGHT_CHANCE 0.1f
-#ifndef EARLY_WORTH
-#define EARLY_WORTH 4.0f
-#endif
+#define EARLY_WORTH 4.0f /* before roulette_depth a path worth less than 1 / this may end */
 
 /* A path under way to its next surface. */
 struct flight {
     uint32_t path, parent;
     rgb beta, worth; /* see struct shade_block */
+    uint32_t row; /* of the guide, where it starts */
     float pdf; /* of its direction by solid angle; 0 for a camera ray */
 };
 
@@ -191,6 +190,9 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->specular[lane] = m->specular[segment];
     lanes3_set_rgb(&v->emission, lane, m->emission[segment]);
     s->area_density[lane] = world->lights->area_density[segment];
+    if (s->area_density[lane] > 0.0f && world->guide)
+        s->area_density[lane] *= guide_density_factor(world->guide, f->row,
+                                                      lights_part(world->lights, hit->triangle, b1, b2));
 }
 
 static void add_emission(const struct vertex_block *v, int count, rgb *radiance) {
@@ -202,21 +204,45 @@ static void add_emission(const struct vertex_block *v, int count, rgb *radiance)
     }
 }
 
+/* The rows of the guide, and their places that the picks will need fetched. */
+static void find_rows(struct shade_block *s, const struct guide *guide, int count) {
+    shade_cells(s, &guide->grid);
+    for (int i = 0; i < count; i++) {
+        s->guide_row[i] = guide->row[s->cell[i]];
+        __builtin_prefetch(guide->start + s->guide_row[i] * GUIDE_STARTS);
+        __builtin_prefetch(guide->cumulative +
+                           s->guide_row[i] * (guide->patch_count + 1) + (size_t)(s->pick[i] * (float)guide->patch_count));
+    }
+}
+
+static void load_light(struct shade_block *s, struct vertex_block *v, int lane, const struct light_triangle *t) {
+    lanes3_set(&s->light_corner, lane, t->corner);
+    lanes3_set(&s->light_edge1, lane, t->edge1);
+    lanes3_set(&s->light_edge2, lane, t->edge2);
+    lanes3_set_rgb(&s->radiance, lane, t->radiance);
+    s->light_density[lane] = t->density;
+    v->light_segment[lane] = t->segment;
+}
+
 /* Chooses a light for every lane and loads its triangle; false when there is no light. */
-static bool pick_lights(struct shade_block *s, struct vertex_block *v, const struct lights *lights,
-                        int count) {
+static bool pick_lights(struct shade_block *s, struct vertex_block *v, const struct world *world, int count) {
+    const struct lights *lights = world->lights;
     if (!(lights->triangles.total > 0.0))
         return lights_any(lights);
+    if (world->guide)
+        find_rows(s, world->guide, count);
     for (int i = 0; i < count; i++) {
         if (s->pick[i] < lights->environment_chance)
             continue;
-        const struct light_triangle *t = lights_pick(lights, s->pick[i]);
-        lanes3_set(&s->light_corner, i, t->corner);
-        lanes3_set(&s->light_edge1, i, t->edge1);
-        lanes3_set(&s->light_edge2, i, t->edge2);
-        lanes3_set_rgb(&s->radiance, i, t->radiance);
-        s->light_density[i] = t->density;
-        v->light_segment[i] = t->segment;
+        float pick = lights_rescale(lights, s->pick[i]);
+        if (!world->guide) {
+            load_light(s, v, i, lights_pick(lights, s->pick[i]));
+            continue;
+        }
+        float factor;
+        uint32_t entry = guide_pick(world->guide, lights, s->guide_row[i], pick, &factor);
+        load_light(s, v, i, &lights->triangle[entry]);
+        s->light_density[i] *= factor;
     }
     return true;
 }
@@ -281,7 +307,7 @@ static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32
             (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f, lanes3_get(&s->way, i), INFINITY};
         b->flight[flights] = (struct flight){v->path[i], first + (uint32_t)i,
                                              lanes3_rgb(&s->way_beta, i), lanes3_rgb(&s->way_worth, i),
-                                             s->way_pdf[i]};
+                                             s->guide_row[i], s->way_pdf[i]};
         flights += s->way_open[i];
     }
     b->shadow_count = shadows;
@@ -313,7 +339,7 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
         return;
     memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);
-    if (pick_lights(s, v, world->lights, count))
+    if (pick_lights(s, v, world, count))
         shade_light(s);
     else
         memset(s->light_pdf, 0, sizeof s->light_pdf);
@@ -376,7 +402,7 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     for (size_t i = 0; i < count; i++) {
         b->key[i] = sampler_key(settings->seed, key[i].index, key[i].iteration);
         b->sample[i] = key[i].sample;
-        b->flight[i] = (struct flight){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, {1.0f, 1.0f, 1.0f}, 0.0f};
+        b->flight[i] = (struct flight){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, {1.0f, 1.0f, 1.0f}, 0, 0.0f};
         b->ray[i] = (struct accel_ray){ray[i].origin, 0.0f, ray[i].direction, INFINITY};
         radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
     }

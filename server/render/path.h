@@ -17,6 +17,8 @@
 #include "server/render/gradient.h"
 #include "server/render/world.h"
 
+#define PATH_LEAST_COLOR 0.3f /* where derivatives are wanted */
+
 struct path_settings {
     int max_depth;      /* segments from the camera: 1 emission only, 2 direct light, ... <= 32 */
     int roulette_depth; /* Russian roulette decides on this segment and those after it. Where it is

@@ -75,6 +75,13 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
     }
 }
 
+KERNEL void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid) {
+    const struct guide_grid g = *grid;
+    FOR_LANES {
+        s->cell[i] = guide_cell(&g, lanes3_get(&s->point, i), lanes3_get(&s->frame_normal, i));
+    }
+}
+
 KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
     uint32_t pair = (uint32_t)(depth + 1) * PAIRS_PER_VERTEX;
     FOR_LANES {

@@ -4,10 +4,14 @@
 #ifndef UNBAKE_RENDER_SHADE_H
 #define UNBAKE_RENDER_SHADE_H
 
+#include "server/render/guide.h"
 #include "server/render/lanes.h"
 
 /* From the hit and the triangle: point, frame, wo, weight of the emission. */
 void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s);
+
+/* The guide's cells. */
+void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid);
 
 /* Random numbers of the vertex that ends segment number `depth` (0: the camera's). */
 void shade_numbers(struct shade_block *restrict s, int depth);

@@ -44,7 +44,7 @@ enum status world_init(struct world *w, const struct mesh *mesh, const struct se
     w->lights = lights_new(NULL);
     if (environment)
         world_set_environment(w, environment, pool);
-    lights_update(w->lights, mesh, segments, materials);
+    world_update_lights(w);
     return STATUS_OK;
 }
 
@@ -56,6 +56,7 @@ void world_set_environment(struct world *w, const struct image *environment, str
 }
 
 void world_release(struct world *w) {
+    guide_free(w->guide);
     lights_free(w->lights);
     accel_free(w->accel);
     mem_free(w->triangle);
@@ -63,5 +64,11 @@ void world_release(struct world *w) {
 }
 
 void world_update_lights(struct world *w) {
-    lights_update(w->lights, w->mesh, w->segments, w->materials);
+    bool others = lights_update(w->lights, w->mesh, w->segments, w->materials);
+    if (others) {
+        guide_free(w->guide);
+        w->guide = guide_new(w->lights, w->mesh, w->accel);
+    } else if (w->guide) {
+        guide_update(w->guide, w->lights);
+    }
 }

@@ -10,6 +10,7 @@
 #include "common/parallel.h"
 #include "common/vec.h"
 #include "server/render/accel.h"
+#include "server/render/guide.h"
 #include "server/render/light.h"
 #include "server/scene/atlas.h"
 #include "server/scene/materials.h"
@@ -34,6 +35,7 @@ struct world {
     struct world_triangle *triangle;  /* [triangle_count] owned */
     struct accel *accel;              /* owned */
     struct lights *lights;            /* owned */
+    struct guide *guide;              /* of the lights; NULL: picked by power; owned */
 };
 
 /* Builds the acceleration structure and the emitter tables. environment (latitude-longitude,
@@ -49,7 +51,8 @@ void world_release(struct world *world);
  * how it reaches the surfaces. */
 void world_set_environment(struct world *world, const struct image *environment, struct parallel *pool);
 
-/* Rebuilds the emitter tables after emission changed. */
+/* Takes over changed emission. Where other segments emit than before the guide is learnt anew, in a
+ * fraction of a second. */
 void world_update_lights(struct world *world);
 
 #endif

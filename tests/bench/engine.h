@@ -15,10 +15,19 @@
 #define DEPTH 9
 #define BATCH 2048
 #define ATLAS 2048
+/* As the settings of a job have it by default. */
+#define ROULETTE_DEPTH 4
 
 static inline double now_sec(void) {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Processor time of all threads: what else runs on the machine hardly moves it. */
+static inline double cpu_sec(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
@@ -76,7 +85,8 @@ static inline double run(struct work *w, bool backward) {
 static inline void work_init(struct work *w, const struct room *room, const struct camera *camera, int threads) {
     memset(w, 0, sizeof *w);
     w->room = room;
-    w->settings = (struct path_settings){DEPTH, 6, 1};
+    w->settings = (struct path_settings){.max_depth = DEPTH, .roulette_depth = ROULETTE_DEPTH, .seed = 1,
+                                         .least_color = PATH_LEAST_COLOR};
     w->path_count = (size_t)camera->width * camera->height * SPP;
     w->chunk_count = (w->path_count + BATCH - 1) / BATCH;
     w->ray = mem_array(w->path_count, sizeof *w->ray);

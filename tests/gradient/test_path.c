@@ -89,7 +89,7 @@ static double trace(struct path_batch *batch, const struct box *b, const struct 
 }
 
 static void check_parameter(struct box *b, const struct parameter *p) {
-    struct path_settings settings = {p->depth, 99, 21};
+    struct path_settings settings = {.max_depth = p->depth, .roulette_depth = 99, .seed = 21};
     struct path_batch *batch = path_batch_new(BATCH, p->depth);
     struct gradient_log *log = gradient_log_new(3);
     rgb radiance[BATCH], one[BATCH];
@@ -158,7 +158,7 @@ static void check_parameters(void) {
     for (size_t i = 0; i < sizeof glossy / sizeof *glossy; i++)
         check_parameter(&b, &glossy[i]);
     /* What does not shine has a derivative by emission too: it would, if it did. */
-    struct path_settings settings = {3, 99, 22};
+    struct path_settings settings = {.max_depth = 3, .roulette_depth = 99, .seed = 22};
     struct path_batch *batch = path_batch_new(BATCH, 3);
     struct gradient_log *log = gradient_log_new(3);
     rgb radiance[BATCH], one[BATCH];
@@ -206,7 +206,7 @@ static void check_loss(void) {
     struct box b;
     box_init(&b);
     box_build(&b);
-    struct path_settings settings = {3, 99, 23};
+    struct path_settings settings = {.max_depth = 3, .roulette_depth = 99, .seed = 23};
     struct path_batch *batch[2] = {path_batch_new(PIXELS, 3), path_batch_new(PIXELS, 3)};
     struct gradient_log *log = gradient_log_new(3);
     const struct parameter walls = {"walls", SEGMENT_COLOR, 0, true, 3};

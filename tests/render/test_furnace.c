@@ -27,7 +27,7 @@ static double albedo(float base, float roughness, float specular, float cosine) 
 
 /* Mean and standard error of `count` paths along one ray. */
 static double shoot(const struct box *b, struct ray ray, int depth, uint32_t count, double *error) {
-    struct path_settings settings = {depth, 99, 31};
+    struct path_settings settings = {.max_depth = depth, .roulette_depth = 99, .seed = 31};
     struct path_batch *batch = path_batch_new(256, depth);
     struct ray rays[256];
     struct path_key key[256];
@@ -107,7 +107,7 @@ static void check_glow(void) {
     found = shoot(&b, box_ray(3), 12, 1 << 15, &error);
     CHECK_THAT(found > 0.5 / 0.55 && found < 0.5 / 0.4, "glowing room: %g", found);
     /* Roulette leaves the mean alone. */
-    struct path_settings settings = {12, 2, 5};
+    struct path_settings settings = {.max_depth = 12, .roulette_depth = 2, .seed = 5};
     struct path_batch *batch = path_batch_new(256, 12);
     struct ray rays[256];
     struct path_key key[256];
@@ -146,7 +146,7 @@ enum { CHUNKS = 13, CHUNK_PATHS = 200 };
 
 static void work_chunk(void *user, size_t index, int thread) {
     struct work *w = user;
-    struct path_settings settings = {6, 3, 41};
+    struct path_settings settings = {.max_depth = 6, .roulette_depth = 3, .seed = 41};
     struct ray ray[CHUNK_PATHS];
     struct path_key key[CHUNK_PATHS];
     rgb radiance[CHUNK_PATHS];
@@ -186,7 +186,7 @@ static void check_threads(void) {
         parallel_for(pool, CHUNKS, work_chunk, &work);
         struct gradient *g = gradient_new(BOX_SIDE, BOX_SIDE, 3);
         gradient_reduce(g, log, CHUNKS, pool);
-        struct path_settings settings = {6, 3, 42};
+        struct path_settings settings = {.max_depth = 6, .roulette_depth = 3, .seed = 42};
         struct image picture;
         CHECK(film_render(&b.world, &camera, 8, &settings, 0, pool, &picture) == 0);
         size_t bytes = (size_t)picture.width * picture.height * picture.channel_count * sizeof(float);

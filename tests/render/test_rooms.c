@@ -15,7 +15,7 @@ static void check_view(const struct room *room, const char *name, const char *nu
     struct room_picture picture;
     room_picture_init(&picture, camera.width, camera.height, RUNS);
     /* 16 bounces at most, like theirs. */
-    struct path_settings settings = {17, 6, 5};
+    struct path_settings settings = {.max_depth = 17, .roulette_depth = 6, .seed = 5};
     for (int run = 0; run < RUNS; run++) {
         struct image image;
         CHECK(film_render(&room->world, &camera, RUN_SPP, &settings, (uint32_t)run, room->pool, &image) == 0);

@@ -1,0 +1,100 @@
+/* guide.h -- which parts of the emitters light which parts of a room.
+ *
+ * Picked by power alone, most light samples end at a wall or behind the light. So emitters are cut
+ * into patches, space into cells that tell surfaces by the side they face, and for each row, a cell
+ * and side in which surface lies, the light from each patch is estimated once by a few shadow rays.
+ * Light samples at a point follow the estimates of its row; with a part of them power, so that
+ * what the rays did not find is found all the same. Only the density of samples depends on a guide,
+ * never what they bring.
+ *
+ * A patch is a run of light triangles (light.h), within which power decides. A guide is a function
+ * of geometry and of which segments emit, its rows also of how much: the same after a resume. */
+#ifndef UNBAKE_RENDER_GUIDE_H
+#define UNBAKE_RENDER_GUIDE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/vec.h"
+#include "server/render/accel.h"
+#include "server/render/light.h"
+#include "server/scene/mesh.h"
+
+#define GUIDE_STARTS 32
+
+/* Cells are cubes; numbers count x fastest, and within a cell the six sides +x, -x, +y, ... */
+struct guide_grid {
+    vec3 origin;
+    float cells_per_m;
+    int32_t size[3];
+};
+
+struct guide {
+    struct guide_grid grid;
+    uint16_t *row;            /* [cells * 6] 0 where none was learnt; owned, as all below */
+    size_t row_count, patch_count;
+    uint32_t *first;          /* [patch_count + 1] light triangle */
+    uint16_t *patch_of;       /* [light triangles] */
+    float *reach;             /* [row_count][patch_count] what arrives of radiance 1 */
+    float *power;             /* [patch_count] share of all power */
+    float *cumulative;        /* [row_count][patch_count + 1] from 0 to 1; row 0 is by power */
+    uint16_t *start;          /* [row_count][GUIDE_STARTS] patch in whose range i / GUIDE_STARTS lies */
+};
+
+/* NULL where lights have more patches than are worth while. */
+struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel);
+void guide_free(struct guide *guide);
+
+/* Takes over changed radiances of the lights that the guide was made for. */
+void guide_update(struct guide *guide, const struct lights *lights);
+
+/* The number of the cell and side of a point, for grid->row. */
+static inline int32_t guide_cell(const struct guide_grid *grid, vec3 p, vec3 normal) {
+    float fx = (p.x - grid->origin.x) * grid->cells_per_m;
+    float fy = (p.y - grid->origin.y) * grid->cells_per_m;
+    float fz = (p.z - grid->origin.z) * grid->cells_per_m;
+    int32_t x = (int32_t)fx, y = (int32_t)fy, z = (int32_t)fz;
+    x = x < 0 ? 0 : x < grid->size[0] ? x : grid->size[0] - 1;
+    y = y < 0 ? 0 : y < grid->size[1] ? y : grid->size[1] - 1;
+    z = z < 0 ? 0 : z < grid->size[2] ? z : grid->size[2] - 1;
+    float ax = normal.x < 0.0f ? -normal.x : normal.x;
+    float ay = normal.y < 0.0f ? -normal.y : normal.y;
+    float az = normal.z < 0.0f ? -normal.z : normal.z;
+    int32_t of_x = normal.x < 0.0f ? 1 : 0, of_y = normal.y < 0.0f ? 3 : 2, of_z = normal.z < 0.0f ? 5 : 4;
+    int32_t across = ax > ay ? of_x : of_y;
+    int32_t side = az > (ax > ay ? ax : ay) ? of_z : across;
+    return ((z * grid->size[1] + y) * grid->size[0] + x) * 6 + side;
+}
+
+static inline float guide_chance(const struct guide *g, size_t row, size_t patch) {
+    const float *c = g->cumulative + row * (g->patch_count + 1) + patch;
+    return c[1] - c[0];
+}
+
+/* The light triangle for a number in [0, 1); *density_factor: how many times denser than by power
+ * its points are picked. */
+static inline uint32_t guide_pick(const struct guide *g, const struct lights *lights, size_t row, float pick,
+                                  float *density_factor) {
+    const float *c = g->cumulative + row * (g->patch_count + 1);
+    size_t patch = g->start[row * GUIDE_STARTS + (size_t)(pick * GUIDE_STARTS)];
+    while (c[patch + 1] <= pick && patch + 1 < g->patch_count)
+        patch++;
+    float width = c[patch + 1] - c[patch];
+    *density_factor = width / g->power[patch];
+    uint32_t first = g->first[patch], end = g->first[patch + 1];
+    if (end - first == 1)
+        return first;
+    const float *by_power = lights->triangles.cumulative;
+    float within = (pick - c[patch]) / width;
+    float at = by_power[first] + within * (by_power[end] - by_power[first]);
+    uint32_t entry = light_table_pick(&lights->triangles, at < 0x1.fffffep-1f ? at : 0x1.fffffep-1f);
+    return entry < first ? first : entry < end ? entry : end - 1;
+}
+
+/* The same factor for a point of light triangle `entry`. */
+static inline float guide_density_factor(const struct guide *g, size_t row, uint32_t entry) {
+    size_t patch = g->patch_of[entry];
+    return guide_chance(g, row, patch) / g->power[patch];
+}
+
+#endif
