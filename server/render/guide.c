@@ -8,9 +8,9 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define CELLS_ACROSS 24      /* along the longest side */
-#define SURFACE_POINTS 131072
-#define POINTS_A_ROW 16
+#define CELLS_ACROSS 16      /* along the longest side */
+#define SURFACE_POINTS 32768
+#define POINTS_A_ROW 8
 #define PATCHES_MAX 256
 #define ROWS_MAX UINT16_MAX
 #define POWER_SHARE 0.1f     /* of the samples follow power */
