@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/file.h>
@@ -10,6 +11,19 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+
+#define TRIES 20 /* of 50 ms */
+
+/* A daemon that was just killed may have a child that was about to become a worker and has not yet
+ * seen that it must end: until then it has the lock, too. */
+static bool take(int fd) {
+    for (int i = 0; flock(fd, LOCK_EX | LOCK_NB) != 0; i++) {
+        if (errno != EWOULDBLOCK || i == TRIES)
+            return false;
+        usleep(50000);
+    }
+    return true;
+}
 
 enum status folder_lock(const char *dir, int *fd, struct error *err) {
     *fd = -1;
@@ -21,7 +35,7 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
     if (*fd < 0) {
         status = error_set_errno(err, errno, "cannot open %s", path);
-    } else if (flock(*fd, LOCK_EX | LOCK_NB) != 0) {
+    } else if (!take(*fd)) {
         ssize_t got = errno == EWOULDBLOCK ? pread(*fd, holder, sizeof holder - 1, 0) : -1;
         holder[got > 0 ? strcspn(holder, "\n") : 0] = '\0';
         if (got >= 0)

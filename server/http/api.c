@@ -17,6 +17,7 @@
 #include "server/http/field.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
+#include "server/http/tally.h"
 
 #define RESERVE_BYTES ((uint64_t)16 << 20)
 #define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
@@ -77,6 +78,7 @@ enum status api_new(struct api **out, const struct api_config *config, struct st
     api->store = store;
     api->scheduler = scheduler;
     pthread_mutex_init(&api->scene_mutex, NULL);
+    api->tally = tally_new();
     api->hub = hub_new(config->keepalive_sec);
     api->digests = digests_new();
     api->partials = partials_new(api);
@@ -109,6 +111,7 @@ void api_free(struct api *api) {
     store_on_change(api->store, NULL, NULL);
     partials_free(api->partials);
     hub_free(api->hub);
+    tally_free(api->tally);
     digests_free(api->digests);
     pthread_mutex_destroy(&api->scene_mutex);
     mem_free(api);

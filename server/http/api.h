@@ -41,6 +41,7 @@ struct hub;      /* events.h */
 struct digests;  /* digests.h */
 struct partials; /* partial.h */
 struct listener; /* listener.h */
+struct tally;    /* tally.h */
 
 struct api {
     struct api_config config; /* pointers in it are borrowed */
@@ -52,7 +53,8 @@ struct api {
     struct listener *listener; /* NULL before it listens; for figures */
     /* Held while a scene's row and its file appear or disappear together. */
     pthread_mutex_t scene_mutex;
-    atomic_ullong uploaded_bytes, request_count[6]; /* by first digit of the status */
+    struct tally *tally; /* of requests */
+    atomic_ullong uploaded_bytes;
 };
 
 /* Makes the data folder's parts, removes what an earlier life left half done (uploads, trash,

@@ -20,6 +20,7 @@
 #include "server/http/problem.h"
 #include "server/http/auth.h"
 #include "server/http/routes.h"
+#include "server/http/tally.h"
 #include "server/http/tls.h"
 
 #define LIBRARY_THREADS 4
@@ -402,8 +403,7 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
         return;
     *context = NULL;
     int status = x->reply ? x->reply->status : 0;
-    if (status >= 100 && status < 600)
-        atomic_fetch_add(&l->api->request_count[status / 100], 1);
+    tally_add(l->api->tally, &x->request, status);
     log_request(x, status, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
     bool was_stream = x->reply && x->reply->stream && x->reply->stream->wake;
     response_free(x->reply); /* closes the stream: after this nobody wakes x */

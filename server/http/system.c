@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "common/file.h"
+#include "common/mem.h"
 #include "common/protocol.h"
 #include "common/settings.h"
 #include "server/http/embedded.h"
@@ -74,9 +75,26 @@ struct response *system_healthz(struct api *api, struct request *r) {
     return status_reply("ok");
 }
 
+/* Whether the disk of the data folder takes what it is given: a file goes there and comes back. */
+static enum status probe_disk(const struct api *api, const struct request *r, struct error *err) {
+    static const char text[] = "can this be read back?\n";
+    struct buf found;
+    char *path = mem_printf("%s/trash/probe-%s", api->config.data_dir, r->id); /* swept at the next start */
+    buf_init(&found, 4096);
+    enum status status = file_replace(path, text, sizeof text - 1, err);
+    if (status == STATUS_OK)
+        status = file_read(path, &found, err);
+    if (status == STATUS_OK && strcmp(buf_text(&found), text) != 0)
+        status = error_set(err, STATUS_CORRUPT, "%s: what is read back differs", path);
+    unlink(path);
+    buf_release(&found);
+    mem_free(path);
+    return status;
+}
+
 struct response *system_readyz(struct api *api, struct request *r) {
     struct error err;
-    if (store_probe(api->store, &err) != STATUS_OK)
+    if (store_probe(api->store, &err) != STATUS_OK || probe_disk(api, r, &err) != STATUS_OK)
         return problem_full(r, 503, err.message, err.hint, NULL);
     struct response *full = api_check_room(api, r, 0);
     bool waits = scheduler_waits_for_disk(api->scheduler);
@@ -110,71 +128,4 @@ struct response *system_settings(struct api *api, struct request *r) {
     cJSON *value = cJSON_CreateObject();
     json_add(value, "items", settings_describe());
     return response_json(200, value);
-}
-
-/* --- figures ----------------------------------------------------------------------------- */
-
-static void metric(struct buf *b, const char *name, const char *type, const char *help, double value) {
-    buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\nunbaked_%s %.17g\n", name, help, name, type,
-               name, value);
-}
-
-static void metric_head(struct buf *b, const char *name, const char *type, const char *help) {
-    buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\n", name, help, name, type);
-}
-
-static double resident_bytes(void) {
-    unsigned long long total, resident = 0;
-    FILE *file = fopen("/proc/self/statm", "re");
-    if (!file)
-        return 0;
-    if (fscanf(file, "%llu %llu", &total, &resident) != 2)
-        resident = 0;
-    fclose(file);
-    return (double)resident * (double)sysconf(_SC_PAGESIZE);
-}
-
-static void store_metrics(struct buf *b, const struct store_counts *counts) {
-    metric_head(b, "jobs", "gauge", "Jobs by state.");
-    for (int i = 0; i < JOB_STATE_COUNT; i++)
-        buf_printf(b, "unbaked_jobs{state=\"%s\"} %lld\n", job_state_name((enum job_state)i),
-                   (long long)counts->jobs_by_state[i]);
-    metric_head(b, "scenes", "gauge", "Scenes by state.");
-    for (int i = 0; i < SCENE_STATE_COUNT; i++)
-        buf_printf(b, "unbaked_scenes{state=\"%s\"} %lld\n", scene_state_name((enum scene_state)i),
-                   (long long)counts->scenes_by_state[i]);
-    metric(b, "attempts", "gauge", "Attempts of the jobs that are kept.", (double)counts->attempts);
-    metric(b, "events", "gauge", "Stored events.", (double)counts->events);
-    metric(b, "wal_bytes", "gauge", "Size of the database's write-ahead log.", (double)counts->wal_bytes);
-}
-
-struct response *system_metrics(struct api *api, struct request *r) {
-    struct store_counts counts;
-    struct error err;
-    uint64_t room = 0;
-    if (store_count(api->store, &counts, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    struct buf b;
-    buf_init(&b, (size_t)1 << 20);
-    metric_head(&b, "build_info", "gauge", "Always 1; the version is a label.");
-    buf_printf(&b, "unbaked_build_info{version=\"%s\"} 1\n", UNBAKE_VERSION);
-    store_metrics(&b, &counts);
-    metric(&b, "workers", "gauge", "Worker processes alive.", scheduler_running(api->scheduler));
-    metric_head(&b, "http_requests_total", "counter", "Requests answered, by class of status.");
-    for (int i = 1; i < 6; i++)
-        buf_printf(&b, "unbaked_http_requests_total{code=\"%dxx\"} %llu\n", i,
-                   (unsigned long long)atomic_load(&api->request_count[i]));
-    metric(&b, "uploaded_bytes_total", "counter", "Bytes of bundles received.",
-           (double)atomic_load(&api->uploaded_bytes));
-    metric(&b, "event_streams", "gauge", "Open event streams.", (double)hub_count(api->hub));
-    if (api->listener) {
-        metric(&b, "connections", "gauge", "Open connections.", (double)listener_connections(api->listener));
-        metric(&b, "late_connections_total", "counter", "Connections shut for being too slow.",
-               (double)listener_late(api->listener));
-    }
-    if (file_free_bytes(api->config.data_dir, &room, NULL) == STATUS_OK)
-        metric(&b, "disk_free_bytes", "gauge", "Free space of the data folder's disk.", (double)room);
-    metric(&b, "resident_bytes", "gauge", "Memory of the daemon itself.", resident_bytes());
-    size_t length = b.length;
-    return response_text(200, "text/plain; version=0.0.4; charset=utf-8", buf_detach(&b), length);
 }

@@ -134,8 +134,8 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
 }
 
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
-                              struct store *store, int64_t job_id, int thread_count,
-                              struct error *err) {
+                              struct store *store, struct figures *figures, int64_t job_id,
+                              int thread_count, struct error *err) {
     struct job job;
     struct error why = {0};
     int number;
@@ -144,13 +144,16 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         return STATUS_OK; /* its user was faster: paused, cancelled, deleted */
     if (status != STATUS_OK)
         return status;
-    *a = (struct attempt){.job_id = job_id, .number = number,
+    *a = (struct attempt){.job_id = job_id, .number = number, .iteration = -1.0,
                           .worker = {.pid_fd = -1, .pipe_fd = -1},
                           .dir = mem_printf("%s/jobs/%lld", config->data_dir, (long long)job_id)};
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
         a->owner_id = job.owner_id;
+        if (number == 1 && job.started_ms > job.created_ms)
+            atomic_fetch_add(&figures->first_wait_ms, (unsigned long long)(job.started_ms - job.created_ms));
+        atomic_fetch_add(&figures->first_start_count, number == 1);
         a->settings = mem_strdup(job.settings);
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
@@ -207,6 +210,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
 struct listener {
     struct attempt *attempt;
     struct store *store;
+    struct figures *figures;
 };
 
 static void enter_event(const struct listener *l, const char *type, const cJSON *data) {
@@ -279,6 +283,11 @@ static void note_checkpoint(const struct listener *l, const cJSON *line) {
         json_number(line, "bytes", "checkpoint", 0, &bytes, NULL) != STATUS_OK ||
         json_number(line, "seconds", "checkpoint", 0, &seconds, NULL) != STATUS_OK)
         return;
+    if (bytes >= 0.0 && seconds >= 0.0 && bytes < 1e15 && seconds < 1e6) {
+        atomic_fetch_add(&l->figures->checkpoint_count, 1);
+        atomic_fetch_add(&l->figures->checkpoint_bytes, (unsigned long long)bytes);
+        atomic_fetch_add(&l->figures->checkpoint_us, (unsigned long long)(seconds * 1e6));
+    }
     cJSON *data = cJSON_CreateObject();
     char *message = mem_printf("checkpoint at iteration %.0f: %.1f MB in %.2f s", iteration,
                                bytes * 1e-6, seconds);
@@ -287,6 +296,30 @@ static void note_checkpoint(const struct listener *l, const cJSON *line) {
     enter_event(l, EVENT_LOG, data);
     mem_free(message);
     cJSON_Delete(data);
+}
+
+/* How far the optimiser is: the loss comes with its iteration, `rays` is only for the figures.
+ * True when the metric is none of the job's curves. */
+static bool note_figures(const struct listener *l, const cJSON *line) {
+    struct attempt *a = l->attempt;
+    const char *series;
+    double step, value;
+    if (json_string(line, "series", "metric", "", &series, NULL) != STATUS_OK ||
+        json_number(line, "step", "metric", 0, &step, NULL) != STATUS_OK ||
+        json_number(line, "value", "metric", 0, &value, NULL) != STATUS_OK)
+        return false;
+    bool is_rays = strcmp(series, "rays") == 0;
+    /* The first iteration that is heard of may be a resumed one: only what follows is new. */
+    if (strcmp(series, "loss") == 0 && step < 1e15) {
+        if (a->iteration >= 0.0 && step > a->iteration)
+            atomic_fetch_add(&l->figures->iteration_count, (unsigned long long)(step - a->iteration));
+        a->iteration = step;
+    }
+    if (is_rays && value > a->rays && value < 1e18) {
+        atomic_fetch_add(&l->figures->ray_count, (unsigned long long)(value - a->rays));
+        a->rays = value;
+    }
+    return is_rays;
 }
 
 static void hear(void *user, const char *text, size_t length) {
@@ -305,8 +338,10 @@ static void hear(void *user, const char *text, size_t length) {
     }
     if (strcmp(type, "progress") == 0 || strcmp(type, "stage") == 0)
         enter_event(l, EVENT_PROGRESS, line);
-    else if (strcmp(type, "metric") == 0)
-        enter_event(l, EVENT_METRIC, line);
+    else if (strcmp(type, "metric") == 0) {
+        if (!note_figures(l, line))
+            enter_event(l, EVENT_METRIC, line);
+    }
     else if (strcmp(type, "log") == 0)
         enter_event(l, EVENT_LOG, line);
     else if (strcmp(type, "preview") == 0)
@@ -330,8 +365,8 @@ static void hear(void *user, const char *text, size_t length) {
     cJSON_Delete(line);
 }
 
-void attempt_listen(struct attempt *a, struct store *store) {
-    struct listener listener = {.attempt = a, .store = store};
+void attempt_listen(struct attempt *a, struct store *store, struct figures *figures) {
+    struct listener listener = {.attempt = a, .store = store, .figures = figures};
     if (a->phase != ATTEMPT_ALIVE)
         return;
     supervisor_read(&a->worker, hear, &listener);
@@ -501,22 +536,29 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
     return status;
 }
 
-void attempt_charge(struct attempt *a, struct store *store) {
-    double used = supervisor_cpu_sec(&a->worker);
-    if (a->job_id && used > a->charged_sec &&
-        store_usage_add(store, a->owner_id, used - a->charged_sec, NULL) == STATUS_OK)
-        a->charged_sec = used;
+void attempt_charge(struct attempt *a, struct store *store, struct figures *figures) {
+    double used = supervisor_cpu_sec(&a->worker), more = used - a->charged_sec;
+    if (!a->job_id || !(more > 0.0) || store_usage_add(store, a->owner_id, more, NULL) != STATUS_OK)
+        return;
+    atomic_fetch_add(&figures->cpu_ms, (unsigned long long)(more * 1e3));
+    a->charged_sec = used;
 }
 
-enum status attempt_settle(struct attempt *a, struct store *store, struct error *err) {
+enum status attempt_settle(struct attempt *a, struct store *store, struct figures *figures,
+                           struct error *err) {
     struct verdict verdict;
-    attempt_charge(a, store);
+    attempt_charge(a, store, figures);
     judge(a, &verdict);
     enum status status = a->job_id ? settle_job(a, store, &verdict, err)
                                    : settle_check(a, store, &verdict, err);
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
+    static const enum figures_end ends[] = {
+        [OUTCOME_OK] = END_SUCCEEDED,   [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
+        [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK};
+    if (a->job_id)
+        atomic_fetch_add(&figures->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
         [OUTCOME_MEMORY] = "broke off",

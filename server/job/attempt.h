@@ -33,6 +33,7 @@ struct attempt {
     int thread_count, memory_step; /* what it was to have, and how often that was made smaller */
     uint64_t oom_kills;           /* of the machine, before it started */
     long event_count;             /* what it has reported */
+    double iteration, rays;       /* the newest that it reported; negative iteration: none yet */
     bool complained;              /* a report could not be entered, and the log says so */
     /* What it said of itself. */
     bool has_end;
@@ -45,20 +46,21 @@ struct attempt {
  * is alive or (the input is at fault, the disk is full, the user was faster) still empty. Else
  * the job is in the queue again and it is of no use to try at once. */
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
-                              struct store *store, int64_t job_id, int thread_count,
-                              struct error *err);
+                              struct store *store, struct figures *figures, int64_t job_id,
+                              int thread_count, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
                                 const char *scene_id, int thread_count, struct error *err);
 
 /* Reads what the worker says and notices its end. */
-void attempt_listen(struct attempt *a, struct store *store);
+void attempt_listen(struct attempt *a, struct store *store, struct figures *figures);
 
 /* Enters the CPU time since the last call for the job's owner. A failure is no harm: the next call
  * makes up for it. */
-void attempt_charge(struct attempt *a, struct store *store);
+void attempt_charge(struct attempt *a, struct store *store, struct figures *figures);
 
 /* Enters the outcome of an ended attempt and empties it. */
-enum status attempt_settle(struct attempt *a, struct store *store, struct error *err);
+enum status attempt_settle(struct attempt *a, struct store *store, struct figures *figures,
+                           struct error *err);
 
 #endif

@@ -34,6 +34,7 @@ struct scheduler {
     int wake_fd; /* an eventfd: survives any number of calls before it is read */
     atomic_bool stopping;
     atomic_int running;
+    struct figures figures;
     atomic_ulong rounds;
     size_t slot_count;
     struct attempt *slot; /* [slot_count] */
@@ -87,6 +88,10 @@ void scheduler_stop(struct scheduler *s) {
     scheduler_wake(s);
 }
 
+const struct figures *scheduler_figures(const struct scheduler *s) {
+    return &s->figures;
+}
+
 int scheduler_running(const struct scheduler *s) {
     return atomic_load(&s->running);
 }
@@ -121,7 +126,7 @@ static void charge_all(struct scheduler *s) {
         return;
     for (size_t i = 0; i < s->slot_count; i++)
         if (s->slot[i].phase == ATTEMPT_ALIVE)
-            attempt_charge(&s->slot[i], s->store);
+            attempt_charge(&s->slot[i], s->store, &s->figures);
 }
 
 static void start_jobs(struct scheduler *s) {
@@ -137,7 +142,7 @@ static void start_jobs(struct scheduler *s) {
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
-                status = attempt_start_job(&s->slot[i], &s->config, s->store, id, thread_share(s),
+                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->figures, id, thread_share(s),
                                            &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
@@ -289,8 +294,8 @@ static void listen_and_settle(struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         struct error err;
-        attempt_listen(a, s->store);
-        if (a->phase == ATTEMPT_ENDED && attempt_settle(a, s->store, &err) != STATUS_OK)
+        attempt_listen(a, s->store, &s->figures);
+        if (a->phase == ATTEMPT_ENDED && attempt_settle(a, s->store, &s->figures, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         running += a->phase == ATTEMPT_ALIVE;
     }

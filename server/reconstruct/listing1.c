@@ -306,6 +306,16 @@ enum status listing1_start_solved(struct refine *f, double seconds, struct error
     return save(f, err);
 }
 
+/* For the daemon's figures: all rays of this attempt so far. */
+static void tell_rays(const struct refine *f) {
+    uint64_t rays, dropped, sum = 0;
+    for (int t = 0; t < parallel_thread_count(f->r->pool); t++) {
+        path_batch_counts(f->batch[t].paths, &rays, &dropped);
+        sum += rays;
+    }
+    f->hooks->metric(f->hooks->user, "rays", (long)f->counters.iteration, (double)sum);
+}
+
 static enum status loop(struct refine *f, struct error *err) {
     const struct reconstruct_hooks *hooks = f->hooks;
     double told = 0.0;
@@ -322,6 +332,7 @@ static enum status loop(struct refine *f, struct error *err) {
             double left = fraction > 0.0 ? f->counters.elapsed_sec * (1.0 / fraction - 1.0) : -1.0;
             hooks->progress(hooks->user, "refine", fraction, 1.0, left);
             hooks->metric(hooks->user, "loss", (long)f->counters.iteration, loss);
+            tell_rays(f);
         }
         bool stop = hooks->stop_requested(hooks->user);
         if (stop || hooks->checkpoint_due(hooks->user)) {

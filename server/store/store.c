@@ -145,6 +145,10 @@ enum status store_count(struct store *store, struct store_counts *counts, struct
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &counts->attempts, err,
                          "SELECT ifnull(sum(attempt), 0) FROM jobs", "");
+    if (status == STATUS_OK && counts->jobs_by_state[JOB_QUEUED] > 0)
+        status = sql_int(&store->sql, 0, &counts->oldest_queued_ms, err,
+                         "SELECT created_ms FROM jobs WHERE id = (SELECT min(id) FROM jobs WHERE state = ?)",
+                         "n", (int)JOB_QUEUED);
     /* The highest id, not the rows that are left: it only grows, as a counter should. */
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &counts->events, err,

@@ -289,6 +289,7 @@ enum status store_upload_delete(struct store *store, const char *id, struct erro
 struct store_counts {
     int64_t jobs_by_state[JOB_STATE_COUNT], scenes_by_state[SCENE_STATE_COUNT];
     int64_t attempts, events;
+    int64_t oldest_queued_ms; /* when the oldest job that waits was made; 0: none does */
     uint64_t wal_bytes;
 };
 enum status store_count(struct store *store, struct store_counts *counts, struct error *err);

@@ -265,6 +265,8 @@ int main(int argc, char **argv) {
         for (int i = 0; i <= SUBMITTERS; i++)
             pthread_join(client[i].thread, NULL);
         pthread_join(reader, NULL);
+        if (kill_count % 100 == 99)
+            printf("%ld kills\n", kill_count + 1), fflush(stdout);
         check_integrity();
         ready[kill_count] = daemon_start(&daemon_);
         /* What is newest, each time; all, at times. */

@@ -1,0 +1,28 @@
+/* figures.h -- what has been done since the daemon started: counters that only grow, for /metrics.
+ *
+ * Written by the scheduler's thread, read by any. */
+#ifndef UNBAKE_JOB_FIGURES_H
+#define UNBAKE_JOB_FIGURES_H
+
+#include <stdatomic.h>
+
+/* How attempts end. */
+enum figures_end {
+    END_SUCCEEDED,
+    END_INPUT,   /* the input was at fault */
+    END_CRASHED,
+    END_MEMORY,  /* it ran out of memory */
+    END_STOPPED, /* paused, cancelled, or the daemon stopped */
+    END_DISK,    /* it cannot go on until there is room on the disk */
+    END_COUNT
+};
+
+struct figures {
+    atomic_ullong ends[END_COUNT];
+    atomic_ullong first_start_count, first_wait_ms; /* jobs' first attempts, and how long they waited */
+    atomic_ullong iteration_count, ray_count;
+    atomic_ullong checkpoint_count, checkpoint_us, checkpoint_bytes;
+    atomic_ullong cpu_ms; /* of workers */
+};
+
+#endif
