@@ -40,6 +40,7 @@ FUZZ_SRC = $(wildcard tests/fuzz/*.c)
 
 obj = $(patsubst %.c,$(B)/obj/%.o,$(1))
 TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
+PRELOAD = $(patsubst tests/%.c,$(B)/tests/%.so,$(wildcard tests/chaos/preload/*.c))
 BENCH_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(BENCH_SRC))
 FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 
@@ -98,7 +99,12 @@ $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommo
 	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
-tests: all $(TEST_BIN) $(FUZZ_BIN)
+# What a test slips under a program of ours.
+$(B)/tests/%.so: tests/%.c
+	@mkdir -p $(@D)
+	$(CC) $(ALL_CFLAGS) -shared -fPIC -o $@ $< -ldl
+
+tests: all $(TEST_BIN) $(FUZZ_BIN) $(PRELOAD)
 
 demo: deps ## make a room, reconstruct it, show where the pictures are
 	@+$(BUILD) all

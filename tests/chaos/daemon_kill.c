@@ -244,7 +244,7 @@ int main(int argc, char **argv) {
     double *ready = mem_calloc((size_t)kills, sizeof *ready);
     seen = mem_calloc(EVENT_MAX, 1);
     daemon_init(&daemon_, argv[1]);
-    const char *settings[] = {"min_free_mib=0", "max_running=2", "queue_limit=100000", "log_level=warning",
+    const char *settings[] = {"min_free_mib=0", "max_running=1", "queue_limit=100000", "log_level=warning",
                               "checkpoint_interval_sec=0.2"};
     memcpy(daemon_.settings, settings, sizeof settings);
     daemon_start(&daemon_);
@@ -259,7 +259,7 @@ int main(int argc, char **argv) {
         for (int i = 0; i <= SUBMITTERS; i++)
             pthread_create(&client[i].thread, NULL, load, &client[i]);
         random = random * 1664525u + 1013904223u;
-        usleep(5000 + (random >> 8) % (kill_count % 4 ? 150000 : 500000));
+        usleep(5000 + (random >> 8) % (kill_count % 8 ? 120000 : 500000));
         daemon_signal(&daemon_, SIGKILL);
         atomic_store(&stopping, true);
         for (int i = 0; i <= SUBMITTERS; i++)
@@ -271,7 +271,7 @@ int main(int argc, char **argv) {
         ready[kill_count] = daemon_start(&daemon_);
         /* What is newest, each time; all, at times. */
         for (int i = 0; i <= SUBMITTERS; i++)
-            for (long k = 0; k < (kill_count % 25 ? 10 : KEPT); k++) {
+            for (long k = 0; k < (kill_count % 50 ? 6 : KEPT); k++) {
                 const struct client *c = &client[i];
                 const struct made *m = &c->made[(c->next + KEPT - 1 - k) % KEPT];
                 if (m->id || m->sha256[0])
