@@ -31,14 +31,10 @@ static inline void rig_must(enum status status, const struct error *err, const c
     exit(1);
 }
 
-/* Room for so many connections, and event streams. */
-static inline void rig_start_large(struct rig *rig, const struct guard_limits *limits, double keepalive_sec,
-                                   unsigned connection_max, size_t stream_max) {
+/* On the folder rig->dir, which may be there already. */
+static inline void rig_open(struct rig *rig, const struct guard_limits *limits, double keepalive_sec,
+                            unsigned connection_max, size_t stream_max) {
     struct error err;
-    memset(rig, 0, sizeof *rig);
-    snprintf(rig->dir, sizeof rig->dir, "/tmp/unbake-rig-XXXXXX");
-    if (!mkdtemp(rig->dir))
-        CHECK_SKIP("cannot make a folder in /tmp");
     log_set_level(LOG_WARNING);
     rig_must(store_open(&rig->store, rig->dir, &err), &err, "store_open");
     struct scheduler_config work = {.data_dir = rig->dir, .worker_binary = "/bin/false", .max_running = 1,
@@ -50,6 +46,16 @@ static inline void rig_start_large(struct rig *rig, const struct guard_limits *l
     rig_must(api_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "api_new");
     struct listener_config network = {.address = "127.0.0.1", .connection_max = connection_max, .limits = *limits};
     rig_must(listener_start(&rig->listener, &network, rig->api, &err), &err, "listener_start");
+}
+
+/* Room for so many connections, and event streams. */
+static inline void rig_start_large(struct rig *rig, const struct guard_limits *limits, double keepalive_sec,
+                                   unsigned connection_max, size_t stream_max) {
+    memset(rig, 0, sizeof *rig);
+    snprintf(rig->dir, sizeof rig->dir, "/tmp/unbake-rig-XXXXXX");
+    if (!mkdtemp(rig->dir))
+        CHECK_SKIP("cannot make a folder in /tmp");
+    rig_open(rig, limits, keepalive_sec, connection_max, stream_max);
 }
 
 static inline void rig_start(struct rig *rig, const struct guard_limits *limits, double keepalive_sec) {
