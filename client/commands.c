@@ -39,8 +39,10 @@ static const struct command table[] = {
     {"watch", "JOB", "follow a job until it ends",
      "On a terminal one line shows stage, progress, figures and time left; on a pipe a line is\n"
      "printed when something changes, and every 10 s. When the server restarts, watching goes\n"
-     "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n",
-     "  unbake watch last\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
+     "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n"
+     "--exec runs a command then; it finds UNBAKE_JOB, UNBAKE_NAME, UNBAKE_STATE and UNBAKE_REASON in\n"
+     "its environment.\n",
+     "  unbake watch last\n  unbake watch 17 --exec 'notify-send \"$UNBAKE_NAME: $UNBAKE_STATE\"'\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
      1, 1, watch_options, watch_run},
     {"logs", "JOB", "print what the job's log says so far", "",
      "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options, logs_run},

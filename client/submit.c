@@ -27,6 +27,7 @@ const struct option submit_options[] = {
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
     {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"},
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
+    {"webhook", 0, OPTION_TEXT, "URL", "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET"},
     {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
     {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room; send and queue nothing"},
     {0},
@@ -75,9 +76,18 @@ static enum status describe_job(struct submission *s, const struct options *o, s
     if (options_flag(o, "share"))
         json_add_bool(s->job, "shared", true);
     json_add_int(s->job, "priority", options_whole(o, "priority", 0));
-    const char *name = options_text(o, "name", s->name);
+    const char *name = options_text(o, "name", s->name), *url = options_text(o, "webhook", NULL);
+    const char *secret = getenv("UNBAKE_WEBHOOK_SECRET"); /* a command line is for all to read */
     if (name)
         json_add_string(s->job, "name", name);
+    if (url && !(secret && *secret) && status == STATUS_OK) {
+        error_set(err, STATUS_INPUT, "--webhook needs a secret to sign its messages with");
+        status = error_hint(err, "put 16 characters or more into UNBAKE_WEBHOOK_SECRET");
+    } else if (url && status == STATUS_OK) {
+        cJSON *webhook = cJSON_AddObjectToObject(s->job, "webhook");
+        json_add_string(webhook, "url", url);
+        json_add_string(webhook, "secret", secret);
+    }
     return status;
 }
 

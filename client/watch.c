@@ -5,8 +5,11 @@
  * SILENCE_SEC. The end of the job, not the end of a stream, ends the watching; what GET says
  * about the job then is its outcome. */
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "client/commands.h"
 #include "client/meter.h"
@@ -23,6 +26,7 @@
 
 const struct option watch_options[] = {
     {"all", 'a', OPTION_FLAG, NULL, "begin with what happened before, not with the present"},
+    {"exec", 0, OPTION_TEXT, "CMD", "when the job has ended, run that by sh with $UNBAKE_JOB and $UNBAKE_STATE"},
     {0},
 };
 const struct option logs_options[] = {
@@ -291,6 +295,41 @@ int watch_job(struct client *c, int64_t job, bool all) {
     return watch_events(&(struct watch){0}, c, job, all);
 }
 
+/* What is to be done when the job has ended; `code` is how it did, and stays so unless the command
+ * cannot be run. */
+static int run_command(struct client *c, int64_t job, const char *command, int code) {
+    struct reply reply;
+    struct error err;
+    sigset_t none;
+    char number[24];
+    int status;
+    reply_init(&reply);
+    if (client_job_get(c, job, &reply, &err) != STATUS_OK) {
+        code = client_fail(c, &reply, &err);
+        reply_release(&reply);
+        return code;
+    }
+    snprintf(number, sizeof number, "%lld", (long long)job);
+    setenv("UNBAKE_JOB", number, 1);
+    setenv("UNBAKE_STATE", member_text(reply.json, "state"), 1);
+    setenv("UNBAKE_NAME", member_text(reply.json, "name"), 1);
+    setenv("UNBAKE_REASON", member_text(reply.json, "reason"), 1);
+    reply_release(&reply);
+    fflush(NULL);
+    pid_t pid = fork();
+    if (pid == 0) { /* main blocks signals for itself; the command is to get them */
+        sigemptyset(&none);
+        sigprocmask(SIG_SETMASK, &none, NULL);
+        execl("/bin/sh", "sh", "-c", command, (char *)NULL);
+        _exit(127);
+    }
+    if (pid > 0 && waitpid(pid, &status, 0) == pid && WIFEXITED(status) && WEXITSTATUS(status) < 126)
+        return code;
+    error_set(&err, STATUS_INTERNAL, "--exec: the command could not be run");
+    client_fail(c, NULL, &err);
+    return CLIENT_LOCAL;
+}
+
 int watch_run(struct client *c, const struct options *o) {
     struct reply reply;
     struct error err;
@@ -299,7 +338,13 @@ int watch_run(struct client *c, const struct options *o) {
     enum status status = client_job_id(c, o->word[0], &job, &reply, &err);
     int code = status == STATUS_OK ? CLIENT_OK : client_fail(c, &reply, &err);
     reply_release(&reply);
-    return code != CLIENT_OK ? code : watch_job(c, job, options_flag(o, "all"));
+    const char *command = options_text(o, "exec", NULL);
+    if (code != CLIENT_OK)
+        return code;
+    code = watch_job(c, job, options_flag(o, "all"));
+    if (command && (code == CLIENT_OK || code == CLIENT_JOB_FAILED))
+        code = run_command(c, job, command, code);
+    return code;
 }
 
 /* --- logs ---------------------------------------------------------------------------------- */

@@ -52,6 +52,7 @@ static const struct option table[] = {
          "Time after a job's end for which its events are kept; the last one stays."),
     REAL(stop_grace_sec, "s", 1, 3600, "30",
          "Time that a job has to write its checkpoint when it is stopped."),
+    BOOL(webhook_private, "no", "Let webhooks call private and loopback addresses."),
     BOOL(sandbox, "yes", "Keep jobs from the network and from files that are not theirs."),
     INT(max_upload_mib, "MiB", 1, 16777216, "65536", "Largest upload; a larger one is refused with 413."),
     INT(min_free_mib, "MiB", 0, 16777216, "1024",

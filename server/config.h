@@ -36,6 +36,7 @@ struct config {
     double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;
     double upload_keep_hours, job_keep_days, scene_keep_days, collect_interval_sec;
     double head_timeout_sec, idle_timeout_sec, keepalive_sec;
+    bool webhook_private;
     bool sandbox;
 };
 

@@ -119,6 +119,7 @@ static enum status build(struct daemon *d, struct error *err) {
         .event_keep_sec = 3600.0 * c->event_keep_hours,
         .checkpoint_keep_sec = 3600.0 * c->checkpoint_keep_hours,
         .low_disk_bytes = (uint64_t)c->low_disk_mib << 20,
+        .webhook_private = c->webhook_private,
         .sandbox = c->sandbox,
     };
     struct api_config limits = {

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
+#include "common/url.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
@@ -18,6 +19,8 @@
 #define NAME_MAX_BYTES 200
 #define PRIORITY_MAX 100
 #define LABELS_MAX 32
+#define WEBHOOK_SECRET_LEAST 16
+#define WEBHOOK_SECRET_MOST 200
 #define LABEL_MAX_BYTES 100
 
 /* The number of the job in the path, which the caller may change; or *refusal. */
@@ -109,6 +112,7 @@ struct wish {
     const char *scene, *name;
     const cJSON *settings;
     char *labels; /* JSON text; owned; NULL: not given */
+    const char *webhook_url, *webhook_secret; /* NULL: none */
     int priority; /* INT_MIN: not given */
     int shared;   /* -1: not given */
     enum job_place place;
@@ -148,6 +152,25 @@ static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
     else
         problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX,
                       PRIORITY_MAX);
+}
+
+/* {"url", "secret"}: both, and nothing else. */
+static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
+    const char *url = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "url"));
+    const char *secret = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "secret"));
+    struct url parts;
+    struct error err;
+    size_t length = secret ? strlen(secret) : 0;
+    if (!url || !secret || cJSON_GetArraySize(member) != 2)
+        problem_param(params, "webhook", "the secret signs the messages, and so tells them from others'",
+                      "must be an object of two texts, url and secret");
+    else if (length < WEBHOOK_SECRET_LEAST || length > WEBHOOK_SECRET_MOST)
+        problem_param(params, "webhook", NULL, "must have a secret of %d to %d bytes", WEBHOOK_SECRET_LEAST,
+                      WEBHOOK_SECRET_MOST);
+    else if (url_parse(url, &parts, &err) != STATUS_OK)
+        problem_param(params, "webhook", NULL, "%s", err.message);
+    w->webhook_url = url;
+    w->webhook_secret = secret;
 }
 
 /* "first", "last" or the number of a job. */
@@ -212,10 +235,12 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
             continue;
         else if (is_new && strcmp(name, "scene") == 0)
             w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
+        else if (is_new && strcmp(name, "webhook") == 0)
+            read_webhook(w, member, params);
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
-            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, shared"
+            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, webhook, shared"
                                                : "there are name, priority, labels, shared, order, pinned, "
                                                  "expires_at",
                           "is not known here");
@@ -272,6 +297,8 @@ static struct response *add_job(struct api *api, const struct request *r, const 
         .priority = w->priority == INT_MIN ? 0 : w->priority,
         .max_attempts = api->config.max_attempts,
         .user_queue_limit = api->config.user_queue_limit,
+        .webhook_url = w->webhook_url,
+        .webhook_secret = w->webhook_secret,
         .idempotency_key = request_field(r, "Idempotency-Key"),
         .request_sha256 = digest,
     };

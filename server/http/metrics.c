@@ -44,6 +44,7 @@ static void store_metrics(struct buf *b, const struct store_counts *counts) {
     double now = (double)time(NULL), oldest = (double)counts->oldest_queued_ms * 1e-3;
     metric(b, "queue_oldest_seconds", "gauge", "Age of the oldest job that waits.",
            counts->oldest_queued_ms && now > oldest ? now - oldest : 0.0);
+    metric(b, "outbox", "gauge", "Messages of webhooks that are still to be delivered.", (double)counts->outbox);
     metric(b, "attempts", "gauge", "Attempts of the jobs that are kept.", (double)counts->attempts);
     metric(b, "events_total", "counter", "Events ever made.", (double)counts->events);
     metric(b, "wal_bytes", "gauge", "Size of the database's write-ahead log.", (double)counts->wal_bytes);

@@ -65,6 +65,7 @@ cJSON *view_job(const struct job *job) {
         json_add(v, "eta_sec", cJSON_CreateNull());
     json_add_string(v, "reason", or_null(job->reason));
     json_add_string(v, "hint", or_null(job->hint));
+    json_add_string(v, "webhook", or_null(job->webhook));
     static const char *const parts[] = {"events", "outputs", "log"};
     cJSON *links = cJSON_AddObjectToObject(v, "links");
     char path[128];

@@ -73,6 +73,7 @@ struct job {
     int64_t expires_ms;        /* Unix time as of now, 0: never; see store/retention.h */
     double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
+    char *webhook;             /* the URL that is told of its states; "": none */
     char *reason;              /* why it failed or is paused, in plain words; "" if not */
     char *hint;                /* what to do about it; "" if nothing is known */
 };

@@ -21,10 +21,12 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
+#include "server/job/delivery.h"
 #include "server/job/disk.h"
 #include "server/job/housekeeping.h"
 
 #define HOUSEKEEPING_SEC 600.0
+#define DELIVERIES 4      /* webhooks that are called at the same time */
 #define RETRY_SEC 5.0         /* after the store or a start failed */
 #define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
 
@@ -42,7 +44,9 @@ struct scheduler {
     double housekeeping_at; /* as clock_sec */
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
-    struct pollfd *poll;  /* [1 + 2 * slot_count] */
+    struct delivery delivery[DELIVERIES];
+    double outbox_at;       /* when the next message's time comes, as clock_sec */
+    struct pollfd *poll;  /* [1 + 2 * slot_count + DELIVERIES] */
 };
 
 enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config,
@@ -62,7 +66,9 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     }
     s->slot_count = (size_t)(config->max_running > 0 ? config->max_running : 1) + 1;
     s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
-    s->poll = mem_calloc(1 + 2 * s->slot_count, sizeof *s->poll);
+    for (size_t i = 0; i < DELIVERIES; i++)
+        s->delivery[i].worker = (struct worker){.pid_fd = -1, .pipe_fd = -1};
+    s->poll = mem_calloc(1 + 2 * s->slot_count + DELIVERIES, sizeof *s->poll);
     *out = s;
     return STATUS_OK;
 }
@@ -265,6 +271,13 @@ static int keep_deadlines(struct scheduler *s) {
         if (a->worker.pid_fd < 0)
             sleep = fmin(sleep, NO_PIDFD_POLL_SEC);
     }
+    for (size_t i = 0; i < DELIVERIES; i++) {
+        const struct delivery *d = &s->delivery[i];
+        if (d->id)
+            sleep = fmin(sleep, d->worker.pid_fd < 0 ? NO_PIDFD_POLL_SEC : fmax(d->kill_at_sec - now, 0.05));
+    }
+    if (!atomic_load(&s->stopping))
+        sleep = fmin(sleep, fmax(s->outbox_at - now, 0.0));
     return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded down it would spin */
 }
 
@@ -283,6 +296,9 @@ static void wait_for_something(struct scheduler *s, int timeout_ms) {
         s->poll[count++] = (struct pollfd){.fd = a->worker.pid_fd, .events = POLLIN};
         s->poll[count++] = (struct pollfd){.fd = a->worker.pipe_fd, .events = POLLIN};
     }
+    for (size_t i = 0; i < DELIVERIES; i++)
+        if (s->delivery[i].id)
+            s->poll[count++] = (struct pollfd){.fd = s->delivery[i].worker.pid_fd, .events = POLLIN};
     poll(s->poll, count, timeout_ms); /* a signal ends it early, which does no harm */
     uint64_t calls;
     if (s->poll[0].revents && read(s->wake_fd, &calls, sizeof calls) < 0)
@@ -300,6 +316,41 @@ static void listen_and_settle(struct scheduler *s) {
         running += a->phase == ATTEMPT_ALIVE;
     }
     atomic_store(&s->running, running);
+}
+
+/* Sends what the outbox has, as far as there are hands for it. */
+static void deliver(struct scheduler *s) {
+    struct error err;
+    int64_t after = 0;
+    double wait = (double)INFINITY;
+    bool is_free = false;
+    for (size_t i = 0; i < DELIVERIES; i++)
+        is_free = delivery_listen(&s->delivery[i], s->store) || is_free;
+    for (size_t i = 0; i < DELIVERIES && is_free; i++) {
+        struct outbox_row row;
+        enum status status = STATUS_OK;
+        while (s->delivery[i].id == 0 && status == STATUS_OK) {
+            status = store_outbox_next(s->store, after, &row, &err);
+            if (status != STATUS_OK)
+                break;
+            after = row.id;
+            bool is_under_way = false;
+            for (size_t k = 0; k < DELIVERIES; k++)
+                is_under_way = is_under_way || s->delivery[k].id == row.id;
+            if (!is_under_way)
+                status = delivery_start(&s->delivery[i], &s->config, &row, &err);
+            outbox_row_release(&row);
+        }
+        if (status != STATUS_OK && status != STATUS_NOT_FOUND)
+            retry_later(s, "cannot call a webhook", &err);
+    }
+    /* While all are busy, or a message is under way, the end of one wakes us. */
+    is_free = true;
+    for (size_t i = 0; i < DELIVERIES; i++)
+        is_free = is_free && s->delivery[i].id == 0;
+    if (is_free && !s->must_retry && store_outbox_wait(s->store, &wait, &err) != STATUS_OK)
+        wait = RETRY_SEC;
+    s->outbox_at = clock_sec() + wait;
 }
 
 static void keep_house(struct scheduler *s) {
@@ -330,9 +381,16 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
             start_check(s);
             start_jobs(s);
             keep_house(s);
+            deliver(s);
         }
         follow_wishes(s);
         wait_for_something(s, keep_deadlines(s));
+    }
+    /* What was under way is sent again by the next start. */
+    for (size_t i = 0; i < DELIVERIES; i++) {
+        delivery_kill(&s->delivery[i]);
+        while (!delivery_listen(&s->delivery[i], s->store))
+            poll(NULL, 0, 5);
     }
     /* What could not be entered is "running" in the store: the next start queues it again. */
     return STATUS_OK;

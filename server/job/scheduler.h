@@ -24,6 +24,7 @@ struct scheduler_config {
     double checkpoint_keep_sec;     /* of a job that has succeeded */
     double event_keep_sec;          /* of a job that has ended */
     uint64_t low_disk_bytes;        /* with less free space, work waits; 0: never */
+    bool webhook_private;           /* webhooks may go to private addresses */
     bool sandbox;
 };
 

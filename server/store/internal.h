@@ -53,6 +53,11 @@ enum status store_look_for_users(struct store *store, struct error *err);
 /* Inside a transaction: appends one event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,
                                const char *data, struct error *err);
+/* Inside a transaction: gives a job a webhook; tells the job's webhook, if it has one, of a state. */
+enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
+                              struct error *err);
+enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state,
+                               const char *reason, const char *hint, struct error *err);
 /* Inside a transaction: STATUS_CONFLICT unless the job runs its attempt `attempt`. */
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err);
 

@@ -10,7 +10,8 @@
     "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
     " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
     " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
-    " restart_from, memory_step, pinned, " JOB_EXPIRES
+    " restart_from, memory_step, pinned, " JOB_EXPIRES ","                                  \
+    " (SELECT url FROM webhooks WHERE job_id = jobs.id)"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -40,6 +41,7 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .memory_step = sqlite3_column_int(stmt, 24),
         .is_pinned = sqlite3_column_int(stmt, 25) != 0,
         .expires_ms = sqlite3_column_int64(stmt, 26),
+        .webhook = sql_dup(stmt, 27),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -138,6 +140,8 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
         *id = sqlite3_last_insert_rowid(store->sql.db);
         status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}",
                                     err);
+        if (status == STATUS_OK && job->webhook_url)
+            status = store_webhook_set(store, *id, job->webhook_url, job->webhook_secret, err);
     }
     mem_free(key);
     return store_end(store, status, *id, err);

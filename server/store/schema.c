@@ -152,5 +152,23 @@ static const char step_7[] =
     "CREATE TABLE pruned (id INTEGER PRIMARY KEY CHECK (id = 1), event_id INTEGER NOT NULL) STRICT;"
     "INSERT INTO pruned VALUES (1, 0);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6, step_7};
+/* Webhooks of jobs, and what is still to be told. */
+static const char step_8[] =
+    "CREATE TABLE webhooks ("
+    "  job_id INTEGER PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,"
+    "  url TEXT NOT NULL,"
+    "  secret TEXT NOT NULL"
+    ") STRICT;"
+    "CREATE TABLE outbox ("
+    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+    "  job_id INTEGER NOT NULL,"
+    "  url TEXT NOT NULL,"
+    "  secret TEXT NOT NULL,"
+    "  body TEXT NOT NULL,"
+    "  tries INTEGER NOT NULL DEFAULT 0,"
+    "  next_ms INTEGER NOT NULL"
+    ") STRICT;"
+    "CREATE INDEX outbox_by_time ON outbox (next_ms);";
+
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6, step_7, step_8};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -149,6 +149,8 @@ enum status store_count(struct store *store, struct store_counts *counts, struct
         status = sql_int(&store->sql, 0, &counts->oldest_queued_ms, err,
                          "SELECT created_ms FROM jobs WHERE id = (SELECT min(id) FROM jobs WHERE state = ?)",
                          "n", (int)JOB_QUEUED);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &counts->outbox, err, "SELECT count(*) FROM outbox", "");
     /* The highest id, not the rows that are left: it only grows, as a counter should. */
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &counts->events, err,

@@ -96,6 +96,7 @@ struct job_new {
     bool is_shared;
     int priority, max_attempts;
     size_t user_queue_limit;     /* queued jobs of its owner; 0: no limit */
+    const char *webhook_url, *webhook_secret; /* NULL: none */
     const char *idempotency_key; /* NULL: none */
     const char *request_sha256;  /* of the request, compared when the key is known */
 };
@@ -221,6 +222,21 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
  * history begins. */
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err);
 
+/* A message for a webhook, made by every change of its job's state. */
+struct outbox_row {
+    int64_t id, job_id;
+    char *url, *secret, *body; /* owned */
+    int tries;
+};
+void outbox_row_release(struct outbox_row *row);
+/* The first message with id > after whose time has come; STATUS_NOT_FOUND when there is none. */
+enum status store_outbox_next(struct store *store, int64_t after, struct outbox_row *row, struct error *err);
+/* How long until a message's time comes; infinite when there is none. */
+enum status store_outbox_wait(struct store *store, double *seconds, struct error *err);
+/* Removes a message that was delivered, or puts it off: longer each time, and in the end for ever. */
+enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
+                                struct error *err);
+
 struct output_row {
     char *name;
     uint64_t bytes;
@@ -289,6 +305,7 @@ enum status store_upload_delete(struct store *store, const char *id, struct erro
 struct store_counts {
     int64_t jobs_by_state[JOB_STATE_COUNT], scenes_by_state[SCENE_STATE_COUNT];
     int64_t attempts, events;
+    int64_t outbox; /* messages of webhooks that are still to be delivered */
     int64_t oldest_queued_ms; /* when the oldest job that waits was made; 0: none does */
     uint64_t wal_bytes;
 };

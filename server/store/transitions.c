@@ -116,7 +116,10 @@ static enum status move(struct store *store, struct present *now, enum job_state
                 " WHERE id = ?",
                 "nnnttii", (int)to, now->attempt, now->attempts_left, reason, hint,
                 job_is_terminal(to) ? at : (int64_t)0, now->id);
-    return status == STATUS_OK ? append_state(store, now, reason, hint, err) : status;
+    if (status == STATUS_OK)
+        status = append_state(store, now, reason, hint, err);
+    return status == STATUS_OK ? store_webhook_post(store, now->id, now->attempt, job_state_name(to), reason, hint, err)
+                               : status;
 }
 
 static enum status wish(struct store *store, struct present *now, enum job_wanted wanted,

@@ -32,6 +32,17 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
     return STATUS_OK;
 }
 
+static enum status read_deliver(struct order *o, struct error *err) {
+    enum status status = json_string(o->json, "url", WHAT, "", &o->url, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "secret", WHAT, "", &o->secret, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "body", WHAT, "", &o->body, err);
+    if (status == STATUS_OK)
+        status = json_string(o->json, "message_id", WHAT, "", &o->message_id, err);
+    return status == STATUS_OK ? json_bool(o->json, "allow_private", WHAT, false, &o->allow_private, err) : status;
+}
+
 enum status order_read(struct order *o, const char *dir, struct error *err) {
     *o = (struct order){.dir = dir};
     double thread_count, memory_bytes;
@@ -54,6 +65,8 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
     }
     if (status == STATUS_OK && strcmp(o->kind, "reconstruct") == 0)
         status = read_reconstruct(o, err);
+    if (status == STATUS_OK && strcmp(o->kind, "deliver") == 0)
+        status = read_deliver(o, err);
     /* The daemon wrote the file: what is wrong with it is our defect, not the user's. */
     if (status == STATUS_INPUT && err)
         status = err->status = STATUS_INTERNAL;

@@ -4,6 +4,8 @@
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
  *    "checkpoint_interval_sec":60}
  *   {"kind":"check","scene_id":"…","thread_count":4,"memory_bytes":0,"sandbox":true}
+ *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
+ *    "allow_private":false,"sandbox":true}
  *
  * A check's folder is the scene's: it reads DIR/archive and leaves DIR/files/. */
 #ifndef UNBAKE_WORKER_ORDER_H
@@ -29,6 +31,9 @@ struct order {
     const cJSON *settings;  /* object */
     int64_t job_id;
     int attempt;
+    /* kind "deliver" */
+    const char *url, *secret, *body, *message_id;
+    bool allow_private;
     double checkpoint_interval_sec;
 };
 

@@ -56,6 +56,14 @@ static bool restrict_files(const struct sandbox *sandbox) {
         ok = ok && allow(ruleset, sandbox->read_dir, READ_ACCESS);
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++)
         ok = ok && allow(ruleset, folders[i], READ_ACCESS);
+    /* Resolvers and certificates. */
+    static const char *const places[] = {"/etc/resolv.conf", "/etc/hosts", "/etc/nsswitch.conf", "/etc/gai.conf",
+                                         "/etc/host.conf", "/etc/services"};
+    static const char *const trees[] = {"/etc/ssl", "/run/systemd/resolve"};
+    for (size_t i = 0; sandbox->network && i < sizeof places / sizeof places[0]; i++)
+        ok = ok && allow(ruleset, places[i], LANDLOCK_ACCESS_FS_READ_FILE);
+    for (size_t i = 0; sandbox->network && i < sizeof trees / sizeof trees[0]; i++)
+        ok = ok && allow(ruleset, trees[i], READ_ACCESS);
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
         ok = ok && allow(ruleset, files[i], LANDLOCK_ACCESS_FS_READ_FILE);
     ok = ok && syscall(SYS_landlock_restrict_self, ruleset, 0) == 0;
@@ -65,7 +73,7 @@ static bool restrict_files(const struct sandbox *sandbox) {
 
 /* A list of what is refused: what the engine's libraries need is not ours to know, what an
  * intruder needs first is. */
-static bool restrict_system_calls(void) {
+static bool restrict_system_calls(bool network) {
     static const int refused[] = {
         SCMP_SYS(socket), SCMP_SYS(io_uring_setup), /* the network, also by the side door */
         SCMP_SYS(execve), SCMP_SYS(execveat),
@@ -85,7 +93,7 @@ static bool restrict_system_calls(void) {
     if (!filter)
         return false;
     bool ok = true;
-    for (size_t i = 0; ok && i < sizeof refused / sizeof refused[0]; i++)
+    for (size_t i = network ? 1 : 0; ok && i < sizeof refused / sizeof refused[0]; i++) /* socket is first */
         ok = seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), refused[i], 0) == 0;
     /* Signals only to itself (abort), limits only of itself. */
     scmp_datum_t self = (scmp_datum_t)getpid();
@@ -118,7 +126,7 @@ void sandbox_enter(const struct sandbox *sandbox, struct sandbox_result *result)
     result->memory = sandbox->memory_bytes == 0 || limit_memory(sandbox->memory_bytes);
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0) {
         result->files = restrict_files(sandbox);
-        result->system_calls = restrict_system_calls();
+        result->system_calls = restrict_system_calls(sandbox->network);
     }
     if (result->files && result->system_calls && result->memory)
         snprintf(result->text, sizeof result->text,

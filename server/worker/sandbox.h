@@ -17,6 +17,7 @@
 struct sandbox {
     const char *write_dir;
     const char *read_dir;  /* NULL: none */
+    bool network;          /* it may call others, and read what finding them takes */
     uint64_t memory_bytes; /* 0: no limit */
 };
 

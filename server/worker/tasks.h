@@ -14,4 +14,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
 enum status task_reconstruct(const struct order *order, struct progress *progress,
                              struct error *err);
 
+/* Calls a webhook; see deliver.h. */
+enum status task_deliver(const struct order *order, struct progress *progress, struct error *err);
+
 #endif

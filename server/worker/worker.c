@@ -41,7 +41,8 @@ static enum status take_folder(const char *dir, struct error *err) {
 static void confine(const struct order *order, struct progress *progress) {
     struct sandbox_result result;
     struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene,
-                              .memory_bytes = order->memory_bytes};
+                              .memory_bytes = order->memory_bytes,
+                              .network = strcmp(order->kind, "deliver") == 0};
     if (!order->sandbox) {
         progress_log(progress, "warning", "sandbox: switched off by the daemon's configuration");
         return;
@@ -59,6 +60,7 @@ static enum status work(const struct order *order, struct progress *progress, st
     } tasks[] = {
         {"reconstruct", task_reconstruct},
         {"check", task_check},
+        {"deliver", task_deliver},
     };
     for (size_t i = 0; i < sizeof tasks / sizeof tasks[0]; i++)
         if (strcmp(order->kind, tasks[i].kind) == 0)

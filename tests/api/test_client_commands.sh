@@ -57,6 +57,9 @@ has "$out" '"seed":9007199254740991'
 run 0 extend 1 --iterations 4
 has "$out" "job 1 is "
 run 0 watch 1
+run 0 watch 1 -q --exec 'echo "$UNBAKE_JOB $UNBAKE_STATE $UNBAKE_NAME:$UNBAKE_REASON"; exit 3'
+equal "$out" "1 succeeded my room:"
+run 7 watch 1 -q --exec 'exit 127'
 run 0 watch 1 --json --all
 has "$out" "resumed at iteration 3"
 run 0 get 1 report.json -o "$work/longer"

@@ -1,0 +1,92 @@
+/* delivery.c -- see delivery.h. */
+#include "server/job/delivery.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/wait.h>
+
+#include "common/clock.h"
+#include "common/file.h"
+#include "common/json.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/worker/progress.h"
+
+#define LIMIT_SEC 60.0
+
+static void empty(struct delivery *d) {
+    struct error err;
+    supervisor_release(&d->worker);
+    if (file_remove_tree(d->dir, &err) != STATUS_OK)
+        log_warning("%s", err.message);
+    mem_free(d->dir);
+    *d = (struct delivery){.worker = {.pid_fd = -1, .pipe_fd = -1}};
+}
+
+enum status delivery_start(struct delivery *d, const struct scheduler_config *config,
+                           const struct outbox_row *row, struct error *err) {
+    char number[32];
+    *d = (struct delivery){.id = row->id, .job_id = row->job_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
+                           .kill_at_sec = clock_sec() + LIMIT_SEC,
+                           .dir = mem_printf("%s/trash/message-%lld", config->data_dir, (long long)row->id)};
+    cJSON *order = cJSON_CreateObject();
+    json_add_string(order, "kind", "deliver");
+    json_add_bool(order, "sandbox", config->sandbox);
+    json_add_string(order, "url", row->url);
+    json_add_string(order, "secret", row->secret);
+    json_add_string(order, "body", row->body);
+    snprintf(number, sizeof number, "msg_%lld", (long long)row->id);
+    json_add_string(order, "message_id", number);
+    json_add_bool(order, "allow_private", config->webhook_private);
+    char *text = json_text(order), *path = file_join(d->dir, "job.json");
+    enum status status = file_make_dirs(d->dir, err);
+    if (status == STATUS_OK)
+        status = file_replace(path, text, strlen(text), err);
+    if (status == STATUS_OK)
+        status = supervisor_start(&d->worker, config->worker_binary, d->dir, err);
+    mem_free(path);
+    mem_free(text);
+    cJSON_Delete(order);
+    if (status != STATUS_OK)
+        empty(d);
+    return status;
+}
+
+/* The line that says how it ended. */
+static void hear(void *user, const char *text, size_t length) {
+    struct delivery *d = user;
+    const char *type, *message;
+    cJSON *line;
+    if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK)
+        return;
+    if (json_string(line, "type", "line", "", &type, NULL) == STATUS_OK && strcmp(type, "end") == 0 &&
+        json_string(line, "message", "line", "", &message, NULL) == STATUS_OK)
+        snprintf(d->reason, sizeof d->reason, "%s", message);
+    cJSON_Delete(line);
+}
+
+void delivery_kill(struct delivery *d) {
+    supervisor_signal(&d->worker, SIGKILL);
+}
+
+bool delivery_listen(struct delivery *d, struct store *store) {
+    int wait_status;
+    struct error err;
+    bool gave_up;
+    if (d->id == 0)
+        return true;
+    supervisor_read(&d->worker, hear, d);
+    if (clock_sec() >= d->kill_at_sec)
+        delivery_kill(d);
+    if (!supervisor_bury(&d->worker, &wait_status, hear, d))
+        return false;
+    bool delivered = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == PROGRESS_EXIT_OK;
+    if (store_outbox_settle(store, d->id, delivered, &gave_up, &err) != STATUS_OK)
+        log_warning("a webhook's outcome cannot be recorded: %s", err.message);
+    else if (!delivered)
+        log_warning("job %lld: its webhook cannot be called%s: %s", (long long)d->job_id,
+                    gave_up ? ", and will not be again" : "", d->reason[0] ? d->reason : "its time was up");
+    empty(d);
+    return true;
+}

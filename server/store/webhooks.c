@@ -1,0 +1,116 @@
+/* webhooks.c -- what is to be told to whom outside: the outbox; see store.h.
+ *
+ * A message is made in the transaction of the change that it tells of, and goes when it was
+ * delivered or given up: a crash in between repeats a message, and never loses one. */
+#include <math.h>
+
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+#define RETRY_FIRST_MS 2000.0
+#define RETRY_MOST_MS 600000.0
+#define TRIES 30 /* over four hours */
+
+enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
+                              struct error *err) {
+    return sql_run(&store->sql, err, "INSERT INTO webhooks (job_id, url, secret) VALUES (?, ?, ?)", "itt",
+                   job_id, url, secret);
+}
+
+enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state,
+                               const char *reason, const char *hint, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT url, secret, name, labels FROM webhooks JOIN jobs ON jobs.id = job_id WHERE job_id = ?",
+                  "i", job_id);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (!found)
+        return status;
+    char *url = sql_dup(stmt, 0), *secret = sql_dup(stmt, 1);
+    cJSON *body = cJSON_CreateObject(), *job = cJSON_CreateObject(), *labels = cJSON_Parse(sql_text(stmt, 3));
+    json_add_string(body, "type", "job.state");
+    json_add_int(job, "id", job_id);
+    json_add_string(job, "name", sql_text(stmt, 2));
+    json_add_string(job, "state", state);
+    json_add_int(job, "attempt", attempt);
+    json_add_string(job, "reason", *reason ? reason : NULL);
+    json_add_string(job, "hint", *hint ? hint : NULL);
+    json_add(job, "labels", labels ? labels : cJSON_CreateObject());
+    json_add(body, "data", job);
+    sqlite3_reset(stmt);
+    char *text = json_text(body);
+    int64_t now = store_now_ms();
+    status = sql_run(&store->sql, err,
+                     "INSERT INTO outbox (job_id, url, secret, body, next_ms) VALUES (?, ?, ?, ?, ?)", "ittti",
+                     job_id, url, secret, text, now);
+    mem_free(text);
+    cJSON_Delete(body);
+    mem_free(url);
+    mem_free(secret);
+    return status;
+}
+
+void outbox_row_release(struct outbox_row *row) {
+    mem_free(row->url);
+    mem_free(row->secret);
+    mem_free(row->body);
+    *row = (struct outbox_row){0};
+}
+
+enum status store_outbox_next(struct store *store, int64_t after, struct outbox_row *row, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *row = (struct outbox_row){0};
+    /* A clock that was set back must not hold a message for longer than its longest pause. */
+    int64_t now = store_now_ms(), never = now + (int64_t)(2.0 * RETRY_MOST_MS);
+    store_lock(store);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT id, job_id, url, secret, body, tries FROM outbox"
+                  " WHERE (next_ms <= ? OR next_ms > ?) AND id > ? ORDER BY id LIMIT 1",
+                  "iii", now, never, after);
+    if (status == STATUS_OK)
+        status = sql_step(&store->sql, stmt, &found, err);
+    if (found) {
+        *row = (struct outbox_row){.id = sqlite3_column_int64(stmt, 0), .job_id = sqlite3_column_int64(stmt, 1),
+                                   .url = sql_dup(stmt, 2), .secret = sql_dup(stmt, 3), .body = sql_dup(stmt, 4),
+                                   .tries = sqlite3_column_int(stmt, 5)};
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "the outbox has nothing to send")
+                                         : status;
+}
+
+enum status store_outbox_wait(struct store *store, double *seconds, struct error *err) {
+    int64_t next;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, -1, &next, err,
+                                 "SELECT next_ms FROM outbox ORDER BY next_ms LIMIT 1", "");
+    store_unlock(store);
+    double wait = (double)(next - store_now_ms()) * 1e-3;
+    *seconds = next < 0 ? (double)INFINITY : fmin(fmax(wait, 0.05), RETRY_MOST_MS * 1e-3);
+    return status;
+}
+
+enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
+                                struct error *err) {
+    int64_t tries;
+    *gave_up = false;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_int(&store->sql, 0, &tries, err, "SELECT tries FROM outbox WHERE id = ?", "i", id);
+    *gave_up = !delivered && tries + 1 >= TRIES;
+    double pause = fmin(RETRY_FIRST_MS * pow(2.0, (double)tries), RETRY_MOST_MS);
+    if (status == STATUS_OK && (delivered || *gave_up))
+        status = sql_run(&store->sql, err, "DELETE FROM outbox WHERE id = ?", "i", id);
+    else if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE outbox SET tries = tries + 1, next_ms = ? WHERE id = ?", "ii",
+                         store_now_ms() + (int64_t)pause, id);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
