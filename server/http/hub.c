@@ -16,11 +16,23 @@
 #define BATCH_BYTES ((size_t)64 << 10)  /* of data; a single event may have more */
 #define TEXT_BYTES ((size_t)1 << 20)
 
+/* The part of a job's events that was rendered last: most streams of a job ask for the same one. */
+struct rendered {
+    uint64_t version; /* of the store, by the hub's count, when it was fetched */
+    int64_t job_id;   /* 0: nothing yet */
+    int64_t after, owner_id;
+    bool is_shared, is_ndjson;
+    struct event_page page;
+    struct buf text;
+};
+
 struct hub {
-    pthread_mutex_t mutex; /* guards the list and its members' shared part */
+    pthread_mutex_t mutex; /* guards all that follows, and the subscribers' shared part */
     struct subscriber *first;
     size_t count;
     double keepalive_sec;
+    uint64_t version; /* grows with every change */
+    struct rendered last;
 };
 
 struct subscriber {
@@ -45,10 +57,12 @@ struct hub *hub_new(double keepalive_sec) {
     struct hub *hub = mem_calloc(1, sizeof *hub);
     pthread_mutex_init(&hub->mutex, NULL);
     hub->keepalive_sec = keepalive_sec;
+    buf_init(&hub->last.text, TEXT_BYTES);
     return hub;
 }
 
 void hub_free(struct hub *hub) {
+    buf_release(&hub->last.text);
     pthread_mutex_destroy(&hub->mutex);
     mem_free(hub);
 }
@@ -63,6 +77,7 @@ size_t hub_count(struct hub *hub) {
 void hub_changed(void *user, int64_t job_id) {
     struct hub *hub = user;
     pthread_mutex_lock(&hub->mutex);
+    hub->version++;
     for (struct subscriber *s = hub->first; s; s = s->next) {
         if ((s->what.job_id && s->what.job_id != job_id) || !job_id || s->is_dirty)
             continue;
@@ -154,15 +169,67 @@ static void mark_dirty(struct subscriber *s) {
     pthread_mutex_unlock(&s->api->hub->mutex);
 }
 
+/* Takes the next part of a job's events from what another stream rendered just now, where nothing has
+ * changed since and this stream's caller may read it too; false where there is none. */
+static bool take_rendered(struct subscriber *s, struct event_page *page) {
+    struct hub *hub = s->api->hub;
+    const struct rendered *last = &hub->last;
+    pthread_mutex_lock(&hub->mutex);
+    struct job access = {.owner_id = last->owner_id, .is_shared = last->is_shared};
+    bool is_it = last->job_id && last->job_id == s->what.job_id && last->after == s->what.after &&
+                 last->is_ndjson == s->what.is_ndjson && last->version == hub->version &&
+                 caller_access_job(&s->caller, &access) >= ACCESS_READ;
+    if (is_it) {
+        *page = last->page;
+        buf_puts(&s->text, buf_text(&last->text));
+    }
+    pthread_mutex_unlock(&hub->mutex);
+    return is_it;
+}
+
+/* Leaves for others what this stream has just rendered, at that version of the store. */
+static void leave_rendered(struct subscriber *s, const struct event_page *page, uint64_t version) {
+    struct hub *hub = s->api->hub;
+    pthread_mutex_lock(&hub->mutex);
+    struct rendered *last = &hub->last;
+    buf_clear(&last->text);
+    if (buf_puts(&last->text, buf_text(&s->text))) {
+        last->version = version;
+        last->job_id = s->what.job_id;
+        last->after = s->what.after;
+        last->is_ndjson = s->what.is_ndjson;
+        last->owner_id = page->owner_id;
+        last->is_shared = page->is_shared;
+        last->page = *page;
+    } else {
+        last->job_id = 0;
+    }
+    pthread_mutex_unlock(&hub->mutex);
+}
+
+/* Reads and renders the next part. */
+static enum status fetch_page(struct subscriber *s, struct event_page *page) {
+    struct hub *hub = s->api->hub;
+    if (take_rendered(s, page))
+        return STATUS_OK;
+    /* Before the database is asked: what changes meanwhile makes the text out of date. */
+    pthread_mutex_lock(&hub->mutex);
+    uint64_t version = hub->version;
+    pthread_mutex_unlock(&hub->mutex);
+    enum status status = store_event_page(s->api->store, &s->caller, s->what.job_id, s->what.after, BATCH_EVENTS,
+                                          BATCH_BYTES, render_row, s, page, NULL);
+    if (status == STATUS_OK && s->what.job_id)
+        leave_rendered(s, page, version);
+    return status;
+}
+
 /* Renders what the database has after the last event; sets has_ended after the last one of a job that
  * is in a terminal state or that is not to be followed, and when the job is gone or not to be read
  * any more. */
 static void fetch(struct subscriber *s) {
     struct subscription *what = &s->what;
     struct event_page page;
-    struct store *store = s->api->store;
-    if (store_event_page(store, &s->caller, what->job_id, what->after, BATCH_EVENTS, BATCH_BYTES, render_row, s,
-                         &page, NULL) != STATUS_OK) {
+    if (fetch_page(s, &page) != STATUS_OK) {
         s->has_ended = true; /* where the database is at fault the client comes back and asks again */
         return;
     }

@@ -157,7 +157,7 @@ static enum status page_of_job(struct store *store, const struct caller *who, in
     bool found = false;
     enum status status =
         sql_query(&store->sql, &stmt, err,
-                  "SELECT state, pruned_id, revision FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
+                  "SELECT state, pruned_id, revision, owner_id, shared FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
                   "ini", job_id, who == NULL || who->role == ROLE_ADMIN, who ? who->user_id : 0);
     if (status == STATUS_OK)
         status = sql_step(&store->sql, stmt, &found, err);
@@ -165,6 +165,8 @@ static enum status page_of_job(struct store *store, const struct caller *who, in
         page->state = (enum job_state)sqlite3_column_int(stmt, 0);
         page->pruned_id = sqlite3_column_int64(stmt, 1);
         page->revision = sqlite3_column_int64(stmt, 2);
+        page->owner_id = sqlite3_column_int64(stmt, 3);
+        page->is_shared = sqlite3_column_int(stmt, 4) != 0;
         sqlite3_reset(stmt);
     }
     return status == STATUS_OK && !found

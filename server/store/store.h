@@ -208,7 +208,8 @@ struct event_page {
     int64_t last_id;      /* where the next part begins */
     int64_t pruned_id;    /* events up to here may be gone, besides overtaken progress */
     enum job_state state; /* of the job, before its events were looked at */
-    int64_t revision;
+    int64_t revision, owner_id;
+    bool is_shared;
 };
 enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id,
                              int64_t after, size_t limit, size_t byte_limit,
