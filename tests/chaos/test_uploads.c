@@ -129,7 +129,7 @@ static void *carry(void *user) {
 static void *accept_all(void *user) {
     struct proxy *p = user;
     int fd;
-    while ((fd = accept(p->listener, NULL, NULL)) >= 0) {
+    while ((fd = accept4(p->listener, NULL, NULL, SOCK_CLOEXEC)) >= 0) {
         struct link *l = mem_calloc(1, sizeof *l);
         pthread_t thread;
         unsigned number = atomic_fetch_add(&p->connections, 1);
