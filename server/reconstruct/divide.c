@@ -66,7 +66,8 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
                      struct incident *scratch, struct texel_looks *looks) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = segment_of(d->r, texel);
-    float median = d->views->median_radiance, weight = view->weight * views_trust(d->views, view);
+    float median = d->views->median_radiance;
+    float weight = view->weight * views_trust(d->views, view, at->triangle);
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
     rgb gloss = rgb_gray(0.0f);

@@ -90,6 +90,7 @@ struct channel_values {
 /* What the looks of one class of distance from an edge (views_edge) show. */
 struct shown_values {
     struct channel_values channel[3];
+    size_t outshone_count; /* looks left out since something beside was as bright */
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
@@ -110,19 +111,23 @@ static float median(struct channel_values *v) {
     return v->count ? v->value[v->count / 2] : 0.0f;
 }
 
-/* Whether a pixel that mixes surfaces is clearly brighter than all around it: then what is bright
- * in it is the surface looked for and not the lamp or window behind. */
-static bool outshines(const struct photograph *photo, float x, float y, rgb radiance) {
-    for (int i = 0; i < 8; i++) {
+/* Whether what a look of this class of distance from an edge shows is the surface's own. A bright
+ * window may stand behind a thin frame: a pixel that mixes surfaces speaks only when it is clearly
+ * brighter than all around it, one near an edge when it is no darker than its surroundings. */
+static bool outshines(const struct photograph *photo, float x, float y, rgb radiance, int edge) {
+    float own = rgb_mean(radiance), most = 0.0f, sum = 0.0f, count = 0.0f;
+    for (int i = 0; i < 8 && edge > 0; i++) {
         static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
         struct photograph_sample beside;
         float px = x + RING_PIXELS * along[i][0], py = y + RING_PIXELS * along[i][1];
-        if (px < 0.0f || py < 0.0f || px >= (float)photo->camera.width || py >= (float)photo->camera.height)
+        if (px < 0.0f || py < 0.0f || px >= (float)photo->camera.width ||
+            py >= (float)photo->camera.height || !photograph_sample(photo, px, py, &beside))
             continue;
-        if (photograph_sample(photo, px, py, &beside) && OUTSHINES * rgb_mean(beside.radiance) > rgb_mean(radiance))
-            return false;
+        most = fmaxf(most, rgb_mean(beside.radiance));
+        sum += rgb_mean(beside.radiance);
+        count += 1.0f;
     }
-    return true;
+    return edge == VIEWS_EDGE ? own > OUTSHINES * most : own * count >= sum;
 }
 
 static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
@@ -135,10 +140,13 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
     for (size_t k = 0; k < seen; k++) {
         struct photograph_sample sample;
         const struct photograph *photo = &r->scene->photograph[job->views->train[view[k].train]];
-        int edge = views_edge(job->views, &view[k]);
-        if (!photograph_sample(photo, view[k].x, view[k].y, &sample) ||
-            (edge == VIEWS_EDGE && !outshines(photo, view[k].x, view[k].y, sample.radiance)))
+        int edge = views_edge(job->views, &view[k], at.triangle);
+        if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
             continue;
+        if (!outshines(photo, view[k].x, view[k].y, sample.radiance, edge)) {
+            shown[edge].outshone_count++;
+            continue;
+        }
         struct channel_values *channel = shown[edge].channel;
         add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
         add_value(&channel[1], sample.radiance.g, sample.saturated[1]);
@@ -160,7 +168,9 @@ static void observe_segment(void *user, size_t segment, int thread) {
         if (red->count + red->saturated_count < LEAST_LOOKS)
             best = &shown[edge];
     }
-    job->evidence[segment].mixed = best >= &shown[VIEWS_EDGE - 1];
+    if (best->channel[0].count + best->channel[0].saturated_count < best->outshone_count)
+        best = &shown[0]; /* most often it is not what shines: nothing is known */
+    job->evidence[segment].mixed = best == &shown[VIEWS_EDGE];
     job->evidence[segment].shown =
         rgb_make(median(&best->channel[0]), median(&best->channel[1]), median(&best->channel[2]));
     mem_free(shown);

@@ -16,7 +16,7 @@
 /* What is known of a segment's light. */
 struct emitter_evidence {
     rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
-    bool mixed;  /* it was only seen in pixels that mix surfaces or are beside such a one */
+    bool mixed;  /* it was only seen in pixels that mix surfaces */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */
 };

@@ -47,8 +47,8 @@ static void look_all(const struct fuse_job *job, const struct surface_point *p, 
         struct photograph_sample s;
         if (views_sees(v, t, p->position, p->normal, &view) &&
             photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
-            l->clean += views_clean(v, &view);
-            add_look(l, &s, view.weight * views_trust(v, &view), LOG_FLOOR * v->median_radiance);
+            l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
+            add_look(l, &s, view.weight * views_trust(v, &view, p->triangle), LOG_FLOOR * v->median_radiance);
         }
     }
 }

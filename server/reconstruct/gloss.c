@@ -33,8 +33,8 @@
 #define SCALE_MEDIAN 0.005f
 /* Gloss must explain this part of the misfit that remains without, and by so many standard errors
  * over the texels; else the segment is called matt. */
-#define GAIN_LEAST 0.06
-#define GAIN_ERRORS 4.0
+#define GAIN_LEAST 0.03
+#define GAIN_ERRORS 3.0
 /* Rougher highlights cannot be told from matt reflection. */
 #define GLOSS_ROUGHEST 0.7f
 /* Dielectrics are near an index of refraction of 1.5, specular .5: the misfit of others counts this
@@ -99,8 +99,8 @@ static size_t patch_around(const struct reconstruction *r, uint32_t texel, const
 
 /* What a photograph shows of the patch on average; false unless all of it was measured, no nearer
  * to edges than `edge`. */
-static bool patch_shown(const struct views *views, const struct view *view, const vec3 *patch, size_t count,
-                        int edge, rgb *shown) {
+static bool patch_shown(const struct views *views, const struct view *view, uint32_t triangle,
+                        const vec3 *patch, size_t count, int edge, rgb *shown) {
     const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
     *shown = rgb_gray(0.0f);
     for (size_t i = 0; i < count; i++) {
@@ -108,7 +108,7 @@ static bool patch_shown(const struct views *views, const struct view *view, cons
         struct photograph_sample s;
         float depth_m;
         if (!camera_project(&photo->camera, patch[i], &place.x, &place.y, &depth_m) ||
-            views_edge(views, &place) > edge || !photograph_sample(photo, place.x, place.y, &s) ||
+            views_edge(views, &place, triangle) > edge || !photograph_sample(photo, place.x, place.y, &s) ||
             s.saturated[0] || s.saturated[1] || s.saturated[2])
             return false;
         *shown = rgb_mad(*shown, 1.0f / (float)count, s.radiance);
@@ -130,7 +130,8 @@ static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge,
     size_t patch_count = patch_around(r, texel, &at, patch), shown_count = 0;
     size_t seen = views_pick(job->views, at.position, at.normal, texel, VIEWS_ASKED, view);
     for (size_t i = 0; i < seen && shown_count < VIEWS; i++) {
-        if (patch_shown(job->views, &view[i], patch, patch_count, edge, &point->look[shown_count].shown))
+        if (patch_shown(job->views, &view[i], at.triangle, patch, patch_count, edge,
+                        &point->look[shown_count].shown))
             view[shown_count++] = view[i];
     }
     if (shown_count < VIEWS_LEAST)

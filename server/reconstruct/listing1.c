@@ -435,7 +435,8 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
     f->solved = settings_is(set, "method", "solve");
     if (!f->solved)
         start_neutral(f);
-    params_init(&f->params, &r->materials, &r->inverse, &r->segments, f->coarse_levels);
+    params_init(&f->params, &r->materials, &r->inverse, &r->segments, r->atlas.chart_of_triangle,
+                f->coarse_levels);
     chooser_init(&f->chooser, r->inverse.valid_count,
                  (size_t)settings_number(set, "texels_per_iteration"), f->path.seed);
     f->gradient = gradient_new(r->atlas.width, r->atlas.height, r->segments.count);

@@ -45,10 +45,10 @@ static float log_emission(float radiance) {
 }
 
 void params_init(struct params *p, struct materials *materials, const struct inverse_uv *inverse,
-                 const struct segments *segments, int level) {
+                 const struct segments *segments, const uint32_t *chart_of_triangle, int level) {
     size_t count = materials->segment_count;
     *p = (struct params){
-        .materials = materials, .inverse = inverse, .segments = segments, .level = level};
+        .materials = materials, .inverse = inverse, .segments = segments, .chart_of_triangle = chart_of_triangle, .level = level};
     adam_init(&p->base_color, block_count(p, 0), 3, BASE_BETA1, BASE_BETA2);
     adam_init(&p->roughness, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
     adam_init(&p->specular, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
@@ -247,10 +247,15 @@ void params_match(struct params *p, uint32_t texel, const struct loss_match *mat
     for (int c = 0; c < 3; c++)
         factor[c] = (1.0f + step * (match->shown[c] - 1.0f)) / (1.0f + step * (match->rendered[c] - 1.0f));
     size_t side = (size_t)1 << p->level, x0 = bx << p->level, y0 = by << p->level;
+    const uint32_t *triangle = p->inverse->triangle;
+    uint32_t chart = p->chart_of_triangle[triangle[texel]];
     for (size_t y = y0; y < y0 + side && y < texture->height; y++) {
         for (size_t x = x0; x < x0 + side && x < texture->width; x++) {
-            float *value = texture->texel[y * texture->width + x];
-            for (int c = 0; c < 3 && value[3] != 0.0f; c++)
+            size_t at = y * texture->width + x;
+            float *value = texture->texel[at];
+            if (triangle[at] == INVERSE_UV_NONE || p->chart_of_triangle[triangle[at]] != chart)
+                continue;
+            for (int c = 0; c < 3; c++)
                 value[c] = clampf(value[c] * factor[c], BLOCK_MIN, 1.0f);
         }
     }

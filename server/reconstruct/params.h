@@ -33,6 +33,7 @@ struct params {
     struct materials *materials; /* borrowed; what is moved */
     const struct inverse_uv *inverse;    /* borrowed */
     const struct segments *segments;     /* borrowed */
+    const uint32_t *chart_of_triangle; /* borrowed */
     const bool *is_emitter;      /* [segment_count] borrowed; NULL until the emitters are known */
     struct adam base_color;      /* an entry a texel, or a block at coarse levels */
     struct adam roughness, specular, emission; /* an entry a segment */
@@ -48,7 +49,7 @@ struct params {
 
 /* Starts from the materials as they are; a segment whose emission is 0 never emits. */
 void params_init(struct params *p, struct materials *materials, const struct inverse_uv *inverse,
-                 const struct segments *segments, int level);
+                 const struct segments *segments, const uint32_t *chart_of_triangle, int level);
 void params_release(struct params *p);
 
 /* Goes to a finer level: the moments of base colour start anew. */
@@ -60,7 +61,8 @@ void params_set_level(struct params *p, int level);
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool);
 
-/* The step of base colour from a solved start, after one look at a texel: scales the texel's block, by channel,
+/* The step of base colour from a solved start, after one look at a texel: scales what its block has of its chart, by
+ * channel,
  * by the ratio of what was shown to what was rendered, averaged over the block's past looks.
  *
  * Stochastic approximation (Robbins & Monro 1951) of the fixed point rendered = shown with a step of

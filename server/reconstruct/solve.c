@@ -20,9 +20,9 @@
  * known whether they emit. */
 #define BRIGHT 4.0f
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter: white
- * walls stay below it by their reflectance of .9 or less and the noise of what arrives, which is a few percent. More is
- * asked where only pixels that mix surfaces speak. */
-#define EMITTER_SHARE 0.15f
+ * walls stay near .1 by their reflectance of .9, and bowls around lamps below .25, whose pixels have
+ * some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
+#define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_MIXED 0.3f
 #define NEUTRAL_BASE_COLOR 0.5f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */

@@ -77,6 +77,11 @@ static bool meet(const struct corner *a, const struct corner *b, float focal) {
     return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
 }
 
+/* A byte that tells most segments from most others. */
+static uint8_t owner_mark(uint32_t segment) {
+    return (uint8_t)(rng_mix32(segment) >> 24);
+}
+
 /* One row of pixels; the corners of a row are traced twice, which a parallel loop over rows
  * makes simpler than sharing them. */
 static void mark_row(void *user, size_t row, int thread) {
@@ -85,6 +90,7 @@ static void mark_row(void *user, size_t row, int thread) {
     const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
     const struct camera *camera = &photo->camera;
     uint8_t *out = job->views->shows[job->train] + row * camera->width;
+    uint8_t *owner = job->views->owner[job->train] + row * camera->width;
     uint32_t y = (uint32_t)row;
     struct corner left_top = trace_corner(job, camera, 0, y);
     struct corner left_low = trace_corner(job, camera, 0, y + 1);
@@ -96,6 +102,7 @@ static void mark_row(void *user, size_t row, int thread) {
         bool seam = mixed && meet(&left_top, &top, camera->fx) && meet(&left_top, &left_low, camera->fx) &&
                     meet(&left_top, &low, camera->fx) && meet(&top, &left_low, camera->fx);
         out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
+        owner[x] = owner_mark(low.segment);
         /* What is thinner than a pixel may hide between the corners. */
         if (!mixed && low.segment == NO_SURFACE)
             out[x] = hits_centre(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
@@ -163,10 +170,11 @@ void views_update_edges(struct views *v, const struct segments *segments, uint32
 
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
                 const struct accel *accel, struct parallel *pool) {
-    *v = (struct views){.scene = scene, .accel = accel};
+    *v = (struct views){.scene = scene, .segments = segments, .accel = accel};
     v->train = mem_array(scene->photograph_count, sizeof *v->train);
     v->shows = mem_array(scene->photograph_count, sizeof *v->shows);
     v->edge = mem_array(scene->photograph_count, sizeof *v->edge);
+    v->owner = mem_array(scene->photograph_count, sizeof *v->owner);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
             v->train[v->train_count++] = (uint32_t)i;
@@ -175,6 +183,7 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
         const struct camera *camera = &scene->photograph[v->train[t]].camera;
         v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
         v->edge[t] = mem_array((size_t)camera->height * camera->width, 1);
+        v->owner[t] = mem_calloc((size_t)camera->height * camera->width, 1);
         views_update_edges(v, segments, t, pool);
     }
     views_update_median(v);
@@ -184,9 +193,11 @@ void views_release(struct views *v) {
     for (size_t t = 0; t < v->train_count; t++) {
         mem_free(v->shows[t]);
         mem_free(v->edge[t]);
+        mem_free(v->owner[t]);
     }
     mem_free(v->shows);
     mem_free(v->edge);
+    mem_free(v->owner);
     mem_free(v->train);
     *v = (struct views){0};
 }
@@ -221,25 +232,27 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, 
     return !accel_occluded(v->accel, accel_offset(point, normal, direction), direction, 0.0f, distance);
 }
 
-int views_edge(const struct views *v, const struct view *view) {
+int views_edge(const struct views *v, const struct view *view, uint32_t triangle) {
     const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
-    const uint8_t *edge = v->edge[view->train];
+    const uint8_t *edge = v->edge[view->train], *owner = v->owner[view->train];
+    uint8_t own = owner_mark(v->segments->of_triangle[triangle]);
     long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
     int nearest = 0;
     for (long y = y0; y < y0 + 2; y++) {
         for (long x = x0; x < x0 + 2; x++) {
             if (x < 0 || y < 0 || x >= (long)camera->width || y >= (long)camera->height)
                 continue;
-            int here = edge[y * (long)camera->width + x];
+            size_t at = (size_t)(y * (long)camera->width + x);
+            int here = owner[at] == own ? edge[at] : VIEWS_EDGE;
             nearest = here > nearest ? here : nearest;
         }
     }
     return nearest;
 }
 
-float views_trust(const struct views *v, const struct view *view) {
+float views_trust(const struct views *v, const struct view *view, uint32_t triangle) {
     static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f};
-    return trust[views_edge(v, view)];
+    return trust[views_edge(v, view, triangle)];
 }
 
 /* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show

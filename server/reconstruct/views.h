@@ -27,12 +27,14 @@ enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };
 
 struct views {
     const struct scene *scene;  /* borrowed */
+    const struct segments *segments; /* borrowed */
     const struct accel *accel;  /* borrowed */
     size_t train_count;
     uint32_t *train;            /* [train_count] photographs that may be used; owned */
     uint8_t **shows;            /* [train_count][height * width] VIEWS_SURFACE: one surface, ...; owned */
     uint8_t **edge;             /* [train_count][height * width] VIEWS_EDGE where the pixel mixes surfaces,
                                  * one less for every pixel further from such a one, down to 0; owned */
+    uint8_t **owner;            /* [train_count][height * width] a mark of the segment seen; owned */
     float median_radiance;      /* of the training pixels (mean of the channels) */
 };
 
@@ -64,11 +66,12 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 geometr
 /* Unit direction from a point to where training photograph `train` was taken. */
 vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
 
-/* The greatest class of `edge` among the four pixels that a look-up at the view's place reads, and
- * how far such a look-up is to be trusted, in (0, 1]: lenses and reconstruction filters carry light
- * a pixel or two beyond an edge. */
-int views_edge(const struct views *v, const struct view *view);
-float views_trust(const struct views *v, const struct view *view);
+/* The greatest class of `edge` among the four pixels that a look-up at a place of the triangle reads,
+ * and how far such a look-up is to be trusted, in (0, 1]: lenses and reconstruction filters carry
+ * light a pixel or two beyond an edge. A pixel that shows another segment (the triangle's is too thin
+ * for it) counts as one that mixes surfaces. */
+int views_edge(const struct views *v, const struct view *view, uint32_t triangle);
+float views_trust(const struct views *v, const struct view *view, uint32_t triangle);
 
 /* Whether all four pixels that a look-up at the view's place reads are clean. */
 bool views_clean(const struct views *v, const struct view *view);

@@ -34,7 +34,7 @@ static void fixture_init(struct fixture *f) {
     f->inverse = (struct inverse_uv){.width = SIDE, .height = SIDE, .valid_count = texels};
     f->inverse.triangle = mem_calloc_large(texels, sizeof *f->inverse.triangle);
     materials_init(&f->materials, &f->inverse, 1, rgb_gray(0.5f), 0.5f, 0.5f);
-    params_init(&f->params, &f->materials, &f->inverse, &f->segments, 0);
+    params_init(&f->params, &f->materials, &f->inverse, &f->segments, &f->triangle_segment, 0);
     params_fix_emitters(&f->params, &f->is_emitter);
     f->gradient = gradient_new(SIDE, SIDE, 1);
     for (int i = 0; i < LOGS; i++)

@@ -1,0 +1,182 @@
+/* Light gathered at a point (incident.h, highlight.h) against the path tracer, which is itself held
+ * against an independent renderer: what a white diffuse surface and what the specular lobes send to
+ * a viewer, under a lamp and walls that send out a given light. Fixed seeds; the bounds are several
+ * standard errors of both sides. */
+#include "server/reconstruct/highlight.h"
+#include "server/reconstruct/incident.h"
+#include "server/render/path.h"
+#include "server/render/sampler.h"
+#include "tests/check.h"
+#include "tests/render/small_room.h"
+
+#define PATHS 32768
+#define GATHERED 32768
+
+struct fixture {
+    struct mesh mesh;
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+    struct parallel *pool;
+    uint16_t (*radiance)[3]; /* of the walls, as measured */
+    struct surface_point at; /* on the floor */
+};
+
+static void fixture_init(struct fixture *f) {
+    struct error err = {0};
+    f->pool = parallel_new(0);
+    make_mesh(&f->mesh);
+    segments_from_object_id(&f->segments, &f->mesh);
+    CHECK(atlas_make(&f->atlas, &f->mesh, &f->segments, 128, 0.0f, &err) == STATUS_OK);
+    inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, f->pool);
+    materials_init(&f->materials, &f->inverse, OBJECTS, rgb_gray(0.0f), 1.0f, 0.0f);
+    f->materials.emission[LAMP] = lamp_radiance;
+    CHECK(world_init(&f->world, &f->mesh, &f->segments, &f->atlas, &f->materials, NULL, f->pool, &err) ==
+          STATUS_OK);
+    f->radiance = mem_calloc((size_t)f->atlas.width * f->atlas.height, sizeof *f->radiance);
+    for (size_t i = 0; i < f->inverse.valid_count; i++) {
+        uint32_t texel = f->inverse.valid[i];
+        struct surface_point p;
+        CHECK(surface_at_texel(&f->mesh, &f->atlas, &f->inverse, texel, &p));
+        if (p.position.y == 0.0f && p.position.x > 1.0f && p.position.x < 1.3f && p.position.z > 1.0f &&
+            p.position.z < 1.3f)
+            f->at = p;
+    }
+    CHECK(f->at.normal.y == 1.0f);
+}
+
+static void fixture_release(struct fixture *f) {
+    mem_free(f->radiance);
+    world_release(&f->world);
+    materials_release(&f->materials);
+    inverse_uv_release(&f->inverse);
+    atlas_release(&f->atlas);
+    segments_release(&f->segments);
+    mesh_release(&f->mesh);
+    parallel_free(f->pool);
+}
+
+/* Walls that emit send out what the field says of them: then one bounce is the whole of the light. */
+static void light_walls(struct fixture *f) {
+    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0}, {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
+                                               {0.1f, 0.1f, 2}, {0, 0, 0}, {9, 8, 6}};
+    for (int o = 0; o < OBJECTS; o++)
+        f->materials.emission[o] = wall_radiance[o];
+    world_update_lights(&f->world);
+}
+
+/* What the floor at f->at shows to a viewer in direction wo, by paths of one bounce. */
+static rgb trace(struct fixture *f, vec3 wo) {
+    struct path_batch *batch = path_batch_new(1024, 2);
+    struct path_settings settings = {.max_depth = 2, .roulette_depth = 32, .seed = 5};
+    rgb sum = {0, 0, 0};
+    vec3 eye = vec3_mad(f->at.position, 0.3f, wo);
+    for (uint32_t first = 0; first < PATHS; first += 1024) {
+        struct ray ray[1024];
+        struct path_key key[1024];
+        rgb radiance[1024];
+        for (uint32_t i = 0; i < 1024; i++) {
+            ray[i] = (struct ray){eye, vec3_neg(wo)};
+            key[i] = (struct path_key){1, 0, first + i};
+        }
+        path_batch_trace(batch, &f->world, &settings, 1024, ray, key, radiance);
+        for (uint32_t i = 0; i < 1024; i++)
+            sum = rgb_mad(sum, 1.0f / PATHS, radiance[i]);
+    }
+    path_batch_free(batch);
+    return rgb_sub(sum, f->materials.emission[0]);
+}
+
+static void check_close(rgb a, rgb b, float relative, const char *what, float parameter) {
+    const float *p = &a.r, *q = &b.r;
+    for (int c = 0; c < 3; c++)
+        CHECK_THAT(fabsf(p[c] - q[c]) < relative * q[c] + 1e-4f, "%s %.3f, channel %d: gathered %.5f, traced %.5f",
+                   what, (double)parameter, c, (double)p[c], (double)q[c]);
+}
+
+static vec3 viewer(float cosine) {
+    float sine = sqrtf(1.0f - cosine * cosine);
+    return (vec3){0.6f * sine, cosine, 0.8f * sine};
+}
+
+static void set_floor(struct fixture *f, float base, float roughness, float specular) {
+    for (size_t i = 0; i < f->inverse.valid_count; i++) {
+        float *texel = f->materials.base_color.texel[f->inverse.valid[i]];
+        texel[0] = texel[1] = texel[2] = base;
+    }
+    f->materials.roughness[0] = roughness;
+    f->materials.specular[0] = specular;
+}
+
+static void test_diffuse(struct fixture *f) {
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance light;
+    irradiance_gather(&light, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
+    for (float roughness = 0.0f; roughness <= 1.0f; roughness += 0.5f) {
+        for (float cosine = 0.15f; cosine < 1.0f; cosine += 0.4f) {
+            set_floor(f, 1.0f, roughness, 0.0f);
+            rgb gathered = irradiance_diffuse(&light, f->at.shading, roughness, viewer(cosine));
+            check_close(gathered, trace(f, viewer(cosine)), 0.01f, "diffuse, roughness", roughness);
+        }
+    }
+    mem_free(scratch);
+}
+
+static void test_highlights(struct fixture *f) {
+    static const struct highlight_levels levels = {4, 2, {0.1f, 0.3f, 0.5f, 1.0f}, {0.25f, 1.0f}};
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    for (float cosine = 0.3f; cosine < 1.0f; cosine += 0.5f) {
+        struct highlight mean = {0}, one;
+        for (uint32_t i = 0; i < 64; i++) {
+            highlight_gather(&one, scratch, &field, &f->at, viewer(cosine), &levels, sampler_key(7, i, 0), 384, 128);
+            for (size_t k = 0; k < 4; k++)
+                for (size_t m = 0; m < 2; m++)
+                    mean.radiance[k][m] = rgb_mad(mean.radiance[k][m], 1.0f / 64, one.radiance[k][m]);
+        }
+        for (size_t k = 0; k < 4; k++) {
+            for (size_t m = 0; m < 2; m++) {
+                set_floor(f, 0.0f, levels.roughness[k], levels.specular[m]);
+                check_close(mean.radiance[k][m], trace(f, viewer(cosine)), 0.02f, "highlight, roughness",
+                            levels.roughness[k]);
+            }
+        }
+    }
+    mem_free(scratch);
+}
+
+/* The same light from what the texels are said to send out, with the lamp alone as an emitter. */
+static void test_field(struct fixture *f) {
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance emitted, measured;
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    irradiance_gather(&emitted, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
+    for (size_t i = 0; i < f->inverse.valid_count; i++) {
+        uint32_t texel = f->inverse.valid[i];
+        const rgb *e = &f->materials.emission[f->segments.of_triangle[f->inverse.triangle[texel]]];
+        f->radiance[texel][0] = image_half_from_float(e->r);
+        f->radiance[texel][1] = image_half_from_float(e->g);
+        f->radiance[texel][2] = image_half_from_float(e->b);
+    }
+    for (int o = 0; o < LAMP; o++)
+        f->materials.emission[o] = rgb_gray(0.0f);
+    world_update_lights(&f->world);
+    irradiance_gather(&measured, scratch, &field, &f->at, sampler_key(1, 2, 4), GATHERED);
+    check_close(irradiance_diffuse(&measured, f->at.shading, 0.5f, viewer(0.7f)),
+                irradiance_diffuse(&emitted, f->at.shading, 0.5f, viewer(0.7f)), 0.01f, "measured light", 0.0f);
+    mem_free(scratch);
+}
+
+int main(void) {
+    struct fixture f = {0};
+    fixture_init(&f);
+    light_walls(&f);
+    test_diffuse(&f);
+    test_highlights(&f);
+    test_field(&f);
+    fixture_release(&f);
+    return check_result();
+}
