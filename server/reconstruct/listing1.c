@@ -429,7 +429,7 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
         .seed = (uint64_t)settings_number(set, "seed"),
-        .least_color = settings_bool(set, "guided") ? 0.0f : PATH_LEAST_COLOR, /* guided steps go by radiance */
+        .least_color = settings_is(set, "method", "solve") ? 0.0f : PATH_LEAST_COLOR, /* its steps go by radiance */
     };
     f->counters.level = f->coarse_levels;
     f->solved = settings_is(set, "method", "solve");
