@@ -40,7 +40,7 @@ other=$!
 daemon_start --set webhook_private=yes
 kill "$other"
 equal "$(echo "SELECT count(*) FROM outbox" | sqlite3 "$data/state.db" 2>/dev/null || echo locked)" locked "the database's lock"
-curl -s "$url/metrics" | grep -q '^unbaked_outbox [12]$' || fail "$(curl -s "$url/metrics" | grep outbox)"
+curl -s "$url/metrics" | grep -q '^unbaked_outbox [1-9]' || fail "$(curl -s "$url/metrics" | grep outbox)"
 daemon_end TERM
 
 # Not to private addresses, by name or by number.
