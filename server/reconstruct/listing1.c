@@ -422,6 +422,7 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
     const struct settings *set = r->settings;
     struct refine *f = mem_alloc(sizeof *f);
     *f = (struct refine){.r = r, .views = views, .hooks = hooks};
+    f->solved = settings_is(set, "method", "solve");
     f->coarse_levels = (int)settings_number(set, "coarse_levels");
     f->iteration_limit = (uint64_t)settings_number(set, "iterations");
     f->time_limit_sec = settings_number(set, "time_limit_sec");
@@ -429,10 +430,9 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
         .seed = (uint64_t)settings_number(set, "seed"),
-        .least_color = settings_is(set, "method", "solve") ? 0.0f : PATH_LEAST_COLOR, /* its steps go by radiance */
+        .least_color = f->solved ? 0.0f : PATH_LEAST_COLOR, /* steps from a solved start go by radiance */
     };
     f->counters.level = f->coarse_levels;
-    f->solved = settings_is(set, "method", "solve");
     if (!f->solved)
         start_neutral(f);
     params_init(&f->params, &r->materials, &r->inverse, &r->segments, r->atlas.chart_of_triangle,

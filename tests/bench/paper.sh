@@ -162,7 +162,6 @@ has_setting() { # NAME
 speed() {
     local out=$dir/speed wanted took published=(method=listing1) limit note=" (not reached)"
     other_room || return
-    has_setting guided && published+=(guided=false)
     run "$room" "$out-published" report_samples=1 "${published[@]}" &&
         evaluate "$room" "$out-published" --spp 0
     wanted=$(figure "$out-published" base_color_psnr_db)
@@ -198,7 +197,7 @@ ablations() {
         row "ablation, $what: base colour PSNR, dB" "$(figure "$out" base_color_psnr_db)" - higher
         row "ablation, $what: MSRE" "$(figure "$out" msre)" - lower
     done <<<"nothing left out,
-the published method,method=listing1 guided=false
+the published method,method=listing1
 no coarse levels,coarse_levels=0
 exposures and gains as given,calibrate=false
 one photograph a visit,cameras_per_texel=1
