@@ -60,7 +60,7 @@ static const struct command table[] = {
      "  unbake resume 17\n", 1, ANY_NUMBER, no_options, resume_run},
     {"retry", "JOB...", "queue failed or cancelled jobs again, attempts counted anew",
      "They go on from their checkpoints. With --from, also those that succeeded: that stage and all\n"
-     "after it are done anew. Stages are load, prepare, observe, refine, report and export.\n",
+     "after it are done anew. Stages are load, prepare, fuse, solve, refine, report and export.\n",
      "  unbake retry 17\n  unbake retry 17 --from report\n", 1, ANY_NUMBER, retry_options, retry_run},
     {"extend", "JOB", "let a job that has ended go on for longer",
      "It goes on from its checkpoint, which the server keeps for a while.\n",

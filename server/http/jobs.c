@@ -496,7 +496,7 @@ struct response *jobs_retry(struct api *api, struct request *r) {
     int64_t id = own_job(api, r, &refusal);
     if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
         refusal = problem_full(r, 400, "from must name a stage",
-                               "load, prepare, observe, refine, report, export", NULL);
+                               "load, prepare, fuse, solve, refine, report, export", NULL);
     if (refusal)
         return refusal;
     struct error err;

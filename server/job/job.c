@@ -74,7 +74,7 @@ bool job_stage_parse(const char *name, bool *keeps_checkpoint) {
     static const struct {
         const char *name;
         bool keeps_checkpoint;
-    } stages[] = {{"load", false},   {"prepare", false}, {"observe", false},
+    } stages[] = {{"load", false},  {"prepare", false}, {"fuse", false},  {"solve", false},
                   {"refine", false}, {"report", true},   {"export", true}};
     for (size_t i = 0; i < sizeof stages / sizeof *stages; i++) {
         if (strcmp(name, stages[i].name) == 0) {
