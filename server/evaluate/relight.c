@@ -64,8 +64,8 @@ static enum status read_camera(const char *outputs, const struct relight_setting
             status = choose_camera(&t, path, settings->view, camera, err);
     }
     transforms_release(&t);
-    findings_release(&findings);
     cJSON_Delete(findings.problems);
+    findings_release(&findings);
     cJSON_Delete(tree);
     mem_free(path);
     return status;

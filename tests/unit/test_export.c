@@ -200,8 +200,8 @@ static void test_views(const char *dir, const struct camera *wanted) {
                    wanted->world_from_camera.rotation[i / 3][i % 3], 1e-6);
     CHECK(camera.world_from_camera.translation.z == 3.0f);
     transforms_release(&transforms);
-    findings_release(&findings);
     cJSON_Delete(findings.problems);
+    findings_release(&findings);
     cJSON_Delete(tree);
     mem_free(path);
 }
