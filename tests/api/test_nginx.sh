@@ -73,7 +73,7 @@ run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000 --set t
 run 0 list -q --json
 job=$(jq -r '.[0].id' <<<"$out")
 curl -sN -m 60 --cacert "$work/cert.pem" -H "@$work/token" "$url/v1/jobs/$job/events" >"$work/stream" & stream=$!
-wait_for 20 grep -q '^event: progress' "$work/stream"
+wait_for 60 grep -q '^event: preview' "$work/stream"
 kill -0 "$stream" 2>/dev/null || fail "the events came when the stream had ended"
 run 0 get "$job" 'preview/*' -o "$work/textures" -q
 run 0 cancel "$job"

@@ -297,5 +297,6 @@ int main(int argc, char **argv) {
     figure("kills of the daemon: seconds to ready, 99 %", percentile(ready, (size_t)kills, 0.99), 1, "lower");
     CHECK(lost == 0 && twice == 0 && broken == 0 && acknowledged > kills);
     daemon_remove(&daemon_);
+    mem_free(ready);
     return check_result();
 }
