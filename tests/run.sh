@@ -14,7 +14,8 @@ slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/te
 render/test_environment api/test_readme"
 # The thread sanitizer has nothing to find in one thread either.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment
-gradient/test_path render/test_calibrate_light render/test_calibrate_poses fuzz/test_archive fuzz/test_image fuzz/test_ply fuzz/test_transforms"
+gradient/test_path render/test_calibrate_light render/test_calibrate_poses api/test_resume chaos/test_clock
+fuzz/test_archive fuzz/test_image fuzz/test_ply fuzz/test_transforms"
 
 run_one() {
     local name=$1
