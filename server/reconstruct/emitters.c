@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/by_segment.h"
 #include "server/scene/surface.h"
 
 #define TEXELS_PER_SEGMENT 256
@@ -25,35 +26,6 @@
 #define DARKEST_BASE_COLOR 0.02f
 /* Iteration number that keeps the decision's random numbers apart from the optimiser's. */
 #define DECISION_ITERATION UINT64_C(0x7fff0000)
-
-/* The valid texels, sorted by segment. */
-struct texels_by_segment {
-    uint32_t *first; /* [segment_count + 1]; owned */
-    uint32_t *texel; /* owned */
-};
-
-static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
-    return r->segments.of_triangle[r->inverse.triangle[texel]];
-}
-
-static void sort_by_segment(struct texels_by_segment *t, const struct reconstruction *r) {
-    size_t segments = r->segments.count, valid = r->inverse.valid_count;
-    uint32_t *count = mem_calloc(segments + 2, sizeof *count);
-    t->texel = mem_array(valid + 1, sizeof *t->texel);
-    /* A counting sort; count[] is shifted by two while it counts and by one while it places. */
-    for (size_t i = 0; i < valid; i++)
-        count[segment_of(r, r->inverse.valid[i]) + 2]++;
-    for (size_t s = 2; s < segments + 2; s++)
-        count[s] += count[s - 1];
-    for (size_t i = 0; i < valid; i++)
-        t->texel[count[segment_of(r, r->inverse.valid[i]) + 1]++] = r->inverse.valid[i];
-    t->first = count;
-}
-
-static void release_texels(struct texels_by_segment *t) {
-    mem_free(t->first);
-    mem_free(t->texel);
-}
 
 /* The i-th of `wanted` evenly spaced texels of a segment. */
 static uint32_t spaced_texel(const struct texels_by_segment *t, size_t segment, size_t i, size_t wanted) {
@@ -179,9 +151,9 @@ static void observe_segment(void *user, size_t segment, int thread) {
 void emitters_observe(const struct reconstruction *r, const struct views *views,
                       struct emitter_evidence *evidence) {
     struct evidence_job job = {.r = (struct reconstruction *)r, .views = views, .evidence = evidence};
-    sort_by_segment(&job.texels, r);
+    by_segment_sort(&job.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, observe_segment, &job);
-    release_texels(&job.texels);
+    by_segment_release(&job.texels);
 }
 
 /* Base colours of a segment that were looked at and the radiance reflected there, added up: their
@@ -222,9 +194,9 @@ static void gather_light(void *user, size_t segment, int thread) {
 void emitters_decide(struct reconstruction *r, const struct views *views, struct look_batch *batch,
                      struct emitter_evidence *evidence) {
     struct evidence_job job = {.r = r, .views = views, .batch = batch, .evidence = evidence};
-    sort_by_segment(&job.texels, r);
+    by_segment_sort(&job.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, gather_light, &job);
-    release_texels(&job.texels);
+    by_segment_release(&job.texels);
     for (size_t s = 0; s < r->segments.count; s++) {
         struct emitter_evidence *e = &evidence[s];
         float shown = rgb_mean(e->shown);

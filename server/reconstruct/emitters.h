@@ -1,8 +1,8 @@
 /* emitters.h -- the decision which segments emit.
  *
- * Until the decision every segment that photographs show emits a part of what they show of it (the
- * larger the brighter it is) and base colour makes up the rest, so that each surface sends out about the light that the
- * photographs measured, whatever part of it is its own. The light that arrives at a segment is
+ * With method=listing1, until the decision every segment that photographs show emits a part of what
+ * they show of it (the larger the brighter it is) and base colour makes up the rest, so that each
+ * surface sends out about the light that the photographs measured, whatever part of it is its own. The light that arrives at a segment is
  * then right too, and tells what the segment could reflect: base colour 1 at most. A segment
  * whose photographs show clearly more than that is an emitter (the residual of FIPT, Wu et al.
  * 2023, taken by segment). */
@@ -26,7 +26,8 @@ void emitters_observe(const struct reconstruction *r, const struct views *views,
                       struct emitter_evidence *evidence);
 
 /* Fills `arrived` by looks at the present state of the materials, decides, and gives every emitter
- * in r->materials its radiance: what is shown less what a neutral base colour would reflect. batch[threads] is scratch for EMITTERS_TEXELS texels. */
+ * in r->materials its radiance: what is shown less what a neutral base colour would reflect.
+ * batch[threads] is scratch for EMITTERS_TEXELS texels. */
 #define EMITTERS_TEXELS 32
 void emitters_decide(struct reconstruction *r, const struct views *views, struct look_batch *batch,
                      struct emitter_evidence *evidence);

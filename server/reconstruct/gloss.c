@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "common/rng.h"
+#include "server/reconstruct/by_segment.h"
 #include "server/reconstruct/highlight.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -71,7 +72,7 @@ struct gloss_job {
     const struct views *views;
     const struct probes *probes;
     const struct light_field *field;
-    uint32_t *first, *texel;   /* the valid texels by segment: [segment_count + 1], [valid_count] */
+    struct texels_by_segment texels;
     size_t points;             /* at most so many a segment */
     struct gloss_point *point; /* [threads][points] */
     struct incident *scratch;  /* [threads] */
@@ -153,8 +154,8 @@ static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge,
 /* Looks at up to job->points texels of a segment; returns their number. */
 static size_t look_at_segment(const struct gloss_job *job, size_t segment, int edge, int thread) {
     struct gloss_point *point = &job->point[(size_t)thread * job->points];
-    uint32_t texels = job->first[segment + 1] - job->first[segment];
-    const uint32_t *texel = &job->texel[job->first[segment]];
+    uint32_t texels = job->texels.first[segment + 1] - job->texels.first[segment];
+    const uint32_t *texel = &job->texels.texel[job->texels.first[segment]];
     size_t tries = TRIES * job->points, count = 0;
     bool all = texels <= tries;
     tries = all ? texels : tries;
@@ -275,22 +276,6 @@ static void fit_segment(void *user, size_t segment, int thread) {
     materials->specular[segment] = interpolate(specular_of, m, across);
 }
 
-/* A counting sort; count[] is shifted by two while it counts and by one while it places. */
-static void sort_by_segment(struct gloss_job *job) {
-    const struct reconstruction *r = job->r;
-    size_t segments = r->segments.count, valid = r->inverse.valid_count;
-    uint32_t *count = mem_calloc(segments + 2, sizeof *count);
-    job->texel = mem_array(valid + 1, sizeof *job->texel);
-    for (size_t i = 0; i < valid; i++)
-        count[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]] + 2]++;
-    for (size_t s = 2; s < segments + 2; s++)
-        count[s] += count[s - 1];
-    for (size_t i = 0; i < valid; i++)
-        job->texel[count[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]] + 1]++] =
-            r->inverse.valid[i];
-    job->first = count;
-}
-
 void gloss_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
                const struct light_field *field) {
     struct gloss_job job = {.r = r, .views = views, .probes = probes, .field = field};
@@ -298,10 +283,9 @@ void gloss_fit(struct reconstruction *r, const struct views *views, const struct
     job.points = points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
     job.point = mem_array(threads * job.points, sizeof *job.point);
     job.scratch = mem_array(threads, sizeof *job.scratch);
-    sort_by_segment(&job);
+    by_segment_sort(&job.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, fit_segment, &job);
-    mem_free(job.first);
-    mem_free(job.texel);
+    by_segment_release(&job.texels);
     mem_free(job.scratch);
     mem_free(job.point);
 }

@@ -19,9 +19,9 @@
 /* Segments this many times brighter than the median of the room are sampled as lights before it is
  * known whether they emit. */
 #define BRIGHT 4.0f
-/* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter: white
- * walls stay near .1 by their reflectance of .9, and bowls around lamps below .25, whose pixels have
- * some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
+/* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
+ * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
+ * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
 #define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_MIXED 0.3f
 #define NEUTRAL_BASE_COLOR 0.5f
