@@ -47,7 +47,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests benches bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
         install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -105,18 +105,19 @@ $(B)/tests/%.so: tests/%.c
 	$(CC) $(ALL_CFLAGS) -shared -fPIC -o $@ $< -ldl
 
 tests: all $(TEST_BIN) $(FUZZ_BIN) $(PRELOAD)
+benches: all $(BENCH_BIN)
 
 demo: deps ## make a room, reconstruct it, show where the pictures are
 	@+$(BUILD) all
 	@tests/demo.sh $(B)
 
 test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name runs one (T=adam)
-	@+$(BUILD) tests $(if $(T),,asan-build tsan-build)
+	@+$(BUILD) tests $(if $(T),,benches asan-build tsan-build)
 	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
 
 bench: ## print the speed ratios and write build/bench.json; LONG=1: also what takes many minutes
 	@deploy/install-deps.sh bench
-	@+$(BUILD) all $(BENCH_BIN)
+	@+$(BUILD) benches
 	@LONG=$(LONG) tests/bench/run.sh $(B)
 
 fidelity: deps ## compare with the truth of known rooms, 10 minutes each; FIDELITY_SEC, FIDELITY_ROOMS

@@ -13,6 +13,7 @@
 #include "server/demo/room.h"
 #include "server/demo/viewpoints.h"
 #include "server/render/film.h"
+#include "server/scene/camera_json.h"
 
 #define TRUTH_SAMPLES 64 /* first hits per pixel; no light is traced for them */
 /* Ordinary photographs: the first exposure shows the median at this value, the others are
@@ -155,19 +156,6 @@ static enum status write_objects(const struct generator *g, struct error *err) {
 
 /* --- the bundle --------------------------------------------------------------------------- */
 
-/* nerfstudio: camera to world, x right, y up, looking along -z. */
-static cJSON *transform_matrix(const struct camera *camera) {
-    const struct rigid *m = &camera->world_from_camera;
-    const float t[3] = {m->translation.x, m->translation.y, m->translation.z};
-    cJSON *rows = cJSON_CreateArray();
-    for (int i = 0; i < 3; i++)
-        cJSON_AddItemToArray(rows, cJSON_CreateDoubleArray(
-            (double[]){(double)m->rotation[i][0], -(double)m->rotation[i][1],
-                       -(double)m->rotation[i][2], (double)t[i]}, 4));
-    cJSON_AddItemToArray(rows, cJSON_CreateDoubleArray((double[]){0.0, 0.0, 0.0, 1.0}, 4));
-    return rows;
-}
-
 static enum status write_transforms(const struct generator *g, struct error *err) {
     const struct camera *first = &g->camera[0];
     cJSON *root = cJSON_CreateObject(), *frames = cJSON_CreateArray();
@@ -183,7 +171,7 @@ static enum status write_transforms(const struct generator *g, struct error *err
         char name[64];
         snprintf(name, sizeof name, "images/%03u.%s", f, g->settings->sdr ? "png" : "exr");
         json_add_string(frame, "file_path", name);
-        json_add(frame, "transform_matrix", transform_matrix(&g->camera[f]));
+        json_add(frame, "transform_matrix", camera_transform_matrix(&g->camera[f]));
         json_add_string(frame, "split", is_test(g, f) ? "test" : "train");
         if (g->settings->sdr)
             json_add_number(frame, "exposure", (double)frame_exposure(g, f));

@@ -1,18 +1,7 @@
 /* views_json.c -- see views_json.h. */
 #include "server/export/views_json.h"
 
-/* nerfstudio: camera to world, x right, y up, looking along -z. */
-static cJSON *transform_matrix(const struct camera *camera) {
-    const struct rigid *m = &camera->world_from_camera;
-    const float t[3] = {m->translation.x, m->translation.y, m->translation.z};
-    cJSON *rows = cJSON_CreateArray();
-    for (int i = 0; i < 3; i++)
-        cJSON_AddItemToArray(rows, cJSON_CreateDoubleArray(
-            (double[]){(double)m->rotation[i][0], -(double)m->rotation[i][1],
-                       -(double)m->rotation[i][2], (double)t[i]}, 4));
-    cJSON_AddItemToArray(rows, cJSON_CreateDoubleArray((double[]){0.0, 0.0, 0.0, 1.0}, 4));
-    return rows;
-}
+#include "server/scene/camera_json.h"
 
 static void add_lens(cJSON *frame, const struct camera *camera) {
     static const char *const radial[6] = {"k1", "k2", "k3", "k4", "k5", "k6"};
@@ -39,7 +28,7 @@ cJSON *views_json(const struct export_comparison *comparison, size_t count) {
         json_add_string(frame, "file_path", comparison[i].name);
         json_add_string(frame, "split", "test");
         add_lens(frame, comparison[i].camera);
-        json_add(frame, "transform_matrix", transform_matrix(comparison[i].camera));
+        json_add(frame, "transform_matrix", camera_transform_matrix(comparison[i].camera));
         cJSON_AddItemToArray(frames, frame);
     }
     return root;

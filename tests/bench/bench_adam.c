@@ -59,12 +59,6 @@ static void add_entry(struct gradient_log *log, uint32_t x, uint32_t y) {
     log->entry_count++;
 }
 
-static double cpu_sec(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static double step_sec(struct fixture *f) {
     const struct params_rates rates = {.base_color = 1e-4f};
     double start = cpu_sec();

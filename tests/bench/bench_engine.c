@@ -40,14 +40,9 @@ static double run_bare(const struct room *room, const struct record *r) {
 static void bench_room(const char *name) {
     struct room room;
     struct camera camera;
-    char path[128];
-    load(&room, name);
-    snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
-    room_camera(path, "images/014.exr", &camera);
-    struct work one, all;
+    load_view(&room, name, &camera);
+    struct work one;
     work_init(&one, &room, &camera, 1);
-    work_init(&all, &room, &camera, 0);
-    int cores = parallel_thread_count(all.pool);
 
     struct record record = {{0, 0}, {0, 0}, {NULL, NULL}};
     path_batch_set_tap(one.batch[0], record_rays, &record);
@@ -55,27 +50,22 @@ static void bench_room(const char *name) {
     path_batch_set_tap(one.batch[0], NULL, NULL);
     size_t rays = record.count[0] + record.count[1];
 
-    double bare[REPEATS], primal[REPEATS], gradient[REPEATS], primal_all[REPEATS], gradient_all[REPEATS];
+    double bare[REPEATS], primal[REPEATS], gradient[REPEATS];
     for (int i = 0; i < REPEATS; i++) {
         bare[i] = run_bare(&room, &record);
         primal[i] = run(&one, false);
         gradient[i] = run(&one, true);
-        primal_all[i] = run(&all, false);
-        gradient_all[i] = run(&all, true);
     }
     double b = median(bare, REPEATS), p = median(primal, REPEATS), g = median(gradient, REPEATS);
-    double pa = median(primal_all, REPEATS), ga = median(gradient_all, REPEATS);
     double paths = (double)one.path_count;
     fprintf(stderr, "%s: %zu paths, %.2f rays each; one core: bare %.2f Mrays/s, primal %.3f, gradient %.3f "
-            "Mpaths/s; %d cores: %.3f, %.3f\n", name, one.path_count, (double)rays / paths,
-            (double)rays / b * 1e-6, paths / p * 1e-6, paths / g * 1e-6, cores, paths / pa * 1e-6,
-            paths / ga * 1e-6);
+            "Mpaths/s\n", name, one.path_count, (double)rays / paths,
+            (double)rays / b * 1e-6, paths / p * 1e-6, paths / g * 1e-6);
     printf("ray rate over bare Embree (%s)\t%.4f\t0.75\thigher\n", name, b / p);
     printf("gradient over primal cost (%s)\t%.4f\t1.3\tlower\n", name, g / p);
     mem_free(record.ray[0]);
     mem_free(record.ray[1]);
     work_release(&one);
-    work_release(&all);
 }
 
 int main(int argc, char **argv) {

@@ -89,11 +89,9 @@ static void write_room(const struct room *room, const struct camera *c, const ch
 static void bench_room(const char *python, const char *name) {
     struct room room;
     struct camera camera;
-    char path[128], dir[256];
-    load(&room, name);
+    char dir[256];
+    load_view(&room, name, &camera);
     texture_dilate(&room.materials.base_color, 4);
-    snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
-    room_camera(path, "images/014.exr", &camera);
     const char *build = getenv("UNBAKE_BUILD");
     snprintf(dir, sizeof dir, "%s/bench/%s", build ? build : "build", name);
     write_room(&room, &camera, dir);

@@ -38,10 +38,7 @@ static double best_sec(struct work *one, struct work *all, bool backward, double
 static void bench_room(const char *name) {
     struct room room;
     struct camera camera;
-    char path[128];
-    load(&room, name);
-    snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
-    room_camera(path, "images/014.exr", &camera);
+    load_view(&room, name, &camera);
     struct work one, all;
     work_init(&one, &room, &camera, 1);
     work_init(&all, &room, &camera, 0);

@@ -91,10 +91,7 @@ static double variance(const struct moments *m, size_t count) {
 static void bench_room(const char *name) {
     struct room room;
     struct camera camera;
-    char path[128];
-    load(&room, name);
-    snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
-    room_camera(path, "images/014.exr", &camera);
+    load_view(&room, name, &camera);
     struct work work;
     work_init(&work, &room, &camera, 0);
     struct inverse_uv inverse;

@@ -166,4 +166,12 @@ static inline void load(struct room *room, const char *name) {
                          room->pool, &err), &err);
 }
 
+/* The same, and the camera of its frame 014, which sees most of either room. */
+static inline void load_view(struct room *room, const char *name, struct camera *camera) {
+    char path[128];
+    load(room, name);
+    snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
+    room_camera(path, "images/014.exr", camera);
+}
+
 #endif
