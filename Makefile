@@ -36,7 +36,7 @@ CLIENT_LIB_SRC = $(filter-out client/main.c,$(CLIENT_SRC))
 TEST_SRC = $(wildcard tests/unit/*.c tests/gradient/*.c tests/render/*.c tests/api/*.c tests/chaos/*.c \
                       tests/soak/*.c)
 BENCH_SRC = $(wildcard tests/bench/*.c)
-FUZZ_SRC = $(wildcard tests/fuzz/*.c)
+FUZZ_SRC = $(wildcard tests/fuzz/test_*.c)
 
 obj = $(patsubst %.c,$(B)/obj/%.o,$(1))
 TEST_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(TEST_SRC))
@@ -48,7 +48,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
 .PHONY: all help deps man deb demo test tests benches bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
-        install clean
+        fuzzers fuzz-build coverage install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -97,6 +97,12 @@ $(B)/unbake: $(call obj,client/main.c $(CLIENT_LIB_SRC) $(CLIENT_COMMON_SRC))
 $(B)/tests/%: $(B)/obj/tests/%.o $(B)/libserver.a $(B)/libclient.a $(B)/libcommon.a
 	@mkdir -p $(@D)
 	$(CC) $(ALL_LDFLAGS) -o $@ $< $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a $(SERVER_LIBS) -lcurl $(TEST_LIBS)
+# What runs a fuzz target: driver.c, or libFuzzer where make fuzz says so.
+FUZZ_DRIVER = $(B)/obj/tests/fuzz/driver.o
+$(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DRIVER) \
+                   $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a
+	@mkdir -p $(@D)
+	$(CC) $(ALL_LDFLAGS) -o $@ $^ $(SERVER_LIBS) -lcurl
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
 # What a test slips under a program of ours.
@@ -152,13 +158,16 @@ soak: deps ## many clients for a long time; writes build/soak.json; T=name runs 
 	@tests/long.sh soak $(B) "$(T)"
 
 FUZZ_SECONDS ?= 60
-fuzz: deps ## search for crashes for FUZZ_SECONDS (60) with each fuzz program, under the sanitizers
-	@+$(BUILD) asan-build
-	@for program in $(patsubst $(B)/%,build/asan/%,$(FUZZ_BIN)); do \
-	    echo "$$program"; \
-	    UNBAKE_BUILD=build/asan FUZZ_SECONDS=$(FUZZ_SECONDS) FUZZ_SEED=$${FUZZ_SEED:-$$(date +%s)} \
-	        $$program || [ $$? -eq 77 ] || exit 1; \
-	done
+fuzz: deps ## search for crashes with libFuzzer, FUZZ_SECONDS (60) a target; writes build/fuzz.json; T=name runs one
+	@deploy/install-deps.sh fuzz
+	@+$(BUILD) fuzzers fuzz-build
+	@FUZZ_SECONDS=$(FUZZ_SECONDS) tests/fuzz/fuzz.sh $(B) "$(T)"
+
+fuzzers: $(FUZZ_BIN)
+fuzz-build:
+	@$(MAKE) --no-print-directory B=build/fuzz CC=clang CFLAGS="-O1 -g" FUZZ_DRIVER= LDFLAGS=-fsanitize=fuzzer \
+	    SANITIZE="-fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all \
+	    -fno-omit-frame-pointer" fuzzers
 
 # Manual pages and completions come out of the programs, from the tables of their --help.
 MANUALS = $(B)/man/unbake.1 $(B)/man/unbaked.8 $(B)/man/unbaked.conf.5

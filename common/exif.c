@@ -68,7 +68,7 @@ static size_t read_directory(const struct block *b, size_t offset, struct image_
             continue;
         switch (integer_at(b, entry, 2)) {
         case TAG_ORIENTATION:
-            if (value <= 8)
+            if (value >= 1 && value <= 8) /* a rational may lie below 1 */
                 info->orientation = (int)value;
             break;
         case TAG_EXIF_IFD: exif = (size_t)value; break;

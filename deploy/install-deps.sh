@@ -9,6 +9,8 @@ set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
 libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev libcurl4-openssl-dev libseccomp-dev
 zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
+fuzz_packages="clang libclang-rt-14-dev"
+coverage_packages="gcovr"
 bench_packages="libllvm19 python3-venv libmeshoptimizer-dev"
 
 # install PACKAGE...: those that are missing
@@ -37,6 +39,11 @@ install() {
 
 # shellcheck disable=SC2086
 install $packages
+# shellcheck disable=SC2086
+case ${1:-} in
+fuzz) install $fuzz_packages ;;
+coverage) install $coverage_packages ;;
+esac
 if [ "${1:-}" = bench ]; then
     # shellcheck disable=SC2086
     install $bench_packages ||

@@ -2,20 +2,20 @@
  * must come with a mesh whose every index and vertex can be read. */
 #include "server/ingest/ply.h"
 
-#include "tests/fuzz/mutate.h"
+#include "tests/fuzz/fuzz.h"
 
 static volatile float sink;
 
-static void target(const uint8_t *data, size_t size) {
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct mesh mesh;
     struct mesh_report report;
     struct error err = {.message = ""};
     enum status status = ply_parse(data, size, "case", 100000, &mesh, NULL, &err);
     if (status == STATUS_OK) {
         for (size_t i = 0; i < mesh.triangle_count; i++) {
-            CHECK(mesh.face[i] < mesh.face_count && (i == 0 || mesh.face[i] >= mesh.face[i - 1]));
+            MUST(mesh.face[i] < mesh.face_count && (i == 0 || mesh.face[i] >= mesh.face[i - 1]));
             for (int k = 0; k < 3; k++) {
-                CHECK(mesh.index[i][k] < mesh.vertex_count);
+                MUST(mesh.index[i][k] < mesh.vertex_count);
                 sink = mesh.position[mesh.index[i][k]].x;
             }
         }
@@ -24,12 +24,13 @@ static void target(const uint8_t *data, size_t size) {
     if (status == STATUS_OK)
         sink = (float)mesh_area(&mesh);
     else
-        CHECK((status == STATUS_INPUT || status == STATUS_LIMIT) && err.message[0] != '\0');
+        MUST((status == STATUS_INPUT || status == STATUS_LIMIT) && err.message[0] != '\0');
     mesh_release(&mesh);
+    return 0;
 }
 
 /* A binary file of either byte order, with what the shared vectors lack. */
-static void add_binary(struct mutate *m, bool big) {
+static void add_binary(struct seeds *s, bool big) {
     uint8_t file[1024];
     size_t used = (size_t)snprintf((char *)file, 512,
         "ply\nformat binary_%s_endian 1.0\nelement vertex 5\nproperty float x\nproperty double y\n"
@@ -55,25 +56,21 @@ static void add_binary(struct mutate *m, bool big) {
         }
     }
     memset(file + used, 7, 4);
-    mutate_add_bytes(m, file, used + 4);
+    seeds_add(s, file, used + 4);
 }
 
-int main(int argc, char **argv) {
+void fuzz_seeds(struct seeds *s) {
     static const char text[] =
         "ply\r\nformat ascii 1.0\r\ncomment x\r\nelement face 2\r\nproperty int object_id\r\n"
         "property list uchar int vertex_index\r\nelement vertex 6\r\nproperty float nx\r\nproperty float x\r\n"
         "property float y\r\nproperty float z\r\nproperty float ny\r\nproperty float nz\r\nend_header\r\n"
         "-1 3 0 1 2\r\n7 6 0 1 2 3 4 5\r\n0 0 0 0 0 1\r\n0 4 0 0 0 1\r\n0 4 4 0 0 1\r\n0 2 1 0 0 1\r\n"
         "0 1 3 0 0 1\r\n0 0 4 0 0 1\r\n";
-    struct mutate *m = malloc(sizeof *m);
-    mutate_init(m);
-    mutate_add(m, "vectors/ply-happly", ".ply");
-    mutate_add(m, "vectors/assimp/PLY", "");
-    mutate_add(m, "conformance/room.ply", "");
-    mutate_add_bytes(m, text, sizeof text - 1);
-    add_binary(m, false);
-    add_binary(m, true);
-    int result = mutate_run(m, argc, argv, 20000, target);
-    free(m);
-    return result;
+    s->mutants = 10000;
+    seeds_data(s, "vectors/ply-happly", ".ply");
+    seeds_data(s, "vectors/assimp/PLY", "");
+    seeds_data(s, "conformance/room.ply", "");
+    seeds_text(s, text);
+    add_binary(s, false);
+    add_binary(s, true);
 }

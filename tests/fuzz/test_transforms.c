@@ -3,7 +3,9 @@
  * a fault. */
 #include "server/ingest/transforms.h"
 
-#include "tests/fuzz/mutate.h"
+#include <math.h>
+
+#include "tests/fuzz/fuzz.h"
 
 static const char opencv[] =
     "{\"camera_model\":\"OPENCV\",\"w\":64,\"h\":48,\"fl_x\":50.5,\"fl_y\":51,\"cx\":32,\"cy\":24,"
@@ -23,17 +25,17 @@ static void check_frame(const struct transforms_frame *frame) {
     struct camera camera;
     struct error err = {.message = ""};
     const char *file = frame->file;
-    CHECK(file[0] != '\0' && file[0] != '/' && strncmp(file, "../", 3) != 0 && !strstr(file, "/../"));
+    MUST(file[0] != '\0' && file[0] != '/' && strncmp(file, "../", 3) != 0 && !strstr(file, "/../"));
     if (transforms_camera(frame, 64, 48, &camera, &err) != STATUS_OK) {
-        CHECK(err.message[0] != '\0');
+        MUST(err.message[0] != '\0');
         return;
     }
     float x, y, depth_m;
     vec3 direction;
     if (camera_project(&camera, vec3_make(0.1f, 0.2f, -3.0f), &x, &y, &depth_m))
-        CHECK(x >= 0.0f && x < 64.0f && y >= 0.0f && y < 48.0f);
+        MUST(x >= 0.0f && x < 64.0f && y >= 0.0f && y < 48.0f);
     if (camera_direction(&camera, 10.0f, 40.0f, &direction))
-        CHECK_NEAR(vec3_length(direction), 1.0, 1e-4);
+        MUST(fabsf(vec3_length(direction) - 1.0f) < 1e-4f);
 }
 
 static void read_tree(const cJSON *tree) {
@@ -42,63 +44,52 @@ static void read_tree(const cJSON *tree) {
     transforms_read(tree, "case", &t, &f);
     for (size_t i = 0; i < t.frame_count; i++)
         check_frame(&t.frame[i]);
-    CHECK((size_t)cJSON_GetArraySize(f.problems) <= FINDINGS_MAX);
+    MUST((size_t)cJSON_GetArraySize(f.problems) <= FINDINGS_MAX);
     transforms_release(&t);
     cJSON_Delete(f.problems);
     findings_release(&f);
 }
 
-static void target(const uint8_t *data, size_t size) {
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     cJSON *tree = NULL;
     struct error err = {.message = ""};
     if (json_parse((const char *)data, size, "case", &tree, &err) == STATUS_OK)
         read_tree(tree);
     else
-        CHECK(tree == NULL && err.message[0] != '\0');
+        MUST(tree == NULL && err.message[0] != '\0');
     cJSON_Delete(tree);
+    return 0;
 }
 
-/* Puts each of the odd values in the place of `node`'s every child, and below. */
-static void replace_all(cJSON *root, cJSON *node) {
+/* Seeds with each of the odd values in the place of `node`'s every child, and below. */
+static void replace_all(struct seeds *s, cJSON *root, cJSON *node) {
     static const char *const odd[] = {"null", "true", "\"\"", "\"..\"", "-1", "0", "1e999", "1e300",
                                       "[]", "[[]]", "{}", "[1,2,3,4]"};
-    int count = cJSON_GetArraySize(node);
-    for (int i = 0; i < count; i++) {
-        cJSON *child = cJSON_GetArrayItem(node, i);
+    for (cJSON *child = node->child; child; child = child->next) {
+        replace_all(s, root, child);
         for (size_t k = 0; k < sizeof odd / sizeof *odd; k++) {
-            cJSON *kept = cJSON_Duplicate(child, true), *value = cJSON_Parse(odd[k]);
-            char *name = child->string ? strdup(child->string) : NULL;
-            if (name)
-                cJSON_ReplaceItemInObjectCaseSensitive(node, name, value);
-            else
-                cJSON_ReplaceItemInArray(node, i, value);
-            read_tree(root);
-            if (name)
-                cJSON_ReplaceItemInObjectCaseSensitive(node, name, kept);
-            else
-                cJSON_ReplaceItemInArray(node, i, kept);
-            free(name);
-            child = cJSON_GetArrayItem(node, i);
+            cJSON *value = cJSON_Parse(odd[k]), kept = *child;
+            child->type = value->type;
+            child->valuestring = value->valuestring;
+            child->valuedouble = value->valuedouble;
+            child->child = value->child;
+            char *text = json_text(root);
+            seeds_text(s, text);
+            free(text);
+            *child = kept;
+            cJSON_Delete(value);
         }
-        replace_all(root, child);
     }
 }
 
-int main(int argc, char **argv) {
+void fuzz_seeds(struct seeds *s) {
     static const char *const texts[] = {opencv, fisheye};
-    struct mutate *m = malloc(sizeof *m);
-    mutate_init(m);
-    mutate_add(m, "vectors/json-suite", ".json");
-    mutate_add(m, "conformance/room_transforms.json", "");
+    s->mutants = 5000;
+    seeds_data(s, "conformance/room_transforms.json", "");
     for (int i = 0; i < 2; i++) {
         cJSON *tree = cJSON_Parse(texts[i]);
-        CHECK(tree != NULL);
-        replace_all(tree, tree);
+        seeds_text(s, texts[i]);
+        replace_all(s, tree, tree);
         cJSON_Delete(tree);
-        for (int k = 0; k < 100; k++) /* so that the suite's many files do not drown them */
-            mutate_add_bytes(m, texts[i], strlen(texts[i]));
     }
-    int result = mutate_run(m, argc, argv, 20000, target);
-    free(m);
-    return result;
 }
