@@ -97,6 +97,22 @@ out:
     return status;
 }
 
+enum status file_put_in_place(const char *temporary, const char *path, struct error *err) {
+    int fd = open(temporary, O_RDONLY | O_CLOEXEC);
+    enum status status = STATUS_OK;
+    if (fd < 0 || fsync(fd) != 0)
+        status = error_set_errno(err, errno, "cannot sync %s", path);
+    if (fd >= 0)
+        close(fd);
+    if (status == STATUS_OK && rename(temporary, path) != 0)
+        status = error_set_errno(err, errno, "cannot rename to %s", path);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err);
+    else
+        unlink(temporary);
+    return status;
+}
+
 enum status file_make_dirs(const char *path, struct error *err) {
     char *partial = mem_strdup(path);
     enum status status = STATUS_OK;

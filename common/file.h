@@ -16,6 +16,10 @@ enum status file_read(const char *path, struct buf *out, struct error *err);
  * content and never a part: a temporary name beside it, fsync, rename, fsync of the folder. */
 enum status file_replace(const char *path, const void *data, size_t length, struct error *err);
 
+/* Gives a complete file its final name, after its content is on disk; removes it where that fails. Both
+ * names are in one folder. */
+enum status file_put_in_place(const char *temporary, const char *path, struct error *err);
+
 /* Writes all of `data` to fd, through short writes and EINTR. `path` is for the message. */
 enum status file_write_all(int fd, const void *data, size_t length, const char *path,
                            struct error *err);

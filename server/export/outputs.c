@@ -12,6 +12,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/vec.h"
+#include "server/export/formats.h"
 #include "server/export/mesh_ply.h"
 #include "server/export/pictures.h"
 #include "server/export/report_html.h"
@@ -53,7 +54,8 @@ struct export {
     const struct export_input *input;
     export_announce *announce;
     void *user;
-    cJSON *files; /* array: what was written; NULL for previews alone */
+    cJSON *files;    /* array: what was written; NULL for previews alone */
+    cJSON *left_out; /* array: what could not be, and why */
 };
 
 /* --- putting files in place --------------------------------------------------------------- */
@@ -71,23 +73,6 @@ static enum status tell(struct export *e, const char *type, const char *name,
     return e->announce(e->user, type, name, content_type, err);
 }
 
-/* Gives a complete temporary file its name after its content is on disk. */
-static enum status put_in_place(const char *temporary, const char *path, struct error *err) {
-    int fd = open(temporary, O_RDONLY | O_CLOEXEC);
-    enum status status = STATUS_OK;
-    if (fd < 0 || fsync(fd) != 0)
-        status = error_set_errno(err, errno, "%s", temporary);
-    if (fd >= 0)
-        close(fd);
-    if (status == STATUS_OK && rename(temporary, path) != 0)
-        status = error_set_errno(err, errno, "%s", path);
-    if (status == STATUS_OK)
-        status = file_sync_parent(path, err);
-    if (status != STATUS_OK)
-        unlink(temporary);
-    return status;
-}
-
 enum image_format { FORMAT_PNG, FORMAT_EXR_HALF, FORMAT_EXR_FLOAT };
 
 static enum status put_image(struct export *e, const char *type, const char *name,
@@ -101,7 +86,7 @@ static enum status put_image(struct export *e, const char *type, const char *nam
         status = image_write_exr(temporary, image,
                                  format == FORMAT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true, err);
     if (status == STATUS_OK)
-        status = put_in_place(temporary, path, err);
+        status = file_put_in_place(temporary, path, err);
     else
         unlink(temporary);
     if (status == STATUS_OK)
@@ -188,6 +173,9 @@ static enum status put_textures(struct export *e, struct error *err) {
         status = put_image(e, EVENT_OUTPUT, name, &image,
                            kinds[k].type == IMAGE_HALF ? FORMAT_EXR_HALF : FORMAT_EXR_FLOAT,
                            kinds[k].about, err);
+        if (kinds[k].kind == PICTURE_BASE_COLOR && status == STATUS_OK)
+            status = put_image(e, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, FORMAT_PNG,
+                               "the same in 8 bits, sRGB", err);
         image_release(&image);
     }
     mem_free(source);
@@ -204,6 +192,52 @@ static enum status put_mesh(struct export *e, struct error *err) {
     mem_free(path);
     return status;
 }
+
+/* --- for other programs --------------------------------------------------------------------- */
+
+/* Notes that a file is too large to be made, which does not make the others worse. */
+static void leave_out(struct export *e, const char *name, const struct error *err) {
+    cJSON *entry = cJSON_CreateObject();
+    json_add_string(entry, "name", name);
+    json_add_string(entry, "reason", err->message);
+    cJSON_AddItemToArray(e->left_out, entry);
+    char *path = file_join(e->dir, name);
+    unlink(path); /* of an earlier attempt */
+    mem_free(path);
+}
+
+static enum status put_format(struct export *e, const struct format *format, const struct parts *parts,
+                              struct error *err) {
+    struct error own = {0};
+    enum status status = format->write(e->dir, e->input, parts, &own);
+    if (status == STATUS_OK)
+        return tell(e, EVENT_OUTPUT, format->name, format->content_type, format->about, err);
+    if (status == STATUS_LIMIT) {
+        leave_out(e, format->name, &own);
+        return STATUS_OK;
+    }
+    if (err)
+        *err = own;
+    return status;
+}
+
+static enum status put_formats(struct export *e, struct error *err) {
+    const struct export_input *in = e->input;
+    struct parts parts;
+    struct error own = {0};
+    enum status status = STATUS_OK;
+    if (parts_make(&parts, in->mesh, in->segments, in->atlas, &own) != STATUS_OK) {
+        for (size_t f = 0; f < FORMATS_COUNT; f++)
+            leave_out(e, formats[f].name, &own);
+        return STATUS_OK;
+    }
+    for (size_t f = 0; f < FORMATS_COUNT && status == STATUS_OK; f++)
+        status = put_format(e, &formats[f], &parts, err);
+    parts_release(&parts);
+    return status;
+}
+
+/* --- held-out views -------------------------------------------------------------------------- */
 
 static enum status put_views(struct export *e, struct error *err) {
     cJSON *views = views_json(e->input->comparison, e->input->comparison_count);
@@ -324,6 +358,8 @@ static enum status put_report(struct export *e, struct error *err) {
     json_add_string(report, "title", e->input->title);
     json_add(report, "segments", describe_segments(e->input));
     json_add(report, "files", cJSON_Duplicate(e->files, true));
+    if (e->left_out->child)
+        json_add(report, "left_out", cJSON_Duplicate(e->left_out, true));
     char *text = json_page(report);
     enum status status = put_bytes(e, "report.json", MIME_JSON, text, strlen(text), err);
     mem_free(text);
@@ -337,13 +373,13 @@ static enum status put_report(struct export *e, struct error *err) {
 
 enum status export_preview(const char *dir, const struct export_input *input,
                            export_announce *announce, void *user, struct error *err) {
-    struct export e = {dir, input, announce, user, NULL};
+    struct export e = {dir, input, announce, user, NULL, NULL};
     return put_previews(&e, err);
 }
 
 enum status export_outputs(const char *dir, const struct export_input *input,
                            export_announce *announce, void *user, struct error *err) {
-    struct export e = {dir, input, announce, user, cJSON_CreateArray()};
+    struct export e = {dir, input, announce, user, cJSON_CreateArray(), cJSON_CreateArray()};
     enum status status = put_previews(&e, err);
     if (status == STATUS_OK)
         status = put_textures(&e, err);
@@ -352,9 +388,12 @@ enum status export_outputs(const char *dir, const struct export_input *input,
     if (status == STATUS_OK)
         status = put_mesh(&e, err);
     if (status == STATUS_OK)
+        status = put_formats(&e, err);
+    if (status == STATUS_OK)
         status = put_comparisons(&e, err);
     if (status == STATUS_OK)
         status = put_report(&e, err);
+    cJSON_Delete(e.left_out);
     cJSON_Delete(e.files);
     return status;
 }

@@ -17,11 +17,17 @@
  *   preview/base_color.png roughness.png specular.png emission.png confidence.png
  *           environment.png
  *                    at most EXPORT_PREVIEW_SIZE texels a side
+ *   base_color.png   the same as base_color.exr in 8-bit sRGB
  *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
+ *   scene.glb        all of it but distant light, as glTF (glb.h)
+ *   scene.obj scene.mtl   the mesh, with base_color.png (mesh_obj.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
  *   views.json       the cameras of these (views_json.h)
  *   report.json      every setting, version, stage time and metric
- *   report.html      the same for the eye; needs no other file and no network */
+ *   report.html      the same for the eye; needs no other file and no network
+ *
+ * Those of glb.h and mesh_obj.h are left out where they would have too many objects or bytes;
+ * report.json says so under "left_out". */
 #ifndef UNBAKE_EXPORT_OUTPUTS_H
 #define UNBAKE_EXPORT_OUTPUTS_H
 
@@ -70,6 +76,7 @@ struct export_input {
      *   "stages": [{"name": "refine", "seconds": 12.3}, ...]
      *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */
     const cJSON *report;
+    vec3 up; /* the axis of the room that points up, see scene_up; 0: y */
 };
 
 /* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or

@@ -30,7 +30,7 @@ static const char style[] =
     ".wide figure{margin-bottom:1rem}.heads{display:grid;grid-template-columns:repeat(3,1fr);"
     "text-align:center;font-size:.82rem;color:var(--soft);margin-bottom:.3rem}"
     "table{border-collapse:collapse;width:100%;font-size:.87rem;font-variant-numeric:tabular-nums}"
-    "th,td{text-align:left;padding:.25rem .7rem .25rem 0;border-bottom:1px solid var(--line);"
+    "a{color:var(--accent)}th,td{text-align:left;padding:.25rem .7rem .25rem 0;border-bottom:1px solid var(--line);"
     "font-weight:400;vertical-align:top;overflow-wrap:break-word}"
     ".files th{white-space:nowrap}tr:last-child>*{border-bottom:0}td.n,th.n{text-align:right}"
     ".swatch{display:inline-block;width:2.2em;height:1em;border-radius:3px;vertical-align:-.12em;"
@@ -388,9 +388,12 @@ static void put_files(struct buf *out, const cJSON *files) {
         return;
     buf_puts(out, "<h2>Files</h2><div class=\"card files\"><table>");
     for (const cJSON *file = files->child; file; file = file->next) {
-        buf_puts(out, "<tr><th>");
-        put_value(out, cJSON_GetObjectItemCaseSensitive(file, "name"));
-        buf_puts(out, "</th><td>");
+        const cJSON *name = cJSON_GetObjectItemCaseSensitive(file, "name");
+        buf_puts(out, "<tr><th><a href=\"");
+        put_value(out, name);
+        buf_puts(out, "\">");
+        put_value(out, name);
+        buf_puts(out, "</a></th><td>");
         put_value(out, cJSON_GetObjectItemCaseSensitive(file, "about"));
         buf_puts(out, "</td></tr>");
     }

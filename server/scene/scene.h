@@ -18,4 +18,8 @@ struct scene {
 
 void scene_release(struct scene *scene);
 
+/* The axis (x, y, z or one of them backwards) that points up in the photographs, as most of them
+ * are held: no input says it. y where they do not tell. */
+vec3 scene_up(const struct scene *scene);
+
 #endif

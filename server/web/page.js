@@ -222,7 +222,7 @@ async function showOutputs() {
   const id = chosen;
   const { items } = await get(`v1/jobs/${id}/outputs`);
   if (id !== chosen) return;
-  const pictures = items.filter((o) => o.content_type === "image/png");
+  const pictures = items.filter((o) => /^(preview|compare)\/.*\.png$/.test(o.name)); // others are too large
   for (const output of pictures) { // changed in place: no flicker
     let figure = $("pictures").querySelector(`[data-name="${CSS.escape(output.name)}"]`);
     if (!figure) {

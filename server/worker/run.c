@@ -235,6 +235,7 @@ static struct export_input input_of(const struct run *run, const struct reconstr
         .environment = r->environment.map.pixel ? &r->environment.map : NULL,
         .environment_confidence = r->environment.map.pixel ? &r->environment.confidence : NULL,
         .report = r->report,
+        .up = scene_up(r->scene),
     };
 }
 

@@ -110,6 +110,7 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
         .comparison_count = r->held_out_count,
         .comparison = pair,
         .report = r->report,
+        .up = scene_up(r->scene),
     };
     enum status status = file_make_dirs(dir, err);
     if (status == STATUS_OK)

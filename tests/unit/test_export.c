@@ -144,7 +144,7 @@ static void test_report(const char *dir, size_t segments) {
     char *path = file_join(dir, "report.json");
     CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)segments);
-    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 13);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 17);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
     cJSON_Delete(report);
     mem_free(path);
@@ -267,7 +267,7 @@ int main(void) {
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
     struct export_input in = {
         "room <1> & \"2\"", &room.mesh, &room.segments, &room.atlas, &room.inverse, &room.materials,
-        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report};
+        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report, {0.0f, 1.0f, 0.0f}};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);
@@ -276,7 +276,7 @@ int main(void) {
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
-    CHECK_THAT(heard.previews == 5 && heard.outputs == 10, "%d, %d", heard.previews, heard.outputs);
+    CHECK_THAT(heard.previews == 5 && heard.outputs == 14, "%d, %d", heard.previews, heard.outputs);
     CHECK_STRING(heard.last, "report.html");
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);

@@ -1,0 +1,38 @@
+/* formats.c -- see formats.h. */
+#include "server/export/formats.h"
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/export/glb.h"
+#include "server/export/mesh_obj.h"
+
+static enum status write_glb(const char *dir, const struct export_input *input,
+                             const struct parts *parts, struct error *err) {
+    char *path = file_join(dir, "scene.glb"), *picture = file_join(dir, FORMATS_BASE_COLOR);
+    enum status status = glb_write(path, input, parts, picture, err);
+    mem_free(picture);
+    mem_free(path);
+    return status;
+}
+
+static enum status write_obj(const char *dir, const struct export_input *input,
+                             const struct parts *parts, struct error *err) {
+    char *path = file_join(dir, "scene.obj");
+    enum status status = mesh_obj_write(path, input, parts, err);
+    mem_free(path);
+    return status;
+}
+
+static enum status write_mtl(const char *dir, const struct export_input *input,
+                             const struct parts *parts, struct error *err) {
+    char *path = file_join(dir, "scene.mtl");
+    enum status status = mesh_mtl_write(path, input, parts, FORMATS_BASE_COLOR, err);
+    mem_free(path);
+    return status;
+}
+
+const struct format formats[FORMATS_COUNT] = {
+    {"scene.glb", "model/gltf-binary", "the room as glTF 2.0, for Blender and others", write_glb},
+    {"scene.obj", "model/obj", "the mesh with its atlas coordinates", write_obj},
+    {"scene.mtl", "model/mtl", "the materials of scene.obj; wants base_color.png", write_mtl},
+};

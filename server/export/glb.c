@@ -1,0 +1,340 @@
+/* glb.c -- see glb.h. The container is that of the glTF 2.0 specification, section 4: a header, a
+ * chunk of JSON, a chunk of bytes, each padded to four bytes. The bytes: positions, normals, texture
+ * coordinates and indices of all parts, one after the other, then the picture. */
+#include "server/export/glb.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "common/json.h"
+#include "common/mem.h"
+#include "common/protocol.h"
+#include "server/export/sink.h"
+
+#define MAGIC 0x46546c67 /* "glTF" */
+#define CHUNK_JSON 0x4e4f534a
+#define CHUNK_BIN 0x004e4942
+#define HEAD_BYTES 12
+#define CHUNK_HEAD_BYTES 8
+
+#define TYPE_FLOAT 5126
+#define TYPE_UINT 5125
+#define TARGET_VERTICES 34962
+#define TARGET_INDICES 34963
+#define FILTER_LINEAR 9729
+#define FILTER_MIPMAP 9987 /* linear, between mipmaps too */
+#define WRAP_CLAMP 33071
+
+#define CAMERAS_MAX 100 /* of held-out views */
+#define NEAR_M 0.01
+
+/* Buffer views, in order; NORMAL is missing where the mesh has no normals. */
+enum view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_IMAGE, VIEW_COUNT };
+
+struct glb {
+    const struct export_input *in;
+    const struct parts *parts;
+    struct { uint64_t offset, length; int number; } view[VIEW_COUNT];
+    uint64_t length; /* of the bytes, padding included */
+    cJSON *root, *accessors, *nodes, *children;
+    int accessor_count, node_count;
+};
+
+static uint64_t padded(uint64_t length) {
+    return (length + 3) / 4 * 4;
+}
+
+static void lay_out(struct glb *g, uint64_t image_bytes) {
+    uint64_t vertices = g->parts->seams.vertex_count;
+    const uint64_t length[VIEW_COUNT] = {
+        [VIEW_POSITION] = 12 * vertices,
+        [VIEW_NORMAL] = g->in->mesh->normal ? 12 * vertices : 0,
+        [VIEW_UV] = 8 * vertices,
+        [VIEW_INDEX] = 12 * (uint64_t)g->in->mesh->triangle_count,
+        [VIEW_IMAGE] = image_bytes,
+    };
+    int number = 0;
+    for (int v = 0; v < VIEW_COUNT; v++) {
+        g->view[v].offset = g->length;
+        g->view[v].length = length[v];
+        g->view[v].number = number;
+        g->length += padded(length[v]);
+        number += length[v] > 0;
+    }
+}
+
+/* --- JSON ----------------------------------------------------------------------------------- */
+
+static cJSON *add_object(cJSON *parent, const char *key) {
+    return cJSON_AddObjectToObject(parent, key);
+}
+
+static cJSON *append(cJSON *array) {
+    cJSON *object = cJSON_CreateObject();
+    cJSON_AddItemToArray(array, object);
+    return object;
+}
+
+static void add_numbers(cJSON *object, const char *key, const float *value, int count) {
+    json_add(object, key, cJSON_CreateFloatArray(value, count));
+}
+
+static void add_views(struct glb *g) {
+    cJSON *views = cJSON_AddArrayToObject(g->root, "bufferViews");
+    for (int v = 0; v < VIEW_COUNT; v++) {
+        if (g->view[v].length == 0)
+            continue;
+        cJSON *view = append(views);
+        json_add_int(view, "buffer", 0);
+        json_add_int(view, "byteOffset", (int64_t)g->view[v].offset);
+        json_add_int(view, "byteLength", (int64_t)g->view[v].length);
+        if (v < VIEW_INDEX)
+            json_add_int(view, "byteStride", v == VIEW_UV ? 8 : 12); /* several accessors share it */
+        if (v < VIEW_IMAGE)
+            json_add_int(view, "target", v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
+    }
+}
+
+static void add_picture(struct glb *g) {
+    cJSON *image = append(cJSON_AddArrayToObject(g->root, "images"));
+    json_add_string(image, "name", "base_color");
+    json_add_string(image, "mimeType", "image/png");
+    json_add_int(image, "bufferView", g->view[VIEW_IMAGE].number);
+    cJSON *sampler = append(cJSON_AddArrayToObject(g->root, "samplers"));
+    json_add_int(sampler, "magFilter", FILTER_LINEAR);
+    json_add_int(sampler, "minFilter", FILTER_MIPMAP);
+    json_add_int(sampler, "wrapS", WRAP_CLAMP);
+    json_add_int(sampler, "wrapT", WRAP_CLAMP);
+    cJSON *texture = append(cJSON_AddArrayToObject(g->root, "textures"));
+    json_add_int(texture, "sampler", 0);
+    json_add_int(texture, "source", 0);
+}
+
+/* Returns its number. */
+static int add_accessor(struct glb *g, enum view view, size_t first, size_t count, const char *type,
+                        int64_t stride, const struct part *bounds) {
+    cJSON *accessor = append(g->accessors);
+    json_add_int(accessor, "bufferView", g->view[view].number);
+    json_add_int(accessor, "byteOffset", (int64_t)first * stride);
+    json_add_int(accessor, "componentType", view == VIEW_INDEX ? TYPE_UINT : TYPE_FLOAT);
+    json_add_int(accessor, "count", (int64_t)count);
+    json_add_string(accessor, "type", type);
+    if (bounds) {
+        add_numbers(accessor, "min", (float[]){bounds->lower.x, bounds->lower.y, bounds->lower.z}, 3);
+        add_numbers(accessor, "max", (float[]){bounds->upper.x, bounds->upper.y, bounds->upper.z}, 3);
+    }
+    return g->accessor_count++;
+}
+
+static void add_mesh(struct glb *g, cJSON *mesh, size_t i, const char *name) {
+    const struct part *part = &g->parts->part[i];
+    json_add_string(mesh, "name", name);
+    cJSON *primitive = append(cJSON_AddArrayToObject(mesh, "primitives"));
+    cJSON *attributes = add_object(primitive, "attributes");
+    size_t first = part->first_vertex, count = part->vertex_count;
+    json_add_int(attributes, "POSITION", add_accessor(g, VIEW_POSITION, first, count, "VEC3", 12, part));
+    if (g->in->mesh->normal)
+        json_add_int(attributes, "NORMAL", add_accessor(g, VIEW_NORMAL, first, count, "VEC3", 12, NULL));
+    json_add_int(attributes, "TEXCOORD_0", add_accessor(g, VIEW_UV, first, count, "VEC2", 8, NULL));
+    json_add_int(primitive, "indices", add_accessor(g, VIEW_INDEX, 3 * part->first_triangle,
+                                                    3 * part->triangle_count, "SCALAR", 4, NULL));
+    json_add_int(primitive, "material", (int64_t)i);
+}
+
+static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
+    float strength = rgb_max(emission);
+    rgb factor = rgb_scale(emission, 1.0f / strength);
+    add_numbers(material, "emissiveFactor", (float[]){fminf(factor.r, 1.0f), fminf(factor.g, 1.0f),
+                                                      fminf(factor.b, 1.0f)}, 3);
+    json_add_number(add_object(extensions, "KHR_materials_emissive_strength"), "emissiveStrength",
+                    (double)strength);
+}
+
+static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
+    const struct materials *m = g->in->materials;
+    bool shines = rgb_max(m->emission[s]) > 0.0f;
+    json_add_string(material, "name", name);
+    cJSON *model = add_object(material, "pbrMetallicRoughness");
+    json_add_int(add_object(model, "baseColorTexture"), "index", 0);
+    json_add_number(model, "metallicFactor", 0.0);
+    json_add_number(model, "roughnessFactor", (double)m->roughness[s]);
+    json_add_bool(material, "doubleSided", !shines);
+    cJSON *extensions = add_object(material, "extensions");
+    double root = sqrt(0.08 * (double)m->specular[s]);
+    json_add_number(add_object(extensions, "KHR_materials_specular"), "specularFactor",
+                    root > 0.0 ? 1.0 : 0.0);
+    json_add_number(add_object(extensions, "KHR_materials_ior"), "ior", (1.0 + root) / (1.0 - root));
+    if (shines)
+        add_emission(material, extensions, m->emission[s]);
+    json_add_number(add_object(material, "extras"), "specular", (double)m->specular[s]);
+}
+
+static cJSON *add_node(struct glb *g, const char *name) {
+    cJSON_AddItemToArray(g->children, cJSON_CreateNumber(g->node_count++));
+    cJSON *node = append(g->nodes);
+    json_add_string(node, "name", name);
+    return node;
+}
+
+static void add_parts(struct glb *g) {
+    cJSON *meshes = cJSON_AddArrayToObject(g->root, "meshes");
+    cJSON *materials = cJSON_AddArrayToObject(g->root, "materials");
+    for (size_t i = 0; i < g->parts->count; i++) {
+        uint32_t s = g->parts->part[i].segment;
+        char name[32];
+        snprintf(name, sizeof name, "segment %u", s);
+        add_mesh(g, append(meshes), i, name);
+        add_material(g, append(materials), s, name);
+        cJSON *node = add_node(g, name);
+        json_add_int(node, "mesh", (int64_t)i);
+        json_add_int(add_object(node, "extras"), "object_id", g->in->segments->id[s]);
+    }
+}
+
+static void add_camera(struct glb *g, cJSON *cameras, const struct export_comparison *view) {
+    const struct camera *c = view->camera;
+    const float(*r)[3] = c->world_from_camera.rotation;
+    vec3 at = c->world_from_camera.translation;
+    cJSON *node = add_node(g, view->name);
+    /* Ours: x right, y down, z forward; theirs: x right, y up, z back. By columns. */
+    add_numbers(node, "matrix", (float[]){r[0][0], r[1][0], r[2][0], 0.0f, -r[0][1], -r[1][1], -r[2][1],
+                                          0.0f, -r[0][2], -r[1][2], -r[2][2], 0.0f, at.x, at.y, at.z,
+                                          1.0f}, 16);
+    json_add_int(node, "camera", cJSON_GetArraySize(cameras));
+    cJSON *camera = append(cameras);
+    json_add_string(camera, "name", view->name);
+    json_add_string(camera, "type", "perspective");
+    cJSON *lens = add_object(camera, "perspective");
+    json_add_number(lens, "aspectRatio",
+                    ((double)c->width / (double)c->fx) / ((double)c->height / (double)c->fy));
+    json_add_number(lens, "yfov", 2.0 * atan(0.5 * (double)c->height / (double)c->fy));
+    json_add_number(lens, "znear", NEAR_M);
+}
+
+/* An empty array is not valid glTF. */
+static void add_cameras(struct glb *g) {
+    cJSON *cameras = cJSON_CreateArray();
+    for (size_t i = 0; i < g->in->comparison_count && i < CAMERAS_MAX; i++)
+        if (g->in->comparison[i].camera->model == CAMERA_OPENCV)
+            add_camera(g, cameras, &g->in->comparison[i]);
+    if (cJSON_GetArraySize(cameras) > 0)
+        json_add(g->root, "cameras", cameras);
+    else
+        cJSON_Delete(cameras);
+}
+
+/* The rotation, as a quaternion x y z w, that brings an axis to +y. */
+static const float *upright(vec3 up) {
+    static const float turn[6][4] = {
+        {0, 0, 0.70710678f, 0.70710678f}, {0, 0, 0, 1}, {-0.70710678f, 0, 0, 0.70710678f},
+        {0, 0, -0.70710678f, 0.70710678f}, {1, 0, 0, 0}, {0.70710678f, 0, 0, 0.70710678f},
+    };
+    int axis = up.x != 0.0f ? 0 : up.z != 0.0f ? 2 : 1;
+    return turn[axis + (up.x + up.y + up.z < 0.0f ? 3 : 0)];
+}
+
+static void add_room(struct glb *g) {
+    cJSON *room = append(g->nodes);
+    g->node_count++;
+    json_add_string(room, "name", "room");
+    add_numbers(room, "rotation", upright(g->in->up), 4);
+    if (g->in->environment) {
+        cJSON *extras = add_object(room, "extras");
+        json_add_string(extras, "environment", "environment.exr");
+        json_add_string(extras, "environment_layout",
+                        "column over width = atan2(x, -z) / 2 pi modulo 1, row over height = acos(y) / pi, "
+                        "in this node's axes");
+    }
+    g->children = cJSON_AddArrayToObject(room, "children");
+}
+
+/* The whole JSON, padded; the caller's. */
+static char *describe(struct glb *g) {
+    g->root = cJSON_CreateObject();
+    cJSON *asset = add_object(g->root, "asset");
+    json_add_string(asset, "version", "2.0");
+    json_add_string(asset, "generator", "unbake " UNBAKE_VERSION);
+    static const char *const used[] = {"KHR_materials_emissive_strength", "KHR_materials_ior",
+                                       "KHR_materials_specular"};
+    json_add(g->root, "extensionsUsed", cJSON_CreateStringArray(used, 3));
+    json_add_int(append(cJSON_AddArrayToObject(g->root, "buffers")), "byteLength", (int64_t)g->length);
+    add_views(g);
+    add_picture(g);
+    json_add_int(g->root, "scene", 0);
+    cJSON *scene = append(cJSON_AddArrayToObject(g->root, "scenes"));
+    json_add_string(scene, "name", g->in->title);
+    json_add(scene, "nodes", cJSON_CreateIntArray((int[]){0}, 1));
+    g->accessors = cJSON_AddArrayToObject(g->root, "accessors");
+    g->nodes = cJSON_AddArrayToObject(g->root, "nodes");
+    add_room(g);
+    add_parts(g);
+    add_cameras(g);
+    char *text = json_text(g->root);
+    char *whole = mem_printf("%s%*s", text, (int)(padded(strlen(text)) - strlen(text)), "");
+    mem_free(text);
+    cJSON_Delete(g->root);
+    return whole;
+}
+
+/* --- bytes ---------------------------------------------------------------------------------- */
+
+static void put_bytes(const struct glb *g, struct sink *out, const char *picture) {
+    const struct seams *seams = &g->parts->seams;
+    const struct mesh *mesh = g->in->mesh;
+    uint64_t image_bytes = g->view[VIEW_IMAGE].length;
+    for (size_t v = 0; v < seams->vertex_count; v++)
+        sink_vec3(out, seams_position(seams, mesh, v));
+    for (size_t v = 0; v < seams->vertex_count && mesh->normal; v++)
+        sink_vec3(out, seams_normal(seams, mesh, v));
+    for (size_t v = 0; v < seams->vertex_count; v++) {
+        vec2 uv = seams_uv(seams, g->in->atlas, v);
+        sink_float(out, uv.x);
+        sink_float(out, uv.y);
+    }
+    for (size_t p = 0; p < g->parts->count; p++) {
+        const struct part *part = &g->parts->part[p];
+        for (size_t i = part->first_triangle; i < part->first_triangle + part->triangle_count; i++)
+            for (int c = 0; c < 3; c++)
+                sink_u32(out, seams->index[g->parts->order[i]][c] - (uint32_t)part->first_vertex);
+    }
+    sink_copy(out, picture, image_bytes);
+    sink_bytes(out, "\0\0\0", padded(image_bytes) - image_bytes);
+}
+
+static void put_chunk_head(struct sink *out, uint64_t length, uint32_t type) {
+    sink_u32(out, (uint32_t)length);
+    sink_u32(out, type);
+}
+
+enum status glb_write(const char *path, const struct export_input *input, const struct parts *parts,
+                      const char *base_color, struct error *err) {
+    struct glb g = {.in = input, .parts = parts};
+    struct stat info;
+    struct sink out;
+    if (stat(base_color, &info) != 0)
+        return error_set_errno(err, errno, "cannot look at %s", base_color);
+    lay_out(&g, (uint64_t)info.st_size);
+    char *json = describe(&g);
+    uint64_t json_length = strlen(json);
+    uint64_t length = HEAD_BYTES + 2 * CHUNK_HEAD_BYTES + json_length + g.length;
+    enum status status = STATUS_OK;
+    if (length > UINT32_MAX) /* before gigabytes are written that cannot be kept */
+        status = error_set(err, STATUS_LIMIT, "%s would have %llu bytes, a GLB has 4 GiB at most", path,
+                           (unsigned long long)length);
+    if (status == STATUS_OK)
+        status = sink_open(&out, path, UINT32_MAX, err);
+    if (status == STATUS_OK) {
+        sink_u32(&out, MAGIC);
+        sink_u32(&out, 2);
+        sink_u32(&out, (uint32_t)length);
+        put_chunk_head(&out, json_length, CHUNK_JSON);
+        sink_bytes(&out, json, json_length);
+        put_chunk_head(&out, g.length, CHUNK_BIN);
+        put_bytes(&g, &out, base_color);
+        status = sink_close(&out, STATUS_OK, err);
+    }
+    mem_free(json);
+    return status;
+}

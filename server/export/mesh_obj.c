@@ -1,0 +1,68 @@
+/* mesh_obj.c -- see mesh_obj.h. */
+#include "server/export/mesh_obj.h"
+
+#include "server/export/sink.h"
+
+#define PRECISE "%.9g" /* reads back as the same float */
+
+static void put_corner(struct sink *out, uint32_t vertex, uint32_t uv, bool has_normal) {
+    if (has_normal)
+        sink_printf(out, " %u/%u/%u", vertex + 1, uv + 1, vertex + 1);
+    else
+        sink_printf(out, " %u/%u", vertex + 1, uv + 1);
+}
+
+enum status mesh_obj_write(const char *path, const struct export_input *input, const struct parts *parts,
+                           struct error *err) {
+    const struct mesh *mesh = input->mesh;
+    struct sink out;
+    enum status status = sink_open(&out, path, UINT32_MAX, err);
+    if (status != STATUS_OK)
+        return status;
+    sink_printf(&out, "mtllib scene.mtl\n");
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        sink_printf(&out, "v " PRECISE " " PRECISE " " PRECISE "\n", (double)mesh->position[v].x,
+                    (double)mesh->position[v].y, (double)mesh->position[v].z);
+    for (size_t v = 0; v < parts->seams.vertex_count; v++) {
+        vec2 uv = seams_uv(&parts->seams, input->atlas, v);
+        sink_printf(&out, "vt " PRECISE " " PRECISE "\n", (double)uv.x, (double)(1.0f - uv.y));
+    }
+    for (size_t v = 0; v < mesh->vertex_count && mesh->normal; v++)
+        sink_printf(&out, "vn " PRECISE " " PRECISE " " PRECISE "\n", (double)mesh->normal[v].x,
+                    (double)mesh->normal[v].y, (double)mesh->normal[v].z);
+    for (size_t p = 0; p < parts->count; p++) {
+        const struct part *part = &parts->part[p];
+        sink_printf(&out, "o segment_%u\nusemtl segment_%u\n", part->segment, part->segment);
+        for (size_t i = part->first_triangle; i < part->first_triangle + part->triangle_count; i++) {
+            uint32_t t = parts->order[i];
+            sink_printf(&out, "f");
+            for (int c = 0; c < 3; c++)
+                put_corner(&out, mesh->index[t][c], parts->seams.index[t][c], mesh->normal != NULL);
+            sink_printf(&out, "\n");
+        }
+    }
+    return sink_close(&out, STATUS_OK, err);
+}
+
+enum status mesh_mtl_write(const char *path, const struct export_input *input, const struct parts *parts,
+                           const char *base_color, struct error *err) {
+    const struct materials *m = input->materials;
+    struct sink out;
+    enum status status = sink_open(&out, path, UINT32_MAX, err);
+    if (status != STATUS_OK)
+        return status;
+    for (size_t p = 0; p < parts->count; p++) {
+        uint32_t s = parts->part[p].segment;
+        double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
+        double smooth = 1.0 - roughness;
+        sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " PRECISE " " PRECISE " " PRECISE
+                    "\nNi 1.5\nNs " PRECISE "\nPr " PRECISE "\n", s, base_color, specular, specular,
+                    specular, 1000.0 * smooth * smooth, roughness);
+        rgb e = m->emission[s];
+        if (rgb_max(e) > 0.0f)
+            sink_printf(&out, "Ke " PRECISE " " PRECISE " " PRECISE "\n", (double)e.r, (double)e.g,
+                        (double)e.b);
+        sink_printf(&out, "illum 2\n\n");
+    }
+    return sink_close(&out, STATUS_OK, err);
+}

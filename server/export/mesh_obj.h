@@ -1,0 +1,24 @@
+/* mesh_obj.h -- the mesh as Wavefront OBJ (scene.obj) with its materials (scene.mtl).
+ *
+ * One object, "segment_N" as the report numbers it, and one material of the same name for each
+ * segment. Vertices and normals are the mesh's own, so what is connected there is connected here;
+ * texture coordinates have their origin at the lower left. Metres, in the room's own axes.
+ *
+ * MTL has no specular as ours: Ks is specular, for readers that take Ks for the level of a
+ * reflection whose half is that of an index of refraction of 1.5 (Ni), as Blender does. Pr
+ * is roughness, Ke radiance, map_Kd the picture beside it, in sRGB. */
+#ifndef UNBAKE_EXPORT_MESH_OBJ_H
+#define UNBAKE_EXPORT_MESH_OBJ_H
+
+#include "server/export/outputs.h"
+#include "server/export/parts.h"
+
+/* The same input gives the same bytes. STATUS_LIMIT where they would be 4 GiB or more. */
+enum status mesh_obj_write(const char *path, const struct export_input *input, const struct parts *parts,
+                           struct error *err);
+
+/* `base_color` is the picture's name as the material says it. */
+enum status mesh_mtl_write(const char *path, const struct export_input *input, const struct parts *parts,
+                           const char *base_color, struct error *err);
+
+#endif

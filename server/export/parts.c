@@ -1,0 +1,110 @@
+/* parts.c -- see parts.h. */
+#include "server/export/parts.h"
+
+#include "common/mem.h"
+#include "common/rng.h"
+
+#define NONE UINT32_MAX
+
+void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *atlas,
+                const uint32_t *order) {
+    size_t corner_count = 3 * mesh->triangle_count, size = 16;
+    while (size < 2 * corner_count)
+        size *= 2;
+    uint32_t *table = mem_array(size, sizeof *table);
+    for (size_t i = 0; i < size; i++)
+        table[i] = NONE;
+    s->vertex_count = 0;
+    s->corner = mem_array(corner_count, sizeof *s->corner);
+    s->index = mem_array(mesh->triangle_count, sizeof *s->index);
+    for (size_t i = 0; i < corner_count; i++) {
+        size_t t = order ? order[i / 3] : i / 3, c = i % 3;
+        uint32_t vertex = mesh->index[t][c], chart = atlas->chart_of_triangle[t];
+        size_t slot = rng_key(vertex, chart, 0) & (size - 1);
+        for (; table[slot] != NONE; slot = (slot + 1) & (size - 1)) {
+            uint32_t other = s->corner[table[slot]];
+            if (mesh->index[other / 3][other % 3] == vertex &&
+                atlas->chart_of_triangle[other / 3] == chart)
+                break;
+        }
+        if (table[slot] == NONE) {
+            table[slot] = (uint32_t)s->vertex_count;
+            s->corner[s->vertex_count++] = (uint32_t)(3 * t + c);
+        }
+        s->index[t][c] = table[slot];
+    }
+    mem_free(table);
+}
+
+void seams_release(struct seams *s) {
+    mem_free(s->corner);
+    mem_free(s->index);
+    *s = (struct seams){0};
+}
+
+/* Where each segment's triangles begin in the order by segment; [count + 1], the caller's. */
+static size_t *sort_by_segment(const struct mesh *mesh, const struct segments *segments, uint32_t *order) {
+    size_t *begin = mem_calloc(segments->count + 2, sizeof *begin);
+    for (size_t t = 0; t < mesh->triangle_count; t++)
+        begin[segments->of_triangle[t] + 2]++;
+    for (size_t s = 2; s <= segments->count; s++)
+        begin[s] += begin[s - 1];
+    for (size_t t = 0; t < mesh->triangle_count; t++)
+        order[begin[segments->of_triangle[t] + 1]++] = (uint32_t)t;
+    return begin;
+}
+
+/* Vertices were numbered in the order of triangles, so a part's follow the former part's. */
+static void measure(struct parts *p, const struct mesh *mesh, struct part *part, size_t first_vertex) {
+    part->first_vertex = first_vertex;
+    part->lower = (vec3){INFINITY, INFINITY, INFINITY};
+    part->upper = vec3_neg(part->lower);
+    for (size_t i = part->first_triangle; i < part->first_triangle + part->triangle_count; i++) {
+        for (int c = 0; c < 3; c++) {
+            size_t vertex = p->seams.index[p->order[i]][c];
+            vec3 at = seams_position(&p->seams, mesh, vertex);
+            part->lower = (vec3){fminf(part->lower.x, at.x), fminf(part->lower.y, at.y),
+                                 fminf(part->lower.z, at.z)};
+            part->upper = (vec3){fmaxf(part->upper.x, at.x), fmaxf(part->upper.y, at.y),
+                                 fmaxf(part->upper.z, at.z)};
+            if (vertex - first_vertex >= part->vertex_count)
+                part->vertex_count = vertex - first_vertex + 1;
+        }
+    }
+}
+
+enum status parts_make(struct parts *p, const struct mesh *mesh, const struct segments *segments,
+                       const struct atlas *atlas, struct error *err) {
+    *p = (struct parts){.order = mem_array(mesh->triangle_count, sizeof *p->order)};
+    size_t *begin = sort_by_segment(mesh, segments, p->order), first_vertex = 0;
+    for (size_t s = 0; s < segments->count; s++)
+        p->count += begin[s + 1] > begin[s];
+    if (p->count > PARTS_MAX) {
+        enum status status = error_set(err, STATUS_LIMIT, "the room has %zu segments, a file of objects "
+                                       "%d at most", p->count, PARTS_MAX);
+        mem_free(begin);
+        mem_free(p->order);
+        return status;
+    }
+    seams_make(&p->seams, mesh, atlas, p->order);
+    p->part = mem_calloc(p->count, sizeof *p->part);
+    struct part *part = p->part;
+    for (size_t s = 0; s < segments->count; s++) {
+        if (begin[s + 1] == begin[s])
+            continue;
+        *part = (struct part){.segment = (uint32_t)s, .first_triangle = begin[s],
+                              .triangle_count = begin[s + 1] - begin[s]};
+        measure(p, mesh, part, first_vertex);
+        first_vertex += part->vertex_count;
+        part++;
+    }
+    mem_free(begin);
+    return STATUS_OK;
+}
+
+void parts_release(struct parts *p) {
+    seams_release(&p->seams);
+    mem_free(p->order);
+    mem_free(p->part);
+    *p = (struct parts){0};
+}

@@ -1,0 +1,63 @@
+/* parts.h -- the mesh as files have it: with one vertex for each pair of vertex and chart, since a
+ * vertex on the seam of charts has several atlas coordinates; and cut into its segments. */
+#ifndef UNBAKE_EXPORT_PARTS_H
+#define UNBAKE_EXPORT_PARTS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/scene/atlas.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+#define PARTS_MAX 16384 /* objects of one file */
+
+/* Vertices in order of first use. */
+struct seams {
+    size_t vertex_count;
+    uint32_t *corner;     /* [vertex_count] corner 3 t + c that a vertex is taken from; owned */
+    uint32_t (*index)[3]; /* [triangle_count] vertices of each triangle of the mesh; owned */
+};
+
+/* `order` is a permutation of the triangles in which they use their vertices; NULL: as they come. */
+void seams_make(struct seams *seams, const struct mesh *mesh, const struct atlas *atlas,
+                const uint32_t *order);
+void seams_release(struct seams *seams);
+
+/* A segment that has triangles. Charts are of one segment each, so no vertex is of two parts. */
+struct part {
+    uint32_t segment;
+    size_t first_vertex, vertex_count;
+    size_t first_triangle, triangle_count; /* in `order` */
+    vec3 lower, upper;                     /* bounds, metres */
+};
+
+struct parts {
+    struct seams seams;
+    uint32_t *order;   /* [triangle_count] triangles by segment, then as they come; owned */
+    size_t count;
+    struct part *part; /* [count] in order of segments; owned */
+};
+
+/* STATUS_LIMIT where there would be more than PARTS_MAX. */
+enum status parts_make(struct parts *parts, const struct mesh *mesh, const struct segments *segments,
+                       const struct atlas *atlas, struct error *err);
+void parts_release(struct parts *parts);
+
+/* Of a vertex: where it is, its normal (the mesh must have them), and where in the atlas, in parts of
+ * its width and height from the top left corner. */
+static inline vec3 seams_position(const struct seams *s, const struct mesh *mesh, size_t vertex) {
+    uint32_t corner = s->corner[vertex];
+    return mesh->position[mesh->index[corner / 3][corner % 3]];
+}
+static inline vec3 seams_normal(const struct seams *s, const struct mesh *mesh, size_t vertex) {
+    uint32_t corner = s->corner[vertex];
+    return mesh->normal[mesh->index[corner / 3][corner % 3]];
+}
+static inline vec2 seams_uv(const struct seams *s, const struct atlas *atlas, size_t vertex) {
+    vec2 place = atlas->corner[s->corner[vertex] / 3][s->corner[vertex] % 3];
+    return (vec2){place.x / (float)atlas->width, place.y / (float)atlas->height};
+}
+
+#endif

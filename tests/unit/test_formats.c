@@ -1,0 +1,332 @@
+/* test_formats.c -- scene.glb and scene.obj read back: the structure that the glTF 2.0 specification
+ * asks for, and the room's own numbers in it. */
+#include "server/export/formats.h"
+
+#include "common/buf.h"
+#include "common/file.h"
+#include "common/image.h"
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/demo/room.h"
+#include "server/export/glb.h"
+#include "server/export/mesh_obj.h"
+#include "tests/check.h"
+
+struct glb {
+    struct buf file;
+    cJSON *json;
+    const char *bytes;
+    size_t length; /* of bytes */
+};
+
+static uint32_t word_at(const char *at) {
+    uint32_t value;
+    memcpy(&value, at, sizeof value);
+    return value;
+}
+
+static float float_at(const char *at) {
+    float value;
+    memcpy(&value, at, sizeof value);
+    return value;
+}
+
+static double number(const cJSON *object, const char *key) {
+    return cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(object, key));
+}
+
+static const cJSON *item(const struct glb *g, const char *array, double index) {
+    return cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(g->json, array), (int)index);
+}
+
+static const cJSON *member(const cJSON *object, const char *a, const char *b) {
+    return cJSON_GetObjectItemCaseSensitive(cJSON_GetObjectItemCaseSensitive(object, a), b);
+}
+
+/* Header and chunks: lengths, order, padding. */
+static void read_glb(const char *path, struct glb *g) {
+    struct error err;
+    buf_init(&g->file, 1 << 26);
+    CHECK(file_read(path, &g->file, &err) == STATUS_OK);
+    const char *data = g->file.data;
+    CHECK(g->file.length > 28 && memcmp(data, "glTF", 4) == 0 && word_at(data + 4) == 2);
+    CHECK(word_at(data + 8) == g->file.length && g->file.length % 4 == 0);
+    uint32_t length = word_at(data + 12);
+    CHECK(memcmp(data + 16, "JSON", 4) == 0 && length % 4 == 0);
+    CHECK_THAT(json_parse(data + 20, length, "scene.glb", &g->json, &err) == STATUS_OK, "%s", err.message);
+    const char *chunk = data + 20 + length;
+    g->length = word_at(chunk);
+    g->bytes = chunk + 8;
+    CHECK(memcmp(chunk + 4, "BIN\0", 4) == 0);
+    CHECK(g->bytes + g->length == data + g->file.length);
+    CHECK(number(item(g, "buffers", 0), "byteLength") == (double)g->length);
+    CHECK_STRING(cJSON_GetStringValue(member(g->json, "asset", "version")), "2.0");
+}
+
+static void release_glb(struct glb *g) {
+    cJSON_Delete(g->json);
+    buf_release(&g->file);
+}
+
+/* The accessor's elements, which must lie within its view and be aligned. */
+static const char *elements(const struct glb *g, double accessor, const char *type, size_t bytes,
+                            size_t *count) {
+    const cJSON *a = item(g, "accessors", accessor), *view = item(g, "bufferViews", number(a, "bufferView"));
+    size_t offset = (size_t)number(a, "byteOffset"), start = (size_t)number(view, "byteOffset");
+    *count = (size_t)number(a, "count");
+    CHECK_STRING(cJSON_GetStringValue(cJSON_GetObjectItem(a, "type")), type);
+    CHECK(*count > 0 && offset + *count * bytes <= (size_t)number(view, "byteLength"));
+    CHECK(start + (size_t)number(view, "byteLength") <= g->length);
+    CHECK(start % 4 == 0 && offset % 4 == 0);
+    return g->bytes + start + offset;
+}
+
+static void check_bounds(const struct glb *g, double accessor, const char *position, size_t count) {
+    const cJSON *a = item(g, "accessors", accessor);
+    for (int c = 0; c < 3; c++) {
+        float lower = INFINITY, upper = -INFINITY;
+        for (size_t v = 0; v < count; v++) {
+            lower = fminf(lower, float_at(position + 12 * v + 4 * c));
+            upper = fmaxf(upper, float_at(position + 12 * v + 4 * c));
+        }
+        CHECK((float)cJSON_GetArrayItem(cJSON_GetObjectItem(a, "min"), c)->valuedouble == lower);
+        CHECK((float)cJSON_GetArrayItem(cJSON_GetObjectItem(a, "max"), c)->valuedouble == upper);
+    }
+}
+
+/* A mesh against the triangles of its segment; returns their number. */
+static size_t check_mesh(const struct glb *g, const struct export_input *in, const cJSON *mesh,
+                         uint32_t segment) {
+    const cJSON *primitive = cJSON_GetArrayItem(cJSON_GetObjectItem(mesh, "primitives"), 0);
+    const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
+    size_t vertices, normals = 0, uvs, corners, triangle = 0;
+    double positions = number(attributes, "POSITION");
+    const char *position = elements(g, positions, "VEC3", 12, &vertices), *normal = NULL;
+    if (in->mesh->normal)
+        normal = elements(g, number(attributes, "NORMAL"), "VEC3", 12, &normals);
+    else
+        CHECK(!cJSON_GetObjectItem(attributes, "NORMAL"));
+    const char *uv = elements(g, number(attributes, "TEXCOORD_0"), "VEC2", 8, &uvs);
+    const char *index = elements(g, number(primitive, "indices"), "SCALAR", 4, &corners);
+    CHECK(uvs == vertices && (!normal || normals == vertices) && corners % 3 == 0);
+    check_bounds(g, positions, position, vertices);
+    for (size_t t = 0; t < in->mesh->triangle_count; t++) {
+        if (in->segments->of_triangle[t] != segment)
+            continue;
+        for (size_t c = 0; c < 3; c++) {
+            uint32_t v = word_at(index + 4 * (3 * triangle + c));
+            uint32_t wanted = in->mesh->index[t][c];
+            CHECK(v < vertices);
+            CHECK(memcmp(position + 12 * v, &in->mesh->position[wanted], 12) == 0);
+            CHECK(!normal || memcmp(normal + 12 * v, &in->mesh->normal[wanted], 12) == 0);
+            CHECK_NEAR(float_at(uv + 8 * v) * (float)in->atlas->width, in->atlas->corner[t][c].x, 1e-3);
+            CHECK_NEAR(float_at(uv + 8 * v + 4) * (float)in->atlas->height, in->atlas->corner[t][c].y, 1e-3);
+        }
+        triangle++;
+    }
+    CHECK(3 * triangle == corners);
+    return triangle;
+}
+
+/* The reflectance at normal incidence and the radiance are ours. */
+static void check_material(const cJSON *material, const struct materials *m, uint32_t s) {
+    const cJSON *extensions = cJSON_GetObjectItem(material, "extensions");
+    const cJSON *factor = cJSON_GetObjectItem(material, "emissiveFactor");
+    double ior = number(cJSON_GetObjectItem(extensions, "KHR_materials_ior"), "ior");
+    double weight = number(cJSON_GetObjectItem(extensions, "KHR_materials_specular"), "specularFactor");
+    double r = (ior - 1.0) / (ior + 1.0);
+    CHECK_NEAR(weight * r * r, 0.08 * (double)m->specular[s], 1e-7);
+    CHECK(weight == (m->specular[s] > 0.0f ? 1.0 : 0.0));
+    CHECK(number(cJSON_GetObjectItem(material, "pbrMetallicRoughness"), "roughnessFactor") ==
+          (double)m->roughness[s]);
+    CHECK(number(cJSON_GetObjectItem(material, "pbrMetallicRoughness"), "metallicFactor") == 0.0);
+    bool shines = rgb_max(m->emission[s]) > 0.0f;
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(material, "doubleSided")) == !shines);
+    CHECK((factor != NULL) == shines);
+    const float wanted[3] = {m->emission[s].r, m->emission[s].g, m->emission[s].b};
+    for (int c = 0; c < 3 && shines; c++) {
+        double f = cJSON_GetArrayItem(factor, c)->valuedouble;
+        double strength = number(cJSON_GetObjectItem(extensions, "KHR_materials_emissive_strength"),
+                                 "emissiveStrength");
+        CHECK(f >= 0.0 && f <= 1.0);
+        CHECK_NEAR(f * strength, wanted[c], 1e-6 * strength);
+    }
+}
+
+static void check_picture(const struct glb *g, const char *png) {
+    struct buf file;
+    struct error err;
+    buf_init(&file, 1 << 26);
+    CHECK(file_read(png, &file, &err) == STATUS_OK);
+    const cJSON *view = item(g, "bufferViews", number(item(g, "images", 0), "bufferView"));
+    size_t length = (size_t)number(view, "byteLength"), offset = (size_t)number(view, "byteOffset");
+    CHECK(length == file.length && offset + length <= g->length && offset % 4 == 0);
+    CHECK(memcmp(g->bytes + offset, file.data, length) == 0);
+    buf_release(&file);
+}
+
+/* The room's node turns `up` to +y and has everything below it. */
+static void check_nodes(const struct glb *g, vec3 up, size_t part_count, const struct camera *camera) {
+    const cJSON *room = item(g, "nodes", 0), *rotation = cJSON_GetObjectItem(room, "rotation");
+    double q[4];
+    for (int i = 0; i < 4; i++)
+        q[i] = cJSON_GetArrayItem(rotation, i)->valuedouble;
+    /* v + 2 w (q x v) + 2 q x (q x v), y */
+    double v[3] = {(double)up.x, (double)up.y, (double)up.z};
+    double a[3] = {q[1] * v[2] - q[2] * v[1], q[2] * v[0] - q[0] * v[2], q[0] * v[1] - q[1] * v[0]};
+    CHECK_NEAR(v[1] + 2.0 * (q[3] * a[1] + q[2] * a[0] - q[0] * a[2]), 1.0, 1e-6);
+    CHECK_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1.0, 1e-6);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(room, "children")) == (int)part_count + 1);
+    const cJSON *node = item(g, "nodes", (double)part_count + 1), *m = cJSON_GetObjectItem(node, "matrix");
+    CHECK(number(node, "camera") == 0.0 && cJSON_GetArraySize(m) == 16);
+    /* theirs looks along -z, its y is up */
+    for (int i = 0; i < 3; i++) {
+        const float *row = camera->world_from_camera.rotation[i];
+        CHECK_NEAR(cJSON_GetArrayItem(m, i)->valuedouble, row[0], 0);
+        CHECK_NEAR(cJSON_GetArrayItem(m, 4 + i)->valuedouble, -row[1], 0);
+        CHECK_NEAR(cJSON_GetArrayItem(m, 8 + i)->valuedouble, -row[2], 0);
+    }
+    CHECK(cJSON_GetArrayItem(m, 14)->valuedouble == 3.0);
+}
+
+static void test_glb(const char *dir, struct export_input *in, const struct parts *parts) {
+    static const vec3 axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
+    struct error err = {0};
+    struct glb g;
+    char *path = file_join(dir, "scene.glb"), *png = file_join(dir, FORMATS_BASE_COLOR);
+    size_t triangles = 0;
+    for (size_t i = 0; i < sizeof axes / sizeof *axes; i++) {
+        in->up = axes[i];
+        CHECK(glb_write(path, in, parts, png, &err) == STATUS_OK);
+        read_glb(path, &g);
+        check_nodes(&g, axes[i], parts->count, in->comparison->camera);
+        if (i + 1 < sizeof axes / sizeof *axes)
+            release_glb(&g);
+    }
+    for (size_t p = 0; p < parts->count; p++) {
+        const cJSON *node = item(&g, "nodes", (double)p + 1), *mesh = item(&g, "meshes", number(node, "mesh"));
+        uint32_t s = parts->part[p].segment;
+        char name[32];
+        snprintf(name, sizeof name, "segment %u", s);
+        CHECK_STRING(cJSON_GetStringValue(cJSON_GetObjectItem(node, "name")), name);
+        triangles += check_mesh(&g, in, mesh, s);
+        check_material(item(&g, "materials", (double)p), in->materials, s);
+    }
+    CHECK(triangles == in->mesh->triangle_count);
+    check_picture(&g, png);
+    release_glb(&g);
+    mem_free(png);
+    mem_free(path);
+}
+
+static size_t count_lines(const char *text, const char *start) {
+    size_t count = 0;
+    for (const char *at = text; at; at = strchr(at, '\n'))
+        count += strncmp(at += at > text || *at == '\n', start, strlen(start)) == 0;
+    return count;
+}
+
+static void test_obj(const char *dir, const struct export_input *in, const struct parts *parts) {
+    struct error err;
+    struct buf file;
+    char *path = file_join(dir, "scene.obj");
+    unsigned v[3], uv[3], n[3];
+    vec3 p;
+    CHECK(mesh_obj_write(path, in, parts, &err) == STATUS_OK);
+    buf_init(&file, 1 << 26);
+    CHECK(file_read(path, &file, &err) == STATUS_OK);
+    const char *text = buf_text(&file), *first = strstr(text, "\nv "), *face = strstr(text, "\nf ");
+    CHECK(count_lines(text, "v ") == in->mesh->vertex_count);
+    CHECK(count_lines(text, "vt ") == parts->seams.vertex_count);
+    CHECK(count_lines(text, "f ") == in->mesh->triangle_count);
+    CHECK(count_lines(text, "o segment_") == parts->count);
+    CHECK(first && sscanf(first, " v %f %f %f", &p.x, &p.y, &p.z) == 3);
+    CHECK(memcmp(&p, in->mesh->position, sizeof p) == 0);
+    CHECK(face && sscanf(face, " f %u/%u/%u %u/%u/%u %u/%u/%u", v, uv, n, v + 1, uv + 1, n + 1, v + 2, uv + 2,
+                         n + 2) == 9);
+    for (int c = 0; c < 3; c++) {
+        CHECK(v[c] == in->mesh->index[parts->order[0]][c] + 1 && n[c] == v[c]);
+        CHECK(uv[c] == parts->seams.index[parts->order[0]][c] + 1);
+    }
+    mem_free(path);
+    path = file_join(dir, "scene.mtl");
+    CHECK(mesh_mtl_write(path, in, parts, "base_color.png", &err) == STATUS_OK);
+    buf_clear(&file);
+    CHECK(file_read(path, &file, &err) == STATUS_OK);
+    CHECK(count_lines(buf_text(&file), "newmtl segment_") == parts->count);
+    CHECK(count_lines(buf_text(&file), "map_Kd base_color.png") == parts->count);
+    CHECK(count_lines(buf_text(&file), "Ke ") == 2);
+    buf_release(&file);
+    mem_free(path);
+}
+
+static void test_same_bytes(const char *dir, const struct export_input *in, const struct parts *parts) {
+    struct error err;
+    struct buf once, twice;
+    for (size_t f = 0; f < FORMATS_COUNT; f++) {
+        char *path = file_join(dir, formats[f].name);
+        buf_init(&once, 1 << 26);
+        buf_init(&twice, 1 << 26);
+        CHECK(formats[f].write(dir, in, parts, &err) == STATUS_OK && file_read(path, &once, &err) == STATUS_OK);
+        CHECK(formats[f].write(dir, in, parts, &err) == STATUS_OK && file_read(path, &twice, &err) == STATUS_OK);
+        CHECK(once.length == twice.length && memcmp(once.data, twice.data, once.length) == 0);
+        CHECK(formats[f].write("/nowhere", in, parts, &err) != STATUS_OK && strstr(err.message, "/nowhere"));
+        buf_release(&once);
+        buf_release(&twice);
+        mem_free(path);
+    }
+}
+
+/* A mesh of more segments than a file of objects may have. */
+static void test_limit(void) {
+    enum { COUNT = PARTS_MAX + 1 };
+    struct error err = {0};
+    struct parts parts;
+    struct mesh mesh = {.triangle_count = COUNT};
+    struct segments segments = {.count = COUNT};
+    segments.of_triangle = mem_array(COUNT, sizeof *segments.of_triangle);
+    for (uint32_t t = 0; t < COUNT; t++)
+        segments.of_triangle[t] = t;
+    CHECK(parts_make(&parts, &mesh, &segments, NULL, &err) == STATUS_LIMIT);
+    CHECK(strstr(err.message, "16385") && strstr(err.message, "16384"));
+    mem_free(segments.of_triangle);
+}
+
+int main(void) {
+    char dir[] = "/tmp/unbake-formats-XXXXXX";
+    static const char *const names[] = {"R", "G", "B"};
+    struct parallel *pool = parallel_new(1);
+    struct room room;
+    struct parts parts;
+    struct image picture;
+    struct error err;
+    CHECK(mkdtemp(dir) != NULL);
+    CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
+    room.materials.specular[ROOM_FLOOR] = 0.0f;
+    image_init(&picture, 5, 3, 3, names); /* odd, for the padding */
+    char *png = file_join(dir, FORMATS_BASE_COLOR);
+    CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
+    struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.0f};
+    camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
+    struct export_comparison comparison = {"images/003.exr", NULL, NULL, &camera};
+    struct export_input in = {.title = "room", .mesh = &room.mesh, .segments = &room.segments,
+                              .atlas = &room.atlas, .materials = &room.materials, .comparison_count = 1,
+                              .comparison = &comparison};
+    CHECK(parts_make(&parts, &room.mesh, &room.segments, &room.atlas, &err) == STATUS_OK);
+    CHECK(parts.count == ROOM_OBJECT_COUNT);
+    test_glb(dir, &in, &parts);
+    test_obj(dir, &in, &parts);
+    test_same_bytes(dir, &in, &parts);
+    vec3 *normal = room.mesh.normal;
+    room.mesh.normal = NULL;
+    test_glb(dir, &in, &parts);
+    room.mesh.normal = normal;
+    test_limit();
+    parts_release(&parts);
+    mem_free(png);
+    image_release(&picture);
+    room_release(&room);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+    parallel_free(pool);
+    return check_result();
+}
