@@ -100,7 +100,7 @@ out:
 enum status file_put_in_place(const char *temporary, const char *path, struct error *err) {
     int fd = open(temporary, O_RDONLY | O_CLOEXEC);
     enum status status = STATUS_OK;
-    if (fd < 0 || fsync(fd) != 0)
+    if (fd < 0 || fchmod(fd, 0640) != 0 || fsync(fd) != 0)
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (fd >= 0)
         close(fd);
