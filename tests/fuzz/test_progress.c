@@ -1,0 +1,153 @@
+/* test_progress.c -- what a worker says on its pipe, as the daemon hears it: a worker has read a
+ * stranger's files, so it may say anything. The first byte chooses a job's attempt or a scene's
+ * check; the outcome is entered after. */
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "common/utf8.h"
+#include "server/job/attempt.h"
+#include "server/job/figures.h"
+#include "server/worker/progress.h"
+#include "tests/fuzz/fuzz.h"
+
+#define SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
+#define CHECKED "ffeeddccbbaa99887766554433221100ffeeddccbbaa99887766554433221100"
+#define JOBS_MAX 50 /* then the store is made anew */
+
+static struct store *store;
+static int job_count;
+
+static void start(void) {
+    bool existed;
+    log_set_level(LOG_ERROR);
+    job_count = 0;
+    MUST(store_open(&store, fuzz_folder(), NULL) == STATUS_OK);
+    MUST(store_scene_add(store, SCENE, "room", 10, 0, &existed, NULL) == STATUS_OK);
+    char *out = file_join(fuzz_folder(), "out/preview"), *file = file_join(fuzz_folder(), "out/a.exr");
+    MUST(file_make_dirs(out, NULL) == STATUS_OK);
+    fuzz_write(file, (const uint8_t *)"0123456789", 10);
+    mem_free(file);
+    mem_free(out);
+}
+
+static void stop(void) {
+    char *path = file_join(fuzz_folder(), "state.db"), *log = file_join(fuzz_folder(), "state.db-wal");
+    store_close(store);
+    unlink(path);
+    unlink(log);
+    mem_free(log);
+    mem_free(path);
+}
+
+/* A pipe that holds the bytes, its other end closed. */
+static int pipe_of(const uint8_t *data, size_t size) {
+    int ends[2];
+    MUST(pipe2(ends, O_CLOEXEC | O_NONBLOCK) == 0);
+    MUST(write(ends[1], data, size) == (ssize_t)size);
+    close(ends[1]);
+    return ends[0];
+}
+
+/* A scene that waits for its check, whatever became of it the last time. */
+static void start_check(void) {
+    bool existed;
+    store_scene_delete(store, CHECKED, -1, false, &existed, NULL);
+    MUST(store_scene_add(store, CHECKED, "room", 10, 0, &existed, NULL) == STATUS_OK);
+}
+
+static int64_t start_job(int *number) {
+    struct job_new job = {.scene_id = SCENE, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 2};
+    int64_t id;
+    bool replayed;
+    MUST(store_job_add(store, &job, 100, &id, &replayed, NULL) == STATUS_OK);
+    MUST(store_job_start(store, id, number, NULL) == STATUS_OK);
+    return id;
+}
+
+/* --- what came of it: it is shown to clients --------------------------------------------------- */
+
+static void check_json(const char *text) {
+    cJSON *value;
+    MUST(json_parse(text, strlen(text), "what is kept", &value, NULL) == STATUS_OK);
+    cJSON_Delete(value);
+}
+
+static void check_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
+    (void)user, (void)id, (void)at_ms, (void)attempt, (void)type;
+    check_json(data);
+}
+
+static void check_job(int64_t id) {
+    struct job job;
+    MUST(store_event_list(store, id, 0, 1000, check_event, NULL, NULL) == STATUS_OK);
+    MUST(store_job_get(store, id, &job, NULL) == STATUS_OK);
+    MUST(utf8_valid(job.reason, strlen(job.reason), NULL) && utf8_valid(job.hint, strlen(job.hint), NULL));
+    job_release(&job);
+}
+
+static void check_scene(void) {
+    struct scene_row row;
+    MUST(store_scene_get(store, CHECKED, &row, NULL) == STATUS_OK);
+    check_json(row.problems);
+    check_json(row.facts);
+    scene_row_release(&row);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static struct figures figures;
+    struct attempt a = {.phase = ATTEMPT_ALIVE, .iteration = -1.0, .dir = mem_strdup(fuzz_folder()),
+                        .worker = {.pid_fd = -1}, .scene_id = CHECKED, .settings = mem_strdup("{}"), .number = 1};
+    int64_t job_id = 0;
+    if (size < 1) {
+        mem_free(a.dir);
+        mem_free(a.settings);
+        return 0;
+    }
+    if (!store)
+        start();
+    start_check();
+    if (data[0] & 1)
+        job_id = a.job_id = start_job(&a.number);
+    else
+        a.problems = cJSON_CreateArray();
+    buf_init(&a.worker.line, PROGRESS_LINE_MAX);
+    a.worker.log_path = mem_strdup("/dev/null");
+    a.worker.pipe_fd = pipe_of(data + 1, size - 1);
+    attempt_listen(&a, store, &figures);
+    a.phase = ATTEMPT_ENDED;
+    a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
+    struct error err;
+    enum status status = attempt_settle(&a, store, &figures, &err);
+    if (status != STATUS_OK)
+        fprintf(stderr, "%s\n", err.message);
+    MUST(status == STATUS_OK && a.phase == ATTEMPT_EMPTY);
+    if (job_id)
+        check_job(job_id);
+    else
+        check_scene();
+    if (++job_count > JOBS_MAX) {
+        stop();
+        store = NULL;
+    }
+    return 0;
+}
+
+void fuzz_seeds(struct seeds *s) {
+    s->mutants = 1500;
+    seeds_text(s, "3{\"type\":\"stage\",\"stage\":\"refine\"}\n"
+                  "{\"type\":\"progress\",\"stage\":\"refine\",\"done\":120,\"total\":1000,\"eta_sec\":33.5}\n"
+                  "{\"type\":\"metric\",\"series\":\"loss\",\"step\":120,\"value\":0.0123}\n"
+                  "{\"type\":\"metric\",\"series\":\"loss\",\"step\":140,\"value\":0.0113}\n"
+                  "{\"type\":\"metric\",\"series\":\"rays\",\"step\":120,\"value\":1e9}\n"
+                  "{\"type\":\"checkpoint\",\"iteration\":120,\"bytes\":1e6,\"seconds\":0.5}\n");
+    seeds_text(s, "3{\"type\":\"output\",\"name\":\"a.exr\",\"bytes\":10,\"sha256\":\"" SCENE "\","
+                  "\"content_type\":\"image/x-exr\"}\n{\"type\":\"preview\",\"name\":\"../a\",\"bytes\":10,\"sha256\":\"\"}\n"
+                  "{\"type\":\"log\",\"level\":\"info\",\"message\":\"hello\"}\n");
+    seeds_text(s, "1{\"type\":\"end\",\"status\":\"no-space\",\"message\":\"full\",\"hint\":\"free some\"}\n{}\n[]\n3\n");
+    seeds_text(s, "4{\"type\":\"problem\",\"file\":\"images/003.png\",\"reason\":\"damaged\",\"hint\":\"\"}\n");
+    seeds_text(s, "2{\"type\":\"scene\",\"facts\":{\"triangle_count\":12}}\n");
+    seeds_text(s, "2{\"type\":\"scene\",\"facts\":[]}\n{\"type\":\"scene\"}\n");
+}
