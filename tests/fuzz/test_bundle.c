@@ -39,6 +39,15 @@ static void start(void) {
     pool = parallel_new(1);
 }
 
+/* It goes to the daemon as a line of JSON. */
+static void check_json(const cJSON *value) {
+    cJSON *again = NULL;
+    char *text = json_text(value);
+    MUST(json_parse(text, strlen(text), "a report", &again, NULL) == STATUS_OK);
+    cJSON_Delete(again);
+    mem_free(text);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static const struct bundle_limits limits = {100, 1 << 20, 100.0, 1 << 20, 1000};
     struct scene scene;
@@ -52,12 +61,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (status == STATUS_OK) {
         MUST(scene.photograph_count > 0);
         cJSON *facts = bundle_facts(&scene);
-        char *text = json_text(facts);
-        mem_free(text);
+        check_json(facts);
         cJSON_Delete(facts);
     } else {
         MUST(status == STATUS_INPUT && err.message[0] != '\0');
     }
+    check_json(problems);
     scene_release(&scene);
     cJSON_Delete(problems);
     return 0;
