@@ -110,7 +110,7 @@ static void print_server(struct client *c, const cJSON *server) {
     buf_printf(&line, " at %s", request_server(c->request));
     cJSON_ArrayForEach(library, cJSON_GetObjectItemCaseSensitive(server, "libraries")) {
         buf_puts(&line, ", ");
-        terminal_clean(&line, library->string);
+        terminal_clean(&line, member_name(library));
         buf_puts(&line, " ");
         terminal_clean(&line, cJSON_IsString(library) ? library->valuestring : "?");
     }

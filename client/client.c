@@ -128,9 +128,18 @@ double member_number(const cJSON *object, const char *key, double fallback) {
     return cJSON_IsNumber(value) && isfinite(value->valuedouble) ? value->valuedouble : fallback;
 }
 
+int64_t member_whole(const cJSON *object, const char *key, int64_t fallback) {
+    double value = member_number(object, key, (double)fallback);
+    return fabs(value) <= 0x1p53 ? (int64_t)value : fallback;
+}
+
 const cJSON *member_items(const cJSON *object, const char *key) {
     const cJSON *value = cJSON_GetObjectItemCaseSensitive(object, key);
     return cJSON_IsArray(value) ? value : NULL;
+}
+
+const char *member_name(const cJSON *member) {
+    return member->string ? member->string : "";
 }
 
 double time_parse(const char *text) {
@@ -161,7 +170,7 @@ enum status client_job_id(struct client *c, const char *word, int64_t *id, struc
         if (status != STATUS_OK)
             return status;
         const cJSON *newest = cJSON_GetArrayItem(member_items(reply->json, "items"), 0);
-        *id = (int64_t)member_number(newest, "id", 0.0);
+        *id = member_whole(newest, "id", 0);
         return *id > 0 ? STATUS_OK : error_set(err, STATUS_NOT_FOUND, "there are no jobs yet");
     }
     char *end;

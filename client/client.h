@@ -80,7 +80,9 @@ enum status client_list(struct client *c, const char *path, size_t limit, cJSON 
 /* Members of a reply, with what stands for absent, null and another type: "", `fallback`. */
 const char *member_text(const cJSON *object, const char *key);
 double member_number(const cJSON *object, const char *key, double fallback);
+int64_t member_whole(const cJSON *object, const char *key, int64_t fallback); /* also beyond 2^53 */
 const cJSON *member_items(const cJSON *object, const char *key); /* an array or NULL */
+const char *member_name(const cJSON *member); /* "" where it is an item of an array */
 
 /* Unix time of an RFC 3339 time in UTC ("2024-05-06T07:08:09.123Z"); NaN for anything else. */
 double time_parse(const char *text);

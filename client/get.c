@@ -95,7 +95,8 @@ static enum status look_up(struct fetch *f) {
     if (!item)
         return error_set(f->err, STATUS_NOT_FOUND, "job %lld has no output %s any more",
                          (long long)f->job, f->name);
-    f->bytes = (uint64_t)member_number(item, "bytes", 0.0);
+    int64_t bytes = member_whole(item, "bytes", 0);
+    f->bytes = bytes > 0 ? (uint64_t)bytes : 0;
     snprintf(f->sha256, sizeof f->sha256, "%s", member_text(item, "sha256"));
     return STATUS_OK;
 }

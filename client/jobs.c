@@ -132,7 +132,7 @@ static void print_members(struct client *c, const char *name, const cJSON *objec
     buf_init(&line, 1 << 16);
     cJSON_ArrayForEach(member, object) {
         char *text = cJSON_IsString(member) ? mem_strdup(member->valuestring) : json_text(member);
-        buf_printf(&line, "%s%s=%s", line.length ? " " : "", member->string, text);
+        buf_printf(&line, "%s%s=%s", line.length ? " " : "", member_name(member), text);
         mem_free(text);
     }
     print_field(c, name, buf_text(&line));

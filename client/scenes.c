@@ -108,7 +108,7 @@ static void print_scene(struct client *c, const cJSON *scene) {
     cJSON_ArrayForEach(fact, cJSON_GetObjectItemCaseSensitive(scene, "facts")) {
         char *text = cJSON_IsString(fact) ? mem_strdup(fact->valuestring) : json_text(fact);
         table_row(&t);
-        table_set(&t, 0, COLOUR_DIM, "%s", fact->string);
+        table_set(&t, 0, COLOUR_DIM, "%s", member_name(fact));
         table_set(&t, 1, COLOUR_NONE, "%s", text);
         mem_free(text);
     }

@@ -289,7 +289,7 @@ int submit_run(struct client *c, const struct options *o) {
     else if (options_flag(o, "dry-run"))
         print_dry_run(&s, &reply);
     else {
-        job = (int64_t)member_number(reply.json, "id", 0.0);
+        job = member_whole(reply.json, "id", 0);
         print_job(&s, reply.json);
     }
     pack_close(s.pack);

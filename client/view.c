@@ -64,7 +64,7 @@ static void take_metric(struct view *v, const cJSON *data) {
 }
 
 void view_event(struct view *v, const char *type, const cJSON *data) {
-    v->attempt = (int)member_number(data, "attempt", v->attempt);
+    v->attempt = (int)member_whole(data, "attempt", v->attempt);
     if (strcmp(type, EVENT_STATE) == 0)
         take_state(v, data);
     else if (strcmp(type, EVENT_PROGRESS) == 0)

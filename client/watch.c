@@ -225,7 +225,7 @@ static void print_outcome(struct client *c, const cJSON *job) {
     const char *state = member_text(job, "state");
     double started = time_parse(member_text(job, "started_at"));
     double finished = time_parse(member_text(job, "finished_at"));
-    long long id = (long long)member_number(job, "id", 0.0);
+    long long id = member_whole(job, "id", 0);
     FILE *out = c->out.out;
     terminal_clear(&c->out);
     fprintf(out, "job %lld %s%s%s", id, terminal_colour(&c->out, state_colour(state)), state,
