@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
+#include "server/export/mitsuba.h"
 
 static enum status write_glb(const char *dir, const struct export_input *input,
                              const struct parts *parts, struct error *err) {
@@ -31,8 +32,26 @@ static enum status write_mtl(const char *dir, const struct export_input *input,
     return status;
 }
 
+static enum status write_xml(const char *dir, const struct export_input *input,
+                             const struct parts *parts, struct error *err) {
+    char *path = file_join(dir, "scene.xml");
+    enum status status = mitsuba_xml_write(path, input, parts, "scene.serialized", err);
+    mem_free(path);
+    return status;
+}
+
+static enum status write_shapes(const char *dir, const struct export_input *input,
+                                const struct parts *parts, struct error *err) {
+    char *path = file_join(dir, "scene.serialized");
+    enum status status = mitsuba_shapes_write(path, input, parts, err);
+    mem_free(path);
+    return status;
+}
+
 const struct format formats[FORMATS_COUNT] = {
     {"scene.glb", "model/gltf-binary", "the room as glTF 2.0, for Blender and others", write_glb},
     {"scene.obj", "model/obj", "the mesh with its atlas coordinates", write_obj},
     {"scene.mtl", "model/mtl", "the materials of scene.obj; wants base_color.png", write_mtl},
+    {"scene.xml", "application/xml", "the room for Mitsuba 3; wants scene.serialized and the textures", write_xml},
+    {"scene.serialized", "application/octet-stream", "the shapes of scene.xml", write_shapes},
 };

@@ -14,7 +14,7 @@ struct format {
                          struct error *err);
 };
 
-#define FORMATS_COUNT 3
+#define FORMATS_COUNT 5
 extern const struct format formats[FORMATS_COUNT]; /* in the order in which they are written */
 
 #endif

@@ -21,12 +21,13 @@
  *   scene.ply        the mesh with its atlas coordinates (mesh_ply.h)
  *   scene.glb        all of it but distant light, as glTF (glb.h)
  *   scene.obj scene.mtl   the mesh, with base_color.png (mesh_obj.h)
+ *   scene.xml scene.serialized   the room for Mitsuba 3, with the EXR files (mitsuba.h)
  *   compare/NNN.png  a held-out photograph | its re-render | their difference
  *   views.json       the cameras of these (views_json.h)
  *   report.json      every setting, version, stage time and metric
  *   report.html      the same for the eye; needs no other file and no network
  *
- * Those of glb.h and mesh_obj.h are left out where they would have too many objects or bytes;
+ * Those of glb.h, mesh_obj.h and mitsuba.h are left out where they would have too many objects or bytes;
  * report.json says so under "left_out". */
 #ifndef UNBAKE_EXPORT_OUTPUTS_H
 #define UNBAKE_EXPORT_OUTPUTS_H

@@ -34,7 +34,7 @@ try() {
     equal "$(jq "$found" "$work/$name.json")" 2 "$name: emitters found"
     equal "$(jq "$false_found" "$work/$name.json")" 0 "$name: emitters that are none"
     for file in base_color.exr roughness.exr specular.exr emission.exr confidence.exr base_color.png scene.ply \
-        scene.glb scene.obj scene.mtl report.json report.html preview/base_color.png; do
+        scene.glb scene.obj scene.mtl scene.xml scene.serialized report.json report.html preview/base_color.png; do
         [ -s "$work/$name.out/$file" ] || fail "$name: $file is missing"
     done
 }

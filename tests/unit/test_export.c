@@ -144,7 +144,7 @@ static void test_report(const char *dir, size_t segments) {
     char *path = file_join(dir, "report.json");
     CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)segments);
-    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 17);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 19);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
     cJSON_Delete(report);
     mem_free(path);
@@ -276,7 +276,7 @@ int main(void) {
     heard = (struct announced){.dir = dir};
     enum status status = export_outputs(dir, &in, hear, &heard, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
-    CHECK_THAT(heard.previews == 5 && heard.outputs == 14, "%d, %d", heard.previews, heard.outputs);
+    CHECK_THAT(heard.previews == 5 && heard.outputs == 16, "%d, %d", heard.previews, heard.outputs);
     CHECK_STRING(heard.last, "report.html");
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
