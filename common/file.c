@@ -121,7 +121,9 @@ enum status file_make_dirs(const char *path, struct error *err) {
             continue;
         char kept = *at;
         *at = '\0';
-        if (mkdir(partial, 0750) != 0 && errno != EEXIST)
+        if (mkdir(partial, 0750) == 0)
+            status = file_sync_parent(partial, err);
+        else if (errno != EEXIST)
             status = error_set_errno(err, errno, "cannot create folder %s", partial);
         *at = kept;
         if (kept == '\0')

@@ -27,7 +27,8 @@ enum status file_write_all(int fd, const void *data, size_t length, const char *
 /* fsync of the folder that holds `path`, so that a rename in it is durable. */
 enum status file_sync_parent(const char *path, struct error *err);
 
-/* Creates the folder and its parents (0750); an existing one is no error. */
+/* Creates the folder and its parents (0750), whose names are on disk then; an existing one is no
+ * error. */
 enum status file_make_dirs(const char *path, struct error *err);
 
 /* Removes a file or a whole tree, never following a symbolic link; absent is no error. */

@@ -129,8 +129,10 @@ static inline double daemon_start(struct daemon *d) {
             _exit(1);
         if (!freopen(d->log, "a", stderr) || !freopen("/dev/null", "w", stdout))
             _exit(126);
-        if (d->preload)
+        if (d->preload) {
             setenv("LD_PRELOAD", d->preload, 1);
+            setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 1); /* it wants to come first, and does well second */
+        }
         execv(d->binary, (char *const *)(uintptr_t)argv);
         _exit(127);
     }
