@@ -48,7 +48,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
 .PHONY: all help deps man deb demo test tests benches bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
-        fuzzers fuzz-build coverage install clean
+        fuzzers fuzz-build coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -168,6 +168,16 @@ fuzz-build:
 	@$(MAKE) --no-print-directory B=build/fuzz CC=clang CFLAGS="-O1 -g" FUZZ_DRIVER= LDFLAGS=-fsanitize=fuzzer \
 	    SANITIZE="-fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all \
 	    -fno-omit-frame-pointer" fuzzers
+
+coverage: deps ## run the tests and say what share of the code they reach; writes build/coverage.json; T=name runs one
+	@deploy/install-deps.sh coverage
+	@+$(BUILD) coverage-build
+	@tests/coverage.sh build/coverage "$(T)"
+
+# Counts are written when a process ends, also by workers, which may write nowhere else any more.
+coverage-build:
+	@$(MAKE) --no-print-directory B=build/coverage CFLAGS="-O1 -g" SANITIZE="--coverage -fprofile-update=atomic" \
+	    CPPFLAGS='-DCOVERAGE_DIR=\"$(CURDIR)/build/coverage/obj\"' tests
 
 # Manual pages and completions come out of the programs, from the tables of their --help.
 MANUALS = $(B)/man/unbake.1 $(B)/man/unbaked.8 $(B)/man/unbaked.conf.5
