@@ -164,8 +164,10 @@ fuzz: deps ## search for crashes with libFuzzer, FUZZ_SECONDS (60) a target; wri
 	@FUZZ_SECONDS=$(FUZZ_SECONDS) tests/fuzz/fuzz.sh $(B) "$(T)"
 
 fuzzers: $(FUZZ_BIN)
+# clang has another way to say that a sanitizer is there.
 fuzz-build:
 	@$(MAKE) --no-print-directory B=build/fuzz CC=clang CFLAGS="-O1 -g" FUZZ_DRIVER= LDFLAGS=-fsanitize=fuzzer \
+	    CPPFLAGS=-D__SANITIZE_ADDRESS__=1 \
 	    SANITIZE="-fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=all \
 	    -fno-omit-frame-pointer" fuzzers
 

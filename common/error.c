@@ -5,13 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/utf8.h"
-
 static void fill(struct error *err, enum status status, const char *format, va_list args) {
     err->status = status;
     err->hint[0] = '\0';
     vsnprintf(err->message, sizeof err->message, format, args);
-    utf8_trim_end(err->message);
 }
 
 enum status error_set(struct error *err, enum status status, const char *format, ...) {
@@ -54,7 +51,6 @@ enum status error_prefix(struct error *err, const char *format, ...) {
     if (used >= 0 && (size_t)used < sizeof err->message)
         snprintf(err->message + used, sizeof err->message - (size_t)used, ": %.*s",
                  (int)(sizeof err->message - (size_t)used), old);
-    utf8_trim_end(err->message);
     return err->status;
 }
 
@@ -65,7 +61,6 @@ enum status error_hint(struct error *err, const char *format, ...) {
     va_start(args, format);
     vsnprintf(err->hint, sizeof err->hint, format, args);
     va_end(args);
-    utf8_trim_end(err->hint);
     return err->status;
 }
 

@@ -227,8 +227,20 @@ void json_add(cJSON *object, const char *key, cJSON *value) {
     cJSON_AddItemToObject(object, key, value);
 }
 
+cJSON *json_new_string(const char *text) {
+    cJSON *value = cJSON_CreateString(text);
+    char *at = value->valuestring;
+    size_t length = strlen(at), bad;
+    while (!utf8_valid(at, length, &bad)) {
+        at[bad] = '?';
+        at += bad + 1;
+        length -= bad + 1;
+    }
+    return value;
+}
+
 void json_add_string(cJSON *object, const char *key, const char *value) {
-    json_add(object, key, value ? cJSON_CreateString(value) : cJSON_CreateNull());
+    json_add(object, key, value ? json_new_string(value) : cJSON_CreateNull());
 }
 
 void json_add_number(cJSON *object, const char *key, double value) {

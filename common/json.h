@@ -36,6 +36,10 @@ enum status json_string(const cJSON *object, const char *key, const char *what,
 enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback,
                       bool *value, struct error *err);
 
+/* A string. What is not UTF-8 in it (a file's name, a sentence cut within a character) becomes '?',
+ * so that what we write can always be read. */
+cJSON *json_new_string(const char *text);
+
 /* Adding members to an object under construction. */
 void json_add_string(cJSON *object, const char *key, const char *value); /* NULL: JSON null */
 void json_add_number(cJSON *object, const char *key, double value); /* non-finite: JSON null */

@@ -1,8 +1,6 @@
 /* utf8.c -- see utf8.h. */
 #include "common/utf8.h"
 
-#include <string.h>
-
 bool utf8_valid(const char *text, size_t length, size_t *bad) {
     const unsigned char *s = (const unsigned char *)text;
     size_t i = 0;
@@ -24,16 +22,4 @@ bool utf8_valid(const char *text, size_t length, size_t *bad) {
         i += extra + 1;
     }
     return true;
-}
-
-void utf8_trim_end(char *text) {
-    char *end = text + strlen(text), *at = end;
-    while (at > text && end - at < 3 && (at[-1] & 0xc0) == 0x80)
-        at--;
-    if (at == text)
-        return;
-    unsigned char lead = (unsigned char)*--at;
-    int bytes = lead < 0xc0 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-    if (bytes > 1 && end - at < bytes)
-        *at = '\0';
 }

@@ -9,7 +9,4 @@
  * *bad (may be NULL) is the offset of the first sequence at fault. */
 bool utf8_valid(const char *text, size_t length, size_t *bad);
 
-/* Takes away what is left of a character at the end of text that was cut at some byte. */
-void utf8_trim_end(char *text);
-
 #endif

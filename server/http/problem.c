@@ -8,7 +8,6 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "common/utf8.h"
 
 static const struct kind {
     int status;
@@ -41,16 +40,6 @@ static const struct kind *kind_of(int status) {
     return kind_of(500);
 }
 
-/* A copy of a sentence that may quote the caller's bytes, cut anywhere: always UTF-8. */
-static void add_sentence(cJSON *object, const char *key, const char *sentence) {
-    char *text = mem_strdup(sentence);
-    size_t length = strlen(text), bad;
-    while (!utf8_valid(text, length, &bad))
-        text[bad] = '?';
-    json_add_string(object, key, text);
-    mem_free(text);
-}
-
 struct response *problem_full(const struct request *r, int status, const char *detail,
                               const char *hint, cJSON *members) {
     const struct kind *kind = kind_of(status);
@@ -60,7 +49,7 @@ struct response *problem_full(const struct request *r, int status, const char *d
     json_add_string(body, "type", type);
     json_add_string(body, "title", kind->title);
     json_add_int(body, "status", status);
-    add_sentence(body, "detail", detail);
+    json_add_string(body, "detail", detail);
     json_add_string(body, "instance", r->target.path ? r->target.path : "");
     json_add_string(body, "request_id", r->id);
     if (hint && *hint)
@@ -96,7 +85,7 @@ void problem_param(cJSON *params, const char *name, const char *hint, const char
     va_end(args);
     cJSON *param = cJSON_CreateObject();
     json_add_string(param, "name", name);
-    add_sentence(param, "reason", reason);
+    json_add_string(param, "reason", reason);
     if (hint)
         json_add_string(param, "hint", hint);
     cJSON_AddItemToArray(params, param);

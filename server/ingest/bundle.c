@@ -388,7 +388,7 @@ cJSON *bundle_facts(const struct scene *scene) {
     json_add_int(facts, "pixel_count", (int64_t)pixel_count);
     json_add(facts, "exposure", exposure_facts(scene));
     for (size_t i = 0; i < scene->warning_count; i++)
-        cJSON_AddItemToArray(warnings, cJSON_CreateString(scene->warning[i]));
+        cJSON_AddItemToArray(warnings, json_new_string(scene->warning[i]));
     json_add(facts, "warnings", warnings);
     return facts;
 }

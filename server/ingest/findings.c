@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "common/utf8.h"
 
 void findings_release(struct findings *f) {
     for (size_t i = 0; i < f->warning_count && i < FINDINGS_MAX; i++)
@@ -41,7 +40,6 @@ void findings_problem(struct findings *f, const char *file, const char *format, 
     va_start(args, format);
     vsnprintf(reason, sizeof reason, format, args);
     va_end(args);
-    utf8_trim_end(reason);
     add_problem(f, file, reason, "");
 }
 
@@ -57,7 +55,6 @@ void findings_warning(struct findings *f, const char *format, ...) {
     va_start(args, format);
     vsnprintf(sentence, sizeof sentence, format, args);
     va_end(args);
-    utf8_trim_end(sentence);
     f->warning = mem_realloc_array(f->warning, f->warning_count, sizeof *f->warning);
     f->warning[f->warning_count - 1] = mem_strdup(sentence);
 }

@@ -12,7 +12,6 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "common/utf8.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
 #include "server/worker/progress.h"
@@ -397,8 +396,6 @@ static void say(struct verdict *v, enum outcome outcome, const char *reason, con
     v->outcome = outcome;
     snprintf(v->reason, sizeof v->reason, "%s", reason);
     snprintf(v->hint, sizeof v->hint, "%s", hint ? hint : "");
-    utf8_trim_end(v->reason); /* they end in JSON */
-    utf8_trim_end(v->hint);
 }
 
 static void judge_signal(const struct attempt *a, struct verdict *v) {

@@ -1,12 +1,23 @@
 /* order.c -- see order.h. */
 #include "server/worker/order.h"
 
+#include <limits.h>
+#include <math.h>
 #include <string.h>
 
 #include "common/file.h"
 #include "common/mem.h"
 
 #define WHAT "job.json"
+
+/* A whole number from 0 to `most`. */
+static enum status read_whole(const struct order *o, const char *key, double fallback, double most, double *value,
+                              struct error *err) {
+    enum status status = json_number(o->json, key, WHAT, fallback, value, err);
+    if (status == STATUS_OK && !(*value >= 0.0 && *value <= most && *value == floor(*value)))
+        status = error_set(err, STATUS_INTERNAL, WHAT ": %s is %g", key, *value);
+    return status;
+}
 
 static enum status read_reconstruct(struct order *o, struct error *err) {
     double job_id, attempt;
@@ -16,9 +27,9 @@ static enum status read_reconstruct(struct order *o, struct error *err) {
     if (status == STATUS_OK)
         status = json_string(o->json, "reduced", WHAT, "", &o->reduced, err);
     if (status == STATUS_OK)
-        status = json_number(o->json, "job_id", WHAT, 0.0, &job_id, err);
+        status = read_whole(o, "job_id", 0.0, 0x1p53, &job_id, err);
     if (status == STATUS_OK)
-        status = json_number(o->json, "attempt", WHAT, 0.0, &attempt, err);
+        status = read_whole(o, "attempt", 0.0, INT_MAX, &attempt, err);
     if (status == STATUS_OK)
         status = json_number(o->json, "checkpoint_interval_sec", WHAT, 60.0,
                              &o->checkpoint_interval_sec, err);
@@ -54,9 +65,9 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = json_string(o->json, "scene_id", WHAT, "", &o->scene_id, err);
     if (status == STATUS_OK)
-        status = json_number(o->json, "thread_count", WHAT, 1.0, &thread_count, err);
+        status = read_whole(o, "thread_count", 1.0, INT_MAX, &thread_count, err);
     if (status == STATUS_OK)
-        status = json_number(o->json, "memory_bytes", WHAT, 0.0, &memory_bytes, err);
+        status = read_whole(o, "memory_bytes", 0.0, 0x1p53, &memory_bytes, err);
     if (status == STATUS_OK)
         status = json_bool(o->json, "sandbox", WHAT, true, &o->sandbox, err);
     if (status == STATUS_OK) {

@@ -22,8 +22,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         path_is_litter(clean);
         MUST(!strchr(path_base(clean), '/') && !strchr(path_extension(clean), '.'));
     } else {
-        MUST(err.status == STATUS_INPUT && !clean);
-        MUST(err.message[0] != '\0' && utf8_valid(err.message, strlen(err.message), NULL));
+        MUST(err.status == STATUS_INPUT && !clean && err.message[0] != '\0');
     }
     if (get_name_is_safe(name))
         check_below(name);

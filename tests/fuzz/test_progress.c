@@ -7,7 +7,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "common/utf8.h"
+#include "server/http/views.h"
 #include "server/job/attempt.h"
 #include "server/job/figures.h"
 #include "server/worker/progress.h"
@@ -84,7 +84,11 @@ static void check_job(int64_t id) {
     struct job job;
     MUST(store_event_list(store, id, 0, 1000, check_event, NULL, NULL) == STATUS_OK);
     MUST(store_job_get(store, id, &job, NULL) == STATUS_OK);
-    MUST(utf8_valid(job.reason, strlen(job.reason), NULL) && utf8_valid(job.hint, strlen(job.hint), NULL));
+    cJSON *view = view_job(&job);
+    char *text = json_text(view);
+    check_json(text);
+    mem_free(text);
+    cJSON_Delete(view);
     job_release(&job);
 }
 

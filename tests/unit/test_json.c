@@ -113,7 +113,20 @@ static void test_suite(void) {
     CHECK(seen > 300);
 }
 
+/* What is no UTF-8 is made so: what we write can always be read. */
+static void test_strings(void) {
+    static const char *const pairs[][2] = {
+        {"Küche", "Küche"}, {"K\xC3", "K?"}, {"\xFF\xFE" "a", "??a"}, {"a\xE2\x82 b", "a?? b"}, {"", ""}};
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        cJSON *object = cJSON_CreateObject();
+        json_add_string(object, "a", pairs[i][0]);
+        CHECK_STRING(cJSON_GetStringValue(object->child), pairs[i][1]);
+        cJSON_Delete(object);
+    }
+}
+
 int main(void) {
+    test_strings();
     test_refusals();
     test_members();
     test_numbers();
