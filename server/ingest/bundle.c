@@ -199,7 +199,7 @@ static char *find_mesh(const char *root, const char *transforms_name, const stru
 
 static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit,
                              struct scene *scene, struct findings *f, struct error *err) {
-    struct ply_report report;
+    struct faces_report report;
     struct error own;
     char *path = file_join(root, name);
     size_t limit = triangle_limit < MESH_MAX_TRIANGLES ? (size_t)triangle_limit : MESH_MAX_TRIANGLES;

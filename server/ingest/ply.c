@@ -5,21 +5,16 @@
  * line; further values on it are ignored, missing ones are an error. */
 #include "server/ingest/ply.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "common/mem.h"
+#include "server/ingest/mapping.h"
 #include "server/ingest/ply_header.h"
-#include "server/ingest/polygon.h"
 
 #define MAX_TOKEN 64 /* characters of a number */
 
@@ -240,19 +235,8 @@ static enum status read_vertices(struct reader *r, const struct ply_element *e, 
     return STATUS_OK;
 }
 
-/* Where faces go, and room for one polygon. */
-struct face_sink {
-    struct mesh *mesh;
-    size_t capacity, limit; /* triangles */
-    bool has_object_id;
-    size_t corner_count;
-    uint32_t corner[POLYGON_MAX_CORNERS];
-    vec3 position[POLYGON_MAX_CORNERS];
-    uint32_t triangle[POLYGON_MAX_CORNERS][3];
-};
-
 static enum status read_corners(struct reader *r, const struct ply_property *p,
-                                struct face_sink *sink) {
+                                struct faces *faces) {
     uint64_t count;
     enum status status = read_list_count(r, p, &count);
     if (status == STATUS_OK && count > POLYGON_MAX_CORNERS)
@@ -262,49 +246,17 @@ static enum status read_corners(struct reader *r, const struct ply_property *p,
         status = read_value(r, p->type, &value);
         if (status != STATUS_OK)
             break;
-        if (!(value >= 0.0 && value < (double)sink->mesh->vertex_count) || value != floor(value)) {
+        if (!(value >= 0.0 && value < (double)faces->mesh->vertex_count) || value != floor(value)) {
             char what[128];
             snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu",
-                     value, sink->mesh->vertex_count - 1);
-            return value_error(r, sink->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
+                     value, faces->mesh->vertex_count - 1);
+            return value_error(r, faces->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
         }
-        sink->corner[i] = (uint32_t)value;
-        sink->position[i] = sink->mesh->position[sink->corner[i]];
+        faces->corner[i] = (uint32_t)value;
+        faces->position[i] = faces->mesh->position[faces->corner[i]];
     }
-    sink->corner_count = (size_t)count;
+    faces->corner_count = (size_t)count;
     return status;
-}
-
-static void reserve_triangles(struct face_sink *sink, size_t wanted) {
-    if (wanted <= sink->capacity)
-        return;
-    struct mesh *mesh = sink->mesh;
-    size_t grown = sink->capacity + sink->capacity / 2;
-    sink->capacity = grown > wanted ? grown : wanted;
-    mesh->index = mem_realloc_array(mesh->index, sink->capacity, sizeof *mesh->index);
-    mesh->face = mem_realloc_array(mesh->face, sink->capacity, sizeof *mesh->face);
-    if (sink->has_object_id)
-        mesh->object_id = mem_realloc_array(mesh->object_id, sink->capacity, sizeof *mesh->object_id);
-}
-
-static enum status add_face(struct reader *r, struct face_sink *sink, size_t face,
-                            int64_t object_id) {
-    struct mesh *mesh = sink->mesh;
-    size_t made = sink->corner_count - 2;
-    if (made > sink->limit - mesh->triangle_count)
-        return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit",
-                         r->cursor.name, sink->limit);
-    reserve_triangles(sink, mesh->triangle_count + made);
-    polygon_triangulate(sink->position, sink->corner_count, sink->triangle);
-    for (size_t i = 0; i < made; i++) {
-        size_t at = mesh->triangle_count++;
-        for (int k = 0; k < 3; k++)
-            mesh->index[at][k] = sink->corner[sink->triangle[i][k]];
-        mesh->face[at] = (uint32_t)face;
-        if (sink->has_object_id)
-            mesh->object_id[at] = object_id;
-    }
-    return STATUS_OK;
 }
 
 static enum status find_face_properties(struct reader *r, const struct ply_element *e, size_t *list,
@@ -325,27 +277,25 @@ static enum status find_face_properties(struct reader *r, const struct ply_eleme
     return STATUS_OK;
 }
 
-static enum status read_faces(struct reader *r, const struct ply_element *e, struct face_sink *sink,
-                              struct ply_report *report) {
+static enum status read_faces(struct reader *r, const struct ply_element *e, struct faces *faces) {
     size_t list = SIZE_MAX, id = SIZE_MAX;
     enum status status = find_face_properties(r, e, &list, &id);
     if (status == STATUS_OK)
         status = begin_element(r, e);
     if (status != STATUS_OK)
         return status;
-    if (e->count > sink->limit)
+    if (e->count > faces->limit)
         return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu",
-                         r->cursor.name, e->count, sink->limit);
-    sink->mesh->face_count = (size_t)e->count;
-    sink->has_object_id = id != SIZE_MAX;
-    reserve_triangles(sink, sink->mesh->face_count);
-    for (size_t i = 0; i < sink->mesh->face_count; i++) {
+                         r->cursor.name, e->count, faces->limit);
+    faces->has_object_id = id != SIZE_MAX;
+    faces_reserve(faces, (size_t)e->count);
+    for (size_t i = 0; i < e->count; i++) {
         double object_id = 0.0;
         status = begin_record(r, i);
         for (size_t k = 0; status == STATUS_OK && k < e->property_count; k++) {
             const struct ply_property *p = &r->header.property[e->first + k];
             if (k == list)
-                status = read_corners(r, p, sink);
+                status = read_corners(r, p, faces);
             else if (k == id)
                 status = read_value(r, p->type, &object_id);
             else
@@ -354,22 +304,17 @@ static enum status read_faces(struct reader *r, const struct ply_element *e, str
         if (status != STATUS_OK)
             return status;
         end_record(r);
-        if (sink->corner_count < 3) {
-            report->small_count++;
-            continue;
-        }
-        report->polygon_count += sink->corner_count > 4;
         /* In text nothing holds the value to its type; out of range would be undefined. */
         if (!(fabs(object_id) < 0x1p53) || object_id != floor(object_id))
             return value_error(r, "has an object_id that is no integer");
-        status = add_face(r, sink, i, (int64_t)object_id);
+        status = faces_add(faces, (int64_t)object_id, r->err);
         if (status != STATUS_OK)
             return status;
     }
     return STATUS_OK;
 }
 
-static enum status read_body(struct reader *r, struct face_sink *sink, struct ply_report *report) {
+static enum status read_body(struct reader *r, struct faces *faces) {
     bool has_vertices = false, has_faces = false;
     const struct ply_element *later = NULL; /* faces that come before the vertices */
     size_t later_at = 0, later_line = 0;
@@ -378,11 +323,11 @@ static enum status read_body(struct reader *r, struct face_sink *sink, struct pl
         enum status status;
         if (!has_vertices && strcmp(e->name, "vertex") == 0) {
             has_vertices = true;
-            status = read_vertices(r, e, sink->mesh);
+            status = read_vertices(r, e, faces->mesh);
         } else if (!has_faces && strcmp(e->name, "face") == 0) {
             has_faces = true;
             if (has_vertices) {
-                status = read_faces(r, e, sink, report);
+                status = read_faces(r, e, faces);
             } else {
                 later = e;
                 later_at = r->cursor.at;
@@ -405,81 +350,52 @@ static enum status read_body(struct reader *r, struct face_sink *sink, struct pl
         return STATUS_OK;
     r->cursor.at = later_at;
     r->cursor.line = later_line;
-    return read_faces(r, later, sink, report);
+    return read_faces(r, later, faces);
 }
 
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct ply_report *report, struct error *err) {
-    struct ply_report own_report;
-    if (!report)
-        report = &own_report;
-    *report = (struct ply_report){0};
+                      struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     struct reader *r = mem_calloc(1, sizeof *r);
-    struct face_sink *sink = mem_calloc(1, sizeof *sink);
+    struct faces *faces = faces_new(mesh, name, triangle_limit, false);
     r->cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
     r->err = err;
-    sink->mesh = mesh;
-    sink->limit = triangle_limit < MESH_MAX_TRIANGLES ? triangle_limit : MESH_MAX_TRIANGLES;
     enum status status = ply_header_parse(&r->cursor, &r->header, err);
     if (status == STATUS_OK)
-        status = read_body(r, sink, report);
+        status = read_body(r, faces);
     if (status != STATUS_OK)
         mesh_release(mesh);
-    mem_free(sink);
+    if (report)
+        *report = faces->report;
+    mem_free(faces);
     mem_free(r);
     return status;
 }
 
-/* The whole file in memory, until munmap. Nobody else writes to an unpacked bundle, so
- * the mapping does not shrink under us. */
-static enum status map_file(const char *path, const char *name, void **data, size_t *size,
-                            struct error *err) {
-    enum status status = STATUS_OK;
-    struct stat info;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0)
-        return error_set_errno(err, errno, "cannot open %s", name);
-    if (fstat(fd, &info) != 0) {
-        status = error_set_errno(err, errno, "cannot ask for the size of %s", name);
-    } else if (!S_ISREG(info.st_mode) || info.st_size == 0) {
-        status = error_set(err, STATUS_INPUT, "%s is not a PLY file: it is %s", name,
-                           S_ISREG(info.st_mode) ? "empty" : "no regular file");
-    } else {
-        *size = (size_t)info.st_size;
-        *data = mmap(NULL, *size, PROT_READ, MAP_PRIVATE, fd, 0);
-        if (*data == MAP_FAILED)
-            status = error_set_errno(err, errno, "cannot map %s", name);
-    }
-    close(fd);
-    return status;
-}
+#define KIND "a PLY file"
 
 enum status ply_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct ply_report *report, struct error *err) {
-    void *data;
-    size_t size;
+                     struct faces_report *report, struct error *err) {
+    struct mapping file;
     *mesh = (struct mesh){0};
-    enum status status = map_file(path, name, &data, &size, err);
-    if (status != STATUS_OK)
-        return status;
-    status = ply_parse(data, size, name, triangle_limit, mesh, report, err);
-    munmap(data, size);
+    enum status status = mapping_open(&file, path, name, KIND, err);
+    if (status == STATUS_OK)
+        status = ply_parse(file.data, file.size, name, triangle_limit, mesh, report, err);
+    mapping_close(&file);
     return status;
 }
 
 enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err) {
-    void *data;
-    size_t size;
-    enum status status = map_file(path, name, &data, &size, err);
+    struct mapping file;
+    enum status status = mapping_open(&file, path, name, KIND, err);
     if (status != STATUS_OK)
         return status;
     struct ply_header *header = mem_alloc(sizeof *header);
-    struct ply_cursor cursor = {.name = name, .data = data, .size = size};
+    struct ply_cursor cursor = {.name = name, .data = file.data, .size = file.size};
     status = ply_header_parse(&cursor, header, err);
     const struct ply_element *face = status == STATUS_OK ? ply_find_element(header, "face") : NULL;
     *count = face ? face->count : 0;
     mem_free(header);
-    munmap(data, size);
+    mapping_close(&file);
     return status;
 }

@@ -11,22 +11,18 @@
 #include <stdint.h>
 
 #include "common/error.h"
+#include "server/ingest/faces.h"
 #include "server/scene/mesh.h"
-
-struct ply_report {
-    size_t polygon_count;  /* faces with more than four corners, cut into triangles */
-    size_t small_count;    /* faces with fewer than three corners, left out */
-};
 
 /* Reads `path` into *mesh, the caller's (mesh_release); vertex numbers are in range, nothing
  * else about the geometry is checked (mesh_check does). More than triangle_limit triangles are
  * STATUS_LIMIT. `name` is the file's name in messages; report may be NULL. */
 enum status ply_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
-                     struct ply_report *report, struct error *err);
+                     struct faces_report *report, struct error *err);
 
 /* The same from memory. */
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct ply_report *report, struct error *err);
+                      struct mesh *mesh, struct faces_report *report, struct error *err);
 
 /* How many faces the header promises; 0 for a point cloud. */
 enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);

@@ -6,14 +6,14 @@
 
 #define CUBE_CORNERS "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
 
-static enum status parse(const char *text, struct mesh *mesh, struct ply_report *report,
+static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report,
                          struct error *err) {
     return ply_parse(text, strlen(text), "mesh.ply", 1000, mesh, report, err);
 }
 
 static void test_ascii(void) {
     struct mesh mesh;
-    struct ply_report report;
+    struct faces_report report;
     struct error err;
     CHECK(parse("ply\r\nformat ascii 1.0\r\ncomment hello\r\nelement vertex 8\r\n"
                 "property double z\r\nproperty list uchar float spare\r\nproperty float x\r\n"

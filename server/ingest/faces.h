@@ -1,0 +1,40 @@
+/* faces.h -- polygons on their way into a mesh: cut into triangles, held against a limit. What the
+ * readers of meshes share. */
+#ifndef UNBAKE_INGEST_FACES_H
+#define UNBAKE_INGEST_FACES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/ingest/polygon.h"
+#include "server/scene/mesh.h"
+
+struct faces_report {
+    size_t polygon_count;  /* faces with more than four corners, cut into triangles */
+    size_t small_count;    /* faces with fewer than three corners, left out */
+};
+
+struct faces {
+    struct mesh *mesh;
+    const char *name;                     /* of the file, for messages */
+    size_t capacity, limit;               /* triangles */
+    bool has_object_id;                   /* whether mesh->object_id is filled */
+    struct faces_report report;
+    size_t corner_count;                  /* the polygon to be added: */
+    uint32_t corner[POLYGON_MAX_CORNERS]; /* its vertices */
+    vec3 position[POLYGON_MAX_CORNERS];   /* and where they are */
+    uint32_t triangle[POLYGON_MAX_CORNERS][3];
+};
+
+/* At most triangle_limit triangles will be taken; an empty *mesh gets them. The caller's (mem_free). */
+struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_limit, bool has_object_id);
+
+/* Makes room for so many triangles in all. */
+void faces_reserve(struct faces *f, size_t triangle_count);
+
+/* Adds the polygon as the face number mesh->face_count of the input, which is counted up. */
+enum status faces_add(struct faces *f, int64_t object_id, struct error *err);
+
+#endif
