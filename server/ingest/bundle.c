@@ -12,9 +12,9 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/archive.h"
+#include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
-#include "server/ingest/ply.h"
 #include "server/ingest/transforms.h"
 
 struct bundle_limits bundle_default_limits(void) {
@@ -131,52 +131,67 @@ static enum status load_transforms(const char *root, const char *name, struct tr
 
 static bool has_faces(const char *root, const char *name) {
     char *path = file_join(root, name);
-    uint64_t count = 0;
-    enum status status = ply_count_faces(path, name, &count, NULL);
+    bool has = mesh_file_has_faces(path, name);
     mem_free(path);
-    /* A damaged file is taken, so that reading it says what is wrong. */
-    return status == STATUS_INPUT || count > 0;
+    return has;
 }
 
-/* The only PLY with faces at the top; NULL with a problem when there is none or more. */
+/* What the files at the top are, as far as a mesh is looked for. */
+struct candidates {
+    char **name; /* [count] sorted */
+    size_t count;
+    size_t point_cloud_count;
+    const char *first, *second; /* meshes */
+    const char *unknown;        /* a mesh of a format that is not read */
+};
+
+/* Of PLY files, or of those of the other formats that are read. */
+static void find_candidates(struct candidates *c, const char *root, bool ply) {
+    static const char *const unknown[] = {"gltf", "glb", "stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
+    for (size_t i = 0; i < c->count; i++) {
+        const char *extension = path_extension(c->name[i]);
+        for (size_t k = 0; k < sizeof unknown / sizeof *unknown; k++)
+            if (strcasecmp(extension, unknown[k]) == 0)
+                c->unknown = c->name[i];
+        if (!mesh_file_is_known(c->name[i]) || (strcasecmp(extension, "ply") == 0) != ply)
+            continue;
+        if (!has_faces(root, c->name[i]))
+            c->point_cloud_count++;
+        else if (!c->first)
+            c->first = c->name[i];
+        else if (!c->second)
+            c->second = c->name[i];
+    }
+}
+
+/* The only PLY with faces at the top; where there is none, the only mesh of another format. NULL with
+ * a problem when there is none or more. */
 static char *search_mesh(const char *root, struct findings *f) {
-    static const char *const other_kinds[] = {"obj", "gltf", "glb", "stl", "fbx", "off", "usd", "usdz"};
-    char **names, *found = NULL, *second = NULL;
-    const char *other = NULL;
-    size_t count, points = 0;
+    struct candidates c = {0};
     struct error err;
-    if (list_folder(root, &names, &count, &err) != STATUS_OK) {
+    char *found = NULL;
+    if (list_folder(root, &c.name, &c.count, &err) != STATUS_OK) {
         findings_error(f, "mesh", &err);
         return NULL;
     }
-    for (size_t i = 0; i < count; i++) {
-        const char *extension = path_extension(names[i]);
-        for (size_t k = 0; k < sizeof other_kinds / sizeof *other_kinds; k++)
-            if (strcasecmp(extension, other_kinds[k]) == 0)
-                other = names[i];
-        if (strcasecmp(extension, "ply") != 0)
-            continue;
-        if (!has_faces(root, names[i]))
-            points++;
-        else if (!found)
-            found = mem_strdup(names[i]);
-        else if (!second)
-            second = names[i];
-    }
-    if (second) {
-        error_set(&err, STATUS_INPUT, "two meshes: %s and %s", found, second);
+    find_candidates(&c, root, true);
+    if (!c.first)
+        find_candidates(&c, root, false);
+    if (c.second) {
+        error_set(&err, STATUS_INPUT, "two meshes: %s and %s", c.first, c.second);
         error_hint(&err, "leave one, or name it in transforms.json as \"mesh\"");
-        findings_error(f, second, &err);
-        mem_free(found);
-        found = NULL;
-    } else if (!found && other) {
-        findings_problem(f, other, "no mesh: the format of %s is not read; a mesh must be PLY", other);
-    } else if (!found) {
-        findings_problem(f, "mesh.ply", points > 0
+        findings_error(f, c.second, &err);
+    } else if (c.first) {
+        found = mem_strdup(c.first);
+    } else if (c.unknown) {
+        findings_problem(f, c.unknown, "no mesh: the format of %s is not read; a mesh must be "
+                         MESH_FILE_FORMATS, c.unknown);
+    } else {
+        findings_problem(f, "mesh.ply", c.point_cloud_count > 0
                              ? "no mesh: the PLY files at the bundle's top are point clouds"
-                             : "no mesh: the bundle has no PLY file at its top");
+                             : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
     }
-    free_names(names, count);
+    free_names(c.name, c.count);
     return found;
 }
 
@@ -203,7 +218,7 @@ static enum status load_mesh(const char *root, const char *name, uint64_t triang
     struct error own;
     char *path = file_join(root, name);
     size_t limit = triangle_limit < MESH_MAX_TRIANGLES ? (size_t)triangle_limit : MESH_MAX_TRIANGLES;
-    enum status status = ply_read(path, name, limit, &scene->mesh, &report, &own);
+    enum status status = mesh_file_read(path, name, limit, &scene->mesh, &report, &own);
     mem_free(path);
     if (status == STATUS_OK)
         status = mesh_check(&scene->mesh, name, &scene->mesh_report, &own);

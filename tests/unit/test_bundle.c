@@ -19,6 +19,7 @@ static struct parallel *pool;
 #define THREE FRAME("a.exr") "," FRAME("./b.png") "," FRAME("c.exr")
 #define MESH "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" \
              "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+#define OBJ "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
 #define CLOUD "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n" \
               "end_header\n0 0 0\n"
 
@@ -283,6 +284,53 @@ static void test_bad(void) {
     }
 }
 
+static size_t triangles_of(const char **file, struct error *err) {
+    struct scene scene;
+    cJSON *problems;
+    enum status status = load(&scene, &problems, err);
+    size_t count = status == STATUS_OK ? scene.mesh.triangle_count : 0;
+    static char blamed[64];
+    const cJSON *first = cJSON_GetArrayItem(problems, 0);
+    snprintf(blamed, sizeof blamed, "%s", first ? cJSON_GetObjectItem(first, "file")->valuestring : "");
+    *file = blamed;
+    scene_release(&scene);
+    cJSON_Delete(problems);
+    return count;
+}
+
+/* Which of several meshes is taken: a PLY before others, one of a kind, or the one that is named. */
+static void test_formats(void) {
+    struct error err;
+    const char *file;
+    char *ply = file_join(work, "mesh.ply");
+    put_good();
+    put("room.obj", OBJ);
+    CHECK(triangles_of(&file, &err) == 1);
+    put("transforms.json", TOP("\"mesh\":\"room.obj\","));
+    CHECK_THAT(triangles_of(&file, &err) == 1, "%s", err.message); /* the other side repeats it */
+    put("transforms.json", TOP(""));
+    CHECK(remove(ply) == 0 && triangles_of(&file, &err) == 1);
+    put("mesh.ply", CLOUD);
+    CHECK(triangles_of(&file, &err) == 1);
+    put("room2.OBJ", OBJ);
+    CHECK(triangles_of(&file, &err) == 0 && strstr(err.message, "two meshes: room.obj and room2.OBJ"));
+    put("room2.OBJ", "");
+    put("room.obj", "v 1 2");
+    CHECK(triangles_of(&file, &err) == 0);
+    mem_free(ply);
+    put_good();
+    ply = file_join(work, "mesh.ply");
+    CHECK(remove(ply) == 0);
+    put("room.obj", OBJ "f 1 2 9\n");
+    CHECK(triangles_of(&file, &err) == 0 && strstr(err.message, "room.obj, line 8"));
+    CHECK_STRING(file, "room.obj");
+    put_good();
+    CHECK(remove(ply) == 0);
+    put("room.fbx", "Kaydara");
+    CHECK(triangles_of(&file, &err) == 0 && strstr(err.message, "format of room.fbx is not read"));
+    mem_free(ply);
+}
+
 /* Everything at once, and more problems than are kept. */
 static void test_many(void) {
     put_good();
@@ -447,6 +495,7 @@ int main(void) {
     test_exif();
     test_variants();
     test_bad();
+    test_formats();
     test_many();
     test_single_folder();
     test_archive();

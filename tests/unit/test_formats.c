@@ -14,6 +14,7 @@
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
 #include "server/export/sink.h"
+#include "server/ingest/obj.h"
 #include "tests/check.h"
 
 struct glb {
@@ -264,6 +265,26 @@ static void test_obj(const char *dir, const struct export_input *in, const struc
     mem_free(path);
 }
 
+/* What is read of scene.obj is the mesh, by segments. */
+static void test_obj_round(const char *dir, const struct export_input *in, const struct parts *parts) {
+    struct error err;
+    struct mesh mesh;
+    char *path = file_join(dir, "scene.obj");
+    CHECK_THAT(obj_read(path, "scene.obj", 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK(mesh.triangle_count == in->mesh->triangle_count && mesh.normal && mesh.object_id);
+    for (size_t t = 0; t < mesh.triangle_count; t++) {
+        uint32_t from = parts->order[t];
+        CHECK(parts->part[mesh.object_id[t]].segment == in->segments->of_triangle[from]);
+        for (int c = 0; c < 3; c++) {
+            uint32_t a = mesh.index[t][c], b = in->mesh->index[from][c];
+            CHECK(memcmp(&mesh.position[a], &in->mesh->position[b], sizeof(vec3)) == 0);
+            CHECK(memcmp(&mesh.normal[a], &in->mesh->normal[b], sizeof(vec3)) == 0);
+        }
+    }
+    mesh_release(&mesh);
+    mem_free(path);
+}
+
 static void test_same_bytes(const char *dir, const struct export_input *in, const struct parts *parts) {
     struct error err;
     struct buf once, twice;
@@ -364,6 +385,7 @@ int main(void) {
     CHECK(parts.count == ROOM_OBJECT_COUNT);
     test_glb(dir, &in, &parts);
     test_obj(dir, &in, &parts);
+    test_obj_round(dir, &in, &parts);
     test_same_bytes(dir, &in, &parts);
     test_failures(dir, &in, &parts);
     vec3 *normal = room.mesh.normal;

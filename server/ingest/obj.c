@@ -1,0 +1,277 @@
+/* obj.c -- see obj.h. One pass over the file in place; what it makes grows with the lines that are
+ * there, so no promise of the file has to be believed. */
+#include "server/ingest/obj.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/intern.h"
+#include "server/ingest/mapping.h"
+
+#define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
+#define NONE UINT32_MAX
+
+struct points {
+    vec3 *at; /* owned */
+    size_t count, capacity;
+};
+
+enum label { LABEL_OBJECT, LABEL_GROUP, LABEL_MATERIAL, LABEL_COUNT };
+
+struct reader {
+    const char *name;
+    const uint8_t *data;
+    size_t size, at, line_end; /* `at` is within the line */
+    size_t line, next_line;    /* numbers, from 1; a line that is continued is several */
+    struct points position, normal;
+    struct faces *faces;
+    bool has_bare;             /* a corner without normal */
+    struct intern pairs;       /* position and normal of each vertex of the mesh */
+    uint32_t (*pair)[2];       /* [pairs.count]; owned */
+    size_t pair_capacity;
+    struct intern labels, objects;
+    uint32_t label[LABEL_COUNT]; /* what holds now */
+    uint32_t object;             /* their combination, once a face has it: */
+    bool object_known;
+    struct error *err;
+};
+
+/* --- lines and tokens ----------------------------------------------------------------------- */
+
+static enum status line_error(const struct reader *r, const char *what) {
+    return error_set(r->err, STATUS_INPUT, "%s, line %zu: %s", r->name, r->line, what);
+}
+
+/* Whether the line that ends at `end` goes on in the next. */
+static bool is_continued(const struct reader *r, size_t end) {
+    if (end > r->at && r->data[end - 1] == '\r')
+        end--;
+    return end > r->at && r->data[end - 1] == '\\';
+}
+
+static bool next_line(struct reader *r) {
+    r->at = r->line_end < r->size && r->line > 0 ? r->line_end + 1 : r->line_end;
+    if (r->at >= r->size)
+        return false;
+    r->line = r->next_line;
+    for (size_t end = r->at;; end++) {
+        const uint8_t *newline = end < r->size ? memchr(r->data + end, '\n', r->size - end) : NULL;
+        r->next_line++;
+        end = newline ? (size_t)(newline - r->data) : r->size;
+        r->line_end = end;
+        if (!newline || !is_continued(r, end))
+            return true;
+    }
+}
+
+static bool is_blank(uint8_t c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\\';
+}
+
+/* The next word of the line, "" at its end. One that is too long for a number or a corner is made
+ * into something that is neither. */
+static size_t next_token(struct reader *r, char token[MAX_TOKEN]) {
+    size_t length = 0;
+    while (r->at < r->line_end && is_blank(r->data[r->at]))
+        r->at++;
+    for (; r->at < r->line_end && !is_blank(r->data[r->at]); r->at++) {
+        if (length + 1 < MAX_TOKEN)
+            token[length++] = (char)r->data[r->at];
+        else
+            token[0] = '?';
+    }
+    token[length] = '\0';
+    return length;
+}
+
+static enum status read_vec3(struct reader *r, struct points *points) {
+    char token[MAX_TOKEN], *end;
+    float value[3];
+    for (int i = 0; i < 3; i++) {
+        if (next_token(r, token) == 0)
+            return line_error(r, "three numbers are wanted");
+        value[i] = (float)strtod(token, &end);
+        if (*end != '\0' || strpbrk(token, "xX("))
+            return line_error(r, "there is a value that is not a number");
+    }
+    if (points->count == points->capacity) {
+        points->capacity = points->capacity ? 2 * points->capacity : 1024;
+        points->at = mem_realloc_array(points->at, points->capacity, sizeof *points->at);
+    }
+    if (points->count == NONE - 1)
+        return error_set(r->err, STATUS_LIMIT, "%s has more vertices than fit", r->name);
+    points->at[points->count++] = (vec3){value[0], value[1], value[2]};
+    return STATUS_OK;
+}
+
+/* --- labels --------------------------------------------------------------------------------- */
+
+static void read_label(struct reader *r, enum label kind) {
+    size_t from = r->at, to = r->line_end;
+    while (from < to && is_blank(r->data[from]))
+        from++;
+    while (to > from && is_blank(r->data[to - 1]))
+        to--;
+    r->label[kind] = intern_number(&r->labels, r->data + from, to - from);
+    r->object_known = false;
+}
+
+static uint32_t object_of_face(struct reader *r) {
+    if (!r->object_known)
+        r->object = intern_number(&r->objects, r->label, sizeof r->label);
+    r->object_known = true;
+    return r->object;
+}
+
+/* --- faces ---------------------------------------------------------------------------------- */
+
+/* An index of the file, 1 for the first of `count` or -1 for the last, as one from 0. */
+static enum status resolve(const struct reader *r, const char *text, char **end, size_t count,
+                           const char *kind, uint32_t *index) {
+    long value = strtol(text, end, 10);
+    if (*end == text)
+        return line_error(r, "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
+    if (value == 0 || value > (long)count || value < -(long)count)
+        return error_set(r->err, STATUS_INPUT, "%s, line %zu: the face refers to %s %ld, but there are %zu "
+                         "above it", r->name, r->line, kind, value, count);
+    *index = (uint32_t)(value > 0 ? value - 1 : (long)count + value);
+    return STATUS_OK;
+}
+
+/* "v", "v/vt", "v//vn", "v/vt/vn": position and, or NONE, normal. */
+static enum status read_corner(const struct reader *r, char *token, uint32_t pair[2]) {
+    char *end;
+    pair[1] = NONE;
+    enum status status = resolve(r, token, &end, r->position.count, "vertex", &pair[0]);
+    if (status != STATUS_OK || *end == '\0')
+        return status;
+    char *normal = *end == '/' ? strchr(end + 1, '/') : NULL;
+    if (normal)
+        status = resolve(r, normal + 1, &end, r->normal.count, "normal", &pair[1]);
+    else if (*end == '/')
+        strtol(end + 1, &end, 10);
+    if (status == STATUS_OK && *end != '\0')
+        status = line_error(r, "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
+    return status;
+}
+
+static uint32_t vertex_of(struct reader *r, const uint32_t pair[2]) {
+    size_t known = r->pairs.count;
+    uint32_t vertex = intern_number(&r->pairs, pair, 2 * sizeof *pair);
+    if (vertex < known)
+        return vertex;
+    if (known == r->pair_capacity) {
+        r->pair_capacity = known ? 2 * known : 1024;
+        r->pair = mem_realloc_array(r->pair, r->pair_capacity, sizeof *r->pair);
+    }
+    memcpy(r->pair[vertex], pair, 2 * sizeof *pair);
+    return vertex;
+}
+
+static enum status read_face(struct reader *r) {
+    char token[MAX_TOKEN];
+    struct faces *f = r->faces;
+    f->corner_count = 0;
+    while (next_token(r, token) > 0 && token[0] != '#') {
+        uint32_t pair[2];
+        if (f->corner_count == POLYGON_MAX_CORNERS)
+            return line_error(r, "the face has more than 1024 corners");
+        enum status status = read_corner(r, token, pair);
+        if (status != STATUS_OK)
+            return status;
+        r->has_bare = r->has_bare || pair[1] == NONE;
+        f->corner[f->corner_count] = vertex_of(r, pair);
+        f->position[f->corner_count++] = r->position.at[pair[0]];
+    }
+    return faces_add(f, object_of_face(r), r->err);
+}
+
+static enum status read_line(struct reader *r) {
+    char word[MAX_TOKEN];
+    next_token(r, word);
+    if (strcmp(word, "v") == 0)
+        return read_vec3(r, &r->position);
+    if (strcmp(word, "vn") == 0)
+        return read_vec3(r, &r->normal);
+    if (strcmp(word, "f") == 0 || strcmp(word, "fo") == 0)
+        return read_face(r);
+    if (strcmp(word, "o") == 0)
+        read_label(r, LABEL_OBJECT);
+    else if (strcmp(word, "g") == 0)
+        read_label(r, LABEL_GROUP);
+    else if (strcmp(word, "usemtl") == 0)
+        read_label(r, LABEL_MATERIAL);
+    return STATUS_OK;
+}
+
+/* --- the mesh ------------------------------------------------------------------------------- */
+
+static void finish(struct reader *r, struct mesh *mesh) {
+    mesh->vertex_count = r->pairs.count;
+    mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
+    if (!r->has_bare)
+        mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        mesh->position[v] = r->position.at[r->pair[v][0]];
+        if (mesh->normal)
+            mesh->normal[v] = r->normal.at[r->pair[v][1]];
+    }
+    if (r->objects.count < 2) {
+        mem_free(mesh->object_id);
+        mesh->object_id = NULL;
+    }
+}
+
+static enum status check_whole(const struct reader *r) {
+    if (memchr(r->data, '\0', r->size < 4096 ? r->size : 4096))
+        return error_set(r->err, STATUS_INPUT, "%s is not an OBJ file: it is not text", r->name);
+    if (r->faces->mesh->triangle_count > 0)
+        return STATUS_OK;
+    error_set(r->err, STATUS_INPUT, "%s has no faces: no line of it begins with \"f\"", r->name);
+    return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or curves");
+}
+
+enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
+                      struct mesh *mesh, struct faces_report *report, struct error *err) {
+    *mesh = (struct mesh){0};
+    struct reader *r = mem_calloc(1, sizeof *r);
+    *r = (struct reader){.name = name, .data = data, .size = size, .next_line = 1, .err = err};
+    r->faces = faces_new(mesh, name, triangle_limit, true);
+    intern_init(&r->pairs);
+    intern_init(&r->labels);
+    intern_init(&r->objects);
+    for (int i = 0; i < LABEL_COUNT; i++)
+        r->label[i] = intern_number(&r->labels, "", 0);
+    enum status status = STATUS_OK;
+    while (status == STATUS_OK && next_line(r))
+        status = read_line(r);
+    if (status == STATUS_OK)
+        status = check_whole(r);
+    if (status == STATUS_OK)
+        finish(r, mesh);
+    else
+        mesh_release(mesh);
+    if (report)
+        *report = r->faces->report;
+    intern_release(&r->objects);
+    intern_release(&r->labels);
+    intern_release(&r->pairs);
+    mem_free(r->pair);
+    mem_free(r->position.at);
+    mem_free(r->normal.at);
+    mem_free(r->faces);
+    mem_free(r);
+    return status;
+}
+
+enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                     struct faces_report *report, struct error *err) {
+    struct mapping file;
+    *mesh = (struct mesh){0};
+    enum status status = mapping_open(&file, path, name, "an OBJ file", err);
+    if (status == STATUS_OK)
+        status = obj_parse(file.data, file.size, name, triangle_limit, mesh, report, err);
+    mapping_close(&file);
+    return status;
+}
