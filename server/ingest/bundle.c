@@ -147,7 +147,7 @@ struct candidates {
 
 /* Of PLY files, or of those of the other formats that are read. */
 static void find_candidates(struct candidates *c, const char *root, bool ply) {
-    static const char *const unknown[] = {"gltf", "glb", "stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
+    static const char *const unknown[] = {"stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
     for (size_t i = 0; i < c->count; i++) {
         const char *extension = path_extension(c->name[i]);
         for (size_t k = 0; k < sizeof unknown / sizeof *unknown; k++)

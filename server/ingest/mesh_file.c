@@ -3,6 +3,7 @@
 
 #include <strings.h>
 
+#include "server/ingest/gltf.h"
 #include "server/ingest/obj.h"
 #include "server/ingest/path.h"
 #include "server/ingest/ply.h"
@@ -16,6 +17,8 @@ static const struct {
 } formats[] = {
     {"ply", ply_read},
     {"obj", obj_read},
+    {"glb", gltf_read},
+    {"gltf", gltf_read},
 };
 
 /* NULL: none. */

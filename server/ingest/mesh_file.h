@@ -9,7 +9,7 @@
 #include "server/ingest/faces.h"
 #include "server/scene/mesh.h"
 
-#define MESH_FILE_FORMATS "PLY or OBJ" /* for messages */
+#define MESH_FILE_FORMATS "PLY, OBJ or glTF" /* for messages */
 
 /* Whether there is a reader for files of this name. */
 bool mesh_file_is_known(const char *name);

@@ -14,7 +14,7 @@
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
 #include "server/export/sink.h"
-#include "server/ingest/obj.h"
+#include "server/ingest/mesh_file.h"
 #include "tests/check.h"
 
 struct glb {
@@ -265,20 +265,21 @@ static void test_obj(const char *dir, const struct export_input *in, const struc
     mem_free(path);
 }
 
-/* What is read of scene.obj is the mesh, by segments. */
-static void test_obj_round(const char *dir, const struct export_input *in, const struct parts *parts) {
+/* What our own readers make of it is the mesh, by segments. */
+static void test_round(const char *dir, const char *name, const struct export_input *in,
+                       const struct parts *parts) {
     struct error err;
     struct mesh mesh;
-    char *path = file_join(dir, "scene.obj");
-    CHECK_THAT(obj_read(path, "scene.obj", 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+    char *path = file_join(dir, name);
+    CHECK_THAT(mesh_file_read(path, name, 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
     CHECK(mesh.triangle_count == in->mesh->triangle_count && mesh.normal && mesh.object_id);
     for (size_t t = 0; t < mesh.triangle_count; t++) {
         uint32_t from = parts->order[t];
         CHECK(parts->part[mesh.object_id[t]].segment == in->segments->of_triangle[from]);
         for (int c = 0; c < 3; c++) {
             uint32_t a = mesh.index[t][c], b = in->mesh->index[from][c];
-            CHECK(memcmp(&mesh.position[a], &in->mesh->position[b], sizeof(vec3)) == 0);
-            CHECK(memcmp(&mesh.normal[a], &in->mesh->normal[b], sizeof(vec3)) == 0);
+            CHECK(vec3_length(vec3_sub(mesh.position[a], in->mesh->position[b])) == 0.0f); /* -0 is 0 */
+            CHECK(vec3_length(vec3_sub(mesh.normal[a], in->mesh->normal[b])) == 0.0f);
         }
     }
     mesh_release(&mesh);
@@ -373,7 +374,7 @@ int main(void) {
     CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
     room.materials.specular[ROOM_FLOOR] = 0.0f;
     image_init(&picture, 5, 3, 3, names); /* odd, for the padding */
-    char *png = file_join(dir, FORMATS_BASE_COLOR);
+    char *png = file_join(dir, FORMATS_BASE_COLOR), *glb = file_join(dir, "scene.glb");
     CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
     struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.0f};
     camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
@@ -385,7 +386,10 @@ int main(void) {
     CHECK(parts.count == ROOM_OBJECT_COUNT);
     test_glb(dir, &in, &parts);
     test_obj(dir, &in, &parts);
-    test_obj_round(dir, &in, &parts);
+    in.up = (vec3){0.0f, 1.0f, 0.0f};
+    CHECK(glb_write(glb, &in, &parts, png, &err) == STATUS_OK);
+    test_round(dir, "scene.obj", &in, &parts);
+    test_round(dir, "scene.glb", &in, &parts);
     test_same_bytes(dir, &in, &parts);
     test_failures(dir, &in, &parts);
     vec3 *normal = room.mesh.normal;
@@ -394,6 +398,7 @@ int main(void) {
     room.mesh.normal = normal;
     test_limit();
     parts_release(&parts);
+    mem_free(glb);
     mem_free(png);
     image_release(&picture);
     room_release(&room);

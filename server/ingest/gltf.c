@@ -1,0 +1,404 @@
+/* gltf.c -- see gltf.h. The nodes of a file form trees (glTF 2.0 specification, 3.5.2): each is visited
+ * once at most, so neither a circle nor a node with many parents costs anything. */
+#include "server/ingest/gltf.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+#include "server/ingest/gltf_file.h"
+
+#define MAX_DEPTH 256 /* of nodes */
+#define TRIANGLES 4
+#define STRIP 5
+#define FAN 6
+
+/* world = m p, rows first; the last row is 0 0 0 1. */
+struct affine {
+    double m[3][4];
+};
+
+struct reader {
+    struct gltf_file file;
+    struct mesh *mesh;
+    struct faces *faces;
+    size_t vertex_capacity;
+    bool has_bare;       /* a primitive without normals */
+    bool *visited;       /* [nodes.count]; owned */
+    int64_t object_count;
+    struct error *err;
+};
+
+/* --- transforms (3.5.3) --------------------------------------------------------------------- */
+
+static struct affine multiply(const struct affine *a, const struct affine *b) {
+    struct affine c;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++)
+            c.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] +
+                        (j == 3 ? a->m[i][3] : 0.0);
+    return c;
+}
+
+/* Columns of the inverse's transpose, times the determinant: what normals are turned by. */
+static void cofactors(const struct affine *a, double c[3][3]) {
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+            c[i][j] = a->m[i1][j1] * a->m[i2][j2] - a->m[i1][j2] * a->m[i2][j1];
+        }
+    }
+}
+
+/* `count` finite numbers, or the fallback's where the member is absent. */
+static enum status read_numbers(struct reader *r, size_t node, const char *key, int count,
+                                const double *fallback, double *value) {
+    const cJSON *array = cJSON_GetObjectItemCaseSensitive(r->file.nodes.item[node], key), *item;
+    int i = 0;
+    memcpy(value, fallback, (size_t)count * sizeof *value);
+    if (!array)
+        return STATUS_OK;
+    bool good = cJSON_GetArraySize(array) == count;
+    cJSON_ArrayForEach(item, array) {
+        good = good && cJSON_IsNumber(item) && isfinite(item->valuedouble);
+        if (good)
+            value[i++] = item->valuedouble;
+    }
+    if (good)
+        return STATUS_OK;
+    return error_set(r->err, STATUS_INPUT, "%s: nodes[%zu].%s is not %d numbers", r->file.name, node, key, count);
+}
+
+static enum status read_transform(struct reader *r, size_t node, struct affine *t) {
+    static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    static const double none[4] = {0, 0, 0, 1}, one[3] = {1, 1, 1};
+    double matrix[16], move[3], q[4], scale[3];
+    enum status status = read_numbers(r, node, "matrix", 16, identity, matrix);
+    if (status == STATUS_OK)
+        status = read_numbers(r, node, "translation", 3, none, move);
+    if (status == STATUS_OK)
+        status = read_numbers(r, node, "rotation", 4, none, q);
+    if (status == STATUS_OK)
+        status = read_numbers(r, node, "scale", 3, one, scale);
+    if (status != STATUS_OK)
+        return status;
+    double x = q[0], y = q[1], z = q[2], w = q[3];
+    const struct affine trs = {{
+        {scale[0] * (1 - 2 * (y * y + z * z)), scale[1] * 2 * (x * y - z * w), scale[2] * 2 * (x * z + y * w), move[0]},
+        {scale[0] * 2 * (x * y + z * w), scale[1] * (1 - 2 * (x * x + z * z)), scale[2] * 2 * (y * z - x * w), move[1]},
+        {scale[0] * 2 * (x * z - y * w), scale[1] * 2 * (y * z + x * w), scale[2] * (1 - 2 * (x * x + y * y)), move[2]},
+    }};
+    struct affine columns;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++)
+            columns.m[i][j] = matrix[4 * j + i];
+    *t = multiply(&columns, &trs); /* a node has one or the other */
+    return STATUS_OK;
+}
+
+/* --- primitives (3.7.2) --------------------------------------------------------------------- */
+
+static enum status open_attribute(struct reader *r, const cJSON *primitive, const char *key, const char *where,
+                                  bool *found, struct gltf_span *span) {
+    const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
+    size_t accessor;
+    enum status status = gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
+    if (status == STATUS_OK && *found)
+        status = gltf_span(&r->file, accessor, "VEC3", span, r->err);
+    if (status == STATUS_OK && *found && span->component != GLTF_FLOAT)
+        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats", r->file.name,
+                           accessor, where, key);
+    return status;
+}
+
+/* One of them on its way into the mesh. Only vertices that its triangles use are taken: files let many
+ * primitives share one array of vertices. */
+struct primitive {
+    const char *where; /* for messages */
+    int mode;
+    const struct affine *t;
+    double turn[3][3]; /* of normals */
+    bool mirrored, has_normal, is_indexed;
+    struct gltf_span position, normal, indices;
+    size_t table_size;
+    uint32_t (*table)[2]; /* [table_size] number in the file, and in the mesh or NONE; owned */
+};
+
+#define NONE UINT32_MAX
+
+static vec3 apply(const double m[3], const double m1[3], const double m2[3], const float v[3]) {
+    double x = (double)v[0], y = (double)v[1], z = (double)v[2];
+    return (vec3){(float)(m[0] * x + m[1] * y + m[2] * z), (float)(m1[0] * x + m1[1] * y + m1[2] * z),
+                  (float)(m2[0] * x + m2[1] * y + m2[2] * z)};
+}
+
+static uint32_t append_vertex(struct reader *r, const struct primitive *p, size_t number) {
+    struct mesh *mesh = r->mesh;
+    const struct affine *t = p->t;
+    float value[3];
+    if (mesh->vertex_count == r->vertex_capacity) {
+        r->vertex_capacity = r->vertex_capacity ? r->vertex_capacity + r->vertex_capacity / 2 : 1024;
+        mesh->position = mem_realloc_array(mesh->position, r->vertex_capacity, sizeof *mesh->position);
+        mesh->normal = mem_realloc_array(mesh->normal, r->vertex_capacity, sizeof *mesh->normal);
+    }
+    gltf_read_vec3(&p->position, number, value);
+    vec3 at = apply(t->m[0], t->m[1], t->m[2], value), normal = {0.0f, 0.0f, 0.0f};
+    vec3 move = {(float)t->m[0][3], (float)t->m[1][3], (float)t->m[2][3]};
+    if (p->has_normal) {
+        gltf_read_vec3(&p->normal, number, value);
+        normal = apply(p->turn[0], p->turn[1], p->turn[2], value);
+    }
+    mesh->position[mesh->vertex_count] = vec3_add(at, move);
+    mesh->normal[mesh->vertex_count] = p->mirrored ? vec3_neg(normal) : normal;
+    return (uint32_t)mesh->vertex_count++;
+}
+
+/* The mesh's number for vertex `number` of the file, which is added when it is new. */
+static uint32_t vertex_of(struct reader *r, const struct primitive *p, size_t number) {
+    size_t slot = rng_mix64(number) & (p->table_size - 1);
+    for (; p->table[slot][1] != NONE; slot = (slot + 1) & (p->table_size - 1))
+        if (p->table[slot][0] == (uint32_t)number)
+            return p->table[slot][1];
+    p->table[slot][0] = (uint32_t)number;
+    p->table[slot][1] = append_vertex(r, p, number);
+    return p->table[slot][1];
+}
+
+/* The corners of triangle number i among the primitive's indices (3.7.2.1). */
+static void corners_of(int mode, size_t i, size_t corner[3]) {
+    corner[0] = mode == TRIANGLES ? 3 * i : mode == STRIP ? i : i + 1;
+    corner[1] = mode == TRIANGLES ? 3 * i + 1 : mode == STRIP ? i + 1 + i % 2 : i + 2;
+    corner[2] = mode == TRIANGLES ? 3 * i + 2 : mode == STRIP ? i + 2 - i % 2 : 0;
+}
+
+static enum status add_triangles(struct reader *r, const struct primitive *p, size_t triangles) {
+    struct faces *f = r->faces;
+    f->corner_count = 3;
+    for (size_t i = 0; i < triangles; i++) {
+        size_t corner[3];
+        corners_of(p->mode, i, corner);
+        for (int k = 0; k < 3; k++) {
+            size_t at = corner[p->mirrored ? 2 - k : k];
+            size_t vertex = p->is_indexed ? gltf_read_index(&p->indices, at) : at;
+            if (vertex >= p->position.count)
+                return error_set(r->err, STATUS_INPUT, "%s: %s refers to vertex %zu, but there are %zu",
+                                 r->file.name, p->where, vertex, p->position.count);
+            f->corner[k] = vertex_of(r, p, vertex);
+            f->position[k] = r->mesh->position[f->corner[k]];
+        }
+        enum status status = faces_add(f, r->object_count - 1, r->err);
+        if (status != STATUS_OK)
+            return status;
+    }
+    return STATUS_OK;
+}
+
+static enum status open_primitive(struct reader *r, const cJSON *object, struct primitive *p) {
+    size_t accessor;
+    bool found;
+    const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
+    if (cJSON_GetObjectItemCaseSensitive(extensions, "KHR_draco_mesh_compression")) {
+        error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name, p->where);
+        return error_hint(r->err, "export it without compression");
+    }
+    enum status status = gltf_index(&r->file, object, "indices", p->where, &r->file.accessors, &p->is_indexed,
+                                    &accessor, r->err);
+    if (status == STATUS_OK && p->is_indexed)
+        status = gltf_span(&r->file, accessor, "SCALAR", &p->indices, r->err);
+    enum gltf_component c = p->indices.component;
+    if (status == STATUS_OK && p->is_indexed && c != GLTF_UBYTE && c != GLTF_USHORT && c != GLTF_UINT)
+        status = error_set(r->err, STATUS_INPUT, "%s: the indices of %s are not unsigned integers", r->file.name,
+                           p->where);
+    if (status == STATUS_OK)
+        status = open_attribute(r, object, "POSITION", p->where, &found, &p->position);
+    if (status == STATUS_OK && !found)
+        status = error_set(r->err, STATUS_INPUT, "%s: %s has no POSITION", r->file.name, p->where);
+    if (status == STATUS_OK)
+        status = open_attribute(r, object, "NORMAL", p->where, &p->has_normal, &p->normal);
+    if (status == STATUS_OK && p->has_normal && p->normal.count != p->position.count)
+        status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file.name, p->where,
+                           p->position.count, p->normal.count);
+    return status;
+}
+
+static enum status add_primitive(struct reader *r, const cJSON *object, const char *where, int mode,
+                                 const struct affine *t) {
+    struct primitive p = {.where = where, .mode = mode, .t = t};
+    enum status status = open_primitive(r, object, &p);
+    if (status != STATUS_OK)
+        return status;
+    size_t count = p.is_indexed ? p.indices.count : p.position.count;
+    size_t triangles = mode == TRIANGLES ? count / 3 : count < 3 ? 0 : count - 2;
+    if (triangles > r->faces->limit - r->mesh->triangle_count)
+        return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit", r->file.name,
+                         r->faces->limit);
+    cofactors(t, p.turn);
+    p.mirrored = t->m[0][0] * p.turn[0][0] + t->m[0][1] * p.turn[0][1] + t->m[0][2] * p.turn[0][2] < 0.0;
+    size_t most = count < p.position.count ? count : p.position.count;
+    for (p.table_size = 16; p.table_size < 2 * most;)
+        p.table_size *= 2;
+    p.table = mem_array(p.table_size, sizeof *p.table);
+    memset(p.table, 0xff, p.table_size * sizeof *p.table);
+    r->has_bare = r->has_bare || !p.has_normal;
+    status = add_triangles(r, &p, triangles);
+    mem_free(p.table);
+    return status;
+}
+
+/* Each change of material within the node begins an object. */
+static enum status add_mesh(struct reader *r, size_t mesh, const struct affine *t) {
+    const cJSON *primitives = cJSON_GetObjectItemCaseSensitive(r->file.meshes.item[mesh], "primitives"), *item;
+    double material = NAN; /* -1: none */
+    size_t i = 0;
+    enum status status = STATUS_OK;
+    cJSON_ArrayForEach(item, primitives) {
+        const cJSON *mode = cJSON_GetObjectItemCaseSensitive(item, "mode");
+        const cJSON *own = cJSON_GetObjectItemCaseSensitive(item, "material");
+        double kind = mode ? cJSON_GetNumberValue(mode) : TRIANGLES, number = own ? cJSON_GetNumberValue(own) : -1.0;
+        char where[64];
+        snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, i++);
+        if (kind != TRIANGLES && kind != STRIP && kind != FAN)
+            continue;
+        if (!(number == material))
+            r->object_count++;
+        material = number;
+        status = add_primitive(r, item, where, (int)kind, t);
+        if (status != STATUS_OK)
+            return status;
+    }
+    return STATUS_OK;
+}
+
+/* --- nodes ---------------------------------------------------------------------------------- */
+
+static enum status visit(struct reader *r, size_t node, const struct affine *parent, int depth) {
+    const cJSON *object = r->file.nodes.item[node], *item;
+    struct affine own, t;
+    char where[48];
+    size_t mesh;
+    bool found;
+    snprintf(where, sizeof where, "nodes[%zu]", node);
+    if (r->visited[node])
+        return error_set(r->err, STATUS_INPUT, "%s: %s has more than one parent", r->file.name, where);
+    if (depth > MAX_DEPTH)
+        return error_set(r->err, STATUS_INPUT, "%s: %s lies more than %d nodes deep", r->file.name, where, MAX_DEPTH);
+    r->visited[node] = true;
+    enum status status = read_transform(r, node, &own);
+    if (status == STATUS_OK)
+        status = gltf_index(&r->file, object, "mesh", where, &r->file.meshes, &found, &mesh, r->err);
+    if (status != STATUS_OK)
+        return status;
+    t = multiply(parent, &own);
+    if (found)
+        status = add_mesh(r, mesh, &t);
+    cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(object, "children")) {
+        double child = cJSON_GetNumberValue(item);
+        if (status != STATUS_OK)
+            break;
+        if (!(child >= 0.0 && child < (double)r->file.nodes.count) || child != floor(child))
+            return error_set(r->err, STATUS_INPUT, "%s: a child of %s is none of the %zu nodes", r->file.name, where,
+                             r->file.nodes.count);
+        status = visit(r, (size_t)child, &t, depth + 1);
+    }
+    return status;
+}
+
+static enum status visit_list(struct reader *r, const cJSON *list, const char *of) {
+    static const struct affine identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
+    const cJSON *item;
+    cJSON_ArrayForEach(item, list) {
+        double node = cJSON_GetNumberValue(item);
+        if (!(node >= 0.0 && node < (double)r->file.nodes.count) || node != floor(node))
+            return error_set(r->err, STATUS_INPUT, "%s: a node of %s is none of the %zu nodes", r->file.name, of,
+                             r->file.nodes.count);
+        enum status status = visit(r, (size_t)node, &identity, 0);
+        if (status != STATUS_OK)
+            return status;
+    }
+    return STATUS_OK;
+}
+
+/* All nodes that are no other's child. */
+static enum status visit_roots(struct reader *r) {
+    cJSON *roots = cJSON_CreateArray();
+    bool *is_child = mem_calloc(r->file.nodes.count + 1, sizeof *is_child);
+    const cJSON *item;
+    for (size_t i = 0; i < r->file.nodes.count; i++) {
+        cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(r->file.nodes.item[i], "children")) {
+            double child = cJSON_GetNumberValue(item);
+            if (child >= 0.0 && child < (double)r->file.nodes.count)
+                is_child[(size_t)child] = true;
+        }
+    }
+    for (size_t i = 0; i < r->file.nodes.count; i++)
+        if (!is_child[i])
+            cJSON_AddItemToArray(roots, cJSON_CreateNumber((double)i));
+    enum status status = visit_list(r, roots, "all");
+    mem_free(is_child);
+    cJSON_Delete(roots);
+    return status;
+}
+
+static enum status read_scene(struct reader *r) {
+    bool found;
+    size_t scene;
+    enum status status = gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found, &scene,
+                                    r->err);
+    if (status != STATUS_OK)
+        return status;
+    r->visited = mem_calloc(r->file.nodes.count + 1, sizeof *r->visited);
+    if (r->file.scenes.count == 0)
+        return visit_roots(r);
+    return visit_list(r, cJSON_GetObjectItemCaseSensitive(r->file.scenes.item[scene], "nodes"), "the scene");
+}
+
+static void finish(struct reader *r) {
+    struct mesh *mesh = r->mesh;
+    if (r->has_bare) {
+        mem_free(mesh->normal);
+        mesh->normal = NULL;
+    }
+    if (r->object_count < 2) {
+        mem_free(mesh->object_id);
+        mesh->object_id = NULL;
+    }
+}
+
+enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder,
+                       size_t triangle_limit, struct mesh *mesh, struct faces_report *report,
+                       struct error *err) {
+    *mesh = (struct mesh){0};
+    struct reader r = {.mesh = mesh, .err = err};
+    r.faces = faces_new(mesh, name, triangle_limit, true);
+    enum status status = gltf_file_open(&r.file, data, size, name, folder, err);
+    if (status == STATUS_OK)
+        status = read_scene(&r);
+    if (status == STATUS_OK && mesh->triangle_count == 0)
+        status = error_set(err, STATUS_INPUT, "%s has no triangles in its scene", name);
+    if (status == STATUS_OK)
+        finish(&r);
+    else
+        mesh_release(mesh);
+    if (report)
+        *report = r.faces->report;
+    gltf_file_release(&r.file);
+    mem_free(r.visited);
+    mem_free(r.faces);
+    return status;
+}
+
+enum status gltf_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err) {
+    struct mapping file;
+    const char *slash = strrchr(path, '/');
+    char *folder = slash ? mem_strndup(path, (size_t)(slash - path)) : mem_strdup(".");
+    *mesh = (struct mesh){0};
+    enum status status = mapping_open(&file, path, name, "a glTF file", err);
+    if (status == STATUS_OK)
+        status = gltf_parse(file.data, file.size, name, folder, triangle_limit, mesh, report, err);
+    mapping_close(&file);
+    mem_free(folder);
+    return status;
+}

@@ -1,0 +1,66 @@
+/* test_gltf.c -- the glTF reader, and the mesh checks behind it, on damaged files. An answer of "ok" must
+ * come with a mesh whose every index and vertex can be read. */
+#include "server/ingest/gltf.h"
+
+#include "common/mem.h"
+#include "tests/fuzz/fuzz.h"
+
+static volatile float sink;
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    struct mesh mesh;
+    struct mesh_report report;
+    struct error err = {.message = ""};
+    enum status status = gltf_parse(data, size, "case", NULL, 100000, &mesh, NULL, &err);
+    if (status == STATUS_OK) {
+        MUST(mesh.triangle_count > 0);
+        for (size_t i = 0; i < mesh.triangle_count; i++) {
+            MUST(mesh.face[i] < mesh.face_count && (i == 0 || mesh.face[i] >= mesh.face[i - 1]));
+            MUST(!mesh.object_id || mesh.object_id[i] >= 0);
+            for (int k = 0; k < 3; k++) {
+                MUST(mesh.index[i][k] < mesh.vertex_count);
+                sink = mesh.position[mesh.index[i][k]].x + (mesh.normal ? mesh.normal[mesh.index[i][k]].x : 0);
+            }
+        }
+        status = mesh_check(&mesh, "case", &report, &err);
+    }
+    if (status == STATUS_OK)
+        sink = (float)mesh_area(&mesh);
+    else
+        MUST((status == STATUS_INPUT || status == STATUS_LIMIT) && err.message[0] != '\0');
+    mesh_release(&mesh);
+    return 0;
+}
+
+#define TABLES                                                                                     \
+    "\"asset\":{\"version\":\"2.0\"},\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,"  \
+    "\"byteOffset\":36,\"byteLength\":8,\"target\":34963}],\"accessors\":[{\"bufferView\":0,\"byteOffset\":0," \
+    "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5123,\"count\":3," \
+    "\"type\":\"SCALAR\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":0}," \
+    "\"indices\":1,\"material\":0},{\"mode\":5,\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0," \
+    "\"children\":[1],\"scale\":[1,-2,1]},{\"mesh\":0,\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,3,0,1]}]," \
+    "\"scenes\":[{\"nodes\":[0]}],\"scene\":0"
+
+static void add_glb(struct seeds *s) {
+    static const char json[] = "{" TABLES ",\"buffers\":[{\"byteLength\":44}]}";
+    static const float points[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    static const uint16_t indices[4] = {0, 1, 2, 0};
+    uint32_t length = (sizeof json - 1 + 3) / 4 * 4, head[] = {0x46546c67, 2, 28 + length + 44, length, 0x4e4f534a};
+    uint32_t chunk[] = {44, 0x004e4942};
+    uint8_t *file = mem_alloc(28 + length + 44);
+    memcpy(file, head, 20);
+    memset(file + 20, ' ', length);
+    memcpy(file + 20, json, sizeof json - 1);
+    memcpy(file + 20 + length, chunk, 8);
+    memcpy(file + 28 + length, points, 36);
+    memcpy(file + 64 + length, indices, 8);
+    seeds_add(s, file, 28 + length + 44);
+    mem_free(file);
+}
+
+void fuzz_seeds(struct seeds *s) {
+    s->mutants = 10000;
+    add_glb(s);
+    seeds_text(s, "{" TABLES ",\"buffers\":[{\"byteLength\":44,\"uri\":\"data:application/octet-stream;base64,"
+                  "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=\"}]}");
+}
