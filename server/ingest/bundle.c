@@ -12,6 +12,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/archive.h"
+#include "server/ingest/colmap.h"
 #include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
@@ -107,7 +108,8 @@ static enum status load_transforms(const char *root, const char *name, struct tr
     *t = (struct transforms){0};
     enum status status = file_read(path, &text, &own);
     if (status == STATUS_NOT_FOUND) {
-        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top", name);
+        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor a COLMAP "
+                  "reconstruction", name);
         error_hint(&own, "nerfstudio and instant-ngp write one; poses are camera-to-world");
     } else if (status == STATUS_LIMIT) {
         error_set(&own, STATUS_INPUT, "%s is larger than %zu bytes", name, TRANSFORMS_MAX_BYTES);
@@ -125,6 +127,21 @@ static enum status load_transforms(const char *root, const char *name, struct tr
     mem_free(path);
     buf_release(&text);
     return failed ? status : STATUS_OK;
+}
+
+/* Where transforms.json is not there and a COLMAP reconstruction is, that takes its place: *name
+ * becomes its name. */
+static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
+                                struct error *err) {
+    char *path = file_join(root, *name);
+    bool is_there = access(path, F_OK) == 0;
+    char *colmap = is_there || strcmp(*name, BUNDLE_TRANSFORMS) != 0 ? NULL : colmap_find(root);
+    mem_free(path);
+    if (!colmap)
+        return load_transforms(root, *name, t, f, err);
+    mem_free(*name);
+    *name = colmap;
+    return colmap_read(root, colmap, t, f, err);
 }
 
 /* --- mesh -------------------------------------------------------------------------------- */
@@ -310,7 +327,7 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
         mem_free(name);
         return status;
     }
-    status = load_transforms(root, name, &t, &f, err);
+    status = load_cameras(root, &name, &t, &f, err);
     bool has_frames = f.problem_count == 0 || t.frame_count > 0;
     if (status != STATUS_OK)
         goto out;

@@ -331,6 +331,36 @@ static void test_formats(void) {
     mem_free(ply);
 }
 
+/* A COLMAP reconstruction where transforms.json is not. */
+static void test_colmap(void) {
+    struct scene scene;
+    struct error err;
+    cJSON *problems;
+    char *transforms = file_join(work, "transforms.json");
+    put_good();
+    CHECK(remove(transforms) == 0 && make_folder("sparse"));
+    put("sparse/cameras.txt", "1 PINHOLE 8 6 7 7.5 4 3\n");
+    put("sparse/images.txt", "1 0 1 0 0 -0.5 0.5 2 1 c.exr\n\n2 0 1 0 0 -0.5 0.5 2 1 a.exr\n1 2 -1\n"
+                             "3 0 1 0 0 -0.5 0.5 2 1 b.png\n\n");
+    CHECK_THAT(load(&scene, &problems, &err) == STATUS_OK, "%s", err.message);
+    CHECK(scene.photograph_count == 3);
+    float x, y, depth_m;
+    CHECK_STRING(scene.photograph[0].name, "a.exr");
+    CHECK(camera_project(&scene.photograph[0].camera, vec3_make(0.7f, 0.6f, 0.0f), &x, &y, &depth_m));
+    CHECK_NEAR(depth_m, 2.0, 1e-6); /* the pose of POSE */
+    CHECK_NEAR(x, 4.0 + 7.0 * 0.1, 1e-5);
+    CHECK_NEAR(y, 3.0 - 7.5 * 0.05, 1e-5);
+    scene_release(&scene);
+    cJSON_Delete(problems);
+    put("sparse/cameras.txt", "1 PINHOLE 9 6 7 7.5 4 3\n");
+    CHECK(load(&scene, &problems, &err) == STATUS_INPUT && strstr(err.message, "8 x 6 pixels, but frames[1] says 9 x 6"));
+    cJSON_Delete(problems);
+    put("sparse/cameras.txt", "1 PINHOLE 8 6 7\n");
+    CHECK(load(&scene, &problems, &err) == STATUS_INPUT && strstr(err.message, "sparse/cameras.txt, line 1"));
+    cJSON_Delete(problems);
+    mem_free(transforms);
+}
+
 /* Everything at once, and more problems than are kept. */
 static void test_many(void) {
     put_good();
@@ -496,6 +526,7 @@ int main(void) {
     test_variants();
     test_bad();
     test_formats();
+    test_colmap();
     test_many();
     test_single_folder();
     test_archive();
