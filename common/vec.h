@@ -38,6 +38,8 @@ static inline bool vec3_is_finite(vec3 a) {
     return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
 }
 
+static inline float clampf(float v, float lo, float hi) { return v < lo ? lo : v > hi ? hi : v; }
+
 static inline rgb rgb_make(float r, float g, float b) { return (rgb){r, g, b}; }
 static inline rgb rgb_gray(float v) { return (rgb){v, v, v}; }
 static inline rgb rgb_add(rgb a, rgb b) { return (rgb){a.r + b.r, a.g + b.g, a.b + b.b}; }
@@ -48,6 +50,10 @@ static inline rgb rgb_scale(rgb a, float s) { return (rgb){a.r * s, a.g * s, a.b
 static inline rgb rgb_mad(rgb a, float s, rgb b) {
     return (rgb){a.r + s * b.r, a.g + s * b.g, a.b + s * b.b};
 }
+static inline rgb rgb_clamp(rgb a, float low, float high) {
+    return (rgb){clampf(a.r, low, high), clampf(a.g, low, high), clampf(a.b, low, high)};
+}
+static inline float rgb_dot(rgb a, rgb b) { return a.r * b.r + a.g * b.g + a.b * b.b; }
 static inline float rgb_max(rgb a) { return fmaxf(a.r, fmaxf(a.g, a.b)); }
 static inline float rgb_mean(rgb a) { return (a.r + a.g + a.b) * (1.0f / 3.0f); }
 /* Relative luminance (Rec. 709). */
@@ -59,7 +65,6 @@ static inline bool rgb_is_finite(rgb a) {
 }
 static inline bool rgb_is_black(rgb a) { return a.r == 0.0f && a.g == 0.0f && a.b == 0.0f; }
 
-static inline float clampf(float v, float lo, float hi) { return v < lo ? lo : v > hi ? hi : v; }
 
 /* An orthonormal frame around unit n (Duff et al. 2017). */
 static inline void vec3_frame(vec3 n, vec3 *s, vec3 *t) {

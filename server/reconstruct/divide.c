@@ -1,6 +1,7 @@
 /* divide.c -- see divide.h. */
 #include "server/reconstruct/divide.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "common/image.h"
@@ -25,6 +26,13 @@
 /* Less white light than this share of the median radiance tells nothing of base colour. */
 #define DARKEST 1e-4f
 #define NEUTRAL_BASE_COLOR 0.5f
+/* A base colour of which a look says more than this is not one. */
+#define MOST 4.0f
+/* Looks of this share of the greatest weight are compared with each other. */
+#define NEAR_WEIGHT 0.3f
+/* Variance by light of others at which a texel counts half in its segment's mean. */
+#define MIXING_FLOOR 0.01
+#define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
 
 /* What is gathered of one texel. */
 struct texel_looks {
@@ -68,6 +76,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     uint32_t segment = segment_of(d->r, texel);
     float median = d->views->median_radiance;
     float weight = view->weight * views_trust(d->views, view, at->triangle);
+    float mixing = views_mixing(d->views, view, at->triangle);
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
     rgb gloss = rgb_gray(0.0f);
@@ -80,17 +89,21 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
         float part = rgb_mean(gloss) / fmaxf(rgb_mean(shown), 0.01f * median) * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
-    rgb base = divide_channels(rgb_sub(shown, gloss), white, DARKEST * median);
-    looks->look[looks->count++] =
-        (struct robust_sample){base, logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR), weight};
+    const rgb expected = fused_radiance(&d->r->fused, texel);
+    rgb deviation = noise_deviation(d->noise, d->views, view, expected);
+    rgb base = rgb_clamp(divide_channels(rgb_sub(shown, gloss), white, DARKEST * median), -MOST, MOST);
+    rgb noise = rgb_clamp(divide_channels(deviation, white, DARKEST * median), 0.0f, MOST);
+    looks->look[looks->count++] = (struct robust_sample){
+        base, logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
+        weight * noise_weight(d->noise, d->views, view, expected, mixing),
+        sqrtf(rgb_dot(noise, noise)) * noise_draw(view), mixing * rgb_dot(base, base)};
 }
 
 static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,
-                     struct texel_looks *looks) {
+                     struct irradiance *light, struct texel_looks *looks) {
     struct surface_point at;
-    struct irradiance light;
     looks->count = 0;
-    if (!light_at(d, texel, &at, &light))
+    if (!light_at(d, texel, &at, light))
         return;
     for (uint32_t t = 0; t < d->views->train_count && looks->count < MAX_LOOKS; t++) {
         struct view view;
@@ -98,7 +111,7 @@ static void look_all(const struct divide *d, uint32_t texel, struct incident *sc
         if (views_sees(d->views, t, at.position, at.normal, &view) &&
             photograph_sample(&d->r->scene->photograph[d->views->train[t]], view.x, view.y, &s) &&
             !s.saturated[0] && !s.saturated[1] && !s.saturated[2])
-            add_look(d, texel, &at, &light, &view, s.radiance, scratch, looks);
+            add_look(d, texel, &at, light, &view, s.radiance, scratch, looks);
     }
 }
 
@@ -108,21 +121,62 @@ static void set_half(uint16_t half[3], rgb value) {
     half[2] = image_half_from_float(value.b);
 }
 
-static void set_texel(struct reconstruction *r, uint32_t texel, rgb value) {
-    float *to = r->materials.base_color.texel[texel];
-    to[0] = clampf(value.r, 0.0f, 1.0f);
-    to[1] = clampf(value.g, 0.0f, 1.0f);
-    to[2] = clampf(value.b, 0.0f, 1.0f);
+static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
+    const float *from = r->materials.base_color.texel[texel];
+    return rgb_make(from[0], from[1], from[2]);
+}
+
+/* How far the looks differ that count about as much as the greatest does: those from further away
+ * show the texel less sharply, which is no noise. */
+static void measure_spread(const struct texel_looks *looks, struct measured *m) {
+    float most = 0.0f, weights = 0.0f, noise = 0.0f, noise_squares = 0.0f, squares = 0.0f;
+    rgb mean = {0.0f, 0.0f, 0.0f};
+    for (size_t i = 0; i < looks->count; i++)
+        most = fmaxf(most, looks->look[i].weight);
+    for (size_t i = 0; i < looks->count; i++) {
+        const struct robust_sample *l = &looks->look[i];
+        if (l->weight < NEAR_WEIGHT * most)
+            continue;
+        weights += l->weight;
+        mean = rgb_mad(mean, l->weight, l->value);
+        squares += l->weight * rgb_dot(l->value, l->value);
+        noise += l->weight * l->noise;
+        noise_squares += l->weight * l->noise * l->noise;
+    }
+    mean = rgb_scale(mean, 1.0f / weights);
+    noise /= weights;
+    m->spread = image_half_from_float(fmaxf(squares / weights - rgb_dot(mean, mean), 0.0f));
+    m->noise_spread = image_half_from_float(fmaxf(noise_squares / weights - noise * noise, 0.0f));
+}
+
+static struct measured mean_of(struct texel_looks *looks, const struct irradiance *light) {
+    struct measured m = {.weight = robust_weigh(looks->look, looks->count, OUTLIER_SCALE)};
+    rgb value = {0.0f, 0.0f, 0.0f};
+    float noise = 0.0f, mixing = 0.0f;
+    for (size_t i = 0; i < looks->count; i++) {
+        const struct robust_sample *l = &looks->look[i];
+        float share = l->weight / m.weight;
+        value = rgb_mad(value, share, l->value);
+        noise += share * l->noise;
+        mixing += share * l->mixing;
+    }
+    const float *sum = light->moment[0];
+    rgb off = divide_channels(rgb_mul(value, light->noise), rgb_make(sum[0], sum[1], sum[2]), FLT_MIN);
+    set_half(m.value, value);
+    m.noise = image_half_from_float(noise);
+    m.light_noise = image_half_from_float(copysignf(sqrtf(rgb_dot(off, off)), rgb_mean(off)));
+    m.mixing = image_half_from_float(mixing);
+    measure_spread(looks, &m);
+    return m;
 }
 
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
     struct texel_looks looks;
-    look_all(d, texel, scratch, &looks);
-    d->known[texel] = looks.count > 0;
-    if (d->r->is_emitter[segment_of(d->r, texel)])
-        set_texel(d->r, texel, rgb_gray(NEUTRAL_BASE_COLOR));
-    else if (looks.count > 0)
-        set_texel(d->r, texel, robust_mean(looks.look, looks.count, OUTLIER_SCALE));
+    struct irradiance light;
+    look_all(d, texel, scratch, &light, &looks);
+    d->measured[texel] = (struct measured){0};
+    if (looks.count > 0 && !d->r->is_emitter[segment_of(d->r, texel)])
+        d->measured[texel] = mean_of(&looks, &light);
 }
 
 struct divide_range {
@@ -143,37 +197,60 @@ void divide_texels(struct divide *d, size_t first, size_t count) {
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &range);
 }
 
-/* Mean base colour of each segment's known texels; neutral where there is none. */
-static rgb *segment_means(const struct divide *d) {
+/* The mean over a segment's texels and their variance about it; those of the whole room where none of
+ * the segment was measured; neutral for emitters. Texels that may have light of others count less. */
+static struct color_prior *segment_priors(const struct divide *d) {
     const struct reconstruction *r = d->r;
-    double(*sum)[4] = mem_calloc(r->segments.count, sizeof *sum);
-    rgb *mean = mem_array(r->segments.count, sizeof *mean);
+    /* red, green, blue, squares, weights; the last entry is that of the whole room */
+    double(*sum)[5] = mem_calloc(r->segments.count + 1, sizeof *sum);
+    struct color_prior *prior = mem_array(r->segments.count, sizeof *prior);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        double *to = sum[segment_of(r, texel)];
-        for (int c = 0; c < 3 && d->known[texel]; c++)
-            to[c] += (double)r->materials.base_color.texel[texel][c];
-        to[3] += d->known[texel];
+        const struct measured *m = &d->measured[r->inverse.valid[i]];
+        size_t segment = segment_of(r, r->inverse.valid[i]);
+        if (!(m->weight > 0.0f))
+            continue;
+        double weight = 1.0 / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
+        rgb v = measured_value(m);
+        const double value[5] = {(double)v.r, (double)v.g, (double)v.b, (double)rgb_dot(v, v), 1.0};
+        for (int k = 0; k < 5; k++) {
+            sum[segment][k] += weight * value[k];
+            sum[r->segments.count][k] += weight * value[k];
+        }
     }
-    for (size_t s = 0; s < r->segments.count; s++)
-        mean[s] = sum[s][3] > 0.0 ? rgb_make((float)(sum[s][0] / sum[s][3]), (float)(sum[s][1] / sum[s][3]),
-                                             (float)(sum[s][2] / sum[s][3]))
-                                  : rgb_gray(NEUTRAL_BASE_COLOR);
+    for (size_t s = 0; s < r->segments.count; s++) {
+        const double *from = sum[s][4] > 0.0 ? sum[s] : sum[r->segments.count];
+        prior[s] = (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f};
+        if (r->is_emitter[s] || !(from[4] > 0.0))
+            continue;
+        rgb mean = rgb_make((float)(from[0] / from[4]), (float)(from[1] / from[4]), (float)(from[2] / from[4]));
+        float variance = (float)(from[3] / from[4]) - rgb_dot(mean, mean);
+        prior[s] = (struct color_prior){mean, fmaxf(variance, LEAST_VARIANCE)};
+    }
     mem_free(sum);
-    return mean;
+    return prior;
 }
 
-void divide_fill(struct divide *d, uint16_t (*radiance)[3]) {
+/* The same of each chart: that of its segment. */
+static struct color_prior *chart_priors(const struct divide *d) {
+    const struct reconstruction *r = d->r;
+    struct color_prior *of_segment = segment_priors(d);
+    struct color_prior *prior = mem_array(r->atlas.chart_count, sizeof *prior);
+    for (size_t i = 0; i < r->scene->mesh.triangle_count; i++)
+        prior[r->atlas.chart_of_triangle[i]] = of_segment[r->segments.of_triangle[i]];
+    mem_free(of_segment);
+    return prior;
+}
+
+void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     struct reconstruction *r = d->r;
-    rgb *mean = segment_means(d);
+    struct color_prior *prior = chart_priors(d);
+    denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,
+            &r->materials.base_color, r->pool);
+    mem_free(prior);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
+        uint32_t texel = r->inverse.valid[i], segment = segment_of(r, texel);
         rgb white;
-        if (d->known[texel] || !divide_white(d, texel, &white))
-            continue;
-        uint32_t segment = segment_of(r, texel);
-        set_texel(r, texel, mean[segment]);
-        set_half(radiance[texel], rgb_mul(mean[segment], white));
+        if (!(d->measured[texel].weight > 0.0f) && !r->is_emitter[segment] && divide_white(d, texel, &white))
+            set_half(radiance[texel], rgb_mul(texel_color(r, texel), white));
     }
-    mem_free(mean);
 }

@@ -2,14 +2,17 @@
  *
  * For each photograph of a texel, (shown - gloss) / white is its base colour; the robust mean over the
  * photographs is taken, weighted as in fuse.h and less where the highlight is a large part of what
- * is shown. Texels that no photograph measured get the mean of their segment. */
+ * is shown. Then the noise of the photographs is taken out (denoise.h). Texels that no photograph
+ * measured get what is beside them, or the mean of their segment where nothing near is known. */
 #ifndef UNBAKE_RECONSTRUCT_DIVIDE_H
 #define UNBAKE_RECONSTRUCT_DIVIDE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "server/reconstruct/denoise.h"
 #include "server/reconstruct/incident.h"
+#include "server/reconstruct/noise.h"
 #include "server/reconstruct/probes.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/reconstruct/views.h"
@@ -19,18 +22,20 @@ struct divide {
     const struct views *views;
     const struct probes *probes;
     const struct light_field *field;
+    const struct noise *noise;
     struct incident *scratch;         /* [threads] */
-    bool *known;                      /* [height][width] whether a photograph measured the texel */
+    struct measured *measured;        /* [height][width] what the photographs tell of each texel */
 };
 
-/* The valid texels [first, first + count), by their place in inverse.valid. Emitters, whose own light
- * hides it, get a neutral base colour. */
+/* Measures the valid texels [first, first + count), by their place in inverse.valid. Emitters, whose own
+ * light hides it, get a neutral base colour. */
 void divide_texels(struct divide *d, size_t first, size_t count);
 
 /* What a white diffuse surface at the texel sends towards its normal; false where it is not valid. */
 bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
 
-/* After all texels: fills the unknown ones, and writes what they send out to radiance. */
-void divide_fill(struct divide *d, uint16_t (*radiance)[3]);
+/* After all texels: writes r->materials.base_color, and what those send out that no photograph sees
+ * to radiance. */
+void divide_finish(struct divide *d, uint16_t (*radiance)[3]);
 
 #endif

@@ -18,6 +18,7 @@
 struct fuse_job {
     struct fused *f;
     const struct views *views;
+    const struct noise *noise;
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
 };
@@ -26,17 +27,39 @@ struct fuse_job {
 struct looks {
     size_t count, measured, clean;
     struct robust_sample look[MAX_LOOKS];
+    struct view view[MAX_LOOKS];
+    float mixing[MAX_LOOKS]; /* see views_mixing */
 };
 
-static void add_look(struct looks *l, const struct photograph_sample *s, float weight, float floor_radiance) {
-    struct robust_sample *last = &l->look[l->count++];
-    *last = (struct robust_sample){
-        s->radiance, logf(fmaxf(rgb_mean(s->radiance), 0.0f) + floor_radiance), weight};
-    if (s->saturated[0] || s->saturated[1] || s->saturated[2])
-        return;
-    struct robust_sample measured = *last;
-    *last = l->look[l->measured];
-    l->look[l->measured++] = measured;
+static void add_look(struct looks *l, const struct photograph_sample *s, const struct view *view, float weight,
+                     float mixing, float floor_radiance) {
+    size_t at = l->count++;
+    if (!s->saturated[0] && !s->saturated[1] && !s->saturated[2]) {
+        l->look[at] = l->look[l->measured];
+        l->view[at] = l->view[l->measured];
+        l->mixing[at] = l->mixing[l->measured];
+        at = l->measured++;
+    }
+    float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + floor_radiance);
+    l->look[at] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
+    l->view[at] = *view;
+    l->mixing[at] = mixing;
+}
+
+/* Weighs the first `count` looks by their noise, which depends on how bright the texel is: that is
+ * told by all together, each by the light it had. */
+static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t count) {
+    rgb sum = {0.0f, 0.0f, 0.0f};
+    float weights = 0.0f;
+    for (size_t i = 0; i < count; i++) {
+        float weight = l->look[i].weight *
+                       job->views->scene->photograph[job->views->train[l->view[i].train]].exposure;
+        sum = rgb_mad(sum, weight, l->look[i].value);
+        weights += weight;
+    }
+    rgb mean = rgb_scale(sum, 1.0f / weights);
+    for (size_t i = 0; i < count; i++)
+        l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i]);
 }
 
 static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {
@@ -48,7 +71,8 @@ static void look_all(const struct fuse_job *job, const struct surface_point *p, 
         if (views_sees(v, t, p->position, p->normal, &view) &&
             photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
             l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
-            add_look(l, &s, view.weight * views_trust(v, &view, p->triangle), LOG_FLOOR * v->median_radiance);
+            add_look(l, &s, &view, view.weight * views_trust(v, &view, p->triangle),
+                     views_mixing(v, &view, p->triangle), LOG_FLOOR * v->median_radiance);
         }
     }
 }
@@ -73,7 +97,9 @@ static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
         return;
     job->f->count[texel] = (float)l.clean;
     job->f->spread[texel] = spread_of(&l);
-    rgb mean = robust_mean(l.look, l.measured > 0 ? l.measured : l.count, OUTLIER_SCALE);
+    size_t count = l.measured > 0 ? l.measured : l.count;
+    weigh_by_noise(job, &l, count);
+    rgb mean = robust_mean(l.look, count, OUTLIER_SCALE);
     const float channel[3] = {mean.r, mean.g, mean.b};
     for (int c = 0; c < 3; c++)
         job->f->radiance[texel][c] = image_half_from_float(fmaxf(channel[c], 0.0f));
@@ -88,14 +114,14 @@ static void fuse_chunk(void *user, size_t chunk, int thread) {
         fuse_texel(job, job->inverse->valid[i]);
 }
 
-void fuse(struct fused *f, const struct views *views, const struct atlas *atlas,
+void fuse(struct fused *f, const struct views *views, const struct noise *noise, const struct atlas *atlas,
           const struct inverse_uv *inverse, struct parallel *pool) {
     size_t texels = (size_t)inverse->width * inverse->height;
     *f = (struct fused){.width = inverse->width, .height = inverse->height};
     f->radiance = mem_calloc_large(texels, sizeof *f->radiance);
     f->count = mem_calloc_large(texels, sizeof *f->count);
     f->spread = mem_calloc_large(texels, sizeof *f->spread);
-    struct fuse_job job = {f, views, atlas, inverse};
+    struct fuse_job job = {f, views, noise, atlas, inverse};
     parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, fuse_chunk, &job);
 }
 

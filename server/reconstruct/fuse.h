@@ -1,8 +1,8 @@
 /* fuse.h -- the measured light: what the photographs show of each texel, taken together.
  *
  * The mean of all clean look-ups, weighted by the solid angle that a patch of the surface fills in
- * the photograph and by how well a look-up agrees with the others: a highlight that one photograph
- * has caught, or a pose that is off, counts little. A saturated value is a lower bound: it is left
+ * the photograph, by its noise, and by how well a look-up agrees with the others: a highlight that
+ * one photograph has caught, or a pose that is off, counts little. A saturated value is a lower bound: it is left
  * out where others measured, and stands in where none did. Held-out photographs are never asked. */
 #ifndef UNBAKE_RECONSTRUCT_FUSE_H
 #define UNBAKE_RECONSTRUCT_FUSE_H
@@ -10,6 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/image.h"
+#include "server/reconstruct/noise.h"
 #include "server/reconstruct/views.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
@@ -21,8 +23,14 @@ struct fused {
     float *spread;           /* [height][width] standard deviation of the logarithm of what they show; owned */
 };
 
-void fuse(struct fused *f, const struct views *views, const struct atlas *atlas,
+void fuse(struct fused *f, const struct views *views, const struct noise *noise, const struct atlas *atlas,
           const struct inverse_uv *inverse, struct parallel *pool);
 void fused_release(struct fused *f);
+
+static inline rgb fused_radiance(const struct fused *f, uint32_t texel) {
+    const uint16_t *half = f->radiance[texel];
+    return rgb_make(image_float_from_half(half[0]), image_float_from_half(half[1]),
+                    image_float_from_half(half[2]));
+}
 
 #endif

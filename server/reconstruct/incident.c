@@ -110,6 +110,7 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
     vec3_frame(at->shading, &frame[0], &frame[1]);
     size_t light_samples = lights_any(field->world->lights) ? samples / 2 : 0;
     double sum[IRRADIANCE_MOMENTS][3] = {{0}};
+    rgb noise = {0.0f, 0.0f, 0.0f};
     size_t lights_done = 0;
     for (size_t done = 0; done < samples; done += ways_a_chunk) {
         size_t ways = samples - done < ways_a_chunk ? samples - done : ways_a_chunk;
@@ -118,7 +119,6 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
             in->direction[i] = cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
         incident_trace(in, field, at, ways);
         incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
-        lights_done += lit;
         float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
         for (size_t i = 0; i < ways + lit; i++) {
             float c = vec3_dot(in->direction[i], at->shading);
@@ -128,6 +128,8 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
             float basis[IRRADIANCE_MOMENTS];
             moment_basis(in->direction[i], c, basis);
             rgb l = rgb_scale(in->radiance[i], 1.0f / density);
+            bool early = i < ways ? done + i < samples / 2 : lights_done + i - ways < light_samples / 2;
+            noise = rgb_mad(noise, early ? c : -c, l);
             for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
                 chunk[m][0] += basis[m] * l.r;
                 chunk[m][1] += basis[m] * l.g;
@@ -137,7 +139,9 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
         for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
             for (int c = 0; c < 3; c++)
                 sum[m][c] += (double)chunk[m][c];
+        lights_done += lit;
     }
+    irradiance->noise = noise;
     for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
         for (int c = 0; c < 3; c++)
             irradiance->moment[m][c] = (float)sum[m][c];

@@ -50,6 +50,7 @@ void incident_sample_lights(struct incident *in, const struct light_field *field
 #define IRRADIANCE_MOMENTS 14
 struct irradiance {
     float moment[IRRADIANCE_MOMENTS][3];
+    rgb noise; /* a draw of the error of moment[0]: half the difference of what two halves of the samples tell */
 };
 
 /* Gathers from `samples` cosine-distributed directions and half as many light samples. */

@@ -25,8 +25,8 @@
 #define BLOCK_MIN 0.002f
 
 /* Looks that the solved state counts for. One look is off by a third (16 paths, one pixel), the
- * solved light of a block by 4 %: (.33 / .04)^2. */
-#define MATCH_PRIOR 64.0f
+ * solved light of a block by 2 %: (.33 / .02)^2. */
+#define MATCH_PRIOR 256.0f
 
 #define CHUNK 1024 /* touched texels a work item */
 #define AHEAD 16   /* texels under way to the cache */
@@ -237,20 +237,19 @@ void params_step(struct params *p, const struct gradient *gradient, const struct
 
 void params_match(struct params *p, uint32_t texel, const struct loss_match *match, float trust) {
     struct texture *texture = &p->materials->base_color;
-    size_t across = blocks_across(texture->width, p->level);
-    size_t bx = texel % texture->width >> p->level, by = texel / texture->width >> p->level;
-    float *looks = &adam_record(&p->base_color, by * across + bx)[0];
-    float step = trust / (*looks + MATCH_PRIOR);
+    size_t column = texel % texture->width, row = texel / texture->width;
+    size_t block = (row >> p->level) * blocks_across(texture->width, p->level) + (column >> p->level);
+    float *looks = &adam_record(&p->base_color, block)[0];
+    float step = slowdown(p, texel) * trust / (*looks + MATCH_PRIOR);
     *looks += 1.0f;
-    step *= slowdown(p, texel);
     float factor[3];
     for (int c = 0; c < 3; c++)
         factor[c] = (1.0f + step * (match->shown[c] - 1.0f)) / (1.0f + step * (match->rendered[c] - 1.0f));
-    size_t side = (size_t)1 << p->level, x0 = bx << p->level, y0 = by << p->level;
     const uint32_t *triangle = p->inverse->triangle;
     uint32_t chart = p->chart_of_triangle[triangle[texel]];
-    for (size_t y = y0; y < y0 + side && y < texture->height; y++) {
-        for (size_t x = x0; x < x0 + side && x < texture->width; x++) {
+    size_t half = ((size_t)1 << p->level) / 2;
+    for (size_t y = row > half ? row - half : 0; y <= row + half && y < texture->height; y++) {
+        for (size_t x = column > half ? column - half : 0; x <= column + half && x < texture->width; x++) {
             size_t at = y * texture->width + x;
             float *value = texture->texel[at];
             if (triangle[at] == INVERSE_UV_NONE || p->chart_of_triangle[triangle[at]] != chart)

@@ -61,14 +61,14 @@ void params_set_level(struct params *p, int level);
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool);
 
-/* The step of base colour from a solved start, after one look at a texel: scales what its block has of its chart, by
- * channel,
- * by the ratio of what was shown to what was rendered, averaged over the block's past looks.
+/* The step of base colour from a solved start, after one look at a texel: scales all of its chart within
+ * half a block of it, by channel, by the ratio of what was shown to what was rendered. Neighbouring
+ * looks overlap, so nothing shows where a block ends.
  *
  * Stochastic approximation (Robbins & Monro 1951) of the fixed point rendered = shown with a step of
- * 1 / (looks + prior), the prior being what the solved start is worth. To first order a surface's radiance is its base colour times
- * its light, so the ratio is the Newton step; its noise is that of one estimate, where the
- * gradient's is that of a product of two. The prior keeps interreflection (all blocks that scale
+ * 1 / (looks + prior), of the block's past looks, the prior being what the solved start is worth. To first
+ * order a surface's radiance is its base colour times its light, so the ratio is the Newton step; its
+ * noise is that of one estimate, where the gradient's is that of a product of two. The prior keeps interreflection (all blocks that scale
  * together change the light as well) from overshooting, and grows from level to level: a finer
  * block starts from what its parent knew. */
 void params_match(struct params *p, uint32_t texel, const struct loss_match *match, float trust);

@@ -164,5 +164,6 @@ void probes_irradiance(const struct probes *p, const struct probe_mix *mix, stru
         float *to = &out->moment[0][0], w = mix->weight[k];
         for (int i = 0; i < IRRADIANCE_MOMENTS * 3; i++)
             to[i] += w * from[i];
+        out->noise = rgb_mad(out->noise, w, p->probe[mix->probe[k]].light.noise);
     }
 }

@@ -121,7 +121,8 @@ static void make_environment(struct run *run) {
 static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
     make_environment(run);
-    fuse(&run->r->fused, &run->views, &run->r->atlas, &run->r->inverse, run->r->pool);
+    noise_measure(&run->r->noise, &run->views);
+    fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     return STATUS_OK;
 }
 
@@ -185,6 +186,7 @@ void reconstruct_release(struct reconstruction *r) {
     mem_free(r->is_emitter);
     mem_free(r->evidence);
     environment_release(&r->environment);
+    noise_release(&r->noise);
     fused_release(&r->fused);
     world_release(&r->world);
     materials_release(&r->materials);

@@ -66,6 +66,7 @@ struct reconstruction {
     struct materials materials;
     struct world world;
     struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
+    struct noise noise;              /* of the photographs' pixels */
     struct fused fused;              /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
     struct emitter_evidence *evidence; /* [segment_count] why; owned */

@@ -167,9 +167,10 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
-    s->divide = (struct divide){.r = r, .views = views, .probes = &s->probes, .field = &s->field};
+    s->divide = (struct divide){
+        .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
-    s->divide.known = mem_calloc(texels, sizeof *s->divide.known);
+    s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     for (size_t i = 0; i < r->segments.count; i++) {
         r->materials.roughness[i] = 1.0f;
         r->materials.specular[i] = 0.0f;
@@ -178,7 +179,7 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
 }
 
 static void solve_release(struct solve *s) {
-    mem_free(s->divide.known);
+    mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
     mem_free(s->radiance);
@@ -192,7 +193,7 @@ static bool solve_pass(struct solve *s, int pass) {
     gloss_fit(s->r, s->views, &s->probes, &s->field);
     if (!divide_all(s))
         return false;
-    divide_fill(&s->divide, s->radiance);
+    divide_finish(&s->divide, s->radiance);
     return true;
 }
 
@@ -212,7 +213,7 @@ static cJSON *segment_list(const struct reconstruction *r) {
 static void report(const struct solve *s) {
     size_t known = 0;
     for (size_t i = 0; i < s->r->inverse.valid_count; i++)
-        known += s->divide.known[s->r->inverse.valid[i]];
+        known += s->divide.measured[s->r->inverse.valid[i]].weight > 0.0f;
     cJSON *figures = cJSON_AddObjectToObject(s->r->report, "solve");
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);

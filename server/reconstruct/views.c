@@ -255,6 +255,11 @@ float views_trust(const struct views *v, const struct view *view, uint32_t trian
     return trust[views_edge(v, view, triangle)];
 }
 
+float views_mixing(const struct views *v, const struct view *view, uint32_t triangle) {
+    static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
+    return variance[views_edge(v, view, triangle)];
+}
+
 /* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show
  * `wanted`. */
 static bool all_show(const struct views *v, uint32_t train, float x, float y, int margin, uint8_t wanted) {

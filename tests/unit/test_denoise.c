@@ -1,0 +1,162 @@
+/* denoise.h: noise goes, texture stays, holes are filled, and nothing crosses from chart to chart. */
+#include "server/reconstruct/denoise.h"
+
+#include "common/mem.h"
+#include "common/rng.h"
+#include "tests/check.h"
+
+#define WIDTH 256
+#define HEIGHT 128
+#define TEXELS (WIDTH * HEIGHT)
+#define DEVIATION 0.1f /* of the noise, of each channel */
+
+/* Two charts: the left half and the right one, with two columns between them that no triangle covers. */
+static uint32_t triangle[TEXELS], valid[TEXELS], chart_of_triangle[2] = {0, 1};
+static vec2 corner[2][3] = {{{0, 0}, {WIDTH / 2 - 1, 0}, {0, HEIGHT}}, {{WIDTH / 2 + 1, 0}, {WIDTH, 0}, {WIDTH, HEIGHT}}};
+static const struct atlas atlas = {
+    .width = WIDTH, .height = HEIGHT, .chart_count = 2, .chart_of_triangle = chart_of_triangle, .corner = corner};
+static struct inverse_uv inverse = {.width = WIDTH, .height = HEIGHT, .triangle = triangle, .valid = valid};
+
+static struct measured *measured;
+static struct color_prior prior[2];
+static struct texture out;
+static struct parallel *pool;
+
+static void make_surface(void) {
+    for (uint32_t i = 0; i < TEXELS; i++) {
+        uint32_t x = i % WIDTH;
+        triangle[i] = x < WIDTH / 2 - 1 ? 0 : x > WIDTH / 2 ? 1 : INVERSE_UV_NONE;
+        if (triangle[i] != INVERSE_UV_NONE)
+            valid[inverse.valid_count++] = i;
+    }
+}
+
+static float normal(uint64_t a, uint64_t b) {
+    float sum = -6.0f; /* of twelve even numbers */
+    for (uint64_t k = 0; k < 12; k++)
+        sum += rng_to_float((uint32_t)rng_key(a, b, k));
+    return sum;
+}
+
+/* What is there: the left chart is plain, the right one has stripes. */
+static float truth(uint32_t x, uint32_t y) {
+    (void)y;
+    return x < WIDTH / 2 ? 0.8f : x / 4 % 2 ? 0.7f : 0.2f;
+}
+
+static void set(uint32_t x, uint32_t y, float value, float noise, float mixing) {
+    struct measured *m = &measured[y * WIDTH + x];
+    *m = (struct measured){.weight = 1.0f, .noise = image_half_from_float(noise), .mixing = image_half_from_float(mixing)};
+    for (int c = 0; c < 3; c++)
+        m->value[c] = image_half_from_float(value);
+}
+
+/* Gray noise: the same of all channels; its draws are independent of it. */
+static void measure(void) {
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++)
+            set(x, y, truth(x, y) + DEVIATION * normal(1, y * WIDTH + x),
+                sqrtf(3.0f) * DEVIATION * normal(2, y * WIDTH + x), 0.0f);
+}
+
+static void filter(void) {
+    prior[0] = prior[1] = (struct color_prior){rgb_gray(0.5f), 0.05f};
+    texture_init(&out, &inverse, rgb_gray(0.0f));
+    denoise(&atlas, &inverse, 2, measured, prior, &out, pool);
+}
+
+/* Root mean square error over [x0, x1) x [y0, y1). */
+static double error_of(uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1) {
+    double sum = 0.0;
+    for (uint32_t y = y0; y < y1; y++)
+        for (uint32_t x = x0; x < x1; x++) {
+            double off = (double)(out.texel[y * WIDTH + x][1] - truth(x, y));
+            sum += off * off;
+        }
+    return sqrt(sum / ((x1 - x0) * (y1 - y0)));
+}
+
+static void test_noise_goes_and_texture_stays(void) {
+    measure();
+    filter();
+    double plain = error_of(0, WIDTH / 2 - 1, 0, HEIGHT), stripes = error_of(WIDTH / 2 + 1, WIDTH, 0, HEIGHT);
+    CHECK_THAT(plain < 0.15 * (double)DEVIATION, "%.4f is left of %.4f", plain, (double)DEVIATION);
+    CHECK_THAT(stripes < 1.05 * (double)DEVIATION, "stripes are off by %.4f", stripes);
+    texture_release(&out);
+}
+
+/* Where there is no noise nothing changes. */
+static void test_no_noise(void) {
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH; x++)
+            set(x, y, truth(x, y), 0.0f, 0.0f);
+    filter();
+    CHECK(error_of(0, WIDTH / 2 - 1, 0, HEIGHT) < 1e-3 && error_of(WIDTH / 2 + 1, WIDTH, 0, HEIGHT) < 1e-3);
+    texture_release(&out);
+}
+
+/* One texel that is far off is no texture, and does not keep the noise around it. */
+static void test_outlier(void) {
+    measure();
+    set(60, 60, 3.5f, 0.1f, 0.0f);
+    filter();
+    CHECK_NEAR(out.texel[60 * WIDTH + 60][0], 0.8, 0.1);
+    CHECK_THAT(error_of(55, 66, 55, 66) < 0.3 * (double)DEVIATION, "%.4f", error_of(55, 66, 55, 66));
+    texture_release(&out);
+}
+
+static void test_holes(void) {
+    measure();
+    for (uint32_t y = 40; y < 60; y++)
+        for (uint32_t x = 40; x < 60; x++)
+            measured[y * WIDTH + x] = (struct measured){0};
+    filter();
+    CHECK_THAT(error_of(40, 60, 40, 60) < 0.3 * (double)DEVIATION, "%.4f", error_of(40, 60, 40, 60));
+    texture_release(&out);
+}
+
+/* A chart of which nothing was measured has its prior; so has one that may be all light of others. */
+static void test_prior(void) {
+    measure();
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH / 2; x++)
+            measured[y * WIDTH + x] = (struct measured){0};
+    filter();
+    CHECK_NEAR(out.texel[64 * WIDTH + WIDTH / 2 - 2][0], 0.5, 1e-6);
+    texture_release(&out);
+    for (uint32_t y = 0; y < HEIGHT; y++)
+        for (uint32_t x = 0; x < WIDTH / 2; x++)
+            set(x, y, 0.9f, 0.01f, 5.0f);
+    filter();
+    CHECK_NEAR(out.texel[64 * WIDTH + 10][0], 0.5 + 0.4 * 0.05 / 5.05, 1e-3);
+    texture_release(&out);
+}
+
+static void test_threads(void) {
+    measure();
+    filter();
+    struct texture one = out;
+    struct parallel *alone = pool;
+    pool = parallel_new(3);
+    filter();
+    CHECK(memcmp(one.texel, out.texel, TEXELS * sizeof *one.texel) == 0);
+    parallel_free(pool);
+    pool = alone;
+    texture_release(&one);
+    texture_release(&out);
+}
+
+int main(void) {
+    make_surface();
+    measured = mem_calloc(TEXELS, sizeof *measured);
+    pool = parallel_new(1);
+    test_noise_goes_and_texture_stays();
+    test_no_noise();
+    test_outlier();
+    test_holes();
+    test_prior();
+    test_threads();
+    parallel_free(pool);
+    mem_free(measured);
+    return check_failed_count > 0;
+}

@@ -1,0 +1,120 @@
+/* noise.h: the noise of made-up photographs is found, and their texture is not taken for it. */
+#include "server/reconstruct/noise.h"
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "common/rng.h"
+#include "tests/check.h"
+
+#define SIDE 128
+#define PIXELS (SIDE * SIDE)
+#define PHOTOGRAPHS 4
+
+static struct photograph photograph[PHOTOGRAPHS];
+static struct scene scene = {.photograph = photograph, .photograph_count = PHOTOGRAPHS};
+static uint32_t train[PHOTOGRAPHS] = {0, 1, 2, 3};
+static uint8_t edge_pixels[PIXELS], *edge[PHOTOGRAPHS];
+static struct views views = {.scene = &scene, .train_count = PHOTOGRAPHS, .train = train, .edge = edge};
+
+static float normal(uint64_t a, uint64_t b) {
+    float sum = -6.0f;
+    for (uint64_t k = 0; k < 12; k++)
+        sum += rng_to_float((uint32_t)rng_key(a, b, k));
+    return sum;
+}
+
+/* Pictures of value(x, y) with noise of deviation(value, x). */
+static void take(float (*value)(uint32_t x, uint32_t y), float (*deviation)(float value, uint32_t x)) {
+    for (uint32_t t = 0; t < PHOTOGRAPHS; t++) {
+        photograph[t].camera.width = photograph[t].camera.height = SIDE;
+        photograph[t].exposure = 1.0f;
+        photograph[t].gain = rgb_gray(1.0f);
+        photograph[t].clip = INFINITY;
+        photograph[t].is_hdr = true;
+        if (!photograph[t].pixel)
+            photograph[t].pixel = mem_array(PIXELS, sizeof *photograph[t].pixel);
+        edge[t] = edge_pixels;
+        for (uint32_t i = 0; i < PIXELS; i++) {
+            float v = value(i % SIDE, i / SIDE);
+            for (uint32_t c = 0; c < 3; c++)
+                photograph[t].pixel[i][c] =
+                    image_half_from_float(fmaxf(v + deviation(v, i % SIDE) * normal(3 * t + c, i), 0.0f));
+        }
+    }
+}
+
+static float share_at(const struct noise *noise, float x, float y, float radiance) {
+    struct view view = {.train = 1, .x = x, .y = y};
+    return rgb_mean(noise_deviation(noise, &views, &view, rgb_gray(radiance))) / radiance;
+}
+
+static float bright_and_dark(uint32_t x, uint32_t y) {
+    (void)x;
+    return y < SIDE / 2 ? 0.1f : 1.6f;
+}
+
+/* As of photons: the deviation is the root of the value. */
+static float photons(float value, uint32_t x) {
+    (void)x;
+    return 0.05f * sqrtf(value);
+}
+
+static void test_photons(void) {
+    struct noise noise;
+    take(bright_and_dark, photons);
+    noise_measure(&noise, &views);
+    CHECK_NEAR(share_at(&noise, 64.0f, 100.0f, 1.6f), 0.05 / sqrt(1.6), 0.006);
+    CHECK_NEAR(share_at(&noise, 64.0f, 20.0f, 0.1f), 0.05 / sqrt(0.1), 0.025);
+    /* Twice the noise: a quarter of the weight. */
+    struct view dark = {.x = 64.0f, .y = 20.0f}, bright = {.x = 64.0f, .y = 100.0f};
+    CHECK_NEAR(noise_weight(&noise, &views, &bright, rgb_gray(1.6f), 0.0f) /
+                   noise_weight(&noise, &views, &dark, rgb_gray(0.1f), 0.0f),
+               16.0, 5.0);
+    CHECK_NEAR(noise_weight(&noise, &views, &bright, rgb_gray(1.6f), 0.25f), 4.0, 0.1);
+    noise_release(&noise);
+}
+
+/* Waves of 24 pixels, a third of the brightness high. */
+static float waves(uint32_t x, uint32_t y) {
+    return 1.0f + 0.3f * sinf((float)x * 0.26f) * sinf((float)y * 0.26f);
+}
+
+static float twice_as_much_on_the_right(float value, uint32_t x) {
+    return value * (x < SIDE / 2 ? 0.05f : 0.1f);
+}
+
+static void test_places_and_texture(void) {
+    struct noise noise;
+    take(waves, twice_as_much_on_the_right);
+    noise_measure(&noise, &views);
+    float left = share_at(&noise, 20.0f, 40.0f, 1.0f), right = share_at(&noise, 100.0f, 40.0f, 1.0f);
+    CHECK_NEAR(left, 0.05, 0.015);
+    CHECK_NEAR(right, 0.1, 0.03);
+    noise_release(&noise);
+}
+
+/* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter between four, and texels that read
+ * the same pixels have the same. */
+static void test_draw(void) {
+    double middle = 0.0, between = 0.0;
+    for (uint32_t i = 0; i < 10000; i++) {
+        struct view view = {.train = i / 100, .x = (float)(i % 100) + 0.5f, .y = 7.5f};
+        double at = (double)noise_draw(&view);
+        middle += at * at / 10000.0;
+        CHECK(noise_draw(&view) == (float)at);
+        view.x += 0.5f;
+        view.y += 0.5f;
+        between += (double)noise_draw(&view) * (double)noise_draw(&view) / 10000.0;
+    }
+    CHECK_NEAR(middle, 1.0, 1e-6);
+    CHECK_NEAR(between, 0.25, 0.02);
+}
+
+int main(void) {
+    test_photons();
+    test_places_and_texture();
+    test_draw();
+    for (int t = 0; t < PHOTOGRAPHS; t++)
+        mem_free(photograph[t].pixel);
+    return check_failed_count > 0;
+}
