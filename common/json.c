@@ -53,20 +53,35 @@ static bool too_deep(const char *text, size_t length, const char **where) {
     return false;
 }
 
-/* The first key that an object anywhere in the tree holds twice; NULL when there is none. */
+static int by_text(const void *a, const void *b) {
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* A key that this object holds twice; NULL when there is none. Sorted, since whoever sends a megabyte of
+ * keys must not keep us busy for a minute. */
+static const char *own_duplicate(const cJSON *object) {
+    size_t count = 0, filled = 0;
+    for (const cJSON *member = object->child; member; member = member->next)
+        count++;
+    if (count < 2)
+        return NULL;
+    const char **key = mem_array(count, sizeof *key), *twice = NULL;
+    for (const cJSON *member = object->child; member; member = member->next)
+        key[filled++] = member->string;
+    qsort(key, count, sizeof *key, by_text);
+    for (size_t i = 1; i < count && !twice; i++)
+        if (strcmp(key[i - 1], key[i]) == 0)
+            twice = key[i];
+    mem_free(key);
+    return twice;
+}
+
+/* A key that an object anywhere in the tree holds twice; NULL when there is none. */
 static const char *duplicate_key(const cJSON *value) {
-    for (const cJSON *a = value->child; a; a = a->next) {
-        if (cJSON_IsObject(value)) {
-            for (const cJSON *b = a->next; b; b = b->next) {
-                if (strcmp(a->string, b->string) == 0)
-                    return a->string;
-            }
-        }
-        const char *deeper = duplicate_key(a);
-        if (deeper)
-            return deeper;
-    }
-    return NULL;
+    const char *twice = cJSON_IsObject(value) ? own_duplicate(value) : NULL;
+    for (const cJSON *child = value->child; child && !twice; child = child->next)
+        twice = duplicate_key(child);
+    return twice;
 }
 
 enum status json_parse(const char *text, size_t length, const char *what, cJSON **value,

@@ -125,8 +125,28 @@ static void test_strings(void) {
     }
 }
 
+/* As many keys as a request's body holds: done at once, not pair by pair (which takes minutes). */
+static void test_many_keys(void) {
+    enum { COUNT = 100000 };
+    struct buf text;
+    cJSON *value;
+    buf_init(&text, 1 << 22);
+    buf_puts(&text, "{");
+    for (int i = 0; i < COUNT; i++)
+        buf_printf(&text, "\"%x\":%d,", (unsigned)i * 2654435761u, i);
+    size_t length = text.length;
+    buf_puts(&text, "\"last\":0}");
+    CHECK(json_parse(buf_text(&text), text.length, "keys", &value, NULL) == STATUS_OK);
+    cJSON_Delete(value);
+    text.length = length;
+    buf_puts(&text, "\"0\":0}");
+    CHECK(json_parse(buf_text(&text), text.length, "keys", &value, NULL) == STATUS_INPUT);
+    buf_release(&text);
+}
+
 int main(void) {
     test_strings();
+    test_many_keys();
     test_refusals();
     test_members();
     test_numbers();
