@@ -13,6 +13,7 @@
 
 #define NAME_MAX_LENGTH 64
 #define TEXT_MAX_LENGTH 255
+#define UNKNOWN_MAX 50 /* names that are no settings: so many are told, the others counted */
 
 static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03",
@@ -242,6 +243,10 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
     for (const cJSON *value = object->child; value; value = value->next) {
         char reason[256] = "", hint[128] = "";
         int i = index_of(value->string);
+        if (i < 0 && bad >= UNKNOWN_MAX) {
+            bad++;
+            continue;
+        }
         if (i < 0) {
             snprintf(reason, sizeof reason, "there is no such setting");
             const char *nearest = settings_nearest(value->string);

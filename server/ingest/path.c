@@ -25,6 +25,8 @@ static void printable(const char *name, char out[160]) {
         out[used] = '\0';
 }
 
+#define ABSOLUTE "is an absolute path: names must be relative to the bundle"
+
 /* What is wrong with the name as a whole; NULL when nothing is. */
 static const char *whole_fault(const char *name, size_t length) {
     if (length > PATH_MAX_BYTES)
@@ -38,9 +40,7 @@ static const char *whole_fault(const char *name, size_t length) {
         if (c == '\\')
             return "is a name with a backslash: folders are separated by \"/\"";
     }
-    if (name[0] == '/' || (isalpha((unsigned char)name[0]) && name[1] == ':'))
-        return "is an absolute path: names must be relative to the bundle";
-    return NULL;
+    return name[0] == '/' ? ABSOLUTE : NULL;
 }
 
 enum status path_clean(const char *name, char **clean, struct error *err) {
@@ -63,6 +63,8 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
         }
         part += n + (part[n] == '/');
     }
+    if (!fault && used > 1 && isalpha((unsigned char)out[0]) && out[1] == ':')
+        fault = ABSOLUTE; /* a drive, also behind "./" */
     if (fault) {
         char shown[160];
         printable(name, shown);
