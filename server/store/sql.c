@@ -7,18 +7,21 @@
 
 #include "common/mem.h"
 
-/* Turns an SQLite result into ours. A full disk hides behind IOERR where write(2) fails inside
- * a journal, so the errno that SQLite saw decides. */
+/* Turns an SQLite result into ours. A full disk hides behind IOERR where a sync or ftruncate fails and
+ * behind CANTOPEN where a journal cannot be made, so the last errno decides. (sqlite3_system_errno does
+ * not have that of a statement that fails in sqlite3_step; its VFS knows errno alone, too.) Callers
+ * set errno to 0 before. */
 static enum status fail(struct sql *sql, int code, const char *doing, struct error *err) {
+    int os = errno;
+    bool is_full = os == ENOSPC || os == EDQUOT || os == EFBIG;
     const char *why = sql->db ? sqlite3_errmsg(sql->db) : sqlite3_errstr(code);
-    int os = sql->db ? sqlite3_system_errno(sql->db) : 0;
+    if (is_full && ((code & 0xff) == SQLITE_IOERR || (code & 0xff) == SQLITE_CANTOPEN))
+        code = SQLITE_FULL;
     switch (code & 0xff) {
     case SQLITE_FULL:
-        error_set(err, STATUS_NO_SPACE, "%s: no space left on the disk", sql->path);
+        error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path, strerror(is_full ? os : ENOSPC));
         return error_hint(err, "Free some space on the disk that holds the file.");
     case SQLITE_IOERR:
-        if (os == ENOSPC || os == EDQUOT || os == EFBIG)
-            return error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path, strerror(os));
         return error_set(err, STATUS_IO, "%s: cannot %s: %s (%s)", sql->path, doing, why,
                          os ? strerror(os) : "no errno");
     case SQLITE_BUSY:
@@ -37,6 +40,7 @@ static enum status fail(struct sql *sql, int code, const char *doing, struct err
 }
 
 enum status sql_script(struct sql *sql, const char *text, struct error *err) {
+    errno = 0;
     int code = sqlite3_exec(sql->db, text, NULL, NULL, NULL);
     return code == SQLITE_OK ? STATUS_OK : fail(sql, code, text, err);
 }
@@ -52,6 +56,7 @@ static enum status prepare(struct sql *sql, const char *text, sqlite3_stmt **stm
     }
     if (sql->statement_count == SQL_STATEMENT_MAX)
         return error_set(err, STATUS_INTERNAL, "more than %d SQL statements", SQL_STATEMENT_MAX);
+    errno = 0;
     int code = sqlite3_prepare_v3(sql->db, text, -1, SQLITE_PREPARE_PERSISTENT, stmt, NULL);
     if (code != SQLITE_OK)
         return fail(sql, code, text, err);
@@ -103,6 +108,7 @@ enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, c
 }
 
 enum status sql_step(struct sql *sql, sqlite3_stmt *stmt, bool *row, struct error *err) {
+    errno = 0;
     int code = sqlite3_step(stmt);
     *row = code == SQLITE_ROW;
     if (code == SQLITE_ROW)
@@ -178,6 +184,7 @@ enum status sql_end(struct sql *sql, enum status status, struct error *err) {
 static enum status expect(struct sql *sql, const char *pragma, const char *wanted,
                           struct error *err) {
     sqlite3_stmt *stmt = NULL;
+    errno = 0;
     int code = sqlite3_prepare_v2(sql->db, pragma, -1, &stmt, NULL);
     if (code == SQLITE_OK)
         code = sqlite3_step(stmt);
@@ -227,6 +234,7 @@ enum status sql_check(struct sql *sql, struct error *err) {
 enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size,
                      struct error *err) {
     *sql = (struct sql){.path = mem_strdup(path)};
+    errno = 0;
     int code = sqlite3_open_v2(path, &sql->db,
                                SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX |
                                    SQLITE_OPEN_EXRESCODE,
