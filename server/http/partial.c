@@ -111,11 +111,12 @@ static enum status load(struct entry *e, struct error *err) {
     e->is_believed = *row.boot != '\0';
     if (*row.scene_id)
         status = error_set(err, STATUS_CONFLICT, "upload %s is finished", e->id);
-    else if ((e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW)) < 0)
+    else if ((e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW)) < 0 &&
+             (errno != ENOENT || e->received < e->length)) /* whole, it may be on its way: see place */
         status = error_set_errno(err, errno, "cannot open %s", path);
-    else if (e->is_believed && strcmp(row.boot, p->boot) == 0)
+    else if (e->fd >= 0 && e->is_believed && strcmp(row.boot, p->boot) == 0)
         status = believe_tail(e, err);
-    else if (e->is_believed)
+    else if (e->fd >= 0 && e->is_believed)
         status = cut_tail(e, err);
     mem_free(path);
     upload_row_release(&row);
