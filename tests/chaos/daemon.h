@@ -3,6 +3,7 @@
 #define UNBAKE_TESTS_CHAOS_DAEMON_H
 
 #include <arpa/inet.h>
+#include <limits.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <signal.h>
@@ -27,6 +28,7 @@ struct daemon {
     const char *binary;
     const char *settings[16]; /* "name=value"; ends with NULL */
     const char *preload;      /* a library; NULL: none */
+    const char *ready_path;   /* 200 there when it is up; NULL: /readyz */
     pid_t pid;
     int port;
 };
@@ -42,6 +44,24 @@ static inline void daemon_init(struct daemon *d, const char *build) {
     snprintf(d->data, sizeof d->data, "%s/data", d->dir);
     snprintf(d->port_file, sizeof d->port_file, "%s/port", d->dir);
     snprintf(d->log, sizeof d->log, "%s/log", d->dir);
+}
+
+/* In a child, before it executes a program: slips the library under it; NULL: none. */
+static inline void preload_set(const char *library) {
+    if (!library)
+        return;
+    setenv("LD_PRELOAD", library, 1);
+    /* The address sanitizer wants to come first, and does well second. Its own exit status is no
+     * worker's. */
+    setenv("ASAN_OPTIONS", "verify_asan_link_order=0:exitcode=99", 1);
+}
+
+/* The absolute path of a library that was built of tests/chaos/preload/. */
+static inline void preload_find(const char *build, const char *name, char path[PATH_MAX]) {
+    char *relative = mem_printf("%s/tests/chaos/preload/%s.so", build, name);
+    if (!realpath(relative, path))
+        exit(1);
+    mem_free(relative);
 }
 
 static inline int http_connect(int port) {
@@ -68,33 +88,43 @@ static inline bool http_send(int fd, const void *data, size_t length) {
     return true;
 }
 
-/* One request on a connection of its own. The status, 0 where no whole reply came; the body goes to
- * *body (initialised here). `fields` are whole lines. */
-static inline int http_ask(int port, const char *method, const char *path, const char *fields,
-                           const void *data, size_t length, struct buf *body) {
+/* One request on a connection of its own. The status, 0 where no whole reply came; its head and body go
+ * to *head and *body (initialised here). `fields` are whole lines. */
+static inline int http_exchange(int port, const char *method, const char *path, const char *fields,
+                                const void *data, size_t length, struct buf *head, struct buf *body) {
     struct buf reply;
     char chunk[16384];
     ssize_t got = -1;
     int status = 0, fd = http_connect(port);
+    buf_init(head, (size_t)1 << 20);
     buf_init(body, (size_t)64 << 20);
     if (fd < 0)
         return 0;
-    char *head = mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: %zu\r\n%s\r\n",
-                            method, path, length, fields);
+    char *request = mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: %zu\r\n%s\r\n",
+                               method, path, length, fields);
     buf_init(&reply, (size_t)64 << 20);
-    if (http_send(fd, head, strlen(head)) && http_send(fd, data, length))
+    if (http_send(fd, request, strlen(request)) && http_send(fd, data, length))
         while ((got = recv(fd, chunk, sizeof chunk, 0)) > 0)
             buf_append(&reply, chunk, (size_t)got);
     close(fd);
-    mem_free(head);
+    mem_free(request);
     const char *gap = strstr(buf_text(&reply), "\r\n\r\n"), *announced = strcasestr(buf_text(&reply), "\r\nContent-Length:");
     if (gap && sscanf(buf_text(&reply), "HTTP/1.1 %d", &status) == 1) {
         size_t rest = reply.length - (size_t)(gap + 4 - buf_text(&reply));
         if (announced && announced < gap && strtoull(announced + 17, NULL, 10) != rest)
             status = 0; /* cut off */
+        buf_append(head, buf_text(&reply), (size_t)(gap + 2 - buf_text(&reply)));
         buf_append(body, gap + 4, rest);
     }
     buf_release(&reply);
+    return status;
+}
+
+static inline int http_ask(int port, const char *method, const char *path, const char *fields,
+                           const void *data, size_t length, struct buf *body) {
+    struct buf head;
+    int status = http_exchange(port, method, path, fields, data, length, &head, body);
+    buf_release(&head);
     return status;
 }
 
@@ -111,7 +141,7 @@ static inline int http_json(int port, const char *method, const char *path, cons
     return status;
 }
 
-/* Starts it and waits until /readyz says so; the seconds that took. */
+/* Starts it and waits until it says that it is ready; the seconds that took. */
 static inline double daemon_start(struct daemon *d) {
     const char *argv[48] = {d->binary, "--data", d->data, "--listen", "127.0.0.1:0", "--port-file", d->port_file};
     int count = 7;
@@ -129,10 +159,7 @@ static inline double daemon_start(struct daemon *d) {
             _exit(1);
         if (!freopen(d->log, "a", stderr) || !freopen("/dev/null", "w", stdout))
             _exit(126);
-        if (d->preload) {
-            setenv("LD_PRELOAD", d->preload, 1);
-            setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 1); /* it wants to come first, and does well second */
-        }
+        preload_set(d->preload);
         execv(d->binary, (char *const *)(uintptr_t)argv);
         _exit(127);
     }
@@ -141,7 +168,7 @@ static inline double daemon_start(struct daemon *d) {
         FILE *file = fopen(d->port_file, "re");
         int ready = 0;
         if (file && fscanf(file, "%d", &d->port) == 1) {
-            ready = http_get(d->port, "/readyz", &body) == 200;
+            ready = http_get(d->port, d->ready_path ? d->ready_path : "/readyz", &body) == 200;
             buf_release(&body);
         }
         if (file)

@@ -6,7 +6,6 @@
  * code: the database is whole, every checkpoint opens and holds what was saved last, and all that was
  * acknowledged before that moment is so (promises.h). */
 #include <fts.h>
-#include <limits.h>
 
 #include "tests/chaos/daemon.h"
 #include "tests/chaos/promises.h"
@@ -102,14 +101,14 @@ struct parts {
 };
 
 static void parts_begin(struct parts *u, long number, size_t length) {
-    struct buf body;
+    struct buf head, body;
     char fields[100];
     *u = (struct parts){.number = number, .length = length};
     snprintf(fields, sizeof fields, "Tus-Resumable: 1.0.0\r\nUpload-Length: %zu\r\n", length);
-    must(http_ask(daemon_.port, "POST", "/v1/uploads", fields, "", 0, &body) == 201, "an upload", &body);
-    buf_release(&body);
-    must(http_get(daemon_.port, "/v1/uploads?limit=1", &body) == 200 &&
-         sscanf(strstr(buf_text(&body), "\"id\":\"") + 6, "%32[0-9a-f]", u->id) == 1, "the newest upload", &body);
+    int status = http_exchange(daemon_.port, "POST", "/v1/uploads", fields, "", 0, &head, &body);
+    const char *at = strcasestr(buf_text(&head), "\r\nLocation: /v1/uploads/");
+    must(status == 201 && at && sscanf(at + 24, "%32[0-9a-f]", u->id) == 1, "an upload", &body);
+    buf_release(&head);
     mark("upload %s 0 %ld", u->id, number);
     buf_release(&body);
 }
@@ -225,25 +224,23 @@ static void live_once(const char *archive) {
 }
 
 static void record(const char *build, const char *archive) {
-    char library[512], page[128], boot[128], binary[PATH_MAX];
+    char library[PATH_MAX], page[128], boot[128];
     struct error err;
     daemon_init(&daemon_, build);
     const char *settings[] = {"min_free_mib=0", "low_disk_mib=0", "max_running=1", "threads=1", "log_level=warning",
                               "checkpoint_interval_sec=0.1"};
     memcpy(daemon_.settings, settings, sizeof settings);
-    snprintf(library, sizeof library, "%s/tests/chaos/preload/files.so", build);
+    preload_find(build, "files", library);
     snprintf(page, sizeof page, "%s/faults", daemon_.dir);
     snprintf(boot, sizeof boot, "%s/boot", daemon_.dir);
     snprintf(log_path, sizeof log_path, "%s/operations", daemon_.dir);
-    if (!realpath(library, binary))
-        exit(1);
     faults = faults_new(page, daemon_.data, log_path);
     log_fd = open(log_path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
     if (!faults || log_fd < 0 || file_replace(boot, "before the cut\n", 15, &err) != STATUS_OK)
         exit(1);
     setenv("UNBAKE_FAULTS", page, 1);
     setenv("UNBAKE_BOOT_ID", boot, 1);
-    daemon_.preload = binary;
+    daemon_.preload = library;
     daemon_start(&daemon_);
     live_once(archive);
     close(log_fd);

@@ -383,11 +383,10 @@ static int sync_any(long call, int fd) {
         return (int)syscall(call, fd);
     if (fails())
         return -1;
-    /* The log is what survives: the disk need not. */
+    /* Nothing here outlives the test: the disk itself is not waited for. */
     lock();
-    int result = log_fd >= 0 ? 0 : (int)syscall(call, fd);
-    unlock(result == 0, call == SYS_syncfs ? OP_SYNC_ALL : OP_SYNC, inode, 0, "", 0);
-    return result;
+    unlock(true, call == SYS_syncfs ? OP_SYNC_ALL : OP_SYNC, inode, 0, "", 0);
+    return 0;
 }
 
 int fsync(int fd) {

@@ -1,0 +1,389 @@
+/* disk_daemon BUILD ARCHIVE STEP ALL -- the disk fails the daemon at its n-th operation on a file, for
+ * every STEP-th n: ENOSPC or EIO, once or from then on (ALL: 1 for all four at each n, 0 for one in
+ * turn). First while clients send scenes, upload in parts, make, change and remove jobs that never run;
+ * then over the life of jobs that do. Each request does what it should or says why not: 507 for a full
+ * disk, 500 for a broken one, and on a full disk what is there can be removed. Nothing that was
+ * acknowledged is lost; when the disk is well again all goes on, and jobs succeed; no descriptor, no
+ * file and no memory is left over. */
+#include <dirent.h>
+
+#include "tests/chaos/daemon.h"
+#include "tests/chaos/faults.h"
+
+#define THINGS_MAX 32
+#define ROUNDS_PER_LIFE 100 /* then the daemon is stopped, which looks for leaks, and started again */
+
+/* What was acknowledged in this round. */
+struct thing {
+    char path[120], state[16]; /* "": any */
+    bool is_gone, is_unsure;
+};
+
+static struct daemon daemon_;
+static struct faults *faults;
+static struct thing thing[THINGS_MAX];
+static size_t thing_count;
+static char scene[65], round_[80];
+static long strikes, requests;
+
+static bool has_struck(void) {
+    return atomic_load(&faults->roles) && atomic_load(&faults->failed) > 0;
+}
+
+static struct thing *note(const char *path, const char *state) {
+    size_t i = 0;
+    while (i < thing_count && strcmp(thing[i].path, path) != 0)
+        i++;
+    if (i == THINGS_MAX)
+        exit(1);
+    thing_count += i == thing_count;
+    snprintf(thing[i].path, sizeof thing[i].path, "%s", path);
+    snprintf(thing[i].state, sizeof thing[i].state, "%s", state);
+    thing[i].is_gone = thing[i].is_unsure = false;
+    return &thing[i];
+}
+
+/* True when it does what it should; else it must say what the disk did. */
+static bool is_right(int wanted, int status, const char *method, const char *path, const struct buf *body) {
+    bool is_full = atomic_load(&faults->error) == ENOSPC;
+    requests++;
+    if (status == wanted)
+        return true;
+    CHECK_THAT(has_struck() && status == (is_full ? 507 : 500), "%s: %s %s gets %d, not %d: %s", round_, method, path, status,
+               wanted, buf_text(body));
+    CHECK_THAT(!is_full || strcmp(method, "DELETE") != 0, "%s: %s cannot be removed from a full disk", round_, path);
+    return false;
+}
+
+static bool ask(int wanted, const char *method, const char *path, const char *fields, const void *data, size_t length,
+                struct buf *body) {
+    int status = http_ask(daemon_.port, method, path, fields, data, length, body);
+    return is_right(wanted, status, method, path, body);
+}
+
+static bool ask_json(int wanted, const char *method, const char *path, const char *json, struct buf *body) {
+    return ask(wanted, method, path, "Content-Type: application/json\r\nIf-Match: *\r\n", json, strlen(json), body);
+}
+
+/* A change of what is at the path. */
+static bool change(const char *method, const char *path, const char *action, const char *json, int wanted, const char *state) {
+    struct buf body;
+    char *full = mem_printf("%s%s", path, action);
+    struct thing *it = note(path, state);
+    bool done = ask_json(wanted, method, full, json, &body);
+    it->is_unsure = !done;
+    it->is_gone = done && wanted == 204;
+    buf_release(&body);
+    mem_free(full);
+    return done;
+}
+
+/* --- requests ------------------------------------------------------------------------------------- */
+
+static bool submit(const char *name, int iterations, char path[40]) {
+    struct buf body;
+    char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
+                            "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
+                            "\"coarse_levels\":1,\"report_samples\":1}}", scene, name, iterations);
+    bool made = ask_json(201, "POST", "/v1/jobs", json, &body);
+    if (made)
+        snprintf(path, 40, "/v1/jobs/%lld", strtoll(buf_text(&body) + 6, NULL, 10));
+    buf_release(&body);
+    mem_free(json);
+    return made;
+}
+
+static bool send_scene(long number, char path[120]) {
+    struct buf body;
+    char text[600] = "no archive";
+    char id[65];
+    memcpy(text + 100, &number, sizeof number);
+    bool made = ask(201, "POST", "/v1/scenes", "", text, sizeof text, &body);
+    if (made && sscanf(strstr(buf_text(&body), "\"id\":\"") + 6, "%64[0-9a-f]", id) == 1)
+        snprintf(path, 120, "/v1/scenes/%s", id);
+    buf_release(&body);
+    return made;
+}
+
+#define TUS "Tus-Resumable: 1.0.0\r\n"
+
+static bool upload_begin(char path[80]) {
+    struct buf head, body;
+    int status = http_exchange(daemon_.port, "POST", "/v1/uploads", TUS "Upload-Length: 600\r\n", "", 0, &head, &body);
+    bool made = is_right(201, status, "POST", "/v1/uploads", &body);
+    if (made)
+        sscanf(strcasestr(buf_text(&head), "\r\nLocation: ") + 12, "%79[^\r]", path);
+    buf_release(&head);
+    buf_release(&body);
+    return made;
+}
+
+/* An upload in two parts, of which the second makes it a scene. */
+static void upload(long number, bool is_removed) {
+    struct buf body;
+    unsigned char bytes[600] = "neither";
+    char path[80] = "";
+    memcpy(bytes + 100, &number, sizeof number);
+    if (!upload_begin(path))
+        return;
+    note(path, "");
+    bool has_part = ask(204, "PATCH", path, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n",
+                        bytes, 400, &body);
+    buf_release(&body);
+    if (has_part && !is_removed) {
+        ask(204, "PATCH", path, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 400\r\n", bytes + 400,
+            200, &body);
+        buf_release(&body);
+    }
+    if (is_removed)
+        change("DELETE", path, "", "", 204, "");
+}
+
+static void talk(long number) {
+    struct buf body;
+    char first[40], second[40], sent[120];
+    bool has_first = submit("first", 3, first), has_second = submit("second", 3, second), has_scene;
+    if (has_first) {
+        note(first, "queued");
+        change("PATCH", first, "", "{\"name\":\"renamed\",\"priority\":3}", 200, "queued");
+        if (change("POST", first, "/pause", "{}", 202, "paused"))
+            change("POST", first, "/resume", "{}", 202, "queued");
+    }
+    has_scene = send_scene(number, sent);
+    if (has_scene)
+        note(sent, "");
+    upload(number, false);
+    upload(number, true);
+    if (has_second) {
+        note(second, "queued");
+        if (change("POST", second, "/cancel", "{}", 202, "cancelled"))
+            change("POST", second, "/retry", "{}", 202, "queued");
+    }
+    http_get(daemon_.port, "/readyz", &body);
+    buf_release(&body);
+    ask(200, "GET", "/v1/jobs", "", "", 0, &body);
+    buf_release(&body);
+    if (has_second)
+        change("DELETE", second, "", "", 204, "");
+}
+
+/* --- after ---------------------------------------------------------------------------------------------- */
+
+static void check_things(void) {
+    for (size_t i = 0; i < thing_count; i++) {
+        struct buf body;
+        const struct thing *it = &thing[i];
+        char part[40];
+        int status = http_get(daemon_.port, it->path, &body);
+        snprintf(part, sizeof part, "\"state\":\"%s\"", it->state);
+        CHECK_THAT(it->is_unsure || status == (it->is_gone ? 404 : 200), "%s: %s gets %d", round_, it->path, status);
+        CHECK_THAT(it->is_unsure || it->is_gone || !*it->state || strstr(buf_text(&body), part), "%s: %s is not %s: %s", round_,
+                   it->path, it->state, buf_text(&body));
+        buf_release(&body);
+    }
+}
+
+/* After a failure the scheduler looks again in five seconds, or when there is something new. */
+static void wake(void) {
+    char path[40];
+    struct buf body;
+    CHECK(submit("wakes", 3, path));
+    http_ask(daemon_.port, "DELETE", path, "", "", 0, &body);
+    buf_release(&body);
+}
+
+/* Removes all that a listing has, but for the scene that jobs use. */
+static void clear(const char *folder) {
+    char list[40], path[120];
+    snprintf(list, sizeof list, "/v1/%s?limit=200", folder);
+    for (int tries = 0; tries < 500; tries++) {
+        struct buf body, reply;
+        long left = 0;
+        cJSON *value = NULL;
+        const cJSON *item;
+        CHECK(http_get(daemon_.port, list, &body) == 200);
+        json_parse(buf_text(&body), body.length, "a list", &value, NULL);
+        cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(value, "items")) {
+            const cJSON *id = cJSON_GetObjectItemCaseSensitive(item, "id");
+            if (cJSON_IsString(id) && strcmp(id->valuestring, scene) == 0)
+                continue;
+            if (cJSON_IsString(id))
+                snprintf(path, sizeof path, "/v1/%s/%s", folder, id->valuestring);
+            else
+                snprintf(path, sizeof path, "/v1/%s/%.0f", folder, id ? id->valuedouble : 0.0);
+            int status = http_ask(daemon_.port, "DELETE", path, TUS, "", 0, &reply);
+            CHECK_THAT(status == 204 || status == 409, "%s: DELETE %s gets %d: %s", round_, path, status, buf_text(&reply));
+            buf_release(&reply);
+            left++;
+        }
+        cJSON_Delete(value);
+        buf_release(&body);
+        if (left == 0)
+            return;
+        if (tries == 3)
+            wake();
+        if (tries > 3)
+            usleep(20000); /* a scene is being checked */
+    }
+    CHECK_THAT(false, "%s: %s cannot be removed", round_, folder);
+}
+
+static void clear_all(void) {
+    clear("jobs");
+    clear("uploads");
+    clear("scenes");
+}
+
+static long count_entries(const char *path) {
+    DIR *folder = opendir(path);
+    long count = -2;
+    while (folder && readdir(folder))
+        count++;
+    if (folder)
+        closedir(folder);
+    return count;
+}
+
+static long count_descriptors(void) {
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%d/fd", (int)daemon_.pid);
+    return count_entries(path);
+}
+
+/* Stops the daemon and starts it again: nothing has leaked, the database is whole, no file is left. */
+static void renew(long scenes) {
+    static const char *const folders[] = {"scenes", "jobs", "uploads", "trash"};
+    int status;
+    clear_all();
+    kill(daemon_.pid, SIGTERM);
+    waitpid(daemon_.pid, &status, 0);
+    CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == 0, "%s: the daemon ends with %x", round_, (unsigned)status);
+    daemon_start(&daemon_);
+    for (size_t i = 0; i < 4; i++) {
+        char *path = file_join(daemon_.data, folders[i]);
+        long count = count_entries(path);
+        CHECK_THAT(count == (i == 0 ? scenes : 0), "%s: %ld things are left in %s", round_, count, path);
+        mem_free(path);
+    }
+}
+
+/* --- the rounds ------------------------------------------------------------------------------------------- */
+
+static void arm(long n, long way) {
+    snprintf(round_, sizeof round_, "operation %ld fails %s with %s", n, way / 2 ? "for good" : "once",
+             way % 2 ? "EIO" : "ENOSPC");
+    thing_count = 0;
+    faults_arm(faults, FAULTS_DAEMON, n, way % 2 ? EIO : ENOSPC, way / 2);
+}
+
+/* False when there is no n-th operation. */
+static bool talk_once(long n, long way) {
+    static long number;
+    arm(n, way);
+    talk(++number);
+    bool struck = atomic_load(&faults->failed) > 0;
+    faults_lift(faults);
+    check_things();
+    clear_all();
+    strikes += struck;
+    return struck;
+}
+
+static bool wait_for(const char *path, const char *state, double seconds) {
+    char part[40];
+    bool is_so = false;
+    snprintf(part, sizeof part, "\"state\":\"%s\"", state);
+    for (double end = clock_sec() + seconds; !is_so; usleep(10000)) {
+        struct buf body;
+        http_get(daemon_.port, path, &body);
+        is_so = strstr(buf_text(&body), part) != NULL;
+        buf_release(&body);
+        if (clock_sec() >= end)
+            break;
+    }
+    return is_so;
+}
+
+/* A job lives while the disk fails; then it is well again, and this job and another succeed. */
+static bool live_once(long n, long way) {
+    char first[40], second[40];
+    struct buf body;
+    arm(n, way);
+    bool made = submit("first", 3, first);
+    /* Until it has been struck for a while, or its life is over. */
+    for (int left = 50; made && left > 0 && !wait_for(first, "succeeded", 0.0); left -= has_struck())
+        usleep(10000);
+    bool struck = atomic_load(&faults->failed) > 0;
+    faults_lift(faults);
+    CHECK(submit("second", 3, second));
+    if (made && wait_for(first, "paused", 0.0)) {
+        char *path = mem_printf("%s/resume", first);
+        CHECK(ask(202, "POST", path, "", "", 0, &body));
+        buf_release(&body);
+        mem_free(path);
+    }
+    CHECK_THAT(!made || wait_for(first, "succeeded", 60.0), "%s: the job does not succeed", round_);
+    CHECK_THAT(wait_for(second, "succeeded", 60.0), "%s: the next job does not succeed", round_);
+    clear_all();
+    strikes += struck;
+    return struck;
+}
+
+/* With jobs that wait since no disk is large enough, or jobs that run. */
+static void begin(const char *build, bool jobs_wait, const char *archive) {
+    static char library[PATH_MAX];
+    char page[128];
+    daemon_init(&daemon_, build);
+    const char *settings[] = {"min_free_mib=0", "max_running=1", "threads=1", "log_level=error",
+                              "checkpoint_interval_sec=0.1", jobs_wait ? "low_disk_mib=16000000" : "low_disk_mib=0"};
+    memcpy(daemon_.settings, settings, sizeof settings);
+    preload_find(build, "files", library);
+    snprintf(page, sizeof page, "%s/faults", daemon_.dir);
+    faults = faults_new(page, daemon_.data, NULL);
+    if (!faults)
+        exit(1);
+    setenv("UNBAKE_FAULTS", page, 1);
+    daemon_.preload = library;
+    daemon_.ready_path = "/healthz"; /* with jobs that wait for room it is not "ready" */
+    daemon_start(&daemon_);
+    daemon_scene(&daemon_, archive, scene);
+}
+
+static long go_on(bool (*round)(long n, long way), long step, bool all) {
+    bool more = true;
+    long n = 1, rounds = 0, before = 0;
+    for (long turn = 0; more && check_failed_count == 0; n += step, turn++)
+        for (long way = all ? 0 : turn % 4; more && way < (all ? 4 : turn % 4 + 1); way++) {
+            more = round(n, way);
+            if (++rounds == 4)
+                before = count_descriptors();
+            if (rounds % ROUNDS_PER_LIFE == 0)
+                renew(1);
+        }
+    CHECK_THAT(rounds < 5 || count_descriptors() <= before + 3, "%ld descriptors are open, there were %ld", count_descriptors(),
+               before);
+    renew(1);
+    return n - step;
+}
+
+int main(int argc, char **argv) {
+    long step = argc == 5 ? strtol(argv[3], NULL, 10) : 0;
+    if (step <= 0)
+        return 2;
+    bool all = argv[4][0] == '1';
+    begin(argv[1], true, argv[2]);
+    long talked = go_on(talk_once, step, all);
+    daemon_remove(&daemon_);
+    long lived = 0;
+    if (check_failed_count == 0) {
+        begin(argv[1], false, argv[2]);
+        lived = go_on(live_once, 6 * step, false);
+        daemon_remove(&daemon_);
+    }
+    printf("the daemon: %ld operations on files in a talk, %ld in a job's life; %ld made to fail; %ld requests\n", talked,
+           lived, strikes, requests);
+    figure("failing disk, daemon: operations made to fail", (double)strikes, 500, "higher");
+    figure("failing disk, daemon: wrong answers, losses, leaks", check_failed_count, 0, "lower");
+    CHECK(talked > 100 && lived > 60);
+    return check_result();
+}

@@ -1,0 +1,107 @@
+/* disk_worker BUILD ROOM STEP ALL -- the disk fails a worker at its n-th operation on a file, for every
+ * STEP-th n: ENOSPC or EIO, once or from then on (ALL: 1 for all four at each n, 0 for one in turn).
+ * The worker ends with the status that says so (server/worker/progress.h), never by a signal, and
+ * without a leak; a full disk leaves no half-written file. The next attempt, on a disk that is well
+ * again, ends with the textures of one that nobody disturbed. */
+#include <dirent.h>
+
+#include "tests/chaos/faults.h"
+#include "tests/chaos/worker.h"
+
+#define SETTINGS                                                                                                \
+    "\"texture_size\":64,\"iterations\":6,\"texels_per_iteration\":64,\"coarse_levels\":1,"                         \
+    "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
+
+static char binary[512], library[PATH_MAX], log_path[128];
+static struct faults *faults;
+
+/* One attempt; its wait status. */
+static int attempt(const char *dir, const char *room, int number) {
+    int fd, status;
+    worker_order(dir, room, number, 1, 0.0, SETTINGS);
+    pid_t pid = worker_start(binary, dir, library, log_path, &fd);
+    worker_hear(fd, "nothing", 120.0); /* until it ends */
+    waitpid(pid, &status, 0);
+    close(fd);
+    return status;
+}
+
+static long count_scraps(const char *dir) {
+    char *out = file_join(dir, "out");
+    DIR *folder = opendir(out);
+    long count = 0;
+    for (struct dirent *entry; folder && (entry = readdir(folder)) != NULL;)
+        count += strstr(entry->d_name, ".tmp") != NULL || strstr(entry->d_name, ".part") != NULL;
+    if (folder)
+        closedir(folder);
+    mem_free(out);
+    return count;
+}
+
+/* False when there is no n-th operation. */
+static bool strike(const char *root, const char *room, long n, int error, bool for_good,
+                   char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]) {
+    char sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
+    const char *word = error == ENOSPC ? "ENOSPC" : "EIO", *how = for_good ? "for good" : "once";
+    char *dir = file_join(root, "job");
+    int wanted = error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
+    file_make_dirs(dir, NULL);
+    faults_arm(faults, FAULTS_WORKER, n, error, for_good);
+    int status = attempt(dir, room, 1);
+    bool has_struck = atomic_load(&faults->failed) > 0;
+    faults_lift(faults);
+    CHECK_THAT(WIFEXITED(status), "operation %ld fails %s with %s: signal %d", n, how, word, WTERMSIG(status));
+    /* Some it may do without. */
+    CHECK_THAT(WEXITSTATUS(status) == wanted || (WEXITSTATUS(status) == 0 && (!for_good || !has_struck)),
+               "operation %ld fails %s with %s: exit status %d", n, how, word, WEXITSTATUS(status));
+    CHECK_THAT(error != ENOSPC || count_scraps(dir) == 0, "operation %ld fails %s with %s: scraps are left", n, how, word);
+    if (WEXITSTATUS(status) != 0) {
+        status = attempt(dir, room, 2);
+        CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == 0, "after operation %ld failed %s with %s: %x", n, how, word,
+                   (unsigned)status);
+    }
+    if (check_failed_count == 0)
+        worker_hash(dir, sums);
+    for (size_t i = 0; i < WORKER_OUTPUTS && check_failed_count == 0; i++)
+        CHECK_THAT(strcmp(peace[i], sums[i]) == 0, "after operation %ld failed %s with %s: %s differs", n, how, word,
+                   worker_outputs[i]);
+    if (check_failed_count == 0)
+        file_remove_tree(dir, NULL);
+    mem_free(dir);
+    return has_struck;
+}
+
+int main(int argc, char **argv) {
+    long step = argc == 5 ? strtol(argv[3], NULL, 10) : 0, strikes = 0, n = 1;
+    bool all = step > 0 && argv[4][0] == '1', more = true;
+    char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE], top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
+    if (step <= 0 || !mkdtemp(top))
+        return 2;
+    char *root = file_join(top, "jobs"), *dir = file_join(root, "job");
+    snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
+    snprintf(log_path, sizeof log_path, "%s/log", top);
+    snprintf(page, sizeof page, "%s/faults", top);
+    preload_find(argv[1], "files", library);
+    faults = faults_new(page, root, NULL);
+    if (!faults)
+        return 1;
+    setenv("UNBAKE_FAULTS", page, 1);
+    file_make_dirs(dir, NULL);
+    CHECK(attempt(dir, argv[2], 1) == 0);
+    worker_hash(dir, peace);
+    file_remove_tree(dir, NULL);
+    for (long turn = 0; more && check_failed_count == 0; n += step, turn++)
+        for (long way = all ? 0 : turn % 4; more && way < (all ? 4 : turn % 4 + 1); way++, strikes++)
+            more = strike(root, argv[2], n, way % 2 ? EIO : ENOSPC, way / 2, peace);
+    printf("workers: %ld operations on files, %ld of them made to fail\n", n - step, strikes - 1);
+    figure("failing disk, workers: operations made to fail", (double)strikes - 1, 1000, "higher");
+    figure("failing disk, workers: wrong ends, leaks, textures that differ", check_failed_count, 0, "lower");
+    CHECK(n > 100);
+    if (check_failed_count == 0)
+        file_remove_tree(top, NULL);
+    else
+        fprintf(stderr, "kept: %s\n", top);
+    mem_free(dir);
+    mem_free(root);
+    return check_result();
+}
