@@ -103,39 +103,32 @@ static void compare(const char *dir, int view, const struct image *ours, const c
     mem_free(out);
 }
 
-int main(void) {
+/* Exports the room, renders it from both places with either renderer, and compares. */
+static void try(struct room *room, const struct image *sky, const struct image *known, const char *python,
+                struct parallel *pool) {
     char dir[] = "/tmp/unbake-mitsuba-XXXXXX";
-    const char *python = find_python();
-    if (!python)
-        CHECK_SKIP("no Python with Mitsuba 3: `make bench` makes one");
-    struct parallel *pool = parallel_new(0);
-    struct room room;
-    struct error err;
-    struct image sky, known, picture[VIEWS];
-    CHECK(mkdtemp(dir) != NULL);
-    CHECK(room_init(&room, 512, 15.0f, 15.0f, pool, &err) == STATUS_OK);
-    room.materials.specular[ROOM_CARPET] = 0.0f;
-    make_sky(&sky, &known);
-    world_set_environment(&room.world, &sky, pool);
     const struct camera camera[VIEWS] = {
         look((vec3){0.8f, 1.5f, 3.4f}, (vec3){3.5f, 1.1f, 1.0f}),
         look((vec3){9.0f, 5.0f, 8.0f}, (vec3){3.5f, 1.6f, 2.0f}),
     };
     struct path_settings settings = {.max_depth = MAX_DEPTH, .roulette_depth = 5, .seed = 3};
+    struct image picture[VIEWS];
     struct export_comparison comparison[VIEWS];
+    struct error err;
+    CHECK(mkdtemp(dir) != NULL);
     for (int v = 0; v < VIEWS; v++) {
-        film_render(&room.world, &camera[v], SPP, &settings, (uint32_t)v, pool, &picture[v]);
+        film_render(&room->world, &camera[v], SPP, &settings, (uint32_t)v, pool, &picture[v]);
         comparison[v] = (struct export_comparison){"view.exr", &picture[v], &picture[v], &camera[v]};
     }
-    size_t texels = (size_t)room.atlas.width * room.atlas.height;
+    size_t texels = (size_t)room->atlas.width * room->atlas.height;
     float *zero = mem_calloc(texels, sizeof *zero);
     bool is_emitter[ROOM_OBJECT_COUNT] = {false};
     cJSON *report = cJSON_CreateObject();
     struct export_input in = {
-        .title = "room", .mesh = &room.mesh, .segments = &room.segments, .atlas = &room.atlas,
-        .inverse = &room.inverse, .materials = &room.materials, .confidence_count = zero,
-        .confidence_spread = zero, .is_emitter = is_emitter, .environment = &sky,
-        .environment_confidence = &known, .comparison_count = VIEWS, .comparison = comparison,
+        .title = "room", .mesh = &room->mesh, .segments = &room->segments, .atlas = &room->atlas,
+        .inverse = &room->inverse, .materials = &room->materials, .confidence_count = zero,
+        .confidence_spread = zero, .is_emitter = is_emitter, .environment = sky,
+        .environment_confidence = known, .comparison_count = VIEWS, .comparison = comparison,
         .report = report};
     enum status status = export_outputs(dir, &in, hear, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
@@ -145,10 +138,33 @@ int main(void) {
     mem_free(zero);
     for (int v = 0; v < VIEWS; v++)
         image_release(&picture[v]);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+}
+
+int main(void) {
+    const char *python = find_python();
+    if (!python)
+        CHECK_SKIP("no Python with Mitsuba 3: `make bench` makes one");
+    struct parallel *pool = parallel_new(0);
+    struct room room;
+    struct error err;
+    struct image sky, known;
+    CHECK(room_init(&room, 512, 15.0f, 15.0f, pool, &err) == STATUS_OK);
+    room.materials.specular[ROOM_CARPET] = 0.0f;
+    make_sky(&sky, &known);
+    world_set_environment(&room.world, &sky, pool);
+    try(&room, &sky, &known, python, pool);
+
+    /* Once more without shading normals. */
+    world_release(&room.world);
+    mem_free(room.mesh.normal);
+    room.mesh.normal = NULL;
+    CHECK(world_init(&room.world, &room.mesh, &room.segments, &room.atlas, &room.materials, &sky, pool, &err) ==
+          STATUS_OK);
+    try(&room, &sky, &known, python, pool);
     image_release(&sky);
     image_release(&known);
     room_release(&room);
-    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
     parallel_free(pool);
     return check_result();
 }
