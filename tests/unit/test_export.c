@@ -238,6 +238,63 @@ static void test_environment(const char *dir, struct export_input *in, struct an
     image_release(&known);
 }
 
+/* Strips of triangles, each a segment of its own: more than a file of objects may have. */
+static void test_left_out(const char *dir, struct parallel *pool) {
+    enum { COUNT = 16385, PER_ROW = 128 };
+    struct mesh mesh = {.vertex_count = 3 * COUNT, .triangle_count = COUNT, .face_count = COUNT};
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct error err;
+    mesh.position = mem_array(3 * COUNT, sizeof *mesh.position);
+    mesh.index = mem_array(COUNT, sizeof *mesh.index);
+    mesh.face = mem_array(COUNT, sizeof *mesh.face);
+    mesh.object_id = mem_array(COUNT, sizeof *mesh.object_id);
+    for (uint32_t t = 0; t < COUNT; t++) {
+        vec3 corner = {(float)(t % PER_ROW), (float)(t / PER_ROW), 0.0f};
+        mesh.position[3 * t] = corner;
+        mesh.position[3 * t + 1] = vec3_add(corner, (vec3){0.9f, 0.0f, 0.0f});
+        mesh.position[3 * t + 2] = vec3_add(corner, (vec3){0.0f, 0.9f, 0.0f});
+        for (uint32_t k = 0; k < 3; k++)
+            mesh.index[t][k] = 3 * t + k;
+        mesh.face[t] = t;
+        mesh.object_id[t] = t;
+    }
+    segments_from_object_id(&segments, &mesh);
+    CHECK(atlas_make(&atlas, &mesh, &segments, 512, 0.0f, &err) == STATUS_OK);
+    inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
+    materials_init(&materials, &inverse, segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
+    float *zero = mem_calloc((size_t)atlas.width * atlas.height, sizeof *zero);
+    bool *is_emitter = mem_calloc(COUNT, sizeof *is_emitter);
+    cJSON *report = cJSON_CreateObject(), *written = NULL;
+    struct announced heard = {.dir = dir};
+    char *path = file_join(dir, "report.json"), *old = file_join(dir, "scene.glb");
+    CHECK(access(old, F_OK) == 0); /* of an earlier export into this folder */
+    struct export_input in = {.title = "strips", .mesh = &mesh, .segments = &segments, .atlas = &atlas,
+                              .inverse = &inverse, .materials = &materials, .confidence_count = zero,
+                              .confidence_spread = zero, .is_emitter = is_emitter, .report = report};
+    CHECK_THAT(export_outputs(dir, &in, hear, &heard, &err) == STATUS_OK, "%s", err.message);
+    CHECK(access(old, F_OK) != 0);
+    CHECK(json_read(path, 1 << 24, &written, &err) == STATUS_OK);
+    const cJSON *left_out = cJSON_GetObjectItem(written, "left_out"), *first = cJSON_GetArrayItem(left_out, 0);
+    CHECK(cJSON_GetArraySize(left_out) == 5);
+    CHECK_STRING(cJSON_GetStringValue(cJSON_GetObjectItem(first, "name")), "scene.glb");
+    CHECK(strstr(cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")), "16385 segments"));
+    CHECK_STRING(heard.last, "report.html");
+    cJSON_Delete(written);
+    cJSON_Delete(report);
+    mem_free(old);
+    mem_free(path);
+    mem_free(is_emitter);
+    mem_free(zero);
+    materials_release(&materials);
+    inverse_uv_release(&inverse);
+    atlas_release(&atlas);
+    segments_release(&segments);
+    mesh_release(&mesh);
+}
+
 int main(void) {
     static const char *const names[] = {"R", "G", "B"};
     char dir[] = "/tmp/unbake-export-XXXXXX";
@@ -283,6 +340,7 @@ int main(void) {
     test_views(dir, &camera);
     test_report(dir, room.segments.count);
     test_environment(dir, &in, &heard);
+    test_left_out(dir, pool);
     heard.refuse = true;
     CHECK(export_outputs(dir, &in, hear, &heard, &err) == STATUS_CANCELLED);
 
