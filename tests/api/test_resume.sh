@@ -46,7 +46,8 @@ submit() {
 # textures NAME: the hashes of what the job left.
 textures() {
     (cd "$dir/$1/jobs/1/out" && sha256sum base_color.exr roughness.exr specular.exr emission.exr \
-        confidence.exr scene.ply) || fail "no textures in $1"
+        confidence.exr base_color.png scene.ply scene.glb scene.obj scene.mtl scene.xml \
+        scene.serialized) || fail "no textures in $1"
 }
 checkpoints() {
     "$build/unbake" logs 1 2>/dev/null | grep -c "checkpoint at iteration"
