@@ -16,6 +16,7 @@
 #include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
+#include "server/ingest/trajectory.h"
 #include "server/ingest/transforms.h"
 
 struct bundle_limits bundle_default_limits(void) {
@@ -108,9 +109,10 @@ static enum status load_transforms(const char *root, const char *name, struct tr
     *t = (struct transforms){0};
     enum status status = file_read(path, &text, &own);
     if (status == STATUS_NOT_FOUND) {
-        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor a COLMAP "
-                  "reconstruction", name);
-        error_hint(&own, "nerfstudio and instant-ngp write one; poses are camera-to-world");
+        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor poses "
+                  "of another kind", name);
+        error_hint(&own, "nerfstudio and instant-ngp write one; COLMAP, ScanNet and NICE-SLAM's Replica are "
+                   "read, too");
     } else if (status == STATUS_LIMIT) {
         error_set(&own, STATUS_INPUT, "%s is larger than %zu bytes", name, TRANSFORMS_MAX_BYTES);
     } else if (status == STATUS_OK) {
@@ -129,19 +131,22 @@ static enum status load_transforms(const char *root, const char *name, struct tr
     return failed ? status : STATUS_OK;
 }
 
-/* Where transforms.json is not there and a COLMAP reconstruction is, that takes its place: *name
- * becomes its name. */
+/* Where transforms.json is not there and poses of another kind are, those take its place: *name
+ * becomes their name. */
 static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
                                 struct error *err) {
     char *path = file_join(root, *name);
     bool is_there = access(path, F_OK) == 0;
-    char *colmap = is_there || strcmp(*name, BUNDLE_TRANSFORMS) != 0 ? NULL : colmap_find(root);
     mem_free(path);
-    if (!colmap)
+    if (is_there || strcmp(*name, BUNDLE_TRANSFORMS) != 0)
+        return load_transforms(root, *name, t, f, err);
+    char *colmap = colmap_find(root);
+    const char *trajectory = trajectory_find(root);
+    if (!colmap && !trajectory)
         return load_transforms(root, *name, t, f, err);
     mem_free(*name);
-    *name = colmap;
-    return colmap_read(root, colmap, t, f, err);
+    *name = colmap ? colmap : mem_strdup(trajectory);
+    return colmap ? colmap_read(root, colmap, t, f, err) : trajectory_read(root, trajectory, t, f, err);
 }
 
 /* --- mesh -------------------------------------------------------------------------------- */

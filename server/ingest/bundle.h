@@ -1,9 +1,9 @@
 /* bundle.h -- from what a user uploads to a scene. Runs in workers only, never in the daemon.
  *
- * A bundle is a folder with transforms.json (transforms.h) or a COLMAP reconstruction (colmap.h), the
- * photographs it names and a mesh (mesh_file.h): the one that its key `mesh` names; failing that the
- * one of ply_file_path, if it has faces; failing that the only PLY with faces at the top; failing
- * that the only file there of another format that is read. */
+ * A bundle is a folder with transforms.json (transforms.h), a COLMAP reconstruction (colmap.h) or
+ * poses as text (trajectory.h), the photographs that they name and a mesh (mesh_file.h): the one that
+ * its key `mesh` names; failing that the one of ply_file_path, if it has faces; failing that the only
+ * PLY with faces at the top; failing that the only file there of another format that is read. */
 #ifndef UNBAKE_INGEST_BUNDLE_H
 #define UNBAKE_INGEST_BUNDLE_H
 

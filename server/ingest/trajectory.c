@@ -1,0 +1,259 @@
+/* trajectory.c -- see trajectory.h. */
+#include "server/ingest/trajectory.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/ingest/mapping.h"
+#include "server/ingest/pose.h"
+
+#define TRAJECTORY "traj.txt"
+#define PARAMETERS "cam_params.json"
+#define POSES "pose"
+#define INTRINSIC "intrinsic/intrinsic_color.txt"
+#define MAX_FILE_BYTES ((size_t)1 << 16) /* of a matrix or a few parameters */
+#define PIXEL_CENTRE 0.5
+
+const char *trajectory_find(const char *root) {
+    static const char *const kinds[][2] = {{TRAJECTORY, PARAMETERS}, {POSES, INTRINSIC}};
+    for (size_t i = 0; i < 2; i++) {
+        char *poses = file_join(root, kinds[i][0]), *lens = file_join(root, kinds[i][1]);
+        bool found = access(poses, F_OK) == 0 && access(lens, F_OK) == 0;
+        mem_free(poses);
+        mem_free(lens);
+        if (found)
+            return kinds[i][0];
+    }
+    return NULL;
+}
+
+/* --- matrices ------------------------------------------------------------------------------- */
+
+/* A small file as text, the caller's. `name` is below the folder and what messages say. */
+static enum status read_text(const char *root, const char *name, char **text, struct error *err) {
+    struct mapping file;
+    char *path = file_join(root, name);
+    enum status status = mapping_open(&file, path, name, "a text", err);
+    if (status == STATUS_OK && file.size > MAX_FILE_BYTES)
+        status = error_set(err, STATUS_INPUT, "%s is larger than %zu bytes", name, MAX_FILE_BYTES);
+    *text = status == STATUS_OK ? mem_strndup(file.data, file.size) : NULL;
+    mapping_close(&file);
+    mem_free(path);
+    return status;
+}
+
+/* 16 numbers of a text, which ends in a NUL; false where there are others. */
+static bool read_matrix(const char *text, double m[4][4]) {
+    for (int i = 0; i < 16; i++) {
+        char *end;
+        m[i / 4][i % 4] = strtod(text, &end);
+        if (end == text)
+            return false;
+        text = end;
+    }
+    return text[strspn(text, " \t\r\n")] == '\0';
+}
+
+static bool is_finite(double m[4][4]) {
+    for (int i = 0; i < 12; i++)
+        if (!isfinite(m[i / 4][i % 4]))
+            return false;
+    return true;
+}
+
+/* Takes `file`. A pose at fault is a problem, one that was lost is counted. */
+static void add_frame(struct transforms *t, double m[4][4], const struct lens *lens, char *file,
+                      const char *name, const char *place, struct findings *f, size_t *lost_count) {
+    struct transforms_frame frame = {.number = t->named_count++, .file = file, .lens = *lens,
+                                     .exposure_source = EXPOSURE_UNKNOWN};
+    struct error err;
+    bool scaled;
+    if (!is_finite(m)) {
+        (*lost_count)++;
+    } else if (pose_from_matrix((const double(*)[4])m, POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
+                                &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
+        findings_problem(f, name, "%s: %s", place, err.message);
+    } else {
+        t->frame[t->frame_count++] = frame;
+        return;
+    }
+    mem_free(file);
+}
+
+static void warn_of_lost(const char *name, size_t lost_count, struct findings *f) {
+    if (lost_count > 0)
+        findings_warning(f, "%s: %zu poses are not finite and were left out", name, lost_count);
+}
+
+/* --- NICE-SLAM's Replica -------------------------------------------------------------------- */
+
+enum status trajectory_parse(const void *data, size_t size, const char *name, const struct lens *lens,
+                             struct transforms *t, struct findings *f, struct error *err) {
+    const char *text = data, *end = size > 0 ? text + size : text;
+    size_t line = 0, capacity = 0, lost_count = 0;
+    *t = (struct transforms){0};
+    while (text < end) {
+        const char *newline = memchr(text, '\n', (size_t)(end - text)), *stop = newline ? newline : end;
+        char *own = mem_strndup(text, (size_t)(stop - text)), place[48];
+        double m[4][4];
+        bool is_blank = own[strspn(own, " \t\r")] == '\0', is_matrix = !is_blank && read_matrix(own, m);
+        line++;
+        text = stop + 1;
+        mem_free(own);
+        if (is_blank)
+            continue;
+        if (!is_matrix)
+            return error_set(err, STATUS_INPUT, "%s, line %zu: expected the 16 numbers of a matrix", name, line);
+        if (t->named_count == TRANSFORMS_MAX_FRAMES)
+            return error_set(err, STATUS_INPUT, "%s has more than %d poses", name, TRANSFORMS_MAX_FRAMES);
+        if (t->frame_count == capacity) {
+            capacity = capacity ? 2 * capacity : 64;
+            t->frame = mem_realloc_array(t->frame, capacity, sizeof *t->frame);
+        }
+        snprintf(place, sizeof place, "line %zu", line);
+        add_frame(t, m, lens, mem_printf("results/frame%06zu", t->named_count), name, place, f, &lost_count);
+    }
+    warn_of_lost(name, lost_count, f);
+    return STATUS_OK;
+}
+
+/* The numbers w h fx fy cx cy of the member "camera". */
+static enum status read_parameters(const char *root, struct lens *lens, struct error *err) {
+    static const char *const key[6] = {"w", "h", "fx", "fy", "cx", "cy"};
+    double value[6];
+    cJSON *tree = NULL;
+    char *text;
+    enum status status = read_text(root, PARAMETERS, &text, err);
+    if (status == STATUS_OK)
+        status = json_parse(text, strlen(text), PARAMETERS, &tree, err);
+    const cJSON *camera = cJSON_GetObjectItemCaseSensitive(tree, "camera");
+    for (int i = 0; i < 6 && status == STATUS_OK; i++) {
+        status = json_number(camera, key[i], PARAMETERS, NAN, &value[i], err);
+        if (status == STATUS_OK && isnan(value[i]))
+            status = error_set(err, STATUS_INPUT, PARAMETERS ": \"camera\" has no %s", key[i]);
+    }
+    if (status == STATUS_OK)
+        *lens = (struct lens){.model = CAMERA_OPENCV, .width = value[0], .height = value[1], .fl_x = value[2],
+                              .fl_y = value[3], .cx = value[4] + PIXEL_CENTRE, .cy = value[5] + PIXEL_CENTRE,
+                              .angle_x = NAN, .angle_y = NAN};
+    cJSON_Delete(tree);
+    mem_free(text);
+    return status;
+}
+
+static enum status read_replica(const char *root, struct transforms *t, struct findings *f, struct error *err) {
+    struct lens lens;
+    struct mapping file;
+    enum status status = read_parameters(root, &lens, err);
+    if (status != STATUS_OK)
+        return status;
+    char *path = file_join(root, TRAJECTORY);
+    status = mapping_open(&file, path, TRAJECTORY, "a list of poses", err);
+    if (status == STATUS_OK)
+        status = trajectory_parse(file.data, file.size, TRAJECTORY, &lens, t, f, err);
+    mapping_close(&file);
+    mem_free(path);
+    return status;
+}
+
+/* --- ScanNet -------------------------------------------------------------------------------- */
+
+static enum status read_matrix_file(const char *root, const char *name, double m[4][4], struct error *err) {
+    char *text;
+    enum status status = read_text(root, name, &text, err);
+    if (status == STATUS_OK && !read_matrix(text, m))
+        status = error_set(err, STATUS_INPUT, "%s: expected the 16 numbers of a matrix", name);
+    mem_free(text);
+    return status;
+}
+
+static int by_value(const void *a, const void *b) {
+    long x = *(const long *)a, y = *(const long *)b;
+    return (x > y) - (x < y);
+}
+
+/* The numbers N of the files N.txt in the folder, ascending; the caller's. */
+static enum status list_poses(const char *root, long **number, size_t *count, struct error *err) {
+    char *path = file_join(root, POSES), *end;
+    DIR *folder = opendir(path);
+    struct dirent *entry;
+    size_t capacity = 0;
+    *number = NULL;
+    *count = 0;
+    mem_free(path);
+    if (!folder)
+        return error_set_errno(err, errno, "cannot list " POSES);
+    while ((entry = readdir(folder)) != NULL) {
+        long value = strtol(entry->d_name, &end, 10);
+        if (end == entry->d_name || strcmp(end, ".txt") != 0 || value < 0 || *count == TRANSFORMS_MAX_FRAMES + 1)
+            continue;
+        if (*count == capacity) {
+            capacity = capacity ? 2 * capacity : 64;
+            *number = mem_realloc_array(*number, capacity, sizeof **number);
+        }
+        (*number)[(*count)++] = value;
+    }
+    closedir(folder);
+    if (*count > 1)
+        qsort(*number, *count, sizeof **number, by_value);
+    if (*count > TRANSFORMS_MAX_FRAMES)
+        return error_set(err, STATUS_INPUT, POSES " has more than %d poses", TRANSFORMS_MAX_FRAMES);
+    return STATUS_OK;
+}
+
+static enum status read_scannet(const char *root, struct transforms *t, struct findings *f, struct error *err) {
+    double k[4][4], m[4][4];
+    long *number = NULL;
+    size_t count = 0, lost_count = 0;
+    enum status status = read_matrix_file(root, INTRINSIC, k, err);
+    if (status == STATUS_OK)
+        status = list_poses(root, &number, &count, err);
+    struct lens lens = {.model = CAMERA_OPENCV, .width = NAN, .height = NAN, .angle_x = NAN, .angle_y = NAN};
+    if (status == STATUS_OK) {
+        lens.fl_x = k[0][0];
+        lens.fl_y = k[1][1];
+        lens.cx = k[0][2] + PIXEL_CENTRE;
+        lens.cy = k[1][2] + PIXEL_CENTRE;
+        t->frame = mem_calloc(count + 1, sizeof *t->frame);
+    }
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        struct error own;
+        char *name = mem_printf(POSES "/%ld.txt", number[i]);
+        enum status read = read_matrix_file(root, name, m, &own);
+        if (read == STATUS_OK)
+            add_frame(t, m, &lens, mem_printf("color/%ld", number[i]), name, "the pose", f, &lost_count);
+        else if (read == STATUS_INPUT || read == STATUS_NOT_FOUND)
+            findings_error(f, name, &own);
+        else
+            status = read;
+        if (status != STATUS_OK && err)
+            *err = own;
+        mem_free(name);
+    }
+    warn_of_lost(POSES, lost_count, f);
+    mem_free(number);
+    return status;
+}
+
+enum status trajectory_read(const char *root, const char *found, struct transforms *t, struct findings *f,
+                            struct error *err) {
+    struct error own = {0};
+    *t = (struct transforms){0};
+    bool is_replica = strcmp(found, TRAJECTORY) == 0;
+    enum status status = is_replica ? read_replica(root, t, f, &own) : read_scannet(root, t, f, &own);
+    if (status == STATUS_INPUT || status == STATUS_LIMIT || status == STATUS_NOT_FOUND) {
+        findings_error(f, found, &own);
+        return STATUS_OK;
+    }
+    if (status != STATUS_OK && err)
+        *err = own;
+    return status;
+}
