@@ -16,6 +16,7 @@
 #define SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
 #define CHECKED "ffeeddccbbaa99887766554433221100ffeeddccbbaa99887766554433221100"
 #define JOBS_MAX 50 /* then the store is made anew */
+#define SIZE_MAX_HERE 4096 /* each line of it may be a transaction */
 
 static struct store *store;
 static int job_count;
@@ -105,7 +106,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct attempt a = {.phase = ATTEMPT_ALIVE, .iteration = -1.0, .dir = mem_strdup(fuzz_folder()),
                         .worker = {.pid_fd = -1}, .scene_id = CHECKED, .settings = mem_strdup("{}"), .number = 1};
     int64_t job_id = 0;
-    if (size < 1) {
+    if (size < 1 || size > SIZE_MAX_HERE) {
         mem_free(a.dir);
         mem_free(a.settings);
         return 0;
