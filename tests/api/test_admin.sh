@@ -85,6 +85,29 @@ call GET /v1/jobs; expect 200 "access = open"
 stop_daemon
 tail -n 1 "$work/log" | grep -qE '^time=\S+Z level=info msg="stopped"$' || fail "logfmt: $(tail -n 1 "$work/log")"
 
+# --- doctor ---
+doctor() { # WANTED-STATUS "VERDICT NAME PART" OPTION...
+    local wanted=$1 line=$2
+    shift 2
+    unbaked doctor "$@" >"$work/out"
+    equal $? "$wanted" "doctor's exit status with $*"
+    grep -qE "^$line" "$work/out" || fail "doctor $*: no line '$line': $(cat "$work/out")"
+}
+mkdir -m 755 "$work/others"; mkdir -m 750 "$work/damaged"; echo 'this is no database' >"$work/damaged/state.db"
+doctor 0 'warn +data .* is not there' --data "$work/none"
+doctor 0 'warn +sandbox .*sandbox = no' --data "$work/none" --set sandbox=no
+doctor 0 'warn +machine .*more memory than there is' --data "$work/none" --set worker_memory_mib=16777216
+doctor 0 'warn +data .*chmod o=' --data "$work/others" --set min_free_mib=1
+doctor 1 'FAIL +disk' --data "$work/others" --set min_free_mib=16777216
+doctor 1 'FAIL +database .*damaged' --data "$work/damaged" --set min_free_mib=1
+doctor 0 'warn +tokens .*may do everything' --data "$work/none" --set access=open --set listen=0.0.0.0:1
+doctor 0 'warn +tls .*unencrypted' --data "$work/none" --set access=open --set listen=0.0.0.0:1
+doctor 1 'FAIL +tls' --data "$work/none" --set tls_certificate="$work/none" --set tls_key="$work/none"
+doctor 0 'usage: unbaked doctor' --help
+(ulimit -n 500; exec "$build/unbaked" doctor --data "$work/none") >"$work/out"
+grep -qE '^warn +limits .*wanted for max_connections' "$work/out" || fail "doctor with few files: $(cat "$work/out")"
+unbaked doctor word >"$work/out"; equal $? 2 "doctor's exit status with a word"
+
 # --- check-config ---
 unbaked check-config config/unbaked.conf >/dev/null || fail "check-config: $(cat "$work/err")"
 printf 'max_runing = 1\nlog_format = xml\n' >"$work/bad.conf"
@@ -115,6 +138,9 @@ if command -v openssl >/dev/null; then
     wait_for 10 grep -q 'the old certificate stays' "$work/log"
     call GET /healthz --cacert "$work/first.pem"; expect 200 "after a bad reload"
     certificate second; kill -HUP "$daemon_pid"
+    chmod 644 "$work/key.pem"
+    doctor 0 'warn +tls .*everybody here can read the key' --data "$data" --set min_free_mib=1 \
+        --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem"
     wait_for 10 grep -q 'certificate was read again' "$work/log"
     call GET /healthz --cacert "$work/cert.pem"; expect 200 "the new certificate"
     call GET /healthz --cacert "$work/first.pem"; equal "$status" 000 "the old certificate, after a reload"
