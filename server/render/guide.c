@@ -168,7 +168,8 @@ struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, co
     find_rows(&l, mesh);
     g->reach = mem_calloc(g->row_count * g->patch_count, sizeof *g->reach); /* row 0: nothing known */
     g->power = mem_array(g->patch_count, sizeof *g->power);
-    g->cumulative = mem_calloc_large(g->row_count * (g->patch_count + 1), sizeof *g->cumulative);
+    g->stride = g->patch_count + 1 + LIGHT_TABLE_PAD;
+    g->cumulative = mem_calloc_large(g->row_count * g->stride, sizeof *g->cumulative);
     g->start = mem_calloc_large(g->row_count * GUIDE_STARTS, sizeof *g->start);
     for (size_t row = 1; row < g->row_count; row++)
         learn_row(&l, row);
@@ -193,7 +194,7 @@ void guide_free(struct guide *g) {
 
 static void make_row(struct guide *g, size_t row, const float *luminance) {
     const float *reach = g->reach + row * g->patch_count;
-    float *c = g->cumulative + row * (g->patch_count + 1);
+    float *c = g->cumulative + row * g->stride;
     double total = 0.0, sum = 0.0;
     for (size_t p = 0; p < g->patch_count; p++)
         total += (double)(reach[p] * luminance[p]);
@@ -204,6 +205,8 @@ static void make_row(struct guide *g, size_t row, const float *luminance) {
         sum += by_power * (double)g->power[p] + by_reach * (double)(reach[p] * luminance[p]);
     }
     c[g->patch_count] = 1.0f;
+    for (size_t i = 1; i <= LIGHT_TABLE_PAD; i++)
+        c[g->patch_count + i] = INFINITY;
     size_t patch = 0;
     for (size_t i = 0; i < GUIDE_STARTS; i++) {
         while (patch + 1 < g->patch_count && c[patch + 1] * GUIDE_STARTS <= (float)i)

@@ -37,7 +37,8 @@ struct guide {
     uint16_t *patch_of;       /* [light triangles] */
     float *reach;             /* [row_count][patch_count] what arrives of radiance 1 */
     float *power;             /* [patch_count] share of all power */
-    float *cumulative;        /* [row_count][patch_count + 1] from 0 to 1; row 0 is by power */
+    size_t stride;            /* patch_count + 1 + LIGHT_TABLE_PAD */
+    float *cumulative;        /* [row_count][stride] as a light_table's; row 0 is by power */
     uint16_t *start;          /* [row_count][GUIDE_STARTS] patch in whose range i / GUIDE_STARTS lies */
 };
 
@@ -67,7 +68,7 @@ static inline int32_t guide_cell(const struct guide_grid *grid, vec3 p, vec3 nor
 }
 
 static inline float guide_chance(const struct guide *g, size_t row, size_t patch) {
-    const float *c = g->cumulative + row * (g->patch_count + 1) + patch;
+    const float *c = g->cumulative + row * g->stride + patch;
     return c[1] - c[0];
 }
 
@@ -75,10 +76,9 @@ static inline float guide_chance(const struct guide *g, size_t row, size_t patch
  * its points are picked. */
 static inline uint32_t guide_pick(const struct guide *g, const struct lights *lights, size_t row, float pick,
                                   float *density_factor) {
-    const float *c = g->cumulative + row * (g->patch_count + 1);
+    const float *c = g->cumulative + row * g->stride;
     size_t patch = g->start[row * GUIDE_STARTS + (size_t)(pick * GUIDE_STARTS)];
-    while (c[patch + 1] <= pick && patch + 1 < g->patch_count)
-        patch++;
+    patch += light_table_steps(c, patch, pick);
     float width = c[patch + 1] - c[patch];
     *density_factor = width / g->power[patch];
     uint32_t first = g->first[patch], end = g->first[patch + 1];

@@ -68,12 +68,14 @@ struct shade_block {
     struct lanes3 normal;            /* geometric */
     float plane[LANES];
     struct lanes3 shading;           /* interpolated normal, not normalised; 0: none */
-    float column[LANES], row[LANES]; /* place between the centres of the four texels */
+    float place_x[LANES], place_y[LANES]; /* in the texture, texels */
     /* Derived. */
     struct lanes3 point;
     struct lanes3 frame_normal;      /* shading normal on the viewer's side */
     int32_t cell[LANES];             /* of the guide */
     uint32_t guide_row[LANES];
+    uint32_t texel[LANES];           /* number of the first of the four around the place */
+    float column[LANES], row[LANES]; /* place between the centres of the four */
     float filter[4][LANES];          /* weights of valid texels, not normalised */
     float filter_sum[LANES];
     /* Random numbers. */

@@ -23,7 +23,7 @@ static void table_make(struct light_table *t, size_t count, const float *weight)
     if (!(t->total > 0.0))
         return;
     t->count = count;
-    t->cumulative = mem_array(count + 1, sizeof *t->cumulative);
+    t->cumulative = mem_array(count + 1 + LIGHT_TABLE_PAD, sizeof *t->cumulative);
     t->guide_count = count * GUIDE_DENSITY;
     t->guide = mem_array(t->guide_count, sizeof *t->guide);
     double sum = 0.0;
@@ -33,6 +33,8 @@ static void table_make(struct light_table *t, size_t count, const float *weight)
     }
     /* Trailing entries of weight 0 must keep an empty range. */
     t->cumulative[count] = 1.0f;
+    for (size_t i = 1; i <= LIGHT_TABLE_PAD; i++)
+        t->cumulative[count + i] = INFINITY;
     for (size_t i = count; i-- > 0 && weight[i] == 0.0f;)
         t->cumulative[i] = 1.0f;
     size_t entry = 0;

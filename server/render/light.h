@@ -37,12 +37,15 @@ struct light_triangle {
     uint32_t pad;
 };
 
+/* Cumulative sums end in this many infinite entries: searches take several entries at once. */
+#define LIGHT_TABLE_PAD 3
+
 /* A distribution over [0, count): monotone inversion of the cumulative sum, by a table that
  * starts each search near its end, so that stratified numbers give stratified choices. */
 struct light_table {
     size_t count;
     double total;
-    float *cumulative; /* [count + 1], 0 to 1; owned */
+    float *cumulative; /* [count + 1 + LIGHT_TABLE_PAD] 0 to 1; owned */
     size_t guide_count;
     uint32_t *guide;   /* [guide_count]: entry whose range holds i / guide_count; owned */
 };
@@ -65,8 +68,19 @@ struct lights {
     struct light_table blocks; /* of width x (height - 1) cells, which lie between pixel centres */
 };
 
-/* The entry whose range holds u in [0, 1): a linear search from the guide's entry, mostly
- * of no step. */
+/* How many entries to go on from `entry` to the one whose range holds u: a linear search, by four at
+ * once, since how many of the first few are passed is too random to branch on. */
+static inline size_t light_table_steps(const float *cumulative, size_t entry, float u) {
+    size_t steps = 0, passed;
+    do {
+        const float *end = cumulative + entry + steps + 1;
+        passed = (size_t)(end[0] <= u) + (size_t)(end[1] <= u) + (size_t)(end[2] <= u) + (size_t)(end[3] <= u);
+        steps += passed;
+    } while (passed == LIGHT_TABLE_PAD + 1);
+    return steps;
+}
+
+/* The entry whose range holds u in [0, 1), searched from the guide's entry. */
 static inline uint32_t light_table_pick(const struct light_table *t, float u) {
     size_t at = (size_t)(u * (float)t->guide_count);
     at = at < t->guide_count ? at : t->guide_count - 1;
@@ -74,9 +88,8 @@ static inline uint32_t light_table_pick(const struct light_table *t, float u) {
     /* Rounding of u * count may have passed a boundary. */
     while (entry > 0 && t->cumulative[entry] > u)
         entry--;
-    while (entry + 1 < t->count && t->cumulative[entry + 1] <= u)
-        entry++;
-    return entry;
+    size_t found = entry + light_table_steps(t->cumulative, entry, u);
+    return (uint32_t)(found < t->count ? found : t->count - 1); /* where rounding made u 1 */
 }
 
 /* A sampled direction towards light. */

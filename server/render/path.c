@@ -141,21 +141,6 @@ static float4 corner_normal(const struct world_triangle *t, int corner) {
     return __builtin_convertvector(n, float4);
 }
 
-/* Finds the four texels of a hit, as texture_taps does, and has them fetched. */
-static void place_lane(struct vertex_block *v, struct shade_block *s, int lane,
-                       const struct texture *texture, float x, float y) {
-    float cx = clampf(x - 0.5f, 0.0f, (float)texture->width - 1.0f);
-    float cy = clampf(y - 0.5f, 0.0f, (float)texture->height - 1.0f);
-    int column = (int)cx, row = (int)cy;
-    s->column[lane] = cx - (float)column;
-    s->row[lane] = cy - (float)row;
-    uint32_t first = (uint32_t)row * texture->width + (uint32_t)column;
-    v->x[lane] = (uint16_t)column;
-    v->y[lane] = (uint16_t)row;
-    __builtin_prefetch(texture->texel + first, 0, 2);
-    __builtin_prefetch(texture->texel + first + texture->width, 0, 2);
-}
-
 /* Puts the vertex that a ray hit into a lane. */
 static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
                       size_t flight, const rgb *radiance) {
@@ -167,8 +152,8 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     struct shade_block *s = b->shade;
     float b1 = hit->b1, b2 = hit->b2, b0 = 1.0f - b1 - b2;
     const vec2 *c = t->corner;
-    place_lane(v, s, lane, &m->base_color, b0 * c[0].x + b1 * c[1].x + b2 * c[2].x,
-               b0 * c[0].y + b1 * c[1].y + b2 * c[2].y);
+    s->place_x[lane] = b0 * c[0].x + b1 * c[1].x + b2 * c[2].x;
+    s->place_y[lane] = b0 * c[0].y + b1 * c[1].y + b2 * c[2].y;
     v->path[lane] = f->path;
     v->parent[lane] = f->parent;
     lanes3_set_rgb(&v->beta, lane, f->beta);
@@ -211,7 +196,7 @@ static void find_rows(struct shade_block *s, const struct guide *guide, int coun
         s->guide_row[i] = guide->row[s->cell[i]];
         __builtin_prefetch(guide->start + s->guide_row[i] * GUIDE_STARTS);
         __builtin_prefetch(guide->cumulative +
-                           s->guide_row[i] * (guide->patch_count + 1) + (size_t)(s->pick[i] * (float)guide->patch_count));
+                           s->guide_row[i] * guide->stride + (size_t)(s->pick[i] * (float)guide->patch_count));
     }
 }
 
@@ -266,6 +251,18 @@ static void sample_environment(struct shade_block *s, struct vertex_block *v, co
     }
 }
 
+/* Has the texels fetched that the block will read. In a loop that does nothing else, so that many are
+ * under way at once: most lie in a page of their own, whose address must be found first. */
+static void fetch_texels(const struct shade_block *s, const struct texture *texture, int count) {
+    for (int i = 0; i < count; i++) {
+        const float(*texel)[4] = (const float(*)[4])texture->texel + s->texel[i];
+        __builtin_prefetch(texel, 0, 2);
+        __builtin_prefetch(texel + 1, 0, 2);
+        __builtin_prefetch(texel + texture->width, 0, 2);
+        __builtin_prefetch(texel + texture->width + 1, 0, 2);
+    }
+}
+
 /* The sums over the four texels, r g b and weight at once: a texel's fourth value is 1 where it
  * is valid and 0 elsewhere. As texture_taps and texture_gather. */
 static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
@@ -273,8 +270,7 @@ static void gather_texels(struct vertex_block *v, struct shade_block *s, const s
     for (int i = 0; i < count; i++) {
         size_t down = v->y[i] + 1u < texture->height ? texture->width : 0;
         size_t right = v->x[i] + 1u < texture->width ? 1 : 0;
-        const float(*texel)[4] =
-            (const float(*)[4])texture->texel + (size_t)v->y[i] * texture->width + v->x[i];
+        const float(*texel)[4] = (const float(*)[4])texture->texel + s->texel[i];
         const float *at[4] = {texel[0], texel[right], texel[down], texel[down + right]};
         float x = s->column[i], y = s->row[i];
         const float weight[4] = {(1.0f - x) * (1.0f - y), x * (1.0f - y), (1.0f - x) * y, x * y};
@@ -333,9 +329,14 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     struct vertex_block *v = &b->vertex[depth][block];
     struct shade_block *s = b->shade;
     const struct texture *texture = &world->materials->base_color;
+    bool scatters = depth + 1 < settings->max_depth;
+    if (scatters) {
+        shade_place(v, s, texture->width, texture->height);
+        fetch_texels(s, texture, count);
+    }
     shade_surface(v, s);
     add_emission(v, count, radiance);
-    if (depth + 1 == settings->max_depth)
+    if (!scatters)
         return;
     memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);

@@ -75,6 +75,22 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
     }
 }
 
+/* As texture_taps. */
+KERNEL void shade_place(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
+                        uint32_t height) {
+    float right = (float)width - 1.0f, bottom = (float)height - 1.0f;
+    FOR_LANES {
+        float x = clamp_flat(s->place_x[i] - 0.5f, 0.0f, right);
+        float y = clamp_flat(s->place_y[i] - 0.5f, 0.0f, bottom);
+        int32_t column = (int32_t)x, row = (int32_t)y;
+        s->column[i] = x - (float)column;
+        s->row[i] = y - (float)row;
+        s->texel[i] = (uint32_t)row * width + (uint32_t)column;
+        v->x[i] = (uint16_t)column;
+        v->y[i] = (uint16_t)row;
+    }
+}
+
 KERNEL void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid) {
     const struct guide_grid g = *grid;
     FOR_LANES {

@@ -10,6 +10,10 @@
 /* From the hit and the triangle: point, frame, wo, weight of the emission. */
 void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s);
 
+/* The four texels around the places in a texture of this size. */
+void shade_place(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
+                 uint32_t height);
+
 /* The guide's cells. */
 void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid);
 

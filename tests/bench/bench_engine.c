@@ -1,5 +1,6 @@
-/* Speed ratios that need only the engine, each measured within one run: the medians of
- * interleaved repetitions. Prints lines "name value goal better", which run.sh collects. */
+/* Speed ratios that need only the engine, each measured within one run by one thread's processor time:
+ * the medians of interleaved repetitions. Prints lines "name value goal better", which run.sh
+ * collects. */
 #include "tests/bench/engine.h"
 
 #define REPEATS 5
@@ -22,7 +23,7 @@ static void record_rays(void *user, bool shadow, size_t count, const struct acce
 
 /* Seconds for the recorded rays by single queries and nothing else. */
 static double run_bare(const struct room *room, const struct record *r) {
-    double start = now_sec();
+    double start = cpu_sec();
     uint64_t found = 0;
     for (size_t i = 0; i < r->count[0]; i++) {
         const struct accel_ray *a = &r->ray[0][i];
@@ -33,8 +34,14 @@ static double run_bare(const struct room *room, const struct record *r) {
         const struct accel_ray *a = &r->ray[1][i];
         found += accel_occluded(room->world.accel, a->origin, a->direction, a->near_m, a->far_m);
     }
-    double took = now_sec() - start;
+    double took = cpu_sec() - start;
     return found > 0 ? took : 0.0;
+}
+
+static double run_engine(struct work *one, bool backward) {
+    double start = cpu_sec();
+    run(one, backward);
+    return cpu_sec() - start;
 }
 
 static void bench_room(const char *name) {
@@ -53,8 +60,8 @@ static void bench_room(const char *name) {
     double bare[REPEATS], primal[REPEATS], gradient[REPEATS];
     for (int i = 0; i < REPEATS; i++) {
         bare[i] = run_bare(&room, &record);
-        primal[i] = run(&one, false);
-        gradient[i] = run(&one, true);
+        primal[i] = run_engine(&one, false);
+        gradient[i] = run_engine(&one, true);
     }
     double b = median(bare, REPEATS), p = median(primal, REPEATS), g = median(gradient, REPEATS);
     double paths = (double)one.path_count;
