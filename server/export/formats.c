@@ -52,6 +52,7 @@ const struct format formats[FORMATS_COUNT] = {
     {"scene.glb", "model/gltf-binary", "the room as glTF 2.0, for Blender and others", write_glb},
     {"scene.obj", "model/obj", "the mesh with its atlas coordinates", write_obj},
     {"scene.mtl", "model/mtl", "the materials of scene.obj; wants base_color.png", write_mtl},
-    {"scene.xml", "application/xml", "the room for Mitsuba 3; wants scene.serialized and the textures", write_xml},
+    {"scene.xml", "application/xml", "the room for Mitsuba 3; wants scene.serialized and the textures",
+     write_xml},
     {"scene.serialized", "application/octet-stream", "the shapes of scene.xml", write_shapes},
 };

@@ -18,8 +18,8 @@
  * These but the first are one number a segment, so factors hold them exactly where textures would
  * round them to 8 bits and bleed at seams. What differs: glTF takes from the diffuse light what the
  * surface reflects (times 1 - F, F by Schlick), ours does not, so glossy surfaces look a few percent
- * darker, and rooms of them more; its diffuse lobe is Lambert's. Emitters are single-sided, since ours shine from their front
- * only; everything else is double-sided.
+ * darker, and rooms of them more; its diffuse lobe is Lambert's. Emitters are single-sided, since ours
+ * shine from their front only; everything else is double-sided.
  *
  * glTF has no ratified place for distant light: the node "room" names environment.exr in its extras,
  * with the layout of outputs.h in the room's own axes. */

@@ -25,8 +25,8 @@ static void put_sensor(struct sink *out, size_t number, const struct camera *c) 
     const vec3 at = c->world_from_camera.translation;
     const float origin[3] = {at.x, at.y, at.z};
     double width = (double)c->width, height = (double)c->height;
-    sink_printf(out, "  <sensor type=\"perspective\" id=\"view_%zu\">\n    <transform name=\"to_world\"><matrix value=\"",
-                number);
+    sink_printf(out, "  <sensor type=\"perspective\" id=\"view_%zu\">\n"
+                "    <transform name=\"to_world\"><matrix value=\"", number);
     for (int i = 0; i < 3; i++)
         sink_printf(out, PRECISE " " PRECISE " " PRECISE " " PRECISE " ", -(double)r[i][0],
                     -(double)r[i][1], (double)r[i][2], (double)origin[i]);

@@ -7,7 +7,8 @@
  * they are. Emitters are area lights with the segment's radiance: they shine from their front and
  * reflect, as ours do.
  *
- * Each held-out view N of views.json is the sensor view_N: its pinhole, with fx for both axes and without lens distortion. */
+ * Each held-out view N of views.json is the sensor view_N: its pinhole, with fx for both axes and
+ * without lens distortion. */
 #ifndef UNBAKE_EXPORT_MITSUBA_H
 #define UNBAKE_EXPORT_MITSUBA_H
 

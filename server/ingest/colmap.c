@@ -158,7 +158,8 @@ static int by_id(const void *a, const void *b) {
 
 static enum status add_camera(const struct reader *r, struct colmap_cameras *c, uint64_t id,
                               const struct model *model, double width, double height, const double *value) {
-    struct lens lens = {.model = model->kind, .width = width, .height = height, .angle_x = NAN, .angle_y = NAN};
+    struct lens lens = {.model = model->kind, .width = width, .height = height, .angle_x = NAN,
+                        .angle_y = NAN};
     if (!(width >= 1.0 && width <= IMAGE_MAX_SIDE && height >= 1.0 && height <= IMAGE_MAX_SIDE) ||
         width != floor(width) || height != floor(height))
         return error_set(r->err, STATUS_INPUT, "%s: camera %llu is %.9g x %.9g pixels, which cannot be", r->name,

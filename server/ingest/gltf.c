@@ -9,16 +9,13 @@
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/ingest/gltf_file.h"
+#include "server/ingest/gltf_node.h"
 
 #define MAX_DEPTH 256 /* of nodes */
 #define TRIANGLES 4
 #define STRIP 5
 #define FAN 6
-
-/* world = m p, rows first; the last row is 0 0 0 1. */
-struct affine {
-    double m[3][4];
-};
+#define NONE UINT32_MAX
 
 struct reader {
     struct gltf_file file;
@@ -31,85 +28,19 @@ struct reader {
     struct error *err;
 };
 
-/* --- transforms (3.5.3) --------------------------------------------------------------------- */
-
-static struct affine multiply(const struct affine *a, const struct affine *b) {
-    struct affine c;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++)
-            c.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j] +
-                        (j == 3 ? a->m[i][3] : 0.0);
-    return c;
-}
-
-/* Columns of the inverse's transpose, times the determinant: what normals are turned by. */
-static void cofactors(const struct affine *a, double c[3][3]) {
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            c[i][j] = a->m[i1][j1] * a->m[i2][j2] - a->m[i1][j2] * a->m[i2][j1];
-        }
-    }
-}
-
-/* `count` finite numbers, or the fallback's where the member is absent. */
-static enum status read_numbers(struct reader *r, size_t node, const char *key, int count,
-                                const double *fallback, double *value) {
-    const cJSON *array = cJSON_GetObjectItemCaseSensitive(r->file.nodes.item[node], key), *item;
-    int i = 0;
-    memcpy(value, fallback, (size_t)count * sizeof *value);
-    if (!array)
-        return STATUS_OK;
-    bool good = cJSON_GetArraySize(array) == count;
-    cJSON_ArrayForEach(item, array) {
-        good = good && cJSON_IsNumber(item) && isfinite(item->valuedouble);
-        if (good)
-            value[i++] = item->valuedouble;
-    }
-    if (good)
-        return STATUS_OK;
-    return error_set(r->err, STATUS_INPUT, "%s: nodes[%zu].%s is not %d numbers", r->file.name, node, key, count);
-}
-
-static enum status read_transform(struct reader *r, size_t node, struct affine *t) {
-    static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-    static const double none[4] = {0, 0, 0, 1}, one[3] = {1, 1, 1};
-    double matrix[16], move[3], q[4], scale[3];
-    enum status status = read_numbers(r, node, "matrix", 16, identity, matrix);
-    if (status == STATUS_OK)
-        status = read_numbers(r, node, "translation", 3, none, move);
-    if (status == STATUS_OK)
-        status = read_numbers(r, node, "rotation", 4, none, q);
-    if (status == STATUS_OK)
-        status = read_numbers(r, node, "scale", 3, one, scale);
-    if (status != STATUS_OK)
-        return status;
-    double x = q[0], y = q[1], z = q[2], w = q[3];
-    const struct affine trs = {{
-        {scale[0] * (1 - 2 * (y * y + z * z)), scale[1] * 2 * (x * y - z * w), scale[2] * 2 * (x * z + y * w), move[0]},
-        {scale[0] * 2 * (x * y + z * w), scale[1] * (1 - 2 * (x * x + z * z)), scale[2] * 2 * (y * z - x * w), move[1]},
-        {scale[0] * 2 * (x * z - y * w), scale[1] * 2 * (y * z + x * w), scale[2] * (1 - 2 * (x * x + y * y)), move[2]},
-    }};
-    struct affine columns;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++)
-            columns.m[i][j] = matrix[4 * j + i];
-    *t = multiply(&columns, &trs); /* a node has one or the other */
-    return STATUS_OK;
-}
-
 /* --- primitives (3.7.2) --------------------------------------------------------------------- */
 
-static enum status open_attribute(struct reader *r, const cJSON *primitive, const char *key, const char *where,
-                                  bool *found, struct gltf_span *span) {
+static enum status open_attribute(struct reader *r, const cJSON *primitive, const char *key,
+                                  const char *where, bool *found, struct gltf_span *span) {
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
     size_t accessor;
-    enum status status = gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
+    enum status status =
+        gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
     if (status == STATUS_OK && *found)
         status = gltf_span(&r->file, accessor, "VEC3", span, r->err);
     if (status == STATUS_OK && *found && span->component != GLTF_FLOAT)
-        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats", r->file.name,
-                           accessor, where, key);
+        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats",
+                           r->file.name, accessor, where, key);
     return status;
 }
 
@@ -125,8 +56,6 @@ struct primitive {
     size_t table_size;
     uint32_t (*table)[2]; /* [table_size] number in the file, and in the mesh or NONE; owned */
 };
-
-#define NONE UINT32_MAX
 
 static vec3 apply(const double m[3], const double m1[3], const double m2[3], const float v[3]) {
     double x = (double)v[0], y = (double)v[1], z = (double)v[2];
@@ -200,7 +129,8 @@ static enum status open_primitive(struct reader *r, const cJSON *object, struct 
     bool found;
     const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
     if (cJSON_GetObjectItemCaseSensitive(extensions, "KHR_draco_mesh_compression")) {
-        error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name, p->where);
+        error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name,
+                  p->where);
         return error_hint(r->err, "export it without compression");
     }
     enum status status = gltf_index(&r->file, object, "indices", p->where, &r->file.accessors, &p->is_indexed,
@@ -209,8 +139,8 @@ static enum status open_primitive(struct reader *r, const cJSON *object, struct 
         status = gltf_span(&r->file, accessor, "SCALAR", &p->indices, r->err);
     enum gltf_component c = p->indices.component;
     if (status == STATUS_OK && p->is_indexed && c != GLTF_UBYTE && c != GLTF_USHORT && c != GLTF_UINT)
-        status = error_set(r->err, STATUS_INPUT, "%s: the indices of %s are not unsigned integers", r->file.name,
-                           p->where);
+        status = error_set(r->err, STATUS_INPUT, "%s: the indices of %s are not unsigned integers",
+                           r->file.name, p->where);
     if (status == STATUS_OK)
         status = open_attribute(r, object, "POSITION", p->where, &found, &p->position);
     if (status == STATUS_OK && !found)
@@ -218,8 +148,8 @@ static enum status open_primitive(struct reader *r, const cJSON *object, struct 
     if (status == STATUS_OK)
         status = open_attribute(r, object, "NORMAL", p->where, &p->has_normal, &p->normal);
     if (status == STATUS_OK && p->has_normal && p->normal.count != p->position.count)
-        status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file.name, p->where,
-                           p->position.count, p->normal.count);
+        status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file.name,
+                           p->where, p->position.count, p->normal.count);
     return status;
 }
 
@@ -234,7 +164,7 @@ static enum status add_primitive(struct reader *r, const cJSON *object, const ch
     if (triangles > r->faces->limit - r->mesh->triangle_count)
         return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit", r->file.name,
                          r->faces->limit);
-    cofactors(t, p.turn);
+    affine_cofactors(t, p.turn);
     p.mirrored = t->m[0][0] * p.turn[0][0] + t->m[0][1] * p.turn[0][1] + t->m[0][2] * p.turn[0][2] < 0.0;
     size_t most = count < p.position.count ? count : p.position.count;
     for (p.table_size = 16; p.table_size < 2 * most;)
@@ -256,7 +186,8 @@ static enum status add_mesh(struct reader *r, size_t mesh, const struct affine *
     cJSON_ArrayForEach(item, primitives) {
         const cJSON *mode = cJSON_GetObjectItemCaseSensitive(item, "mode");
         const cJSON *own = cJSON_GetObjectItemCaseSensitive(item, "material");
-        double kind = mode ? cJSON_GetNumberValue(mode) : TRIANGLES, number = own ? cJSON_GetNumberValue(own) : -1.0;
+        double kind = mode ? cJSON_GetNumberValue(mode) : TRIANGLES;
+        double number = own ? cJSON_GetNumberValue(own) : -1.0;
         char where[64];
         snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, i++);
         if (kind != TRIANGLES && kind != STRIP && kind != FAN)
@@ -283,14 +214,15 @@ static enum status visit(struct reader *r, size_t node, const struct affine *par
     if (r->visited[node])
         return error_set(r->err, STATUS_INPUT, "%s: %s has more than one parent", r->file.name, where);
     if (depth > MAX_DEPTH)
-        return error_set(r->err, STATUS_INPUT, "%s: %s lies more than %d nodes deep", r->file.name, where, MAX_DEPTH);
+        return error_set(r->err, STATUS_INPUT, "%s: %s lies more than %d nodes deep", r->file.name, where,
+                         MAX_DEPTH);
     r->visited[node] = true;
-    enum status status = read_transform(r, node, &own);
+    enum status status = gltf_node_transform(&r->file, node, &own, r->err);
     if (status == STATUS_OK)
         status = gltf_index(&r->file, object, "mesh", where, &r->file.meshes, &found, &mesh, r->err);
     if (status != STATUS_OK)
         return status;
-    t = multiply(parent, &own);
+    t = affine_multiply(parent, &own);
     if (found)
         status = add_mesh(r, mesh, &t);
     cJSON_ArrayForEach(item, cJSON_GetObjectItemCaseSensitive(object, "children")) {
@@ -298,8 +230,8 @@ static enum status visit(struct reader *r, size_t node, const struct affine *par
         if (status != STATUS_OK)
             break;
         if (!(child >= 0.0 && child < (double)r->file.nodes.count) || child != floor(child))
-            return error_set(r->err, STATUS_INPUT, "%s: a child of %s is none of the %zu nodes", r->file.name, where,
-                             r->file.nodes.count);
+            return error_set(r->err, STATUS_INPUT, "%s: a child of %s is none of the %zu nodes",
+                             r->file.name, where, r->file.nodes.count);
         status = visit(r, (size_t)child, &t, depth + 1);
     }
     return status;
@@ -311,8 +243,8 @@ static enum status visit_list(struct reader *r, const cJSON *list, const char *o
     cJSON_ArrayForEach(item, list) {
         double node = cJSON_GetNumberValue(item);
         if (!(node >= 0.0 && node < (double)r->file.nodes.count) || node != floor(node))
-            return error_set(r->err, STATUS_INPUT, "%s: a node of %s is none of the %zu nodes", r->file.name, of,
-                             r->file.nodes.count);
+            return error_set(r->err, STATUS_INPUT, "%s: a node of %s is none of the %zu nodes",
+                             r->file.name, of, r->file.nodes.count);
         enum status status = visit(r, (size_t)node, &identity, 0);
         if (status != STATUS_OK)
             return status;
@@ -344,8 +276,8 @@ static enum status visit_roots(struct reader *r) {
 static enum status read_scene(struct reader *r) {
     bool found;
     size_t scene;
-    enum status status = gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found, &scene,
-                                    r->err);
+    enum status status = gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found,
+                                    &scene, r->err);
     if (status != STATUS_OK)
         return status;
     r->visited = mem_calloc(r->file.nodes.count + 1, sizeof *r->visited);

@@ -119,7 +119,8 @@ enum status trajectory_parse(const void *data, size_t size, const char *name, co
             t->frame = mem_realloc_array(t->frame, capacity, sizeof *t->frame);
         }
         snprintf(place, sizeof place, "line %zu", line);
-        add_frame(t, m, lens, mem_printf("results/frame%06zu", t->named_count), name, place, f, &lost_count);
+        char *file = mem_printf("results/frame%06zu", t->named_count);
+        add_frame(t, m, lens, file, name, place, f, &lost_count);
     }
     warn_of_lost(name, lost_count, f);
     return STATUS_OK;

@@ -1,0 +1,21 @@
+/* gltf_node.h -- the transform of a glTF node (glTF 2.0 specification, 3.5.3). */
+#ifndef UNBAKE_INGEST_GLTF_NODE_H
+#define UNBAKE_INGEST_GLTF_NODE_H
+
+#include "server/ingest/gltf_file.h"
+
+/* world = m p, rows first; the last row is 0 0 0 1. */
+struct affine {
+    double m[3][4];
+};
+
+/* a after b. */
+struct affine affine_multiply(const struct affine *a, const struct affine *b);
+/* The inverse's transpose times the determinant: what turns normals, also where there is no inverse. */
+void affine_cofactors(const struct affine *a, double c[3][3]);
+
+/* From the node's axes to its parent's, by its matrix or its translation, rotation and scale. */
+enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t,
+                                struct error *err);
+
+#endif
