@@ -87,7 +87,7 @@ static void note_look(const struct refine *f, const struct look_batch *b, size_t
     size_t first = k * (size_t)b->samples;
     *seen = (struct seen){.segment = look->segment, .texel = look->texel, .trust = look->trust};
     seen->match = loss_match_pair(b->reference + first, b->radiance + first, b->samples,
-                                  f->views->median_radiance);
+                                  fused_radiance(&f->r->fused, look->texel), f->views->median_radiance);
     for (int i = 0; i < b->samples; i++) {
         rgb *d = &b->d_radiance[first + (size_t)i];
         *d = rgb_scale(*d, look->trust);
@@ -116,7 +116,8 @@ static void run_chunk(void *user, size_t chunk, int thread) {
     }
     f->chunk_loss[chunk] = loss;
     f->chunk_looks[chunk] = b->look_count;
-    if (b->look_count > 0)
+    /* From a solved start only what is seen moves: no path is walked backwards. */
+    if (b->look_count > 0 && !f->solved)
         path_batch_backward(b->paths, &f->r->world, b->d_radiance, f->log[chunk]);
 }
 
@@ -197,7 +198,7 @@ static void match_blocks(struct refine *f) {
     for (size_t c = 0; c < f->chunk_count; c++) {
         const struct seen *seen = &f->seen[c * f->look_capacity];
         for (size_t i = 0; i < f->chunk_looks[c]; i++)
-            params_match(&f->params, seen[i].texel, &seen[i].match, seen[i].trust);
+            params_match(&f->params, seen[i].texel, &seen[i].match, seen[i].trust * seen[i].match.trust);
     }
 }
 

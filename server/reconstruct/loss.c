@@ -70,7 +70,7 @@ float loss_pair(const struct photograph *photo, const struct photograph_sample *
 }
 
 struct loss_match loss_match_pair(const struct photograph_sample *reference, const rgb *radiance,
-                                  int sample_count, float median) {
+                                  int sample_count, rgb expected, float median) {
     float shown[3] = {0}, rendered[3] = {0}, clip[3] = {0};
     bool saturated[3] = {false};
     float each = 1.0f / (float)sample_count;
@@ -87,12 +87,16 @@ struct loss_match loss_match_pair(const struct photograph_sample *reference, con
         }
     }
     struct loss_match match;
+    float off = 0.0f;
+    const float about[3] = {expected.r, expected.g, expected.b};
     for (int c = 0; c < 3; c++) {
         if (saturated[c])
             shown[c] = rendered[c] >= clip[c] ? rendered[c] : clip[c];
-        float scale = 1.0f / (shown[c] + MATCH_FLOOR * median);
+        float scale = 1.0f / (about[c] + MATCH_FLOOR * median);
         match.shown[c] = scale * shown[c];
         match.rendered[c] = scale * rendered[c];
+        off += (match.shown[c] - scale * about[c]) / 3.0f;
     }
+    match.trust = 1.0f / (1.0f + off * off);
     return match;
 }
