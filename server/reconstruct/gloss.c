@@ -2,6 +2,7 @@
 #include "server/reconstruct/gloss.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/rng.h"
@@ -10,7 +11,7 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-/* Texels of a segment that are looked at, so that all segments together have about so many. */
+/* Texels that are looked at in all; a segment's share of them goes by the root of its share of the texels. */
 #define POINTS_IN_ALL 24000
 #define POINTS_LEAST 24
 #define POINTS_MOST 256
@@ -20,14 +21,17 @@
 #define VIEWS 10
 #define VIEWS_ASKED 40 /* of which those far from edges are taken */
 #define VIEWS_LEAST 3
-#define SAMPLES 384 /* directions a (texel, view), over all roughness levels */
-#define LIGHT_SAMPLES 128
+/* Directions a photograph and place of the patch: of each roughness level, and of the lights. */
+#define SAMPLES_A_LEVEL 1
+#define LIGHT_SAMPLES 5
 #define KEY_GLOSS 17 /* keeps these random numbers apart from others of the texel */
 /* A photograph is read at PATCH x PATCH places over this many texels around, which takes out its
- * noise; their base colour may differ, it is the same in all photographs. */
+ * noise; their base colour may differ, it is the same in all photographs. So are candidates
+ * evaluated at all of them: a patch may be curved. */
 #define PATCH 5
 #define PATCH_TEXELS 8
-#define PATCH_COSINE 0.98f /* between its normals */
+#define PATCH_COSINE 0.8f /* between its normals and that in its middle */
+#define FACING 0.1f       /* cosine at which all of it must face a photograph */
 /* Misfit at which a look has a quarter of its influence: parts of the texel's radiance and of the
  * median of the room. */
 #define SCALE_RELATIVE 0.06f
@@ -42,6 +46,12 @@
  * much more, times the square of the difference. */
 #define PRIOR_SPECULAR 0.5f
 #define PRIOR_WEIGHT 1.0f
+/* What a segment is taken for of which the photographs tell neither that it is glossy nor, by so many
+ * standard errors, that it is matt: half way to an ordinary dielectric. Either way its base colour
+ * is then off by 2 %. */
+#define UNKNOWN_ROUGHNESS 0.5f
+#define UNKNOWN_SPECULAR (0.5f * PRIOR_SPECULAR)
+#define MATT_ERRORS 3.0
 
 #define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
 #define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
@@ -67,99 +77,131 @@ struct gloss_point {
     float misfit[ROUGHNESSES][SPECULARS];
 };
 
+/* A few texels of a chart. */
+struct patch {
+    size_t count;
+    struct surface_point at[PATCH * PATCH];
+    struct irradiance light[PATCH * PATCH];
+};
+
 struct gloss_job {
     struct reconstruction *r;
     const struct views *views;
     const struct probes *probes;
     const struct light_field *field;
     struct texels_by_segment texels;
-    size_t points;             /* at most so many a segment */
-    struct gloss_point *point; /* [threads][points] */
+    double roots;              /* sum over the segments of the root of their texels */
+    struct gloss_point *point; /* [threads][POINTS_MOST] */
     struct incident *scratch;  /* [threads] */
 };
 
 /* --- looking ------------------------------------------------------------------------------------ */
 
-/* Points of the surface around a texel, of its chart and alike in their normals. */
-static size_t patch_around(const struct reconstruction *r, uint32_t texel, const struct surface_point *at,
-                           vec3 patch[PATCH * PATCH]) {
-    uint32_t chart = r->atlas.chart_of_triangle[at->triangle];
+/* Points of the surface around a texel, of its chart and not too unlike in their normals. */
+static void patch_around(const struct gloss_job *job, uint32_t texel, struct patch *patch) {
+    const struct reconstruction *r = job->r;
+    struct surface_point at;
+    patch->count = 0;
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return;
+    uint32_t chart = r->atlas.chart_of_triangle[at.triangle];
     float x0 = (float)(texel % r->atlas.width) + 0.5f, y0 = (float)(texel / r->atlas.width) + 0.5f;
-    size_t count = 0;
     for (int i = 0; i < PATCH * PATCH; i++) {
         struct surface_point p;
+        struct probe_mix mix;
         float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
-        if (surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x0 + PATCH_TEXELS * dx,
-                       y0 + PATCH_TEXELS * dy, &p) &&
-            r->atlas.chart_of_triangle[p.triangle] == chart &&
-            vec3_dot(p.shading, at->shading) > PATCH_COSINE)
-            patch[count++] = p.position;
+        float x = x0 + PATCH_TEXELS * dx, y = y0 + PATCH_TEXELS * dy;
+        if (!surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x, y, &p) ||
+            r->atlas.chart_of_triangle[p.triangle] != chart || vec3_dot(p.shading, at.shading) < PATCH_COSINE)
+            continue;
+        probes_mix(job->probes, &r->atlas, &r->fused, (uint32_t)y * r->atlas.width + (uint32_t)x, &p, &mix);
+        probes_irradiance(job->probes, &mix, &patch->light[patch->count]);
+        patch->at[patch->count++] = p;
     }
-    return count;
 }
 
-/* What a photograph shows of the patch on average; false unless all of it was measured, no nearer
- * to edges than `edge`. */
-static bool patch_shown(const struct views *views, const struct view *view, uint32_t triangle,
-                        const vec3 *patch, size_t count, int edge, rgb *shown) {
+/* What a photograph shows of the patch on average; false unless all of it faces it and was measured, no
+ * nearer to edges than `edge`. */
+static bool patch_shown(const struct views *views, const struct view *view, const struct patch *patch, int edge,
+                        rgb *shown) {
     const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
     *shown = rgb_gray(0.0f);
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < patch->count; i++) {
+        const struct surface_point *at = &patch->at[i];
         struct view place = *view;
         struct photograph_sample s;
         float depth_m;
-        if (!camera_project(&photo->camera, patch[i], &place.x, &place.y, &depth_m) ||
-            views_edge(views, &place, triangle) > edge || !photograph_sample(photo, place.x, place.y, &s) ||
-            s.saturated[0] || s.saturated[1] || s.saturated[2])
+        if (vec3_dot(at->shading, views_direction(views, view->train, at->position)) < FACING ||
+            !camera_project(&photo->camera, at->position, &place.x, &place.y, &depth_m) ||
+            views_edge(views, &place, at->triangle) > edge ||
+            !photograph_sample(photo, place.x, place.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
             return false;
-        *shown = rgb_mad(*shown, 1.0f / (float)count, s.radiance);
+        *shown = rgb_mad(*shown, 1.0f / (float)patch->count, s.radiance);
     }
-    return count > 0;
+    return patch->count > 0;
+}
+
+/* What all candidates send to a photograph, the mean over the patch. */
+static void predict(const struct gloss_job *job, const struct patch *patch, uint32_t texel, uint32_t train,
+                    struct incident *scratch, struct gloss_look *look) {
+    float share = 1.0f / (float)patch->count;
+    memset(look->white, 0, sizeof look->white);
+    memset(&look->highlight, 0, sizeof look->highlight);
+    for (size_t i = 0; i < patch->count; i++) {
+        const struct surface_point *at = &patch->at[i];
+        struct highlight highlight;
+        vec3 wo = views_direction(job->views, train, at->position);
+        highlight_gather(&highlight, scratch, job->field, at, wo, &levels,
+                         sampler_key(KEY_GLOSS + i, texel, train), SAMPLES_A_LEVEL * ROUGHNESSES, LIGHT_SAMPLES);
+        for (size_t k = 0; k < ROUGHNESSES; k++) {
+            rgb white = irradiance_diffuse(&patch->light[i], at->shading, levels.roughness[k], wo);
+            look->white[k] = rgb_mad(look->white[k], share, white);
+            for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++)
+                look->highlight.radiance[k][m] =
+                    rgb_mad(look->highlight.radiance[k][m], share, highlight.radiance[k][m]);
+        }
+    }
 }
 
 static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge, struct incident *scratch,
                           struct gloss_point *point) {
-    const struct reconstruction *r = job->r;
-    struct surface_point at;
-    struct probe_mix mix;
-    struct irradiance light;
+    struct patch patch;
     struct view view[VIEWS_ASKED];
-    vec3 patch[PATCH * PATCH];
+    size_t shown_count = 0;
     point->count = 0;
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+    patch_around(job, texel, &patch);
+    if (patch.count == 0)
         return false;
-    size_t patch_count = patch_around(r, texel, &at, patch), shown_count = 0;
-    size_t seen = views_pick(job->views, at.position, at.normal, texel, VIEWS_ASKED, view);
+    const struct surface_point *middle = &patch.at[patch.count / 2];
+    size_t seen = views_pick(job->views, middle->position, middle->normal, texel, VIEWS_ASKED, view);
     for (size_t i = 0; i < seen && shown_count < VIEWS; i++) {
-        if (patch_shown(job->views, &view[i], at.triangle, patch, patch_count, edge,
-                        &point->look[shown_count].shown))
+        if (patch_shown(job->views, &view[i], &patch, edge, &point->look[shown_count].shown))
             view[shown_count++] = view[i];
     }
     if (shown_count < VIEWS_LEAST)
         return false;
-    probes_mix(job->probes, &r->atlas, &r->fused, texel, &at, &mix);
-    probes_irradiance(job->probes, &mix, &light);
-    for (size_t i = 0; i < shown_count; i++) {
-        struct gloss_look *look = &point->look[i];
-        vec3 wo = views_direction(job->views, view[i].train, at.position);
-        for (size_t k = 0; k < ROUGHNESSES; k++)
-            look->white[k] = irradiance_diffuse(&light, at.shading, levels.roughness[k], wo);
-        highlight_gather(&look->highlight, scratch, job->field, &at, wo, &levels,
-                         sampler_key(KEY_GLOSS, texel, view[i].train), SAMPLES, LIGHT_SAMPLES);
-    }
+    for (size_t i = 0; i < shown_count; i++)
+        predict(job, &patch, texel, view[i].train, scratch, &point->look[i]);
     point->count = shown_count;
     return true;
 }
 
-/* Looks at up to job->points texels of a segment; returns their number. */
+static size_t points_of(const struct gloss_job *job, size_t segment) {
+    double texels = (double)(job->texels.first[segment + 1] - job->texels.first[segment]);
+    size_t points = (size_t)(POINTS_IN_ALL * sqrt(texels) / job->roots);
+    return points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
+}
+
+/* Looks at some texels of a segment; returns their number. */
 static size_t look_at_segment(const struct gloss_job *job, size_t segment, int edge, int thread) {
-    struct gloss_point *point = &job->point[(size_t)thread * job->points];
+    struct gloss_point *point = &job->point[(size_t)thread * POINTS_MOST];
+    size_t points = points_of(job, segment);
     uint32_t texels = job->texels.first[segment + 1] - job->texels.first[segment];
     const uint32_t *texel = &job->texels.texel[job->texels.first[segment]];
-    size_t tries = TRIES * job->points, count = 0;
+    size_t tries = TRIES * points, count = 0;
     bool all = texels <= tries;
     tries = all ? texels : tries;
-    for (size_t i = 0; i < tries && count < job->points; i++) {
+    for (size_t i = 0; i < tries && count < points; i++) {
         /* Spread evenly over the segment wherever the sequence is cut off. */
         size_t at = all ? i : rng_below(sampler_reverse((uint32_t)i), texels);
         count += look_at_texel(job, texel[at], edge, &job->scratch[thread], &point[count]);
@@ -220,8 +262,9 @@ static void misfits(struct gloss_point *point, size_t count, float median, doubl
     }
 }
 
-/* Whether gloss explains more of what the photographs show than chance would. */
-static bool is_significant(const struct gloss_point *point, size_t count, size_t k, size_t m) {
+/* How much better than matt a candidate explains what the photographs show: part of the misfit, and
+ * standard errors of that over the texels. */
+static void compare(const struct gloss_point *point, size_t count, size_t k, size_t m, double *part, double *errors) {
     double total = 0.0, gain = 0.0, squares = 0.0, n = (double)count;
     for (size_t i = 0; i < count; i++) {
         double without = (double)point[i].misfit[ROUGHNESSES - 1][0];
@@ -230,8 +273,28 @@ static bool is_significant(const struct gloss_point *point, size_t count, size_t
         gain += d;
         squares += d * d;
     }
-    double error = sqrt(fmax(0.0, squares - gain * gain / n));
-    return gain > GAIN_LEAST * total && gain > GAIN_ERRORS * error;
+    *part = gain / fmax(total, 1e-30);
+    *errors = gain / sqrt(fmax(squares - gain * gain / n, 1e-30));
+}
+
+static bool is_glossy(const struct gloss_point *point, size_t count, size_t k, size_t m) {
+    double part, errors;
+    compare(point, count, k, m, &part, &errors);
+    return part > GAIN_LEAST && errors > GAIN_ERRORS;
+}
+
+/* Whether no highlight that could be told from matt reflection is there: of a dielectric, at any roughness. */
+static bool is_matt(const struct gloss_point *point, size_t count) {
+    size_t m = 1;
+    while (specular_of[m] < PRIOR_SPECULAR)
+        m++;
+    for (size_t k = 0; k < ROUGHNESSES && levels.roughness[k] <= GLOSS_ROUGHEST; k++) {
+        double part, errors;
+        compare(point, count, k, m, &part, &errors);
+        if (errors > -MATT_ERRORS)
+            return false;
+    }
+    return true;
 }
 
 /* Offset in [-0.5, 0.5] of a parabola's least through three values of which the middle is least. */
@@ -248,16 +311,16 @@ static float interpolate(const float *value, size_t at, double offset) {
 static void fit_segment(void *user, size_t segment, int thread) {
     const struct gloss_job *job = user;
     struct materials *materials = &job->r->materials;
-    struct gloss_point *point = &job->point[(size_t)thread * job->points];
+    struct gloss_point *point = &job->point[(size_t)thread * POINTS_MOST];
     double sum[ROUGHNESSES][SPECULARS];
     size_t count = 0, k = ROUGHNESSES - 1, m = 0;
-    materials->roughness[segment] = 1.0f;
-    materials->specular[segment] = 0.0f;
+    materials->roughness[segment] = UNKNOWN_ROUGHNESS;
+    materials->specular[segment] = UNKNOWN_SPECULAR;
     if (job->r->is_emitter[segment])
         return; /* its own light hides it */
     for (int edge = 0; edge < VIEWS_EDGE && count < POINTS_ENOUGH; edge++)
         count = look_at_segment(job, segment, edge, thread);
-    if (count == 0)
+    if (count < 2)
         return;
     misfits(point, count, job->views->median_radiance, sum);
     for (size_t i = 0; i < ROUGHNESSES * SPECULARS; i++) {
@@ -265,8 +328,13 @@ static void fit_segment(void *user, size_t segment, int thread) {
         if (sum[other_k][other_m] < sum[k][m] && (other_m == 0 || levels.roughness[other_k] <= GLOSS_ROUGHEST))
             k = other_k, m = other_m;
     }
-    if (m == 0 || !is_significant(point, count, k, m))
+    if (m == 0 || !is_glossy(point, count, k, m)) {
+        if (is_matt(point, count)) {
+            materials->roughness[segment] = 1.0f;
+            materials->specular[segment] = 0.0f;
+        }
         return;
+    }
     double along = 0.0, across = 0.0;
     if (k > 0 && k + 1 < ROUGHNESSES)
         along = between(sum[k - 1][m], sum[k][m], sum[k + 1][m]);
@@ -279,11 +347,12 @@ static void fit_segment(void *user, size_t segment, int thread) {
 void gloss_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
                const struct light_field *field) {
     struct gloss_job job = {.r = r, .views = views, .probes = probes, .field = field};
-    size_t threads = (size_t)parallel_thread_count(r->pool), points = POINTS_IN_ALL / r->segments.count;
-    job.points = points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
-    job.point = mem_array(threads * job.points, sizeof *job.point);
+    size_t threads = (size_t)parallel_thread_count(r->pool);
+    job.point = mem_array(threads * POINTS_MOST, sizeof *job.point);
     job.scratch = mem_array(threads, sizeof *job.scratch);
     by_segment_sort(&job.texels, &r->segments, &r->inverse);
+    for (size_t i = 0; i < r->segments.count; i++)
+        job.roots += sqrt((double)(job.texels.first[i + 1] - job.texels.first[i]));
     parallel_for(r->pool, r->segments.count, fit_segment, &job);
     by_segment_release(&job.texels);
     mem_free(job.scratch);
