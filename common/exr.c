@@ -32,7 +32,7 @@ struct stream {
 };
 
 static void *limited_alloc(size_t bytes) {
-    return bytes <= MAX_ALLOCATION ? malloc(bytes) : NULL;
+    return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL;
 }
 
 /* Copies text from the file, so that it fits into a message: whatever is not ASCII is "?". */
@@ -100,7 +100,7 @@ static exr_context_initializer_t initializer(struct stream *stream,
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = on_error;
     init.alloc_fn = limited_alloc;
-    init.free_fn = free;
+    init.free_fn = mem_free;
     init.user_data = stream;
     init.read_fn = stream_read;
     init.size_fn = stream_size;

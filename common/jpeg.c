@@ -43,6 +43,10 @@ static void stop(struct reader *r, enum status status) {
 static void damaged(j_common_ptr common) {
     struct reader *r = common->client_data;
     char message[JMSG_LENGTH_MAX];
+    int which = common->err->msg_parm.i[0];
+    /* Where the system gave none; 1 and 3 are pictures that ask for too much (jmemmgr.c). */
+    if (common->err->msg_code == JERR_OUT_OF_MEMORY && which != 1 && which != 3)
+        mem_exhausted("libjpeg");
     common->err->format_message(common, message);
     stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: %s", r->source->name, message));
 }

@@ -14,6 +14,12 @@
 #define MAX_DEPTH 64
 #define WHOLE_MAX 9007199254740992.0 /* 2^53: every whole number up to it is a double */
 
+/* cJSON leaves out of a tree what there was no memory for: as everywhere, running out of memory ends
+ * the process instead. */
+__attribute__((constructor)) static void set_allocator(void) {
+    cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = mem_alloc, .free_fn = mem_free});
+}
+
 /* Line and column (from 1) of the byte `at`. */
 static void locate(const char *text, const char *at, size_t *line, size_t *column) {
     *line = 1;

@@ -34,6 +34,17 @@ struct reader {
     char warning[128]; /* the last one: it often says what the error that follows means */
 };
 
+/* Running out of memory is nobody's damaged picture. */
+static png_voidp allocate(png_structp png, png_alloc_size_t bytes) {
+    (void)png;
+    return mem_alloc(bytes);
+}
+
+static void release(png_structp png, png_voidp memory) {
+    (void)png;
+    mem_free(memory);
+}
+
 static void read_failed(png_structp png, png_const_charp message) {
     struct reader *r = png_get_error_ptr(png);
     if (r->status == STATUS_OK)
@@ -153,7 +164,8 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
                            struct image_info *info, struct error *err) {
     struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
     struct reader *volatile kept = &r;
-    r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning);
+    r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL, allocate,
+                                     release);
     r.png_info = r.png ? png_create_info_struct(r.png) : NULL;
     if (!r.png_info) {
         png_destroy_read_struct(&r.png, NULL, NULL);
@@ -263,7 +275,8 @@ enum status image_write_png(const char *path, const struct image *image, float s
     w.file = fopen(path, "wbe");
     if (!w.file)
         return error_set_errno(err, errno, "cannot create %s", path);
-    w.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning);
+    w.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning, NULL, allocate,
+                                      release);
     w.png_info = w.png ? png_create_info_struct(w.png) : NULL;
     if (!w.png_info)
         w.status = error_set(err, STATUS_INTERNAL, "libpng does not start");

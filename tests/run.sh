@@ -15,7 +15,7 @@ render/test_environment api/test_readme"
 # The thread sanitizer has nothing to find in one thread either.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment
 gradient/test_path render/test_calibrate_light render/test_calibrate_poses api/test_resume chaos/test_clock
-chaos/test_power_cut chaos/test_disk_faults $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
+chaos/test_power_cut chaos/test_disk_faults chaos/test_memory_faults $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 
 run_one() {
     local name=$1

@@ -42,6 +42,8 @@ struct unpacking {
 /* What libarchive says went wrong: a fault of the file, unless reading it failed. */
 static enum status library_error(struct unpacking *u, const char *entry) {
     int number = archive_errno(u->archive);
+    if (number == ENOMEM)
+        mem_exhausted("libarchive");
     const char *text = archive_error_string(u->archive);
     enum status status = number == EIO || number == EACCES ? STATUS_IO : STATUS_INPUT;
     if (entry)
@@ -292,7 +294,7 @@ enum status archive_unpack(const char *path, const char *name, const char *dir,
     if (u.dir_fd < 0)
         status = error_set_errno(err, errno, "cannot open folder %s", dir);
     else if (!u.archive)
-        status = error_set(err, STATUS_INTERNAL, "libarchive cannot start");
+        mem_exhausted("libarchive");
     else
         status = open_archive(&u, path);
     if (status == STATUS_OK)

@@ -10,6 +10,7 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include <dlfcn.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -79,10 +80,23 @@ static void query_intersect_16_coherent(const int *valid, RTCScene scene, struct
 
 #endif
 
+static void no_memory(void) {
+    mem_exhausted("the ray tracing library");
+}
+
+/* It throws std::bad_alloc also where nobody catches it, which would look like a crash: with
+ * std::set_new_handler (by the name that the C++ ABI gives it) running out of memory comes to us first. */
+static void watch_memory(void) {
+    void (*(*set_new_handler)(void (*)(void)))(void);
+    *(void **)&set_new_handler = dlsym(RTLD_DEFAULT, "_ZSt15set_new_handlerPFvvE");
+    if (set_new_handler)
+        set_new_handler(no_memory);
+}
+
 /* `code` is what rtcGetDeviceError told: asking clears it. */
 static enum status device_error(enum RTCError code, const char *doing, struct error *err) {
     if (code == RTC_ERROR_OUT_OF_MEMORY)
-        mem_exhausted("the ray tracing library");
+        no_memory();
     enum status status = code == RTC_ERROR_UNSUPPORTED_CPU ? STATUS_UNAVAILABLE : STATUS_INTERNAL;
     return error_set(err, status, "the ray tracing library failed while %s (its code %d)", doing,
                      (int)code);
@@ -113,6 +127,7 @@ enum status accel_new(struct accel **result, const struct mesh *mesh, struct par
     struct accel *a = mem_calloc(1, sizeof *a);
     enum status status = STATUS_OK;
     RTCGeometry geometry = NULL;
+    watch_memory();
     a->device = rtcNewDevice("threads=1,user_threads=1");
     if (!a->device) {
         status = device_error(rtcGetDeviceError(NULL), "starting", err);

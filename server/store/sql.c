@@ -2,10 +2,40 @@
 #include "server/store/sql.h"
 
 #include <errno.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <string.h>
 
 #include "common/mem.h"
+
+/* Out of memory ends the process here, too (mem.h): a text or blob that SQLite has no memory for looks
+ * like an empty one, and a checkpoint that it cannot read for that reason like a damaged one. */
+static sqlite3_mem_methods plain_memory;
+
+static void *allocate(int bytes) {
+    void *pointer = plain_memory.xMalloc(bytes);
+    if (!pointer)
+        mem_exhausted("SQLite");
+    return pointer;
+}
+
+static void *reallocate(void *old, int bytes) {
+    void *pointer = plain_memory.xRealloc(old, bytes);
+    if (!pointer)
+        mem_exhausted("SQLite");
+    return pointer;
+}
+
+/* Before the library is used for the first time; later it refuses, and all stays as it is. */
+static void set_allocator(void) {
+    sqlite3_mem_methods ours;
+    if (sqlite3_config(SQLITE_CONFIG_GETMALLOC, &plain_memory) != SQLITE_OK)
+        return;
+    ours = plain_memory;
+    ours.xMalloc = allocate;
+    ours.xRealloc = reallocate;
+    sqlite3_config(SQLITE_CONFIG_MALLOC, &ours);
+}
 
 /* Turns an SQLite result into ours. A full disk hides behind IOERR where a sync or ftruncate fails and
  * behind CANTOPEN where a journal cannot be made, so the last errno decides. (sqlite3_system_errno does
@@ -233,6 +263,8 @@ enum status sql_check(struct sql *sql, struct error *err) {
 
 enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size,
                      struct error *err) {
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, set_allocator);
     *sql = (struct sql){.path = mem_strdup(path)};
     errno = 0;
     int code = sqlite3_open_v2(path, &sql->db,

@@ -12,6 +12,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "common/mem.h"
+
 #ifndef LANDLOCK_ACCESS_FS_REFER
 #define LANDLOCK_ACCESS_FS_REFER (1ULL << 13) /* version 2 */
 #endif
@@ -74,6 +76,13 @@ static bool restrict_files(const struct sandbox *sandbox) {
     return ok;
 }
 
+/* Whether a call of libseccomp did it. A system without memory is not one that cannot. */
+static bool done(int result) {
+    if (result == -ENOMEM)
+        mem_exhausted("libseccomp");
+    return result == 0;
+}
+
 /* A list of what is refused: what the engine's libraries need is not ours to know, what an
  * intruder needs first is. */
 static bool restrict_system_calls(bool network) {
@@ -94,20 +103,20 @@ static bool restrict_system_calls(bool network) {
     };
     scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ALLOW);
     if (!filter)
-        return false;
+        mem_exhausted("libseccomp");
     bool ok = true;
     for (size_t i = network ? 1 : 0; ok && i < sizeof refused / sizeof refused[0]; i++) /* socket is first */
-        ok = seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), refused[i], 0) == 0;
+        ok = done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), refused[i], 0));
     /* Signals only to itself (abort), limits only of itself. */
     scmp_datum_t self = (scmp_datum_t)getpid();
     ok = ok &&
-         seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(kill), 1,
-                          SCMP_A0(SCMP_CMP_NE, self, 0)) == 0 &&
-         seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(tgkill), 1,
-                          SCMP_A0(SCMP_CMP_NE, self, 0)) == 0 &&
-         seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(prlimit64), 1,
-                          SCMP_A0(SCMP_CMP_NE, 0, 0)) == 0;
-    ok = ok && seccomp_load(filter) == 0;
+         done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(kill), 1,
+                               SCMP_A0(SCMP_CMP_NE, self, 0))) &&
+         done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(tgkill), 1,
+                               SCMP_A0(SCMP_CMP_NE, self, 0))) &&
+         done(seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(prlimit64), 1,
+                               SCMP_A0(SCMP_CMP_NE, 0, 0)));
+    ok = ok && done(seccomp_load(filter));
     seccomp_release(filter);
     return ok;
 }

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The disk is full, or broken, at the n-th operation on a file: see disk_daemon.c and disk_worker.c.
+# The disk is full, or broken, at the n-th operation on a file: see fault_daemon.c and fault_worker.c.
 # UNBAKE_STEP sets for which n (every 7th, and every 28th of the many of a worker, in one of four ways
 # each; in the long form every one in all four).
 set -u
@@ -7,6 +7,6 @@ set -u
 make_room "$work/room"
 tar -C "$work/room" -cf "$work/room.tar" .
 if [ -n "${UNBAKE_LONG:-}" ]; then step=1 all=1 worker=1; else step=7 all=0 worker=28; fi
-"$build/tests/chaos/disk_daemon" "$build" "$work/room.tar" "${UNBAKE_STEP:-$step}" $all || fail "the daemon"
-"$build/tests/chaos/disk_worker" "$build" "$work/room" "${UNBAKE_STEP:-$worker}" $all || fail "a worker"
+"$build/tests/chaos/fault_daemon" "$build" "$work/room.tar" disk "${UNBAKE_STEP:-$step}" $all || fail "the daemon"
+"$build/tests/chaos/fault_worker" "$build" "$work/room" disk "${UNBAKE_STEP:-$worker}" $all || fail "a worker"
 finish

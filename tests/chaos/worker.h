@@ -15,12 +15,12 @@ static const char *const worker_outputs[] = {"base_color.exr", "roughness.exr", 
 
 /* Writes the order; `settings` are JSON members. */
 static inline void worker_order(const char *dir, const char *room, int attempt, int threads, double checkpoint_sec,
-                                const char *settings) {
+                                bool sandbox, const char *settings) {
     char *path = file_join(dir, "job.json");
     char *text = mem_printf(
         "{\"kind\":\"reconstruct\",\"scene\":\"%s\",\"scene_id\":\"x\",\"name\":\"x\",\"job_id\":1,\"attempt\":%d,"
-        "\"thread_count\":%d,\"memory_bytes\":0,\"sandbox\":true,\"checkpoint_interval_sec\":%g,\"settings\":{%s}}",
-        room, attempt, threads, checkpoint_sec, settings);
+        "\"thread_count\":%d,\"memory_bytes\":0,\"sandbox\":%s,\"checkpoint_interval_sec\":%g,\"settings\":{%s}}",
+        room, attempt, threads, sandbox ? "true" : "false", checkpoint_sec, settings);
     struct error err;
     if (file_replace(path, text, strlen(text), &err) != STATUS_OK)
         exit(1);

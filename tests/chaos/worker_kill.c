@@ -71,7 +71,7 @@ int main(int argc, char **argv) {
     snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
     char *dir = file_join(root, "peace");
     file_make_dirs(dir, &err);
-    worker_order(dir, argv[2], 1, 2, 0.03, SETTINGS);
+    worker_order(dir, argv[2], 1, 2, 0.03, true, SETTINGS);
     finish(dir);
     worker_hash(dir, peace);
     mem_free(dir);
@@ -80,7 +80,7 @@ int main(int argc, char **argv) {
         file_make_dirs(dir, &err);
         bool ended = false;
         for (int i = 0; i < KILLS_PER_JOB && done < kills && !ended; i++) {
-            worker_order(dir, argv[2], i + 1, 1 + (i + 1) % 2, 0.03, SETTINGS);
+            worker_order(dir, argv[2], i + 1, 1 + (i + 1) % 2, 0.03, true, SETTINGS);
             ended = live(dir, i % 5 == 4 ? ANYWHERE : i % 2 ? WHILE_IT_SAVES : WHILE_IT_ITERATES, &while_saving);
             done += !ended;
         }

@@ -1,10 +1,14 @@
-/* disk_daemon BUILD ARCHIVE STEP ALL -- the disk fails the daemon at its n-th operation on a file, for
- * every STEP-th n: ENOSPC or EIO, once or from then on (ALL: 1 for all four at each n, 0 for one in
- * turn). First while clients send scenes, upload in parts, make, change and remove jobs that never run;
- * then over the life of jobs that do. Each request does what it should or says why not: 507 for a full
- * disk, 500 for a broken one, and on a full disk what is there can be removed. Nothing that was
- * acknowledged is lost; when the disk is well again all goes on, and jobs succeed; no descriptor, no
- * file and no memory is left over. */
+/* fault_daemon BUILD ARCHIVE disk|memory STEP ALL -- the daemon's n-th operation on a file or n-th
+ * allocation fails, for every STEP-th n: a disk by ENOSPC or EIO, once or from then on, memory once or
+ * from then on (ALL: 1 for all of these at each n, 0 for one in turn). First while clients send scenes,
+ * upload in parts, make, change and remove jobs that never run; then, of a disk, over the life of jobs
+ * that do.
+ *
+ * Each request does what it should or says why not: 507 for a full disk, 500 for a broken one, and on a
+ * full disk what is there can be removed. Without memory a request may find its connection closed, and
+ * the daemon may end, by the status that says so and never by a signal: it is started again. Nothing that
+ * was acknowledged is lost; afterwards all goes on, and jobs succeed; no descriptor, no file and no
+ * memory is left over. */
 #include <dirent.h>
 
 #include "tests/chaos/daemon.h"
@@ -24,7 +28,8 @@ static struct faults *faults;
 static struct thing thing[THINGS_MAX];
 static size_t thing_count;
 static char scene[65], round_[80];
-static long strikes, requests;
+static long strikes, requests, ends;
+static bool is_memory; /* not the disk */
 
 static bool has_struck(void) {
     return atomic_load(&faults->roles) && atomic_load(&faults->failed) > 0;
@@ -49,6 +54,11 @@ static bool is_right(int wanted, int status, const char *method, const char *pat
     requests++;
     if (status == wanted)
         return true;
+    if (is_memory) {
+        CHECK_THAT(has_struck() && (status == 0 || status == 500), "%s: %s %s gets %d, not %d: %s", round_, method, path,
+                   status, wanted, buf_text(body));
+        return false;
+    }
     CHECK_THAT(has_struck() && status == (is_full ? 507 : 500), "%s: %s %s gets %d, not %d: %s", round_, method, path, status,
                wanted, buf_text(body));
     CHECK_THAT(!is_full || strcmp(method, "DELETE") != 0, "%s: %s cannot be removed from a full disk", round_, path);
@@ -269,11 +279,31 @@ static void renew(long scenes) {
 
 /* --- the rounds ------------------------------------------------------------------------------------------- */
 
+/* One of `ways` ways to fail. */
 static void arm(long n, long way) {
-    snprintf(round_, sizeof round_, "operation %ld fails %s with %s", n, way / 2 ? "for good" : "once",
-             way % 2 ? "EIO" : "ENOSPC");
+    bool for_good = is_memory ? way % 2 : way / 2;
+    int error = is_memory ? ENOMEM : way % 2 ? EIO : ENOSPC;
+    snprintf(round_, sizeof round_, "%s %ld fails %s with %s", is_memory ? "allocation" : "operation", n,
+             for_good ? "for good" : "once", strerrorname_np(error));
     thing_count = 0;
-    faults_arm(faults, FAULTS_DAEMON, n, way % 2 ? EIO : ENOSPC, way / 2);
+    faults_arm(faults, FAULTS_DAEMON, n, error, for_good);
+}
+
+/* Without memory it may have ended, if it said why; then there is another. */
+static void revive(void) {
+    struct buf body;
+    int status = 0;
+    bool lives = !is_memory || http_get(daemon_.port, "/healthz", &body) == 200;
+    if (is_memory)
+        buf_release(&body);
+    if (lives)
+        return;
+    for (int i = 0; i < 1000 && waitpid(daemon_.pid, &status, WNOHANG) != daemon_.pid; i++)
+        usleep(10000);
+    CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == MEM_EXIT_STATUS, "%s: the daemon ends with %x", round_,
+               (unsigned)status);
+    ends++;
+    daemon_start(&daemon_);
 }
 
 /* False when there is no n-th operation. */
@@ -283,6 +313,7 @@ static bool talk_once(long n, long way) {
     talk(++number);
     bool struck = atomic_load(&faults->failed) > 0;
     faults_lift(faults);
+    revive();
     check_things();
     clear_all();
     strikes += struck;
@@ -337,7 +368,7 @@ static void begin(const char *build, bool jobs_wait, const char *archive) {
     const char *settings[] = {"min_free_mib=0", "max_running=1", "threads=1", "log_level=error",
                               "checkpoint_interval_sec=0.1", jobs_wait ? "low_disk_mib=16000000" : "low_disk_mib=0"};
     memcpy(daemon_.settings, settings, sizeof settings);
-    preload_find(build, "files", library);
+    preload_find(build, is_memory ? "memory" : "files", library);
     snprintf(page, sizeof page, "%s/faults", daemon_.dir);
     faults = faults_new(page, daemon_.data, NULL);
     if (!faults)
@@ -351,9 +382,9 @@ static void begin(const char *build, bool jobs_wait, const char *archive) {
 
 static long go_on(bool (*round)(long n, long way), long step, bool all) {
     bool more = true;
-    long n = 1, rounds = 0, before = 0;
+    long n = 1, rounds = 0, before = 0, ways = is_memory ? 2 : 4;
     for (long turn = 0; more && check_failed_count == 0; n += step, turn++)
-        for (long way = all ? 0 : turn % 4; more && way < (all ? 4 : turn % 4 + 1); way++) {
+        for (long way = all ? 0 : turn % ways; more && way < (all ? ways : turn % ways + 1); way++) {
             more = round(n, way);
             if (++rounds == 4)
                 before = count_descriptors();
@@ -367,23 +398,29 @@ static long go_on(bool (*round)(long n, long way), long step, bool all) {
 }
 
 int main(int argc, char **argv) {
-    long step = argc == 5 ? strtol(argv[3], NULL, 10) : 0;
+    long step = argc == 6 ? strtol(argv[4], NULL, 10) : 0;
     if (step <= 0)
         return 2;
-    bool all = argv[4][0] == '1';
+    bool all = argv[5][0] == '1';
+    is_memory = strcmp(argv[3], "memory") == 0;
     begin(argv[1], true, argv[2]);
-    long talked = go_on(talk_once, step, all);
+    long talked = go_on(talk_once, step, all), lived = 0;
     daemon_remove(&daemon_);
-    long lived = 0;
-    if (check_failed_count == 0) {
+    if (check_failed_count == 0 && !is_memory) {
         begin(argv[1], false, argv[2]);
         lived = go_on(live_once, 6 * step, false);
         daemon_remove(&daemon_);
     }
-    printf("the daemon: %ld operations on files in a talk, %ld in a job's life; %ld made to fail; %ld requests\n", talked,
-           lived, strikes, requests);
-    figure("failing disk, daemon: operations made to fail", (double)strikes, 500, "higher");
-    figure("failing disk, daemon: wrong answers, losses, leaks", check_failed_count, 0, "lower");
-    CHECK(talked > 100 && lived > 60);
+    printf("the daemon, %s: %ld in a talk, %ld in a job's life; %ld made to fail; %ld requests, %ld ends\n",
+           is_memory ? "allocations" : "operations on files", talked, lived, strikes, requests, ends);
+    if (is_memory) {
+        figure("no memory, daemon: allocations made to fail", (double)strikes, 1000, "higher");
+        figure("no memory, daemon: crashes, wrong answers, losses", check_failed_count, 0, "lower");
+    } else {
+        figure("failing disk, daemon: operations made to fail", (double)strikes, 500, "higher");
+        figure("failing disk, daemon: wrong answers, losses, leaks", check_failed_count, 0, "lower");
+        CHECK(lived > 60);
+    }
+    CHECK(talked > 100);
     return check_result();
 }

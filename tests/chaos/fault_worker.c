@@ -1,8 +1,9 @@
-/* disk_worker BUILD ROOM STEP ALL -- the disk fails a worker at its n-th operation on a file, for every
- * STEP-th n: ENOSPC or EIO, once or from then on (ALL: 1 for all four at each n, 0 for one in turn).
- * The worker ends with the status that says so (server/worker/progress.h), never by a signal, and
- * without a leak; a full disk leaves no half-written file. The next attempt, on a disk that is well
- * again, ends with the textures of one that nobody disturbed. */
+/* fault_worker BUILD ROOM disk|memory STEP ALL -- a worker's n-th operation on a file or n-th allocation
+ * fails, for every STEP-th n: a disk by ENOSPC or EIO, once or from then on, memory once or from then on
+ * (ALL: 1 for all of these at each n, 0 for one in turn). The worker ends with the status that says so
+ * (server/worker/progress.h), by which the daemon pauses the job or tries again with less, never by a
+ * signal, and without a leak; a full disk leaves no half-written file. The next attempt, when all is
+ * well again, ends with the textures of one that nobody disturbed. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -14,11 +15,13 @@
 
 static char binary[512], library[PATH_MAX], log_path[128];
 static struct faults *faults;
+static bool is_memory; /* not the disk */
 
 /* One attempt; its wait status. */
 static int attempt(const char *dir, const char *room, int number) {
     int fd, status;
-    worker_order(dir, room, number, 1, 0.0, SETTINGS);
+    /* libseccomp (2.5.4) uses memory that it did not get. */
+    worker_order(dir, room, number, 1, 0.0, !is_memory, SETTINGS);
     pid_t pid = worker_start(binary, dir, library, log_path, &fd);
     worker_hear(fd, "nothing", 120.0); /* until it ends */
     waitpid(pid, &status, 0);
@@ -42,9 +45,9 @@ static long count_scraps(const char *dir) {
 static bool strike(const char *root, const char *room, long n, int error, bool for_good,
                    char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]) {
     char sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
-    const char *word = error == ENOSPC ? "ENOSPC" : "EIO", *how = for_good ? "for good" : "once";
+    const char *word = strerrorname_np(error), *how = for_good ? "for good" : "once";
     char *dir = file_join(root, "job");
-    int wanted = error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
+    int wanted = is_memory ? PROGRESS_EXIT_MEMORY : error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
     file_make_dirs(dir, NULL);
     faults_arm(faults, FAULTS_WORKER, n, error, for_good);
     int status = attempt(dir, room, 1);
@@ -72,8 +75,8 @@ static bool strike(const char *root, const char *room, long n, int error, bool f
 }
 
 int main(int argc, char **argv) {
-    long step = argc == 5 ? strtol(argv[3], NULL, 10) : 0, strikes = 0, n = 1;
-    bool all = step > 0 && argv[4][0] == '1', more = true;
+    long step = argc == 6 ? strtol(argv[4], NULL, 10) : 0, strikes = 0, n = 1;
+    bool all = step > 0 && argv[5][0] == '1', more = true;
     char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE], top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
     if (step <= 0 || !mkdtemp(top))
         return 2;
@@ -81,7 +84,8 @@ int main(int argc, char **argv) {
     snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
     snprintf(log_path, sizeof log_path, "%s/log", top);
     snprintf(page, sizeof page, "%s/faults", top);
-    preload_find(argv[1], "files", library);
+    is_memory = strcmp(argv[3], "memory") == 0;
+    preload_find(argv[1], is_memory ? "memory" : "files", library);
     faults = faults_new(page, root, NULL);
     if (!faults)
         return 1;
@@ -90,12 +94,20 @@ int main(int argc, char **argv) {
     CHECK(attempt(dir, argv[2], 1) == 0);
     worker_hash(dir, peace);
     file_remove_tree(dir, NULL);
+    long ways = is_memory ? 2 : 4;
     for (long turn = 0; more && check_failed_count == 0; n += step, turn++)
-        for (long way = all ? 0 : turn % 4; more && way < (all ? 4 : turn % 4 + 1); way++, strikes++)
-            more = strike(root, argv[2], n, way % 2 ? EIO : ENOSPC, way / 2, peace);
-    printf("workers: %ld operations on files, %ld of them made to fail\n", n - step, strikes - 1);
-    figure("failing disk, workers: operations made to fail", (double)strikes - 1, 1000, "higher");
-    figure("failing disk, workers: wrong ends, leaks, textures that differ", check_failed_count, 0, "lower");
+        for (long way = all ? 0 : turn % ways; more && way < (all ? ways : turn % ways + 1); way++, strikes++)
+            more = strike(root, argv[2], n, is_memory ? ENOMEM : way % 2 ? EIO : ENOSPC, is_memory ? way % 2 : way / 2,
+                          peace);
+    printf("workers: %ld %s, %ld of them made to fail\n", n - step, is_memory ? "allocations" : "operations on files",
+           strikes - 1);
+    if (is_memory) {
+        figure("no memory, workers: allocations made to fail", (double)strikes - 1, 500, "higher");
+        figure("no memory, workers: wrong ends, textures that differ", check_failed_count, 0, "lower");
+    } else {
+        figure("failing disk, workers: operations made to fail", (double)strikes - 1, 1000, "higher");
+        figure("failing disk, workers: wrong ends, leaks, textures that differ", check_failed_count, 0, "lower");
+    }
     CHECK(n > 100);
     if (check_failed_count == 0)
         file_remove_tree(top, NULL);
