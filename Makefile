@@ -176,9 +176,10 @@ coverage: deps ## run the tests and say what share of the code they reach; write
 	@+$(BUILD) coverage-build
 	@tests/coverage.sh build/coverage "$(T)"
 
-# Counts are written when a process ends. Threads may lose some, which does not matter: a line that ran is not 0.
+# Counts are written when a process ends, and (as fork and execv are the compiler's in GNU C) before it becomes
+# another program. Threads may lose some, which does not matter: a line that ran is not 0.
 coverage-build:
-	@$(MAKE) --no-print-directory B=build/coverage CFLAGS="-O1 -g" SANITIZE=--coverage \
+	@$(MAKE) --no-print-directory B=build/coverage CFLAGS="-O1 -g -std=gnu11" SANITIZE=--coverage \
 	    CPPFLAGS='-DCOVERAGE_DIR=\"$(CURDIR)/build/coverage/obj\"' tests
 
 # Manual pages and completions come out of the programs, from the tables of their --help.
