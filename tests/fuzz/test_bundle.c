@@ -75,7 +75,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 #define POSE "\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]"
 
 void fuzz_seeds(struct seeds *s) {
-    s->mutants = 1000;
+    s->mutants = 500;
     seeds_text(s, "{\"w\":16,\"h\":12,\"fl_x\":20,\"cx\":8,\"cy\":6,\"k1\":-0.1,\"frames\":["
                   "{\"file_path\":\"a.png\",\"exposure_time\":0.01,\"iso\":100,\"mask_path\":\"a.png\"," POSE "},"
                   "{\"file_path\":\"./b.exr\",\"exposure\":0.5,\"split\":\"test\"," POSE "}]}");

@@ -76,7 +76,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    s->mutants = 300;
+    s->mutants = 200;
     seeds_add(s, "", 0);
     seeds_add(s, "\x80", 1);
     seeds_add(s, "\0\0\144\5\0\1\0\7\1\0\0\2\2\0\20\1", 16); /* in the header, the schema, a page, a tile */

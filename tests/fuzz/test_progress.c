@@ -141,7 +141,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    s->mutants = 1500;
+    s->mutants = 600;
     seeds_text(s, "3{\"type\":\"stage\",\"stage\":\"refine\"}\n"
                   "{\"type\":\"progress\",\"stage\":\"refine\",\"done\":120,\"total\":1000,\"eta_sec\":33.5}\n"
                   "{\"type\":\"metric\",\"series\":\"loss\",\"step\":120,\"value\":0.0123}\n"

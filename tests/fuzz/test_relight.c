@@ -143,7 +143,7 @@ void fuzz_seeds(struct seeds *s) {
     static const char sky[] = "e#?RGBE\n\n-Y 2 +X 4\nabc\200\1\1\1\3bcd\201\1\1\1\1abc\200\1\1\1\3bcd\201\1\1\1\1";
     uint8_t text[SEED_MAX_BYTES];
     struct buf file;
-    s->mutants = 400;
+    s->mutants = 150;
     start();
     seeds_text(s, "c" CAMERAS);
     seeds_add(s, sky, sizeof sky - 1);
