@@ -4,6 +4,7 @@
 #include <endian.h>
 #include <errno.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -95,8 +96,9 @@ void sink_copy(struct sink *s, const char *path, uint64_t length) {
 }
 
 enum status sink_close(struct sink *s, enum status status, struct error *err) {
-    if (fclose(s->file) != 0 && s->status == STATUS_OK)
-        fail(s, errno);
+    bool had_failed = ferror(s->file) != 0;
+    if ((fclose(s->file) != 0 || had_failed) && s->status == STATUS_OK)
+        fail(s, had_failed ? EIO : errno);
     if (status == STATUS_OK && s->status == STATUS_LIMIT)
         status = error_set(err, STATUS_LIMIT, "%s would be larger than %llu bytes", s->path,
                            (unsigned long long)s->limit);
