@@ -189,6 +189,20 @@ static enum status get(struct partials *p, const char *id, struct entry **out, s
     return status;
 }
 
+/* What was received since the last commit may be lost: where a sync has failed, the kernel can have
+ * dropped it, and the next sync would say that all is well. It is to be sent again. */
+static void forget_tail(struct entry *e) {
+    struct error err;
+    pthread_mutex_lock(&e->mutex);
+    e->received = e->counted;
+    e->is_loaded = false; /* the next to come reads row and hash again */
+    e->holder = NULL;
+    if (ftruncate(e->fd, (off_t)e->counted) != 0 &&
+        store_upload_begin(e->partials->api->store, e->id, "", &err) != STATUS_OK)
+        log_warning("upload %s: %s", e->id, err.message);
+    pthread_mutex_unlock(&e->mutex);
+}
+
 static enum status commit(struct entry *e, struct error *err) {
     pthread_mutex_lock(&e->mutex);
     uint64_t received = e->received;
@@ -197,11 +211,15 @@ static enum status commit(struct entry *e, struct error *err) {
     pthread_mutex_unlock(&e->mutex);
     if (!has_news)
         return STATUS_OK;
-    if (fdatasync(e->fd) != 0)
-        return error_set_errno(err, errno, "cannot sync upload %s", e->id);
-    enum status status = store_upload_advance(e->partials->api->store, e->id, received, &hash,
-                                              sizeof hash, err);
+    if (fdatasync(e->fd) != 0) {
+        enum status failed = error_set_errno(err, errno, "cannot sync upload %s", e->id);
+        forget_tail(e);
+        return failed;
+    }
     pthread_mutex_lock(&e->mutex);
+    enum status status = /* another thread's sync may have failed meanwhile */
+        e->is_loaded ? store_upload_advance(e->partials->api->store, e->id, received, &hash, sizeof hash, err)
+                     : error_set(err, STATUS_CONFLICT, "upload %s stands at an earlier offset", e->id);
     if (status == STATUS_OK && e->counted < received)
         e->counted = received;
     pthread_mutex_unlock(&e->mutex);

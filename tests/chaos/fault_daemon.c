@@ -28,6 +28,7 @@ static struct faults *faults;
 static struct thing thing[THINGS_MAX];
 static size_t thing_count;
 static char scene[65], round_[80];
+static char kept_upload[80]; /* the path of the last */
 static long strikes, requests, ends;
 static bool is_memory; /* not the disk */
 
@@ -128,14 +129,22 @@ static bool upload_begin(char path[80]) {
     return made;
 }
 
+static void fill(unsigned char bytes[600], long number) {
+    memset(bytes, 'x', 600);
+    memcpy(bytes, "neither", 7);
+    memcpy(bytes + 100, &number, sizeof number);
+}
+
 /* An upload in two parts, of which the second makes it a scene. */
 static void upload(long number, bool is_removed) {
     struct buf body;
-    unsigned char bytes[600] = "neither";
+    unsigned char bytes[600];
     char path[80] = "";
-    memcpy(bytes + 100, &number, sizeof number);
+    fill(bytes, number);
+    *kept_upload = '\0';
     if (!upload_begin(path))
         return;
+    strcpy(kept_upload, path);
     note(path, "");
     bool has_part = ask(204, "PATCH", path, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n",
                         bytes, 400, &body);
@@ -162,8 +171,8 @@ static void talk(long number) {
     has_scene = send_scene(number, sent);
     if (has_scene)
         note(sent, "");
-    upload(number, false);
     upload(number, true);
+    upload(number, false);
     if (has_second) {
         note(second, "queued");
         if (change("POST", second, "/cancel", "{}", 202, "cancelled"))
@@ -191,6 +200,30 @@ static void check_things(void) {
                    it->path, it->state, buf_text(&body));
         buf_release(&body);
     }
+}
+
+/* What counts of an upload is what was sent. */
+static void check_upload(long number) {
+    struct buf body, bytes;
+    unsigned char sent[600];
+    char hex[65] = "";
+    int status = *kept_upload ? http_get(daemon_.port, kept_upload, &body) : 0;
+    if (!*kept_upload)
+        return;
+    fill(sent, number);
+    const char *offset = strstr(buf_text(&body), "\"offset\":"), *made = strstr(buf_text(&body), "\"scene\":\"");
+    size_t length = offset ? strtoull(offset + 9, NULL, 10) : 0;
+    if (made)
+        sscanf(made + 9, "%64[0-9a-f]", hex);
+    char *path = *hex ? mem_printf("%s/scenes/%s/archive", daemon_.data, hex)
+                      : mem_printf("%s%s", daemon_.data, kept_upload + strlen("/v1"));
+    buf_init(&bytes, 1 << 20);
+    CHECK_THAT(status != 200 || (file_read(path, &bytes, NULL) == STATUS_OK && bytes.length >= length && length <= 600 &&
+                                 memcmp(bytes.data ? bytes.data : "", sent, length) == 0),
+               "%s: of %zu bytes of an upload not all are as they were sent", round_, length);
+    buf_release(&bytes);
+    buf_release(&body);
+    mem_free(path);
 }
 
 /* After a failure the scheduler looks again in five seconds, or when there is something new. */
@@ -315,6 +348,7 @@ static bool talk_once(long n, long way) {
     faults_lift(faults);
     revive();
     check_things();
+    check_upload(number);
     clear_all();
     strikes += struck;
     return struck;

@@ -12,7 +12,8 @@
  *    holds its lock for itself.
  * 3. Between fork and exec nothing here allocates, locks or is interrupted: system calls only.
  *
- * A write that fails has written its first half before: devices do so. An unlink of DATA/reserve while
+ * A write that fails has written its first half before, and a sync of an upload that fails by EIO loses
+ * its last byte: devices do so. An unlink of DATA/reserve while
  * the disk is full makes room: from then on what is armed for good strikes no more, but nobody makes
  * that file again. */
 #include <dlfcn.h>
@@ -377,12 +378,25 @@ FILE *fopen(const char *path, const char *mode) {
 
 /* --- syncing --------------------------------------------------------------------------------------------- */
 
+/* What was to reach the disk is gone; the next sync knows nothing of it. */
+static void lose_end(int fd) {
+    char path[4096];
+    struct stat info;
+    int kept = errno;
+    if (kept == EIO && link_target(fd, path, sizeof path) && strstr(path, "/uploads/") && fstat(fd, &info) == 0 &&
+        info.st_size > 0)
+        syscall(SYS_pwrite64, fd, "", (size_t)1, info.st_size - 1);
+    errno = kept;
+}
+
 static int sync_any(long call, int fd) {
     uint64_t inode;
     if (!find_fd(fd, &inode))
         return (int)syscall(call, fd);
-    if (fails())
+    if (fails()) {
+        lose_end(fd);
         return -1;
+    }
     /* Nothing here outlives the test: the disk itself is not waited for. */
     lock();
     unlock(true, call == SYS_syncfs ? OP_SYNC_ALL : OP_SYNC, inode, 0, "", 0);
