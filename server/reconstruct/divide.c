@@ -241,11 +241,29 @@ static struct color_prior *chart_priors(const struct divide *d) {
     return prior;
 }
 
+/* What was measured as it is, and the priors where nothing was. */
+static void keep_noise(struct divide *d, const struct color_prior *prior) {
+    struct reconstruction *r = d->r;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        const struct measured *m = &d->measured[texel];
+        rgb value = m->weight > 0.0f ? measured_value(m)
+                                     : prior[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]].mean;
+        float *to = r->materials.base_color.texel[texel];
+        to[0] = clampf(value.r, 0.0f, 1.0f);
+        to[1] = clampf(value.g, 0.0f, 1.0f);
+        to[2] = clampf(value.b, 0.0f, 1.0f);
+    }
+}
+
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     struct reconstruction *r = d->r;
     struct color_prior *prior = chart_priors(d);
-    denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,
-            &r->materials.base_color, r->pool);
+    if (d->denoises)
+        denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,
+                &r->materials.base_color, r->pool);
+    else
+        keep_noise(d, prior);
     mem_free(prior);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i], segment = segment_of(r, texel);

@@ -23,6 +23,7 @@ struct divide {
     const struct probes *probes;
     const struct light_field *field;
     const struct noise *noise;
+    bool denoises;                    /* else base colour is as measured */
     struct incident *scratch;         /* [threads] */
     struct measured *measured;        /* [height][width] what the photographs tell of each texel */
 };

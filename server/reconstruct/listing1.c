@@ -66,6 +66,7 @@ struct refine {
     uint64_t iteration_limit;  /* 0: by time */
     double time_limit_sec;
     int coarse_levels;
+    bool one_estimate, by_pixels, any_emits; /* settings estimates, choose and emitters */
     bool solved;               /* it starts from solved materials and corrects what is smooth in them */
 };
 
@@ -103,7 +104,9 @@ static void run_chunk(void *user, size_t chunk, int thread) {
     size_t end = (chunk + 1) * CHUNK_TEXELS;
     for (size_t i = chunk * CHUNK_TEXELS; i < end && i < f->chooser.stratum_count; i++) {
         size_t item = chooser_item(&f->chooser, f->counters.iteration, i);
-        if (item != CHOOSE_NONE)
+        if (f->by_pixels)
+            look_add_pixels(b, i, f->counters.iteration);
+        else if (item != CHOOSE_NONE)
             look_add(b, f->r->inverse.valid[item], f->counters.iteration);
     }
     look_trace(b);
@@ -111,7 +114,8 @@ static void run_chunk(void *user, size_t chunk, int thread) {
     for (size_t k = 0; k < b->look_count; k++) {
         size_t first = k * (size_t)b->samples;
         loss += (double)loss_pair(b->look[k].photograph, b->reference + first, b->radiance + first,
-                                  b->samples, f->views->median_radiance, b->d_radiance + first);
+                                  b->samples, f->one_estimate, f->views->median_radiance,
+                                  b->d_radiance + first);
         note_look(f, b, k, &f->seen[chunk * b->look_capacity + k]);
     }
     f->chunk_loss[chunk] = loss;
@@ -164,14 +168,22 @@ static void start_base_color(struct refine *f) {
     }
 }
 
+static void fix_emitters(struct refine *f) {
+    if (f->any_emits)
+        params_free_emission(&f->params);
+    else
+        params_fix_emitters(&f->params, f->r->is_emitter);
+}
+
 static void decide_emitters(struct refine *f) {
     struct reconstruction *r = f->r;
-    emitters_decide(r, f->views, f->batch, f->r->evidence);
+    if (!f->any_emits)
+        emitters_decide(r, f->views, f->batch, f->r->evidence);
     /* A part of a segment's median light may have been more than all of its dark parts': what base
      * colour did about that is worth nothing. */
     start_base_color(f);
     params_refine(&f->params, f->counters.level);
-    params_fix_emitters(&f->params, r->is_emitter);
+    fix_emitters(f);
     for (size_t s = 0; s < r->segments.count; s++)
         params_set_emission(&f->params, s, r->materials.emission[s]);
     world_update_lights(&r->world);
@@ -293,7 +305,7 @@ enum status listing1_load(struct refine *f, bool *found, struct error *err) {
     f->hooks->log(f->hooks->user, line);
     params_set_level(&f->params, f->counters.level);
     if (f->counters.decided)
-        params_fix_emitters(&f->params, f->r->is_emitter);
+        fix_emitters(f);
     return STATUS_OK;
 }
 
@@ -424,6 +436,9 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
     struct refine *f = mem_alloc(sizeof *f);
     *f = (struct refine){.r = r, .views = views, .hooks = hooks};
     f->solved = settings_is(set, "method", "solve");
+    f->one_estimate = settings_is(set, "estimates", "one");
+    f->by_pixels = settings_is(set, "choose", "pixels");
+    f->any_emits = settings_is(set, "emitters", "any");
     f->coarse_levels = (int)settings_number(set, "coarse_levels");
     f->iteration_limit = (uint64_t)settings_number(set, "iterations");
     f->time_limit_sec = settings_number(set, "time_limit_sec");

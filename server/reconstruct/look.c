@@ -1,6 +1,8 @@
 /* look.c -- see look.h. */
 #include "server/reconstruct/look.h"
 
+#include <math.h>
+
 #include "common/mem.h"
 #include "common/rng.h"
 
@@ -86,6 +88,29 @@ void look_add(struct look_batch *b, uint32_t texel, uint64_t iteration) {
     uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
     for (size_t k = 0; k < seen && b->look_count < b->look_capacity; k++) {
         if (connect(b, b->look_count, &view[k], texel, iteration, (uint32_t)k * samples_a_half))
+            b->look_count++;
+    }
+}
+
+void look_add_pixels(struct look_batch *b, uint64_t number, uint64_t iteration) {
+    const struct reconstruction *r = b->r;
+    uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
+    for (int k = 0; k < b->cameras && b->look_count < b->look_capacity; k++) {
+        uint64_t pick = rng_key(b->path.seed, iteration, number * VIEWS_PICK_MAX + (uint64_t)k);
+        uint64_t place = rng_mix64(pick);
+        struct view view = {.train = rng_below((uint32_t)pick, (uint32_t)b->views->train_count)};
+        const struct camera *camera = &r->scene->photograph[b->views->train[view.train]].camera;
+        struct accel_hit hit;
+        vec3 direction;
+        view.x = rng_to_float((uint32_t)place) * (float)camera->width;
+        view.y = rng_to_float((uint32_t)(place >> 32)) * (float)camera->height;
+        if (!camera_direction(camera, view.x, view.y, &direction) ||
+            !accel_intersect(b->views->accel, camera_origin(camera), direction, 0.0f, INFINITY, &hit))
+            continue;
+        vec2 at = atlas_point(&r->atlas, hit.triangle, hit.b1, hit.b2);
+        uint32_t texel = (uint32_t)at.y * r->atlas.width + (uint32_t)at.x;
+        if (r->inverse.triangle[texel] != INVERSE_UV_NONE &&
+            connect(b, b->look_count, &view, texel, iteration, (uint32_t)k * samples_a_half))
             b->look_count++;
     }
 }

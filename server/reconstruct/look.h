@@ -43,6 +43,10 @@ void look_batch_clear(struct look_batch *b);
 /* Adds up to `cameras` looks at a valid texel, drawn by (seed, iteration, texel). */
 void look_add(struct look_batch *b, uint32_t texel, uint64_t iteration);
 
+/* Adds up to `cameras` looks at what random pixels of random photographs show, drawn by (seed, iteration,
+ * number). */
+void look_add_pixels(struct look_batch *b, uint64_t number, uint64_t iteration);
+
 /* Traces the paths of all looks: fills radiance[look_count * samples]. */
 void look_trace(struct look_batch *b);
 

@@ -38,7 +38,7 @@ static float residual(float half, float all, float reference, bool saturated, fl
 }
 
 float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, float median_radiance, rgb *d_radiance) {
+                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance) {
     rgb half[2] = {{0, 0, 0}, {0, 0, 0}}, target = {0, 0, 0}, clip = {0, 0, 0};
     bool saturated[3] = {false};
     int count[2] = {(sample_count + 1) / 2, sample_count / 2};
@@ -53,8 +53,8 @@ float loss_pair(const struct photograph *photo, const struct photograph_sample *
     }
     float each = 1.0f / (float)sample_count;
     rgb all = rgb_scale(rgb_add(half[0], half[1]), each);
-    half[0] = rgb_scale(half[0], 1.0f / (float)count[0]);
-    half[1] = rgb_scale(half[1], 1.0f / (float)count[1]);
+    half[0] = one_estimate ? all : rgb_scale(half[0], 1.0f / (float)count[0]);
+    half[1] = one_estimate ? all : rgb_scale(half[1], 1.0f / (float)count[1]);
     target = rgb_scale(target, each);
     clip = rgb_scale(clip, each);
     weight *= each;

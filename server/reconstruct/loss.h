@@ -9,6 +9,8 @@
 #ifndef UNBAKE_RECONSTRUCT_LOSS_H
 #define UNBAKE_RECONSTRUCT_LOSS_H
 
+#include <stdbool.h>
+
 #include "common/vec.h"
 #include "server/scene/photograph.h"
 
@@ -17,10 +19,10 @@ float loss_weight(const struct photograph *photo, const struct photograph_sample
                   float median_radiance);
 
 /* What one look at a texel compares: sample_count paths of one photograph, even ones half A, odd
- * ones half B. Writes d_radiance[sample_count], the derivative of the loss by each path's
+ * ones half B; where `one_estimate`, all paths stand for either half, and noise adds to the loss. Writes d_radiance[sample_count], the derivative of the loss by each path's
  * radiance, and returns the unbiased estimate of the loss itself (it may be negative). */
 float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, float median_radiance, rgb *d_radiance);
+                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance);
 
 /* The same look as a ratio: relative to what the texel is `expected` to show, what the photograph shows and
  * what the render shows, by channel. (Relative to what this photograph shows, its noise would be on

@@ -225,7 +225,7 @@ static void step_segments(struct params *p, const struct gradient *gradient,
 
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool) {
-    if (p->is_emitter)
+    if (p->is_emitter || p->any_emits)
         step_segments(p, gradient, rates);
     if (rates->skip_base_color)
         return;
@@ -266,6 +266,10 @@ void params_fix_emitters(struct params *p, const bool *is_emitter) {
         if (!is_emitter[s])
             p->materials->emission[s] = rgb_gray(0.0f);
     }
+}
+
+void params_free_emission(struct params *p) {
+    p->any_emits = true;
 }
 
 void params_set_emission(struct params *p, size_t segment, rgb emission) {

@@ -35,6 +35,7 @@ struct params {
     const struct segments *segments;     /* borrowed */
     const uint32_t *chart_of_triangle; /* borrowed */
     const bool *is_emitter;      /* [segment_count] borrowed; NULL until the emitters are known */
+    bool any_emits;              /* no emitters are told; all segments move */
     struct adam base_color;      /* an entry a texel, or a block at coarse levels */
     struct adam roughness, specular, emission; /* an entry a segment */
     float (*log_emission)[3];    /* [segment_count]; owned */
@@ -76,6 +77,9 @@ void params_match(struct params *p, uint32_t texel, const struct loss_match *mat
 /* Tells the emitters from now on (borrowed): all other segments emit exactly 0, for good, and the
  * reflectance of an emitter, which its own light hides, moves slowly. */
 void params_fix_emitters(struct params *p, const bool *is_emitter);
+
+/* Tells that there is no telling: from now on any segment may emit. */
+void params_free_emission(struct params *p);
 
 /* Sets a segment's emission, with moments that start anew. */
 void params_set_emission(struct params *p, size_t segment, rgb emission);

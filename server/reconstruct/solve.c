@@ -168,7 +168,8 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->divide = (struct divide){
-        .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise};
+        .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise,
+        .denoises = settings_bool(r->settings, "denoise")};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     for (size_t i = 0; i < r->segments.count; i++) {

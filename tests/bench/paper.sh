@@ -197,7 +197,12 @@ ablations() {
         row "ablation, $what: base colour PSNR, dB" "$(figure "$out" base_color_psnr_db)" - higher
         row "ablation, $what: MSRE" "$(figure "$out" msre)" - lower
     done <<<"nothing left out,
+noise left in,denoise=false
+nothing refined,iterations=1
 the published method,method=listing1
+published; any segment may emit,method=listing1 emitters=any
+published; one estimate instead of two,method=listing1 estimates=one
+published; pixels instead of texels,method=listing1 choose=pixels
 no coarse levels,coarse_levels=0
 exposures and gains as given,calibrate=false
 one photograph a visit,cameras_per_texel=1
