@@ -12,7 +12,7 @@ find "$build/obj" -name '*.gcda' -delete
 bash tests/run.sh "$one" "$build"
 failed=$?
 
-# Branches that only an exception could take, and counts that two processes wrote at once, are no matter.
+# Branches are not told, lines are.
 gcovr --root . --filter 'server/' --filter 'common/' --filter 'client/' --exclude-unreachable-branches \
     --json-summary-pretty --json-summary "$build/coverage.json" --html-details "$build/lines.html" --txt "$build/coverage.txt" \
     "$build/obj" || exit 1
