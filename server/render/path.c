@@ -34,6 +34,7 @@
 #define MAX_DEPTH 32
 #define MIN_CHANCE 0.05f
 #define MAX_CHANCE 0.95f
+#define DERIVATIVE_WORTH 2.0f /* from roulette_depth, where derivatives are wanted: as EARLY_WORTH */
 #define MIN_LIGHT_CHANCE 0.1f
 #define EARLY_WORTH 4.0f /* before roulette_depth a path worth less than 1 / this may end */
 
@@ -310,14 +311,15 @@ static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32
     b->flight_count = flights;
 }
 
-/* Before roulette_depth only paths that are worth little may end. */
+/* Before roulette_depth, and where derivatives are wanted, only paths that are worth little may end. */
 static struct shade_roulette roulette_at(const struct path_settings *settings, int segment) {
     bool any = settings->roulette_depth <= settings->max_depth;
     bool all = any && segment >= settings->roulette_depth;
+    bool derivatives = settings->derivatives;
     return (struct shade_roulette){
-        .scale = all ? 1.0f : EARLY_WORTH,
+        .scale = !all ? EARLY_WORTH : derivatives ? DERIVATIVE_WORTH : 1.0f,
         .least = any ? MIN_CHANCE : 1.0f,
-        .most = all ? MAX_CHANCE : 1.0f,
+        .most = all && !derivatives ? MAX_CHANCE : 1.0f,
         .least_light = any ? MIN_LIGHT_CHANCE : 1.0f,
         .least_color = settings->least_color,
     };

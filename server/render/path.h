@@ -24,6 +24,8 @@ struct path_settings {
     int roulette_depth; /* Russian roulette decides on this segment and those after it. Where it is
                          * at most max_depth, light samples that can bring only little play too;
                          * otherwise nothing is left to chance */
+    bool derivatives;   /* are wanted: roulette ends fewer paths, since what they log at far vertices
+                         * is scattered over many texels, whose noise falls only with their number */
     uint64_t seed;
     float least_color;  /* roulette takes no base colour for darker than this: derivatives by base
                          * colour are no smaller where it is dark. 0 where only pictures are wanted */

@@ -41,6 +41,7 @@ static uint32_t *find_texels(const struct room *room, const struct inverse_uv *i
 static void set_paths(struct work *w, const struct inverse_uv *inverse, const uint32_t *texel, uint32_t round,
                       enum how how) {
     const struct room *room = w->room;
+    w->settings.derivatives = how == DEFAULT;
     w->settings.least_color = how == DEFAULT ? PATH_LEAST_COLOR : 0.0f;
     for (size_t i = 0; i < w->path_count; i++) {
         uint32_t look = (uint32_t)(i / SPP), sample = (uint32_t)(i % SPP), t = texel[look], triangle;

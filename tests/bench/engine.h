@@ -85,7 +85,8 @@ static inline double run(struct work *w, bool backward) {
 static inline void work_init(struct work *w, const struct room *room, const struct camera *camera, int threads) {
     memset(w, 0, sizeof *w);
     w->room = room;
-    w->settings = (struct path_settings){.max_depth = DEPTH, .roulette_depth = ROULETTE_DEPTH, .seed = 1,
+    w->settings = (struct path_settings){.max_depth = DEPTH, .roulette_depth = ROULETTE_DEPTH,
+                                         .derivatives = true, .seed = 1,
                                          .least_color = PATH_LEAST_COLOR};
     w->path_count = (size_t)camera->width * camera->height * SPP;
     w->chunk_count = (w->path_count + BATCH - 1) / BATCH;

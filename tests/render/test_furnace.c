@@ -86,6 +86,35 @@ static void check_plate(float base, float roughness, float specular, float cosin
     box_release(&b);
 }
 
+/* Roulette leaves the mean alone; `found` was made without it. */
+static void check_roulette(const struct box *b, double found, double error, bool derivatives) {
+    struct path_settings settings = {.max_depth = 12, .roulette_depth = 2, .derivatives = derivatives, .seed = 5};
+    struct path_batch *batch = path_batch_new(256, 12);
+    struct ray rays[256];
+    struct path_key key[256];
+    rgb radiance[256];
+    double sum = 0.0, square = 0.0;
+    for (uint32_t g = 0; g < 200; g++) {
+        double mean = 0.0;
+        for (uint32_t i = 0; i < 256; i++) {
+            rays[i] = box_ray(3);
+            key[i] = (struct path_key){g, 1, i};
+        }
+        path_batch_trace(batch, &b->world, &settings, 256, rays, key, radiance);
+        for (int i = 0; i < 256; i++)
+            mean += (double)radiance[i].g / 256.0;
+        sum += mean / 200.0;
+        square += mean * mean / 200.0;
+    }
+    double roulette_error = sqrt((square - sum * sum) / 199.0);
+    CHECK_THAT(fabs(sum - found) < 4.0 * (error + roulette_error), "roulette: %g, without %g +- %g", sum,
+               found, error + roulette_error);
+    uint64_t rays_traced, dropped;
+    path_batch_counts(batch, &rays_traced, &dropped);
+    CHECK(rays_traced > 0 && dropped == 0);
+    path_batch_free(batch);
+}
+
 /* Black walls that all shine: exactly their radiance at any depth. */
 static void check_glow(void) {
     struct box b;
@@ -106,32 +135,8 @@ static void check_glow(void) {
             b.materials.base_color.texel[i][c] = 0.5f;
     found = shoot(&b, box_ray(3), 12, 1 << 15, &error);
     CHECK_THAT(found > 0.5 / 0.55 && found < 0.5 / 0.4, "glowing room: %g", found);
-    /* Roulette leaves the mean alone. */
-    struct path_settings settings = {.max_depth = 12, .roulette_depth = 2, .seed = 5};
-    struct path_batch *batch = path_batch_new(256, 12);
-    struct ray rays[256];
-    struct path_key key[256];
-    rgb radiance[256];
-    double sum = 0.0, square = 0.0;
-    for (uint32_t g = 0; g < 200; g++) {
-        double mean = 0.0;
-        for (uint32_t i = 0; i < 256; i++) {
-            rays[i] = box_ray(3);
-            key[i] = (struct path_key){g, 1, i};
-        }
-        path_batch_trace(batch, &b.world, &settings, 256, rays, key, radiance);
-        for (int i = 0; i < 256; i++)
-            mean += (double)radiance[i].g / 256.0;
-        sum += mean / 200.0;
-        square += mean * mean / 200.0;
-    }
-    double roulette_error = sqrt((square - sum * sum) / 199.0);
-    CHECK_THAT(fabs(sum - found) < 4.0 * (error + roulette_error), "roulette: %g, without %g +- %g", sum,
-               found, error + roulette_error);
-    uint64_t rays_traced, dropped;
-    path_batch_counts(batch, &rays_traced, &dropped);
-    CHECK(rays_traced > 0 && dropped == 0);
-    path_batch_free(batch);
+    check_roulette(&b, found, error, false);
+    check_roulette(&b, found, error, true);
     box_release(&b);
 }
 
