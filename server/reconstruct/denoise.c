@@ -19,7 +19,7 @@
 #define NOISE_SCALE_MIN 1.0f
 #define NOISE_SCALE_MAX 8.0f
 /* Noise of rare, far outliers has more power around a few texels than a draw of it tells. */
-#define NOISE_SAFETY 2.0f
+#define NOISE_SAFETY 1.5f
 #define POWER_BOUND 9.0f /* of a texel, in variances of its noise */
 /* Reach of all filters together: 2 steps of each level, and the widest window. */
 #define MARGIN (2 * ((1 << LEVELS) - 1) + WINDOW_MAX)
