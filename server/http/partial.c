@@ -33,6 +33,7 @@ struct entry {
     struct entry *next;
     pthread_mutex_t mutex; /* guards what follows */
     bool is_loaded, is_gone;
+    bool is_spoiled; /* what the file has beyond `counted` must be cut off and could not be yet */
     int fd; /* -1 before it is loaded */
     uint64_t length;
     uint64_t received, counted; /* in the file; in the store */
@@ -114,10 +115,11 @@ static enum status load(struct entry *e, struct error *err) {
     else if ((e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW)) < 0 &&
              (errno != ENOENT || e->received < e->length)) /* whole, it may be on its way: see place */
         status = error_set_errno(err, errno, "cannot open %s", path);
-    else if (e->fd >= 0 && e->is_believed && strcmp(row.boot, p->boot) == 0)
+    else if (e->fd >= 0 && e->is_believed && !e->is_spoiled && strcmp(row.boot, p->boot) == 0)
         status = believe_tail(e, err);
     else if (e->fd >= 0 && e->is_believed)
         status = cut_tail(e, err);
+    e->is_spoiled = e->is_spoiled && status != STATUS_OK;
     mem_free(path);
     upload_row_release(&row);
     return status;
@@ -136,7 +138,7 @@ static void drop(struct entry *e) {
 
 static bool is_clean(struct entry *e) {
     pthread_mutex_lock(&e->mutex);
-    bool clean = !e->is_loaded || e->is_gone || e->received == e->counted;
+    bool clean = e->is_gone || (!e->is_spoiled && (!e->is_loaded || e->received == e->counted));
     pthread_mutex_unlock(&e->mutex);
     return clean;
 }
@@ -197,8 +199,9 @@ static void forget_tail(struct entry *e) {
     e->received = e->counted;
     e->is_loaded = false; /* the next to come reads row and hash again */
     e->holder = NULL;
-    if (ftruncate(e->fd, (off_t)e->counted) != 0 &&
-        store_upload_begin(e->partials->api->store, e->id, "", &err) != STATUS_OK)
+    e->is_spoiled = ftruncate(e->fd, (off_t)e->counted) != 0 &&
+                    store_upload_begin(e->partials->api->store, e->id, "", &err) != STATUS_OK;
+    if (e->is_spoiled)
         log_warning("upload %s: %s", e->id, err.message);
     pthread_mutex_unlock(&e->mutex);
 }
@@ -273,6 +276,11 @@ static enum status finish(struct partials *p, const char *id, struct error *err)
 
 /* Commits; finishes what is whole. */
 static enum status settle(struct entry *e, struct error *err) {
+    pthread_mutex_lock(&e->mutex);
+    bool is_spoiled = e->is_spoiled && !e->is_gone;
+    pthread_mutex_unlock(&e->mutex);
+    if (is_spoiled)
+        forget_tail(e);
     enum status status = commit(e, err);
     pthread_mutex_lock(&e->mutex);
     bool is_whole = !e->is_gone && e->counted == e->length;
