@@ -3,13 +3,13 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/file.h"
 #include "common/image.h"
 #include "common/json.h"
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/demo/room.h"
 #include "server/demo/viewpoints.h"
 #include "server/render/film.h"
@@ -71,11 +71,6 @@ static void render_frame(struct generator *g, uint32_t frame) {
     image_release(&film);
 }
 
-static int by_value(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* From the median over all values of the training frames. */
 static float choose_base_exposure(const struct generator *g) {
     size_t per_frame = (size_t)g->settings->width * g->settings->height * 3;
@@ -83,8 +78,7 @@ static float choose_base_exposure(const struct generator *g) {
     float *value = mem_array(count, sizeof *value);
     for (uint32_t f = 0; f < g->settings->train_count; f++)
         memcpy(value + f * per_frame, g->picture[f].pixel, per_frame * sizeof *value);
-    qsort(value, count, sizeof *value, by_value);
-    float median = value[count / 2];
+    float median = quantile(value, count, 0.5);
     mem_free(value);
     return median > 0.0f ? SHOWN_MEDIAN / median : 1.0f;
 }

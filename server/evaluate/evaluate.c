@@ -3,12 +3,12 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/file.h"
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/evaluate/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
@@ -90,11 +90,6 @@ static enum status score_objects(struct evaluator *e, struct evaluation *v, stru
 
 /* --- photographs -------------------------------------------------------------------------- */
 
-static int by_value(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 /* Radiance of a pixel's channels; false where it is masked or not finite. */
 static bool pixel_radiance(const struct photograph *p, uint32_t x, uint32_t y,
                            struct photograph_sample *sample) {
@@ -121,8 +116,7 @@ static double training_median(const struct scene *scene) {
             }
         }
     }
-    qsort(value, count, sizeof *value, by_value);
-    double median = count ? (double)value[count / 2] : 0.0;
+    double median = (double)quantile(value, count, 0.5);
     mem_free(value);
     return median;
 }

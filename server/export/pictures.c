@@ -2,10 +2,10 @@
 #include "server/export/pictures.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "common/vec.h"
 
 #define COMPARISON_GAP 4 /* pixels between the pictures */
@@ -225,11 +225,6 @@ static void put(struct image *image, uint32_t x, uint32_t y, rgb c) {
     p[2] = c.b;
 }
 
-static int by_value(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return x < y ? -1 : x > y;
-}
-
 float picture_scale(const struct image *picture) {
     size_t count = (size_t)picture->width * picture->height, used = 0;
     float *luminance = mem_array(count, sizeof *luminance);
@@ -238,8 +233,7 @@ float picture_scale(const struct image *picture) {
         if (isfinite(l))
             luminance[used++] = l;
     }
-    qsort(luminance, used, sizeof *luminance, by_value);
-    float level = used ? luminance[used * 4 / 5] : 0.0f;
+    float level = quantile(luminance, used, 0.8);
     mem_free(luminance);
     return level > 0.0f ? 0.6f / level : 1.0f;
 }

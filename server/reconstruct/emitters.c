@@ -2,9 +2,9 @@
 #include "server/reconstruct/emitters.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/reconstruct/by_segment.h"
 #include "server/scene/surface.h"
 
@@ -46,11 +46,6 @@ struct evidence_job {
     struct emitter_evidence *evidence;
 };
 
-static int compare_floats(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 /* Values of one channel: those that were measured, and of the saturated ones, which are lower
  * bounds, the largest. */
 struct channel_values {
@@ -79,8 +74,7 @@ static void add_value(struct channel_values *v, float radiance, bool saturated) 
 static float median(struct channel_values *v) {
     if ((float)v->count < MEASURED_PART * (float)(v->count + v->saturated_count))
         return v->bound;
-    qsort(v->value, v->count, sizeof v->value[0], compare_floats);
-    return v->count ? v->value[v->count / 2] : 0.0f;
+    return quantile(v->value, v->count, 0.5);
 }
 
 /* Whether what a look of this class of distance from an edge shows is the surface's own. A bright

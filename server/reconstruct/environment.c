@@ -12,6 +12,7 @@
 #include <stdlib.h>
 
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/reconstruct/fill.h"
 
 #define PI 3.14159265358979323846
@@ -87,11 +88,6 @@ static void find_window(void *user, size_t train, int thread) {
     w->cosine = angle < (float)PI ? cosf(angle) : -1.0f;
 }
 
-static int compare_floats(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static const struct camera *camera_of(const struct gather *g, const struct window *w) {
     return &g->views->scene->photograph[g->views->train[w->train]].camera;
 }
@@ -109,8 +105,7 @@ static uint32_t find_windows(struct gather *g, struct parallel *pool) {
         focal[g->window_count] = camera_of(g, &g->window[g->window_count])->fx;
         g->window_count++;
     }
-    qsort(focal, g->window_count, sizeof *focal, compare_floats);
-    float wanted = g->window_count ? 2.0f * (float)PI * focal[g->window_count / 2] : 0.0f;
+    float wanted = 2.0f * (float)PI * quantile(focal, g->window_count, 0.5);
     mem_free(focal);
     if (g->window_count == 0)
         return 0;
@@ -322,9 +317,8 @@ static void note_figures(struct environment *e) {
         if (known[0] > 1.0f)
             spread[spread_count++] = known[1];
     }
-    qsort(spread, spread_count, sizeof *spread, compare_floats);
     e->seen_share = seen / all;
-    e->median_spread = spread_count ? (double)spread[spread_count / 2] : 0.0;
+    e->median_spread = (double)quantile(spread, spread_count, 0.5);
     e->luminance = luminance / all;
     e->seen_luminance = seen_luminance / seen;
     mem_free(spread);

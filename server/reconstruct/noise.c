@@ -2,10 +2,10 @@
 #include "server/reconstruct/noise.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "common/rng.h"
 
 #define LEAST_EXPONENT (-24) /* the first octave begins at 2^-24, a half's smallest number */
@@ -88,11 +88,6 @@ static void add_row(struct octave *octaves, const struct photograph *photo, cons
     }
 }
 
-static int compare_floats(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void measure_shares(struct noise *noise, const struct views *v) {
     struct octave *octaves = mem_calloc(NOISE_OCTAVES, sizeof *octaves);
     bool rounded = false;
@@ -107,9 +102,7 @@ static void measure_shares(struct noise *noise, const struct views *v) {
         struct octave *o = &octaves[k];
         size_t count = o->met < SAMPLES ? (size_t)o->met : SAMPLES;
         if (count >= LEAST_SAMPLES) {
-            qsort(o->kept, count, sizeof *o->kept, compare_floats);
-            float here = o->kept[(size_t)(QUANTILE * (double)count)] /
-                         (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
+            float here = quantile(o->kept, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
             if (rounded)
                 here = fmaxf(here, rounding_share(ldexpf(0.75f, k + LEAST_EXPONENT)));
             share = fminf(share, here);
@@ -141,8 +134,7 @@ static float block_variance(const struct noise *noise, const struct photograph *
     }
     if (count < LEAST_DIFFERENCES)
         return 0.0f;
-    qsort(ratio, count, sizeof *ratio, compare_floats);
-    float median = ratio[count / 2] / MEDIAN_DEVIATIONS;
+    float median = quantile(ratio, count, 0.5) / MEDIAN_DEVIATIONS;
     return median * median / DIFFERENCE_VARIANCE;
 }
 

@@ -2,10 +2,10 @@
 #include "server/reconstruct/views.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "common/rng.h"
 #include "server/reconstruct/choose.h"
 
@@ -134,11 +134,6 @@ static void make_edges(uint8_t *edge, const uint8_t *shows, uint32_t width, uint
         spread_class(edge, (long)width, (long)height, of);
 }
 
-static int compare_floats(const void *a, const void *b) {
-    float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 void views_update_median(struct views *v) {
     const size_t per_photo = 4096; /* an even sample */
     float *value = mem_array(v->train_count * per_photo + 1, sizeof *value);
@@ -155,8 +150,8 @@ void views_update_median(struct views *v) {
                 value[count++] = rgb_mean(sample.radiance);
         }
     }
-    qsort(value, count, sizeof *value, compare_floats);
-    v->median_radiance = count && value[count / 2] > 0.0f ? value[count / 2] : 1.0f;
+    float median = quantile(value, count, 0.5);
+    v->median_radiance = median > 0.0f ? median : 1.0f;
     mem_free(value);
 }
 

@@ -2,8 +2,8 @@
 #include "server/reconstruct/denoise.h"
 
 #include "common/mem.h"
-#include "common/rng.h"
 #include "tests/check.h"
+#include "tests/unit/normal.h"
 
 #define WIDTH 256
 #define HEIGHT 128
@@ -29,13 +29,6 @@ static void make_surface(void) {
         if (triangle[i] != INVERSE_UV_NONE)
             valid[inverse.valid_count++] = i;
     }
-}
-
-static float normal(uint64_t a, uint64_t b) {
-    float sum = -6.0f; /* of twelve even numbers */
-    for (uint64_t k = 0; k < 12; k++)
-        sum += rng_to_float((uint32_t)rng_key(a, b, k));
-    return sum;
 }
 
 /* What is there: the left chart is plain, the right one has stripes. */

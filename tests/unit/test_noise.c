@@ -3,8 +3,8 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "common/rng.h"
 #include "tests/check.h"
+#include "tests/unit/normal.h"
 
 #define SIDE 128
 #define PIXELS (SIDE * SIDE)
@@ -15,13 +15,6 @@ static struct scene scene = {.photograph = photograph, .photograph_count = PHOTO
 static uint32_t train[PHOTOGRAPHS] = {0, 1, 2, 3};
 static uint8_t edge_pixels[PIXELS], *edge[PHOTOGRAPHS];
 static struct views views = {.scene = &scene, .train_count = PHOTOGRAPHS, .train = train, .edge = edge};
-
-static float normal(uint64_t a, uint64_t b) {
-    float sum = -6.0f;
-    for (uint64_t k = 0; k < 12; k++)
-        sum += rng_to_float((uint32_t)rng_key(a, b, k));
-    return sum;
-}
 
 /* Pictures of value(x, y) with noise of deviation(value, x). */
 static void take(float (*value)(uint32_t x, uint32_t y), float (*deviation)(float value, uint32_t x)) {
