@@ -20,6 +20,8 @@
 #define NOISE_SCALE_MAX 8.0f
 /* Noise of rare, far outliers has more power around a few texels than a draw of it tells. */
 #define NOISE_SAFETY 1.5f
+/* Beyond so many times the noise outliers are too many to be outliers. */
+#define TEXTURE_CERTAIN 2.0f
 #define POWER_BOUND 9.0f /* of a texel, in variances of its noise */
 /* Reach of all filters together: 2 steps of each level, and the widest window. */
 #define MARGIN (2 * ((1 << LEVELS) - 1) + WINDOW_MAX)
@@ -244,10 +246,12 @@ static void measure_power(struct tile *t, size_t radius) {
     window_sums(t->bounded_power, t->scratch, t->width, t->height, radius);
 }
 
-/* Power of texture around a texel: none where it takes a few outliers to see more than noise. */
+/* Power of texture around a texel: what is beyond noise; of outliers only up to their bound, unless there
+ * are so many that they are no outliers. */
 static float texture_power(const struct tile *t, size_t at) {
-    float noise = NOISE_SAFETY * t->noise_power[at];
-    return t->bounded_power[at] < noise ? 0.0f : (t->power[at] - noise) / t->weight_sum[at];
+    float noise = t->noise_power[at], bounded = t->bounded_power[at];
+    float power = bounded < TEXTURE_CERTAIN * noise ? bounded : t->power[at];
+    return fmaxf(power - NOISE_SAFETY * noise, 0.0f) / t->weight_sum[at];
 }
 
 /* Adds the share of this level's detail that is texture. */
