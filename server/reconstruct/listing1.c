@@ -445,7 +445,7 @@ struct refine *listing1_new(struct reconstruction *r, const struct views *views,
     f->path = (struct path_settings){
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
-        .derivatives = true,
+        .derivatives = !f->solved, /* from there no path is walked backwards */
         .seed = (uint64_t)settings_number(set, "seed"),
         .least_color = f->solved ? 0.0f : PATH_LEAST_COLOR, /* steps from a solved start go by radiance */
     };
