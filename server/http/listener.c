@@ -175,17 +175,28 @@ static struct MHD_Response *library_response(struct exchange *x) {
                                            MHD_RESPMEM_PERSISTENT);
 }
 
+/* A reply that lacks its Location, say, must not look whole. Fields without a value are left out. */
+static bool add_fields(const struct exchange *x, struct MHD_Response *made) {
+    const struct response *reply = x->reply;
+    bool added = MHD_add_response_header(made, "X-Request-Id", x->request.id) == MHD_YES &&
+                 MHD_add_response_header(made, "X-Content-Type-Options", "nosniff") == MHD_YES;
+    for (size_t i = 0; i < reply->field_count && added; i++)
+        added = !*reply->fields[i].value ||
+                MHD_add_response_header(made, reply->fields[i].name, reply->fields[i].value) == MHD_YES;
+    if (reply->must_close && added)
+        added = MHD_add_response_header(made, "Connection", "close") == MHD_YES;
+    return added;
+}
+
 static enum MHD_Result queue_reply(struct exchange *x) {
     struct response *reply = x->reply;
     struct MHD_Response *made = library_response(x);
     if (!made)
         return MHD_NO;
-    for (size_t i = 0; i < reply->field_count; i++)
-        MHD_add_response_header(made, reply->fields[i].name, reply->fields[i].value);
-    MHD_add_response_header(made, "X-Request-Id", x->request.id);
-    MHD_add_response_header(made, "X-Content-Type-Options", "nosniff");
-    if (reply->must_close)
-        MHD_add_response_header(made, "Connection", "close");
+    if (!add_fields(x, made)) {
+        MHD_destroy_response(made);
+        return MHD_NO;
+    }
     guard_enter(x->listener->guard, x->guarded, GUARD_REPLY);
     enum MHD_Result result = MHD_queue_response(x->connection, (unsigned)reply->status, made);
     MHD_destroy_response(made);

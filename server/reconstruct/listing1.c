@@ -329,6 +329,16 @@ static void tell_rays(const struct refine *f) {
     f->hooks->metric(f->hooks->user, "rays", (long)f->counters.iteration, (double)sum);
 }
 
+/* How far it is, after an iteration of this loss. */
+static void tell(const struct refine *f, double loss) {
+    const struct reconstruct_hooks *hooks = f->hooks;
+    double fraction = fraction_done(f);
+    double left = fraction > 0.0 ? f->counters.elapsed_sec * (1.0 / fraction - 1.0) : -1.0;
+    hooks->progress(hooks->user, "refine", fraction, 1.0, left);
+    hooks->metric(hooks->user, "loss", (long)f->counters.iteration, loss);
+    tell_rays(f);
+}
+
 static enum status loop(struct refine *f, struct error *err) {
     const struct reconstruct_hooks *hooks = f->hooks;
     double told = 0.0;
@@ -339,13 +349,9 @@ static enum status loop(struct refine *f, struct error *err) {
         double loss = iterate(f, fraction);
         double end = now_sec();
         f->counters.elapsed_sec += end - begin;
-        if (end - told > 1.0) {
+        if (end - told > 1.0 || fraction_done(f) >= 1.0) {
             told = end;
-            fraction = fraction_done(f);
-            double left = fraction > 0.0 ? f->counters.elapsed_sec * (1.0 / fraction - 1.0) : -1.0;
-            hooks->progress(hooks->user, "refine", fraction, 1.0, left);
-            hooks->metric(hooks->user, "loss", (long)f->counters.iteration, loss);
-            tell_rays(f);
+            tell(f, loss);
         }
         bool stop = hooks->stop_requested(hooks->user);
         if (stop || hooks->checkpoint_due(hooks->user)) {

@@ -122,8 +122,9 @@ static bool upload_begin(char path[80]) {
     struct buf head, body;
     int status = http_exchange(daemon_.port, "POST", "/v1/uploads", TUS "Upload-Length: 600\r\n", "", 0, &head, &body);
     bool made = is_right(201, status, "POST", "/v1/uploads", &body);
-    if (made)
-        sscanf(strcasestr(buf_text(&head), "\r\nLocation: ") + 12, "%79[^\r]", path);
+    const char *location = strcasestr(buf_text(&head), "\r\nLocation: ");
+    CHECK_THAT(!made || location, "%s: an upload that is made has no place", round_);
+    made = made && location && sscanf(location + 12, "%79[^\r]", path) == 1;
     buf_release(&head);
     buf_release(&body);
     return made;
