@@ -131,7 +131,7 @@ static void run(const struct seeds *s) {
     static struct mutant m;
     for (size_t i = 0; i < s->count; i++)
         try(s->seed[i].data, s->seed[i].size);
-    for (long i = 0; i < s->mutants; i++) {
+    for (long i = 0; i < s->mutants && s->count > 0; i++) {
         const struct seed *seed = &s->seed[below(&m, s->count)];
         memcpy(m.data, seed->data, seed->size);
         m.size = seed->size;
