@@ -73,6 +73,17 @@ enum status file_sync_parent(const char *path, struct error *err) {
     return status;
 }
 
+/* What both ways to replace a file end with: `status` tells whether the temporary one is whole. */
+static enum status rename_synced(const char *temporary, const char *path, enum status status, struct error *err) {
+    if (status == STATUS_OK && rename(temporary, path) != 0)
+        status = error_set_errno(err, errno, "cannot rename to %s", path);
+    if (status == STATUS_OK)
+        status = file_sync_parent(path, err);
+    else
+        unlink(temporary);
+    return status;
+}
+
 enum status file_replace(const char *path, const void *data, size_t length, struct error *err) {
     char *temporary = mem_printf("%s.tmp-XXXXXX", path);
     enum status status = STATUS_OK;
@@ -86,12 +97,7 @@ enum status file_replace(const char *path, const void *data, size_t length, stru
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (close(fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot close %s", path);
-    if (status == STATUS_OK && rename(temporary, path) != 0)
-        status = error_set_errno(err, errno, "cannot rename to %s", path);
-    if (status == STATUS_OK)
-        status = file_sync_parent(path, err);
-    else
-        unlink(temporary);
+    status = rename_synced(temporary, path, status, err);
 out:
     mem_free(temporary);
     return status;
@@ -104,13 +110,7 @@ enum status file_put_in_place(const char *temporary, const char *path, struct er
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (fd >= 0)
         close(fd);
-    if (status == STATUS_OK && rename(temporary, path) != 0)
-        status = error_set_errno(err, errno, "cannot rename to %s", path);
-    if (status == STATUS_OK)
-        status = file_sync_parent(path, err);
-    else
-        unlink(temporary);
-    return status;
+    return rename_synced(temporary, path, status, err);
 }
 
 enum status file_make_dirs(const char *path, struct error *err) {
