@@ -109,6 +109,20 @@ void client_note(struct client *c, const char *format, ...) {
     fputs("\n", stderr);
 }
 
+void field_print(struct client *c, const char *name, const char *value) {
+    if (!*value)
+        return;
+    struct buf clean_name, clean;
+    buf_init(&clean_name, 1 << 10);
+    buf_init(&clean, 1 << 16);
+    terminal_clean(&clean_name, name);
+    terminal_clean(&clean, value);
+    fprintf(c->out.out, "%s%-14s%s %s\n", terminal_colour(&c->out, COLOUR_DIM), buf_text(&clean_name),
+            terminal_colour(&c->out, COLOUR_NONE), buf_text(&clean));
+    buf_release(&clean);
+    buf_release(&clean_name);
+}
+
 void client_print_json(struct client *c, const cJSON *value) {
     char *text = json_text(value);
     fprintf(c->out.out, "%s\n", text);

@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "client/collection.h"
 #include "common/protocol.h"
 
 #define ANY_NUMBER ((size_t)-1)
@@ -75,10 +76,11 @@ static const struct command table[] = {
      "A SCENE is an id or its beginning, 8 digits or more. What the server removes by itself, and when,\n"
      "is in the column `expires`.\n",
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes keep 3f2a91c0 --pin\n"
-     "  unbake scenes rm 3f2a91c0 --dry-run\n", 0, ANY_NUMBER, scenes_options, scenes_run},
-    {"uploads", "[rm UPLOAD...]", "list uploads that can be resumed, or give them up",
+     "  unbake scenes rm 3f2a91c0 --dry-run\n", 0, ANY_NUMBER, collection_options, scenes_run},
+    {"uploads", "[show|keep|rm UPLOAD...]", "list uploads that can be resumed, show, keep or give them up",
      "`unbake submit` of the same room goes on where an upload stopped.\n",
-     "  unbake uploads\n", 0, ANY_NUMBER, uploads_options, uploads_run},
+     "  unbake uploads\n  unbake uploads keep 5f0c77d2a5e14b0e8f6f0c9f4b6f8d11 --keep-days 7\n", 0, ANY_NUMBER,
+     collection_options, uploads_run},
     {"collect", "", "remove what has expired, now (admins)",
      "The server does so by itself once a minute or as it is configured.\n",
      "  unbake collect --dry-run\n", 0, 0, collect_options, collect_run},

@@ -39,13 +39,12 @@ int get_run(struct client *c, const struct options *o);
 bool get_name_is_safe(const char *name);
 
 /* scenes.c */
-extern const struct option scenes_options[];
 int scenes_run(struct client *c, const struct options *o);
 /* Prints a rejected scene's problems, each with its file. */
 void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
 
 /* uploads.c */
-extern const struct option uploads_options[], collect_options[];
+extern const struct option collect_options[];
 int uploads_run(struct client *c, const struct options *o);
 int collect_run(struct client *c, const struct options *o);
 

@@ -4,10 +4,10 @@
 
 #include "client/commands.h"
 #include "client/keeping.h"
-#include "common/nearest.h"
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
+#include "common/nearest.h"
 #include "common/protocol.h"
 
 const struct option list_options[] = {
@@ -25,16 +25,13 @@ const struct option rm_options[] = {
     {0},
 };
 
-static const char *const states[] = {JOB_STATE_QUEUED,    JOB_STATE_RUNNING, JOB_STATE_PAUSED,
-                                     JOB_STATE_SUCCEEDED, JOB_STATE_FAILED,  JOB_STATE_CANCELLED};
-
 static enum status check_state(const char *state, struct error *err) {
     struct nearest nearest;
     nearest_init(&nearest, state);
-    for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
-        if (strcmp(states[i], state) == 0)
+    for (const char *const *known = command_job_states; *known; known++) {
+        if (strcmp(*known, state) == 0)
             return STATUS_OK;
-        nearest_offer(&nearest, states[i]);
+        nearest_offer(&nearest, *known);
     }
     error_set(err, STATUS_INPUT, "a job is never \"%.100s\"", state);
     return nearest.best ? error_hint(err, "did you mean %s?", nearest.best)
@@ -114,17 +111,6 @@ int list_run(struct client *c, const struct options *o) {
 
 /* --- show ---------------------------------------------------------------------------------- */
 
-static void print_field(struct client *c, const char *name, const char *value) {
-    if (!*value)
-        return;
-    struct buf clean;
-    buf_init(&clean, 1 << 16);
-    terminal_clean(&clean, value);
-    fprintf(c->out.out, "%s%-10s%s %s\n", terminal_colour(&c->out, COLOUR_DIM), name,
-            terminal_colour(&c->out, COLOUR_NONE), buf_text(&clean));
-    buf_release(&clean);
-}
-
 /* "texture_size=512 seed=7" */
 static void print_members(struct client *c, const char *name, const cJSON *object) {
     struct buf line;
@@ -135,7 +121,7 @@ static void print_members(struct client *c, const char *name, const cJSON *objec
         buf_printf(&line, "%s%s=%s", line.length ? " " : "", member_name(member), text);
         mem_free(text);
     }
-    print_field(c, name, buf_text(&line));
+    field_print(c, name, buf_text(&line));
     buf_release(&line);
 }
 
@@ -163,34 +149,33 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     char text[96], left[16];
     const char *wanted = member_text(job, "wanted");
     snprintf(text, sizeof text, "%.0f", member_number(job, "id", 0.0));
-    print_field(c, "job", text);
-    print_field(c, "name", member_text(job, "name"));
+    field_print(c, "job", text);
+    field_print(c, "name", member_text(job, "name"));
     snprintf(text, sizeof text, "%s%s%s", member_text(job, "state"),
              strcmp(wanted, "run") == 0 ? "" : ", to ", strcmp(wanted, "run") == 0 ? "" : wanted);
-    print_field(c, "state", text);
-    print_field(c, "reason", member_text(job, "reason"));
-    print_field(c, "hint", member_text(job, "hint"));
+    field_print(c, "state", text);
+    field_print(c, "reason", member_text(job, "reason"));
+    field_print(c, "hint", member_text(job, "hint"));
     if (strcmp(member_text(job, "state"), JOB_STATE_RUNNING) == 0) {
         format_duration(left, member_number(job, "eta_sec", -1.0));
         snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job),
                  left);
-        print_field(c, "stage", text);
+        field_print(c, "stage", text);
     }
-    print_field(c, "owner", member_text(job, "owner"));
-    print_field(c, "shared", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "shared")) ? "yes" : "");
-    print_field(c, "scene", member_text(job, "scene"));
+    field_print(c, "owner", member_text(job, "owner"));
+    field_print(c, "shared", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "shared")) ? "yes" : "");
+    field_print(c, "scene", member_text(job, "scene"));
     snprintf(text, sizeof text, "%.0f", member_number(job, "priority", 0.0));
-    print_field(c, "priority", text);
+    field_print(c, "priority", text);
     print_members(c, "labels", cJSON_GetObjectItemCaseSensitive(job, "labels"));
     print_members(c, "settings", cJSON_GetObjectItemCaseSensitive(job, "settings"));
     snprintf(text, sizeof text, "%.0f, %.0f left", member_number(job, "attempt", 0.0),
              member_number(job, "attempts_left", 0.0));
-    print_field(c, "attempt", text);
-    print_field(c, "created", member_text(job, "created_at"));
-    print_field(c, "started", member_text(job, "started_at"));
-    print_field(c, "finished", member_text(job, "finished_at"));
-    print_field(c, "expires", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "pinned"))
-                                  ? "never: pinned" : member_text(job, "expires_at"));
+    field_print(c, "attempt", text);
+    field_print(c, "created", member_text(job, "created_at"));
+    field_print(c, "started", member_text(job, "started_at"));
+    field_print(c, "finished", member_text(job, "finished_at"));
+    field_print(c, "expires", keeping_time(job));
     print_outputs(c, outputs);
 }
 

@@ -25,10 +25,18 @@ enum status keeping_describe(const struct options *o, cJSON *body, struct error 
     return STATUS_OK;
 }
 
+static bool is_pinned(const cJSON *thing) {
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned"));
+}
+
+const char *keeping_time(const cJSON *thing) {
+    return is_pinned(thing) ? "never: pinned" : member_text(thing, "expires_at");
+}
+
 void keeping_text(char out[16], const cJSON *thing) {
     double at = time_parse(member_text(thing, "expires_at"));
     out[0] = '\0';
-    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned")))
+    if (is_pinned(thing))
         strcpy(out, "pinned");
     else if (!isnan(at))
         format_duration(out, fmax(at - (double)time(NULL), 0.0));

@@ -15,5 +15,7 @@ enum status keeping_describe(const struct options *o, cJSON *body, struct error 
 
 /* "pinned", the time that is left ("3d 4h"), or "" where a job, scene or upload is kept for ever. */
 void keeping_text(char out[16], const cJSON *thing);
+/* The same in full: "never: pinned", or the time; borrowed. */
+const char *keeping_time(const cJSON *thing);
 
 #endif

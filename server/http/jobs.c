@@ -10,6 +10,7 @@
 #include "common/sha256.h"
 #include "common/url.h"
 #include "server/http/auth.h"
+#include "server/http/body.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
@@ -212,11 +213,10 @@ static struct response *read_wish(const struct request *r, struct wish *w, bool 
     memset(w, 0, sizeof *w);
     w->priority = INT_MIN;
     w->shared = -1;
-    struct error err;
-    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &w->body, &err) != STATUS_OK)
-        return problem(r, 400, "%s", err.message);
-    if (!cJSON_IsObject(w->body))
-        return problem(r, 400, "the request body is not a JSON object");
+    struct response *refusal = NULL;
+    w->body = body_object(r, &refusal);
+    if (!w->body)
+        return refusal;
     for (const cJSON *member = w->body->child; member; member = member->next) {
         const char *name = member->string;
         if (strcmp(name, "name") == 0)

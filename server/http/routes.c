@@ -125,26 +125,35 @@ static struct response *check_query(const struct request *r) {
     return NULL;
 }
 
+static bool is_json(const struct request *r) {
+    const char *type = request_field(r, "Content-Type");
+    return type && (field_is_type(type, MIME_JSON) ||
+                    (r->method == METHOD_PATCH && field_is_type(type, "application/merge-patch+json")));
+}
+
+static enum route_body body_of(const struct request *r) {
+    return r->route->body == ROUTE_BODY_PATCH && is_json(r) ? ROUTE_BODY_JSON : r->route->body;
+}
+
 static struct response *check_media_type(const struct request *r) {
     const char *type = request_field(r, "Content-Type");
     const char *coding = request_field(r, "Content-Encoding");
-    static const char *const types[] = {[ROUTE_BODY_IGNORED] = MIME_JSON, [ROUTE_BODY_JSON] = MIME_JSON,
-        [ROUTE_BODY_UPLOAD] = "application/octet-stream", [ROUTE_BODY_PATCH] = MIME_TUS};
-    const char *accepted = types[r->route->body];
+    enum route_body body = body_of(r);
+    static const char *const accepted[] = {[ROUTE_BODY_IGNORED] = MIME_JSON, [ROUTE_BODY_JSON] = MIME_JSON,
+        [ROUTE_BODY_UPLOAD] = "application/octet-stream", [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
     const char *detail = NULL;
     if (coding && r->has_body)
         detail = "a body with a Content-Encoding is not taken";
-    else if (r->route->body == ROUTE_BODY_UPLOAD && type && field_is_type(type, "multipart/form-data"))
+    else if (body == ROUTE_BODY_UPLOAD && type && field_is_type(type, "multipart/form-data"))
         detail = "a form is not taken: send the archive itself as the body, as curl -T does";
-    else if (r->route->body == ROUTE_BODY_JSON && !(type && (field_is_type(type, MIME_JSON) ||
-             (r->method == METHOD_PATCH && field_is_type(type, "application/merge-patch+json")))))
+    else if (body == ROUTE_BODY_JSON && !is_json(r))
         detail = "the body must be JSON and Content-Type say so";
-    else if (r->route->body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))
-        detail = "Content-Type must be " MIME_TUS;
+    else if (body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))
+        detail = "Content-Type must be " MIME_TUS ", or " MIME_JSON " for a change of how long it is kept";
     if (!detail)
         return NULL;
     struct response *reply = problem(r, 415, "%s", detail);
-    response_field(reply, "Accept", "%s", accepted);
+    response_field(reply, "Accept", "%s", accepted[r->route->body]);
     return reply;
 }
 
@@ -170,22 +179,23 @@ struct response *routes_begin(struct api *api, struct request *r) {
         refusal = check_media_type(r);
     if (refusal)
         return refusal;
-    if (r->route->body == ROUTE_BODY_PATCH)
+    enum route_body body = body_of(r);
+    if (body == ROUTE_BODY_PATCH)
         return uploads_begin(api, r); /* the upload's length is the limit */
-    uint64_t limit = r->route->body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
+    uint64_t limit = body == ROUTE_BODY_UPLOAD ? api->config.max_upload_bytes : ROUTES_BODY_MAX;
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
     buf_init(&r->body, ROUTES_BODY_MAX);
-    return r->route->body == ROUTE_BODY_UPLOAD ? upload_begin(api, r) : NULL;
+    return body == ROUTE_BODY_UPLOAD ? upload_begin(api, r) : NULL;
 }
 
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length) {
-    if (r->route->body == ROUTE_BODY_UPLOAD) {
+    if (r->upload) {
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
             return too_large(r, api->config.max_upload_bytes);
         return upload_data(api, r, data, length);
     }
-    if (r->route->body == ROUTE_BODY_PATCH)
+    if (r->patch)
         return uploads_data(api, r, data, length);
     return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
 }

@@ -14,7 +14,7 @@ enum route_body {
     ROUTE_BODY_IGNORED, /* a small one is read and forgotten */
     ROUTE_BODY_JSON,    /* collected in request.body */
     ROUTE_BODY_UPLOAD,  /* goes to disk */
-    ROUTE_BODY_PATCH    /* goes on with an upload in parts */
+    ROUTE_BODY_PATCH    /* goes on with an upload in parts; as JSON it is a change of it instead */
 };
 
 /* The role that a caller must have at least. */

@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "common/sha256.h"
 #include "server/http/auth.h"
+#include "server/http/body.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
@@ -90,16 +91,10 @@ struct response *scenes_add(struct api *api, struct request *r) {
 /* What a PATCH asks for, checked; or *refusal. `body` keeps the name. */
 static void read_patch(const struct request *r, cJSON **body, const char **name, struct keeping *keeping,
                        struct response **refusal) {
-    struct error err;
     *name = NULL;
-    if (json_parse(buf_text(&r->body), r->body.length, "the request body", body, &err) != STATUS_OK) {
-        *refusal = problem(r, 400, "%s", err.message);
+    *body = body_object(r, refusal);
+    if (!*body)
         return;
-    }
-    if (!cJSON_IsObject(*body)) {
-        *refusal = problem(r, 400, "the request body is not a JSON object");
-        return;
-    }
     cJSON *params = cJSON_CreateArray();
     for (const cJSON *member = (*body)->child; member; member = member->next) {
         if (strcmp(member->string, "name") == 0) {

@@ -1,5 +1,6 @@
 /* uploads.c -- /v1/uploads: bundles in parts, by the tus protocol 1.0.0 (tus.io) with its
- * extensions creation, termination, expiration and checksum. What is on disk is partial.c's. */
+ * extensions creation, termination, expiration and checksum. What is on disk is partial.c's. A PATCH
+ * whose body is JSON is not of the protocol: it changes how long the upload is kept. */
 #include "server/http/uploads.h"
 
 #include <inttypes.h>
@@ -13,6 +14,7 @@
 #include "common/sha1.h"
 #include "common/sha256.h"
 #include "common/utf8.h"
+#include "server/http/body.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
@@ -79,6 +81,8 @@ static const char *find_upload(struct api *api, const struct request *r, struct 
 static void add_expiry(struct response *reply, int64_t expires_ms) {
     char text[64];
     struct tm utc;
+    if (expires_ms <= 0) /* pinned */
+        return;
     time_t seconds = (time_t)(expires_ms / 1000);
     gmtime_r(&seconds, &utc);
     strftime(text, sizeof text, "%a, %d %b %Y %H:%M:%S GMT", &utc); /* the locale is always C */
@@ -339,8 +343,36 @@ static bool is_as_sent(struct patch *p) {
     return memcmp(found, p->wanted, sizeof found) == 0;
 }
 
+/* A PATCH with a JSON body. */
+static struct response *change(struct api *api, const struct request *r) {
+    struct keeping keeping = {0};
+    struct upload_row row;
+    struct error err;
+    struct response *reply = NULL;
+    const char *id = find_upload(api, r, &reply);
+    cJSON *body = reply ? NULL : body_object(r, &reply);
+    if (reply)
+        return reply;
+    cJSON *params = cJSON_CreateArray();
+    for (const cJSON *member = body->child; member; member = member->next)
+        if (!keeping_read(&keeping, member, params))
+            problem_param(params, member->string, "there are pinned, expires_at", "is not known here");
+    cJSON_Delete(body);
+    if (cJSON_GetArraySize(params) > 0)
+        return problem_invalid(r, "the change cannot be made", params);
+    cJSON_Delete(params);
+    if (store_upload_keep(api->store, id, &keeping, &err) != STATUS_OK ||
+        store_upload_get(api->store, id, &row, NULL, 0, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    reply = response_json(200, view_upload(&row));
+    upload_row_release(&row);
+    return reply;
+}
+
 struct response *uploads_patch(struct api *api, struct request *r) {
     struct patch *p = r->patch;
+    if (!p)
+        return change(api, r);
     struct error err;
     struct upload_row row = {0};
     enum status status = STATUS_OK;

@@ -109,6 +109,7 @@ cJSON *view_upload(const struct upload_row *row) {
     json_add_string(v, "scene", or_null(row->scene_id));
     add_time(v, "created_at", row->created_ms);
     add_time(v, "updated_at", row->updated_ms);
+    json_add_bool(v, "pinned", row->is_pinned);
     add_time(v, "expires_at", row->expires_ms);
     char path[128];
     cJSON *links = cJSON_AddObjectToObject(v, "links");

@@ -45,7 +45,13 @@ int64_t store_now_ms(void); /* Unix time */
     " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"    \
     " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms, ifnull((SELECT"         \
     " max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
-#define UPLOAD_EXPIRES "(updated_ms + (SELECT upload_ms FROM retention))"
+#define UPLOAD_EXPIRES                                                                         \
+    "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                         \
+    " ELSE updated_ms + (SELECT upload_ms FROM retention) END)"
+/* What a struct keeping changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
+#define KEEPING_SET                                                                            \
+    "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                            \
+    " expires_ms = iif(?2, ?3, expires_ms)"
 
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);

@@ -208,11 +208,8 @@ enum status store_scene_patch(struct store *store, const char *id, const char *n
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err,
-                     "UPDATE scenes SET name = ifnull(?1, name),"
-                     " pinned = CASE ?2 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"
-                     " expires_ms = iif(?3, ?4, expires_ms) WHERE id = ?5",
-                     "tnnit", name, (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms,
-                     id);
+                     "UPDATE scenes SET " KEEPING_SET ", name = ifnull(?4, name) WHERE id = ?5",
+                     "nnitt", (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, name, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
     return store_end(store, status, 0, err);

@@ -170,5 +170,11 @@ static const char step_8[] =
     ") STRICT;"
     "CREATE INDEX outbox_by_time ON outbox (next_ms);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5, step_6, step_7, step_8};
+/* How long an upload is kept, as for scenes and jobs. */
+static const char step_9[] =
+    "ALTER TABLE uploads ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
+    "ALTER TABLE uploads ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
+
+const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
+                                    step_6, step_7, step_8, step_9};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

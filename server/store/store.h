@@ -273,7 +273,8 @@ struct upload_row {
     uint64_t length, received;     /* bytes; `received` are on disk */
     char boot[UPLOAD_BOOT_SIZE];   /* see store_upload_begin */
     char scene_id[SCENE_ID_SIZE];  /* what became of it, once all is received; "" before */
-    int64_t created_ms, updated_ms, expires_ms;
+    bool is_pinned;
+    int64_t created_ms, updated_ms, expires_ms; /* expires_ms 0: never */
 };
 void upload_row_release(struct upload_row *row);
 
@@ -299,6 +300,8 @@ enum status store_upload_advance(struct store *store, const char *id, uint64_t r
                                  const void *hash, size_t hash_size, struct error *err);
 enum status store_upload_finish(struct store *store, const char *id, const char *scene_id,
                                 struct error *err);
+enum status store_upload_keep(struct store *store, const char *id, const struct keeping *keeping,
+                              struct error *err);
 enum status store_upload_delete(struct store *store, const char *id, struct error *err);
 
 /* --- figures ----------------------------------------------------------------------------- */

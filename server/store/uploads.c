@@ -8,7 +8,7 @@
 
 #define COLUMNS                                                                                \
     "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash," \
-    " owner_id, (SELECT name FROM users WHERE users.id = owner_id), " UPLOAD_EXPIRES
+    " owner_id, (SELECT name FROM users WHERE users.id = owner_id), pinned, " UPLOAD_EXPIRES
 
 static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
     *row = (struct upload_row){
@@ -20,7 +20,8 @@ static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
         .received = (uint64_t)sqlite3_column_int64(stmt, 5),
         .created_ms = sqlite3_column_int64(stmt, 8),
         .updated_ms = sqlite3_column_int64(stmt, 9),
-        .expires_ms = sqlite3_column_int64(stmt, 13),
+        .is_pinned = sqlite3_column_int(stmt, 13) != 0,
+        .expires_ms = sqlite3_column_int64(stmt, 14),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
     snprintf(row->sha256, sizeof row->sha256, "%s", sql_text(stmt, 3));
@@ -155,6 +156,16 @@ enum status store_upload_finish(struct store *store, const char *id, const char 
         return status;
     status = sql_run(&store->sql, err, "UPDATE uploads SET scene_id = ? WHERE id = ?", "tt", scene_id,
                      id);
+    return end_change(store, status, id, err);
+}
+
+enum status store_upload_keep(struct store *store, const char *id, const struct keeping *keeping,
+                              struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err, "UPDATE uploads SET " KEEPING_SET " WHERE id = ?4", "nnit",
+                     (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, id);
     return end_change(store, status, id, err);
 }
 

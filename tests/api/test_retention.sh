@@ -48,7 +48,25 @@ so '.dry_run and (.items | map(.kind)) == ["scene"] and .bytes > 1000'
 call GET "/v1/scenes/$scene"; expect 200 "after dry runs"
 
 # --- then it goes; the pinned job stays ---
+call POST /v1/uploads -H "$tus" -H 'Upload-Length: 100'; upload=$(header location)
+run 0 uploads keep "${upload##*/}" --keep-days 2 --json; so '.expires_at != null and .pinned == false'
+change "$upload" '{"expires_at":"2020-01-01T00:00:00Z"}'; expect 200
+run 0 collect --dry-run --json; so '(.items | map(.kind)) == ["upload", "scene"]'
+run 0 uploads keep "${upload##*/}" --pin; has "$out" "never: pinned"
+run 0 uploads; has "$out" pinned
+call HEAD "$upload" -H "$tus"; expect 200; equal "$(header upload-expires)" ""
+for wrong in '{"expires_at":5}' '{"pinned":1}' '{"name":"x"}'; do
+    change "$upload" "$wrong"; expect 422 "$wrong"
+done
+change "$upload" '[1]'; expect 400
+change "${upload%?}x" '{"pinned":true}'; expect 404
+run 2 uploads keep "${upload##*/}"
+run 2 uploads rm
 run 0 collect --json; so '(.items | map(.kind)) == ["scene"] and .items[0].name == "kitchen"'
+call GET "$upload"; expect 200 "the pinned upload"; equal "$(field .expires_at)" null
+run 0 uploads keep "${upload##*/}" --unpin
+run 0 collect --json; so '(.items | map(.kind)) == ["upload"]'
+gone "$upload" || fail "the expired upload is there"
 gone "/v1/scenes/$scene" || fail "the expired scene is there"
 [ ! -e "$data/scenes/$scene" ] || fail "its files are there"
 call GET /v1/jobs/1; expect 200 "the pinned job"

@@ -1,0 +1,20 @@
+/* collection.h -- what `scenes` and `uploads` have in common: list, show, keep, rm. */
+#ifndef UNBAKE_CLIENT_COLLECTION_H
+#define UNBAKE_CLIENT_COLLECTION_H
+
+#include "client/client.h"
+
+struct collection {
+    const char *name; /* of the command, "scenes" */
+    const char *one;  /* "scene" */
+    const char *path; /* "/v1/scenes" */
+    void (*print_all)(struct client *c, const cJSON *items); /* at least one */
+    void (*print_one)(struct client *c, const cJSON *thing);
+};
+
+extern const struct option collection_options[];
+
+/* The whole of such a command. */
+int collection_run(struct client *c, const struct options *o, const struct collection *what);
+
+#endif
