@@ -17,7 +17,7 @@
 
 static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03",
-     "first step size of base colour; it falls over the run"},
+     "listing1: first step size of base colour; it falls over the run"},
     {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true",
      "look for faults of the capture (exposure, colour, vignette, poses, blur) and put them right"},
     {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "2",
@@ -49,7 +49,7 @@ static const struct setting table[] = {
     {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64",
      "samples per pixel of the held-out re-renders"},
     {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
-     "first step size of roughness"},
+     "listing1: first step size of roughness"},
     {"roulette_depth", SETTING_INT, "segments", 2, 32, NULL, "4",
      "segment from which Russian roulette may end a path"},
     {"samples_per_camera", SETTING_INT, "paths", 2, 4096, NULL, "16",
@@ -59,7 +59,7 @@ static const struct setting table[] = {
     {"segmentation", SETTING_CHOICE, "", 0, 0, "auto|given|automatic", "auto",
      "objects from the mesh's object_id, from its shape, or (auto) from whichever is there"},
     {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
-     "first step size of specular"},
+     "listing1: first step size of specular"},
     {"texels_per_iteration", SETTING_INT, "texels", 64, 16777216, NULL, "4096",
      "texels chosen in one optimiser step"},
     {"texels_per_metre", SETTING_REAL, "texels/m", 0, 100000, NULL, "0",

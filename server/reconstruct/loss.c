@@ -7,9 +7,6 @@
  * camera at its base sensitivity (full well about 10^4 electrons). */
 #define PHOTON_VARIANCE 1e-4f
 
-/* Share of the median radiance below which a relative difference counts for less. */
-#define MATCH_FLOOR 0.003f
-
 /* Variance of the stored linear value v of an 8-bit sRGB frame. */
 static float stored_variance(float v) {
     /* Slope of the sRGB decoding curve at v, times one code, over the standard deviation of a
@@ -38,7 +35,8 @@ static float residual(float half, float all, float reference, bool saturated, fl
 }
 
 float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance) {
+                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance,
+                rgb *d_radiance) {
     rgb half[2] = {{0, 0, 0}, {0, 0, 0}}, target = {0, 0, 0}, clip = {0, 0, 0};
     bool saturated[3] = {false};
     int count[2] = {(sample_count + 1) / 2, sample_count / 2};
@@ -67,36 +65,4 @@ float loss_pair(const struct photograph *photo, const struct photograph_sample *
     for (int s = 0; s < sample_count; s++)
         d_radiance[s] = rgb_scale(difference[1 - (s & 1)], weight / (float)count[s & 1]);
     return weight * 3.0f * rgb_mean(rgb_mul(difference[0], difference[1]));
-}
-
-struct loss_match loss_match_pair(const struct photograph_sample *reference, const rgb *radiance,
-                                  int sample_count, rgb expected, float median) {
-    float shown[3] = {0}, rendered[3] = {0}, clip[3] = {0};
-    bool saturated[3] = {false};
-    float each = 1.0f / (float)sample_count;
-    for (int s = 0; s < sample_count; s++) {
-        const struct photograph_sample *ref = &reference[s];
-        const float r[3] = {ref->radiance.r, ref->radiance.g, ref->radiance.b};
-        const float i[3] = {radiance[s].r, radiance[s].g, radiance[s].b};
-        const float k[3] = {ref->clip_radiance.r, ref->clip_radiance.g, ref->clip_radiance.b};
-        for (int c = 0; c < 3; c++) {
-            shown[c] += each * fmaxf(r[c], 0.0f);
-            rendered[c] += each * i[c];
-            clip[c] += each * k[c];
-            saturated[c] = saturated[c] || ref->saturated[c];
-        }
-    }
-    struct loss_match match;
-    float off = 0.0f;
-    const float about[3] = {expected.r, expected.g, expected.b};
-    for (int c = 0; c < 3; c++) {
-        if (saturated[c])
-            shown[c] = rendered[c] >= clip[c] ? rendered[c] : clip[c];
-        float scale = 1.0f / (about[c] + MATCH_FLOOR * median);
-        match.shown[c] = scale * shown[c];
-        match.rendered[c] = scale * rendered[c];
-        off += (match.shown[c] - scale * about[c]) / 3.0f;
-    }
-    match.trust = 1.0f / (1.0f + off * off);
-    return match;
 }

@@ -19,22 +19,11 @@ float loss_weight(const struct photograph *photo, const struct photograph_sample
                   float median_radiance);
 
 /* What one look at a texel compares: sample_count paths of one photograph, even ones half A, odd
- * ones half B; where `one_estimate`, all paths stand for either half, and noise adds to the loss. Writes d_radiance[sample_count], the derivative of the loss by each path's
- * radiance, and returns the unbiased estimate of the loss itself (it may be negative). */
+ * ones half B; where `one_estimate`, all paths stand for either half, and noise adds to the loss.
+ * Writes d_radiance[sample_count], the derivative of the loss by each path's radiance, and returns
+ * the unbiased estimate of the loss itself (it may be negative). */
 float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance);
-
-/* The same look as a ratio: relative to what the texel is `expected` to show, what the photograph shows and
- * what the render shows, by channel. (Relative to what this photograph shows, its noise would be on
- * both sides, and their mean ratio off by its variance.) Saturated channels that the render
- * exceeds too count as equal. */
-struct loss_match {
-    float shown[3];    /* R / (expected + a share of the median) */
-    float rendered[3]; /* I / (the same) */
-    float trust;       /* half where the photograph is off by all that is expected: a highlight, or
-                        * light of what is in front */
-};
-struct loss_match loss_match_pair(const struct photograph_sample *reference, const rgb *radiance,
-                                  int sample_count, rgb expected, float median_radiance);
+                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance,
+                rgb *d_radiance);
 
 #endif

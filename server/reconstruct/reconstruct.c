@@ -10,6 +10,7 @@
 #include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/listing1.h"
+#include "server/reconstruct/refine.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
 #include "server/reconstruct/views.h"
@@ -25,8 +26,8 @@ struct run {
     struct reconstruction *r;
     const struct reconstruct_hooks *hooks;
     struct views views;
-    struct refine *refine; /* owned */
-    cJSON *stages;         /* owned by the report */
+    struct optimiser *optimiser; /* of listing1 or refine; owned */
+    cJSON *stages;               /* owned by the report */
 };
 
 /* Announces a stage, runs it, notes its time. */
@@ -130,29 +131,31 @@ static enum status solve(struct run *run, struct error *err) {
     double begin = clock_sec();
     enum status status = solve_run(run->r, &run->views, run->hooks, err);
     if (status == STATUS_OK)
-        status = listing1_start_solved(run->refine, clock_sec() - begin, err);
+        status = refine_start(run->optimiser, clock_sec() - begin, err);
     return status;
 }
 
-static enum status refine(struct run *run, struct error *err) {
-    return listing1_run(run->refine, err);
+static enum status optimise(struct run *run, struct error *err) {
+    return optimiser_run(run->optimiser, err);
 }
 
 /* The stages that a checkpoint holds: those that are done are not done again. */
 static enum status run_resumable(struct run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
-    run->refine = listing1_new(run->r, &run->views, run->hooks);
-    enum status status = listing1_load(run->refine, &found, err);
+    run->optimiser = solves ? refine_new(run->r, &run->views, run->hooks)
+                            : listing1_new(run->r, &run->views, run->hooks);
+    enum status status = optimiser_load(run->optimiser, &found, err);
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
     if (status == STATUS_OK)
-        status = run_stage(run, "refine", refine, err);
-    listing1_free(run->refine);
+        status = run_stage(run, "refine", optimise, err);
+    optimiser_free(run->optimiser);
     return status;
 }
 
 static enum status report(struct run *run, struct error *err) {
     world_update_lights(&run->r->world);
+    report_emitters(run->r);
     return report_held_out(run->r, &run->views, run->hooks, err);
 }
 

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/emitters.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/film.h"
 #include "server/render/path.h"
@@ -13,6 +14,8 @@
 #define SHOWN_MEDIAN 0.2
 /* Seed offset that keeps the report's random numbers apart from the optimiser's. */
 #define REPORT_SEED UINT64_C(0x7265706f7274)
+/* A segment whose emission explained this share at the decision came near it. */
+#define REPORTED_SHARE 0.05f
 
 /* The photograph's radiance as an R G B picture; masked pixels become NaN. */
 static void photograph_radiance(const struct photograph *photo, struct image *image) {
@@ -145,4 +148,21 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         hooks->metric(hooks->user, "msre", 0, msre);
     }
     return STATUS_OK;
+}
+
+void report_emitters(struct reconstruction *r) {
+    cJSON *list = cJSON_AddArrayToObject(r->report, "emitters");
+    for (size_t s = 0; s < r->segments.count; s++) {
+        if (!r->is_emitter[s] && r->evidence[s].share < REPORTED_SHARE)
+            continue;
+        cJSON *entry = cJSON_CreateObject();
+        json_add_int(entry, "segment", (int64_t)s);
+        json_add_int(entry, "object_id", r->segments.id[s]);
+        json_add_bool(entry, "is_emitter", r->is_emitter[s]);
+        json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].share);
+        const rgb *e = &r->materials.emission[s];
+        const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};
+        json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));
+        cJSON_AddItemToArray(list, entry);
+    }
 }

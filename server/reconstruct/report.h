@@ -1,4 +1,5 @@
-/* report.h -- the last stage: what the held-out photographs say about the result. */
+/* report.h -- the last stage: what was decided about emitters, and what the held-out photographs say
+ * about the result. */
 #ifndef UNBAKE_RECONSTRUCT_REPORT_H
 #define UNBAKE_RECONSTRUCT_REPORT_H
 
@@ -9,5 +10,8 @@
  * of unknown exposure is compared at the exposure that fits it best. STATUS_CANCELLED when stopped. */
 enum status report_held_out(struct reconstruction *r, const struct views *views,
                             const struct reconstruct_hooks *hooks, struct error *err);
+
+/* Adds "emitters" to r->report: the segments that emit or came near it, with the evidence. */
+void report_emitters(struct reconstruction *r);
 
 #endif

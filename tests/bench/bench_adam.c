@@ -20,6 +20,7 @@ struct fixture {
     struct segments segments;
     struct inverse_uv inverse;
     struct materials materials;
+    struct emission emission;
     struct params params;
     struct gradient *gradient;
     struct gradient_log *log[LOGS];
@@ -34,8 +35,10 @@ static void fixture_init(struct fixture *f) {
     f->inverse = (struct inverse_uv){.width = SIDE, .height = SIDE, .valid_count = texels};
     f->inverse.triangle = mem_calloc_large(texels, sizeof *f->inverse.triangle);
     materials_init(&f->materials, &f->inverse, 1, rgb_gray(0.5f), 0.5f, 0.5f);
-    params_init(&f->params, &f->materials, &f->inverse, &f->segments, &f->triangle_segment, 0);
-    params_fix_emitters(&f->params, &f->is_emitter);
+    emission_init(&f->emission, &f->materials);
+    emission_fix(&f->emission, &f->is_emitter);
+    params_init(&f->params, &f->materials, &f->inverse, &f->segments, &f->emission, 0);
+    params_free_segments(&f->params);
     f->gradient = gradient_new(SIDE, SIDE, 1);
     for (int i = 0; i < LOGS; i++)
         f->log[i] = gradient_log_new(1);
@@ -46,6 +49,7 @@ static void fixture_release(struct fixture *f) {
         gradient_log_free(f->log[i]);
     gradient_free(f->gradient);
     params_release(&f->params);
+    emission_release(&f->emission);
     materials_release(&f->materials);
     mem_free(f->inverse.triangle);
     parallel_free(f->pool);

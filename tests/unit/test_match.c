@@ -1,0 +1,80 @@
+/* match.h: what a look tells as a ratio, and the window that moves by it. */
+#include "server/reconstruct/match.h"
+
+#include "common/rng.h"
+#include "tests/check.h"
+#include "tests/unit/surface.h"
+
+static const uint32_t chart_of_triangle[2] = {0, 1};
+
+/* Looks at texel 0 whose light is noisy around 0.8: the block's base colour finds shown / light,
+ * keeps its detail, and nothing moves that is further away than half a block. */
+static void test_step(void) {
+    struct materials m;
+    struct emission e;
+    struct matcher matcher;
+    materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
+    m.base_color.texel[1][0] = 0.25f; /* detail: half as red as its neighbours */
+    emission_init(&e, &m);
+    matcher_init(&matcher, &m.base_color, &inverse, &segments, chart_of_triangle, &e, 2);
+    for (int look = 0; look < 3000; look++) {
+        float *red = &m.base_color.texel[0][0];
+        struct match match;
+        for (int c = 0; c < 3; c++) {
+            float light = 0.8f * (0.5f + rng_to_float((uint32_t)rng_key(1, (uint64_t)look, (uint64_t)c)));
+            match.shown[c] = 1.0f; /* relative to a radiance of 0.48 */
+            match.rendered[c] = red[c] * light / 0.48f;
+        }
+        matcher_step(&matcher, 0, &match, 1.0f);
+    }
+    for (int c = 0; c < 3; c++)
+        CHECK_NEAR(m.base_color.texel[0][c], 0.6, 0.02);
+    CHECK_NEAR(m.base_color.texel[1][0] / m.base_color.texel[0][0], 0.5, 1e-4);
+    CHECK_NEAR(m.base_color.texel[2 * SIDE + 2][1], m.base_color.texel[0][1], 1e-6);
+    CHECK(m.base_color.texel[3][0] == 0.5f && m.base_color.texel[3 * SIDE][0] == 0.5f);
+    matcher_release(&matcher);
+    emission_release(&e);
+    materials_release(&m);
+}
+
+/* A window ends where the chart does, and an emitter's moves a twentieth as far. */
+static void test_window(void) {
+    const bool is_emitter[2] = {false, true};
+    const struct match twice = {.shown = {2, 2, 2}, .rendered = {1, 1, 1}, .trust = 1.0f};
+    struct materials m;
+    struct emission e;
+    struct matcher matcher;
+    materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
+    emission_init(&e, &m);
+    emission_fix(&e, is_emitter);
+    matcher_init(&matcher, &m.base_color, &inverse, &segments, chart_of_triangle, &e, 2);
+    matcher_step(&matcher, SIDE / 2 - 1, &twice, 1.0f);
+    float wall = m.base_color.texel[SIDE / 2 - 1][0] / 0.5f - 1.0f;
+    CHECK(wall > 0.0f && m.base_color.texel[SIDE / 2][0] == 0.5f);
+    matcher_step(&matcher, SIDE / 2, &twice, 1.0f);
+    CHECK_NEAR(m.base_color.texel[SIDE / 2][0] / 0.5f - 1.0f, 0.05f * wall, 1e-5);
+    matcher_release(&matcher);
+    emission_release(&e);
+    materials_release(&m);
+}
+
+/* A saturated channel counts as equal where the render exceeds the clip, and as the clip where not;
+ * what is as far off as all that is expected is trusted by half. */
+static void test_look(void) {
+    const struct photograph_sample shown = {.radiance = {1, 1, 2}, .saturated = {true, true, false},
+                                            .clip_radiance = {1, 1, 1}};
+    const rgb rendered = {3, 0.5f, 1};
+    struct match match = match_look(&shown, &rendered, 1, rgb_gray(1.0f), 0.0f);
+    CHECK(match.shown[0] == 3.0f && match.rendered[0] == 3.0f);
+    CHECK(match.shown[1] == 1.0f && match.rendered[1] == 0.5f);
+    CHECK(match.shown[2] == 2.0f && match.rendered[2] == 1.0f);
+    CHECK_NEAR(match.trust, 0.5, 1e-6);
+}
+
+int main(void) {
+    make_surface();
+    test_step();
+    test_window();
+    test_look();
+    return check_result();
+}
