@@ -7,9 +7,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "server/arguments.h"
 #include "server/config.h"
 
-#define EXIT_USAGE 2
 #define CONFIG_FILE_DEFAULT "/etc/unbaked.conf" /* of the commands; the daemon is told its file */
 
 struct flag {

@@ -1,14 +1,11 @@
 /* command.c -- `unbaked demo-room`: its options. */
-#include <errno.h>
 #include <getopt.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "server/arguments.h"
 #include "server/demo/generate.h"
-
-#define EXIT_USAGE 2
 
 static const char usage[] =
     "usage: unbaked demo-room DIR [option ...]\n"
@@ -37,20 +34,6 @@ struct arguments {
     uint32_t threads;
     const char *dir;
 };
-
-/* A number in [low, high]; says so and gives false where the text is none. */
-static bool read_number(const char *option, const char *text, double low, double high, bool whole,
-                        double *value) {
-    char *end;
-    errno = 0;
-    *value = strtod(text, &end);
-    bool ok = errno == 0 && end != text && *end == '\0' && *value >= low && *value <= high &&
-              (!whole || *value == floor(*value));
-    if (!ok)
-        fprintf(stderr, "unbaked demo-room: --%s wants a%s number from %g to %g, not '%s'\n",
-                option, whole ? " whole" : "", low, high, text);
-    return ok;
-}
 
 /* EXIT_SUCCESS to go on, EXIT_USAGE to stop; --help is handled by the caller (-1). */
 static int read_arguments(int argc, char **argv, struct arguments *a) {
@@ -92,11 +75,11 @@ static int read_arguments(int argc, char **argv, struct arguments *a) {
         if (i == SDR) {
             s->sdr = true;
         } else if (i == SEED) {
-            if (!read_number("seed", optarg, 0, 9007199254740991.0, true, &seed))
+            if (!argument_number("demo-room", "seed", optarg, 0, 9007199254740991.0, true, &seed))
                 return EXIT_USAGE;
             s->seed = (uint64_t)seed;
         } else {
-            if (!read_number(number[i].name, optarg, number[i].low, number[i].high,
+            if (!argument_number("demo-room", number[i].name, optarg, number[i].low, number[i].high,
                              number[i].whole != NULL, &value))
                 return EXIT_USAGE;
             if (number[i].whole)

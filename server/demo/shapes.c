@@ -44,7 +44,8 @@ static void add_triangle(struct shapes *s, int64_t object, uint32_t a, uint32_t 
     m->face_count = m->triangle_count;
 }
 
-void shapes_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3 v) {
+/* The parallelogram origin, origin + u, origin + u + v, origin + v; its front is where u x v points. */
+static void add_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3 v) {
     vec3 normal = vec3_normalize(vec3_cross(u, v));
     uint32_t a = add_vertex(s, origin, normal);
     uint32_t b = add_vertex(s, vec3_add(origin, u), normal);
@@ -69,9 +70,9 @@ void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int wi
         if (without & face[i].name)
             continue;
         if (without & SHAPE_INWARD)
-            shapes_quad(s, object, face[i].origin, face[i].v, face[i].u);
+            add_quad(s, object, face[i].origin, face[i].v, face[i].u);
         else
-            shapes_quad(s, object, face[i].origin, face[i].u, face[i].v);
+            add_quad(s, object, face[i].origin, face[i].u, face[i].v);
     }
 }
 

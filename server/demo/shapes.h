@@ -1,4 +1,4 @@
-/* shapes.h -- putting a mesh together from quads, boxes and turned bodies.
+/* shapes.h -- putting a mesh together from boxes and turned bodies.
  *
  * Faces have vertices of their own with the face's normal, turned bodies share smooth ones. Every
  * triangle is counter-clockwise as seen from outside. */
@@ -29,10 +29,6 @@ enum {
 };
 
 void shapes_init(struct shapes *s);
-
-/* The parallelogram origin, origin + u, origin + u + v, origin + v; its front is where u x v
- * points. */
-void shapes_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3 v);
 
 /* The faces of an axis-aligned box, but for those in `without`. */
 void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without);

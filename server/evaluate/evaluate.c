@@ -16,6 +16,7 @@
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
+#define ROULETTE_DEPTH 5
 #define OBJECTS_LIMIT ((size_t)1 << 26) /* bytes of objects.json */
 
 /* All that the views share. */
@@ -127,7 +128,7 @@ static const char *const rgb_names[] = {"R", "G", "B"};
  * Masked pixels are NaN, which metrics_msre leaves out. */
 static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
                       struct image *photograph, struct image *render) {
-    struct path_settings path = {.max_depth = (int)e->settings->max_depth, .roulette_depth = 5,
+    struct path_settings path = {.max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
                                  .seed = e->settings->seed};
     struct image film; /* has standard errors too */
     uint32_t width = p->camera.width, height = p->camera.height;

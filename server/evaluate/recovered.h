@@ -1,8 +1,8 @@
 /* recovered.h -- a finished job's outputs, read back as something to render.
  *
  * Only the files that a user gets are read: scene.ply for the atlas coordinates and the segments,
- * the EXR textures for the values, environment.exr, where it is there, for distant light. Geometry comes from the room itself: scene.ply must list the
- * same triangles. */
+ * the EXR textures for the values, environment.exr, where it is there, for distant light. Geometry
+ * comes from the room itself: scene.ply must list the same triangles. */
 #ifndef UNBAKE_EVALUATE_RECOVERED_H
 #define UNBAKE_EVALUATE_RECOVERED_H
 

@@ -16,6 +16,8 @@
 #define PI 3.14159265358979323846
 #define ROULETTE_DEPTH 5
 
+static const char *const rgb_names[] = {"R", "G", "B"};
+
 struct relight_settings relight_default_settings(void) {
     return (struct relight_settings){.view = "0", .environment_scale = 1.0f, .up = 'y', .lights = true,
                                      .spp = 64, .max_depth = 16, .seed = 7};
@@ -81,10 +83,9 @@ static vec3 to_picture(vec3 d, char up, float turn) {
 }
 
 void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out) {
-    static const char *const names[] = {"R", "G", "B"};
     struct lights *lights = lights_new(picture);
     float turn = turn_deg * (float)(PI / 180.0);
-    image_init(out, picture->width, picture->height, 3, names);
+    image_init(out, picture->width, picture->height, 3, rgb_names);
     for (uint32_t y = 0; y < out->height; y++) {
         for (uint32_t x = 0; x < out->width; x++) {
             double phi = 2.0 * PI * ((double)x + 0.5) / out->width;
@@ -139,8 +140,7 @@ static enum status change_environment(struct world *world, const char *outputs,
 /* --- the picture -------------------------------------------------------------------------------- */
 
 static void take_colors(const struct image *film, struct image *image) {
-    static const char *const names[] = {"R", "G", "B"};
-    image_init(image, film->width, film->height, 3, names);
+    image_init(image, film->width, film->height, 3, rgb_names);
     for (size_t i = 0; i < (size_t)film->width * film->height; i++)
         memcpy(image->pixel + 3 * i, film->pixel + film->channel_count * i, 3 * sizeof *image->pixel);
 }

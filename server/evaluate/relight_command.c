@@ -1,15 +1,12 @@
 /* relight_command.c -- `unbaked relight`: its options and the file that it writes. */
-#include <errno.h>
 #include <getopt.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/arguments.h"
 #include "server/evaluate/relight.h"
 #include "server/export/pictures.h"
-
-#define EXIT_USAGE 2
 
 static const char usage[] =
     "usage: unbaked relight OUTPUTS [option ...]\n"
@@ -39,19 +36,6 @@ struct arguments {
     const char *out, *outputs;
     bool help;
 };
-
-static bool read_number(const char *option, const char *text, double low, double high, bool is_whole,
-                        double *value) {
-    char *end;
-    errno = 0;
-    *value = strtod(text, &end);
-    if (errno == 0 && end != text && *end == '\0' && *value >= low && *value <= high &&
-        (!is_whole || *value == floor(*value)))
-        return true;
-    fprintf(stderr, "unbaked relight: --%s wants a %snumber from %g to %g, not '%s'\n", option,
-            is_whole ? "whole " : "", low, high, text);
-    return false;
-}
 
 static bool read_word(const char *option, const char *text, const char *one, const char *other,
                       bool *is_one) {
@@ -84,26 +68,26 @@ static bool read_option(int option, struct arguments *a) {
     case 'c': s->cameras = optarg; break;
     case 'e': s->environment = optarg; break;
     case 'f':
-        ok = read_number("environment-scale", optarg, 0.0, 1e9, false, &value);
+        ok = argument_number("relight", "environment-scale", optarg, 0.0, 1e9, false, &value);
         s->environment_scale = (float)value;
         break;
     case 'r':
-        ok = read_number("turn", optarg, -360.0, 360.0, false, &value);
+        ok = argument_number("relight", "turn", optarg, -360.0, 360.0, false, &value);
         s->turn_deg = (float)value;
         break;
     case 'u': ok = read_axis(optarg, &s->up); break;
     case 'l': ok = read_word("lights", optarg, "on", "off", &s->lights); break;
     case 'o': a->out = optarg; break;
-    case 'x': ok = read_number("exposure", optarg, 0.0, 1e9, false, &a->exposure); break;
+    case 'x': ok = argument_number("relight", "exposure", optarg, 0.0, 1e9, false, &a->exposure); break;
     case 's':
-        ok = read_number("spp", optarg, 1.0, 1048576.0, true, &value);
+        ok = argument_number("relight", "spp", optarg, 1.0, 1048576.0, true, &value);
         s->spp = (uint32_t)value;
         break;
     case 'd':
-        ok = read_number("max-depth", optarg, 1.0, 32.0, true, &value);
+        ok = argument_number("relight", "max-depth", optarg, 1.0, 32.0, true, &value);
         s->max_depth = (uint32_t)value;
         break;
-    case 't': ok = read_number("threads", optarg, 0.0, 1024.0, true, &a->threads); break;
+    case 't': ok = argument_number("relight", "threads", optarg, 0.0, 1024.0, true, &a->threads); break;
     case 'h': a->help = true; break;
     default: ok = false;
     }

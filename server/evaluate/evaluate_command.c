@@ -1,14 +1,12 @@
-/* command.c -- `unbaked evaluate`: its options and its table. */
-#include <errno.h>
+/* evaluate_command.c -- `unbaked evaluate`: its options and its table. */
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "common/mem.h"
+#include "server/arguments.h"
 #include "server/evaluate/evaluate.h"
-
-#define EXIT_USAGE 2
 
 static const char usage[] =
     "usage: unbaked evaluate ROOM OUTPUTS [option ...]\n"
@@ -32,17 +30,11 @@ struct arguments {
     const char *room, *outputs;
 };
 
-static bool read_number(const char *option, const char *text, long low, long high, uint32_t *value) {
-    char *end;
-    errno = 0;
-    long number = strtol(text, &end, 10);
-    if (errno != 0 || end == text || *end != '\0' || number < low || number > high) {
-        fprintf(stderr, "unbaked evaluate: --%s wants a whole number from %ld to %ld, not '%s'\n",
-                option, low, high, text);
-        return false;
-    }
-    *value = (uint32_t)number;
-    return true;
+static bool read_count(const char *option, double low, double high, uint32_t *count) {
+    double value;
+    bool ok = argument_number("evaluate", option, optarg, low, high, true, &value);
+    *count = ok ? (uint32_t)value : *count;
+    return ok;
 }
 
 static bool read_arguments(int argc, char **argv, struct arguments *a) {
@@ -56,12 +48,12 @@ static bool read_arguments(int argc, char **argv, struct arguments *a) {
     optind = 1;
     for (int c; ok && (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
         switch (c) {
-        case 's': ok = read_number("spp", optarg, 0, 1 << 20, &a->settings.spp); break;
-        case 'n': ok = read_number("samples", optarg, 16, 4096, &a->settings.samples); break;
-        case 'd': ok = read_number("max-depth", optarg, 2, 32, &a->settings.max_depth); break;
+        case 's': ok = read_count("spp", 0, 1 << 20, &a->settings.spp); break;
+        case 'n': ok = read_count("samples", 16, 4096, &a->settings.samples); break;
+        case 'd': ok = read_count("max-depth", 2, 32, &a->settings.max_depth); break;
         case 'p': a->settings.pictures_dir = optarg; break;
         case 'j': a->json = true; break;
-        case 't': ok = read_number("threads", optarg, 0, 1024, &a->threads); break;
+        case 't': ok = read_count("threads", 0, 1024, &a->threads); break;
         case 'h': a->help = true; return true;
         default: ok = false;
         }
