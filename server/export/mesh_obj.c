@@ -3,7 +3,7 @@
 
 #include "server/export/sink.h"
 
-#define PRECISE "%.9g" /* reads back as the same float */
+#define NS_MOST 1000.0 /* of a surface of roughness 0 */
 
 static void put_corner(struct sink *out, uint32_t vertex, uint32_t uv, bool has_normal) {
     if (has_normal)
@@ -21,14 +21,14 @@ enum status mesh_obj_write(const char *path, const struct export_input *input, c
         return status;
     sink_printf(&out, "mtllib scene.mtl\n");
     for (size_t v = 0; v < mesh->vertex_count; v++)
-        sink_printf(&out, "v " PRECISE " " PRECISE " " PRECISE "\n", (double)mesh->position[v].x,
+        sink_printf(&out, "v " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)mesh->position[v].x,
                     (double)mesh->position[v].y, (double)mesh->position[v].z);
     for (size_t v = 0; v < parts->seams.vertex_count; v++) {
         vec2 uv = seams_uv(&parts->seams, input->atlas, v);
-        sink_printf(&out, "vt " PRECISE " " PRECISE "\n", (double)uv.x, (double)(1.0f - uv.y));
+        sink_printf(&out, "vt " SINK_FLOAT " " SINK_FLOAT "\n", (double)uv.x, (double)(1.0f - uv.y));
     }
     for (size_t v = 0; v < mesh->vertex_count && mesh->normal; v++)
-        sink_printf(&out, "vn " PRECISE " " PRECISE " " PRECISE "\n", (double)mesh->normal[v].x,
+        sink_printf(&out, "vn " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)mesh->normal[v].x,
                     (double)mesh->normal[v].y, (double)mesh->normal[v].z);
     for (size_t p = 0; p < parts->count; p++) {
         const struct part *part = &parts->part[p];
@@ -55,12 +55,12 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
         uint32_t s = parts->part[p].segment;
         double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
         double smooth = 1.0 - roughness;
-        sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " PRECISE " " PRECISE " " PRECISE
-                    "\nNi 1.5\nNs " PRECISE "\nPr " PRECISE "\n", s, base_color, specular, specular,
-                    specular, 1000.0 * smooth * smooth, roughness);
+        sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
+                    "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n", s, base_color, specular, specular,
+                    specular, NS_MOST * smooth * smooth, roughness);
         rgb e = m->emission[s];
         if (rgb_max(e) > 0.0f)
-            sink_printf(&out, "Ke " PRECISE " " PRECISE " " PRECISE "\n", (double)e.r, (double)e.g,
+            sink_printf(&out, "Ke " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)e.r, (double)e.g,
                         (double)e.b);
         sink_printf(&out, "illum 2\n\n");
     }

@@ -12,7 +12,6 @@
 #include "server/export/sink.h"
 
 #define PI 3.14159265358979323846
-#define PRECISE "%.9g" /* reads back as the same float */
 #define SENSORS_MAX 100
 #define SPP 64
 #define MAX_DEPTH 16
@@ -28,13 +27,13 @@ static void put_sensor(struct sink *out, size_t number, const struct camera *c) 
     sink_printf(out, "  <sensor type=\"perspective\" id=\"view_%zu\">\n"
                 "    <transform name=\"to_world\"><matrix value=\"", number);
     for (int i = 0; i < 3; i++)
-        sink_printf(out, PRECISE " " PRECISE " " PRECISE " " PRECISE " ", -(double)r[i][0],
+        sink_printf(out, SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT " ", -(double)r[i][0],
                     -(double)r[i][1], (double)r[i][2], (double)origin[i]);
     sink_printf(out, "0 0 0 1\"/></transform>\n"
                 "    <string name=\"fov_axis\" value=\"x\"/>\n"
-                "    <float name=\"fov\" value=\"" PRECISE "\"/>\n"
-                "    <float name=\"principal_point_offset_x\" value=\"" PRECISE "\"/>\n"
-                "    <float name=\"principal_point_offset_y\" value=\"" PRECISE "\"/>\n"
+                "    <float name=\"fov\" value=\"" SINK_FLOAT "\"/>\n"
+                "    <float name=\"principal_point_offset_x\" value=\"" SINK_FLOAT "\"/>\n"
+                "    <float name=\"principal_point_offset_y\" value=\"" SINK_FLOAT "\"/>\n"
                 "    <float name=\"near_clip\" value=\"0.001\"/>\n"
                 "    <film type=\"hdrfilm\">\n"
                 "      <integer name=\"width\" value=\"%u\"/>\n"
@@ -61,14 +60,14 @@ static void put_shape(struct sink *out, const struct export_input *in, const cha
                 "    <boolean name=\"face_normals\" value=\"%s\"/>\n"
                 "    <bsdf type=\"twosided\"><bsdf type=\"principled\">\n"
                 "      <ref name=\"base_color\" id=\"base_color\"/>\n"
-                "      <float name=\"roughness\" value=\"" PRECISE "\"/>\n"
-                "      <float name=\"specular\" value=\"" PRECISE "\"/>\n"
+                "      <float name=\"roughness\" value=\"" SINK_FLOAT "\"/>\n"
+                "      <float name=\"specular\" value=\"" SINK_FLOAT "\"/>\n"
                 "    </bsdf></bsdf>\n",
                 segment, shapes, number, in->mesh->normal ? "false" : "true",
                 (double)m->roughness[segment], (double)m->specular[segment]);
     if (rgb_max(e) > 0.0f)
-        sink_printf(out, "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" PRECISE " " PRECISE
-                    " " PRECISE "\"/></emitter>\n", (double)e.r, (double)e.g, (double)e.b);
+        sink_printf(out, "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" SINK_FLOAT " " SINK_FLOAT
+                    " " SINK_FLOAT "\"/></emitter>\n", (double)e.r, (double)e.g, (double)e.b);
     sink_printf(out, "  </shape>\n");
 }
 

@@ -10,6 +10,8 @@
 
 #define COMPARISON_GAP 4 /* pixels between the pictures */
 
+static const char *const rgb_channel[] = {"R", "G", "B"};
+
 /* --- the margin: nearest valid texel ------------------------------------------------------ */
 
 struct margin {
@@ -93,12 +95,11 @@ static rgb value_at(const struct export_input *input, enum picture_kind kind, si
 
 void picture_texture(const struct export_input *input, enum picture_kind kind,
                      const uint32_t *source, struct image *image) {
-    static const char *const color_channel[] = {"R", "G", "B"};
     static const char *const gray_channel[] = {"Y"};
     static const char *const confidence_channel[] = {"count", "spread"};
     static const struct { uint32_t count; const char *const *name; } channels[] = {
-        [PICTURE_BASE_COLOR] = {3, color_channel},
-        [PICTURE_EMISSION] = {3, color_channel},
+        [PICTURE_BASE_COLOR] = {3, rgb_channel},
+        [PICTURE_EMISSION] = {3, rgb_channel},
         [PICTURE_ROUGHNESS] = {1, gray_channel},
         [PICTURE_SPECULAR] = {1, gray_channel},
         [PICTURE_CONFIDENCE] = {2, confidence_channel},
@@ -118,8 +119,6 @@ void picture_texture(const struct export_input *input, enum picture_kind kind,
 }
 
 /* --- previews ----------------------------------------------------------------------------- */
-
-static const char *const rgb_channel[] = {"R", "G", "B"};
 
 /* Five anchors of the viridis map (van der Walt and Smith 2015), sRGB values. */
 static rgb ramp(float t) {

@@ -11,6 +11,8 @@
 #include "common/error.h"
 #include "common/vec.h"
 
+#define SINK_FLOAT "%.9g" /* of sink_printf: reads back as the same float */
+
 struct sink {
     char *path, *temporary; /* owned */
     FILE *file;
