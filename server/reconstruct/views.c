@@ -202,7 +202,8 @@ vec3 views_direction(const struct views *v, uint32_t train, vec3 point) {
     return vec3_normalize(vec3_sub(camera_origin(camera), point));
 }
 
-bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+/* As views_sees, but for the visibility ray. */
+static bool faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
     const struct photograph *photo = &v->scene->photograph[v->train[train]];
     const struct camera *camera = &photo->camera;
     vec3 to_camera = vec3_sub(camera_origin(camera), point);
@@ -219,7 +220,7 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal,
 }
 
 bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
-    if (!views_faces(v, train, point, normal, view))
+    if (!faces(v, train, point, normal, view))
         return false;
     vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
     float distance = vec3_length(to_camera);

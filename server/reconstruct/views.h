@@ -59,10 +59,6 @@ void views_update_median(struct views *v);
 bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
                 struct view *view);
 
-/* The same but for the visibility ray. */
-bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
-                 struct view *view);
-
 /* Unit direction from a point to where training photograph `train` was taken. */
 vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
 

@@ -22,6 +22,8 @@
 #define SEARCH_STEP 1.015 /* of the density, until one fits and one does not */
 #define SEARCH_END 1.003  /* ratio of those two at which the search ends */
 #define MIN_DENSITY 1e-3  /* of the most that could fit: not worth less */
+#define SHRINK 0.8        /* of a density at which a chart is larger than the grid */
+#define SPECK_FILL 0.9    /* share of the texels that charts of one texel each can take */
 
 /* The charts drawn at one density. */
 struct drawing {
@@ -121,18 +123,18 @@ static struct grid grid_of(uint32_t size) {
 static size_t padded_cells(const struct pack_item *item, uint32_t padding) {
     size_t words = pack_words(item->width), count = 0;
     for (uint32_t y = 0; y < item->height + padding; y++) {
-        uint64_t carry[2] = {0, 0}; /* the word before, whose last bits reach into this one */
+        uint64_t before = 0; /* the word before, whose last bits reach into this one */
         uint32_t first = y > padding ? y - padding : 0;
         uint32_t last = y < item->height ? y : item->height - 1;
         for (size_t i = 0; i <= words; i++) {
-            carry[1] = 0;
+            uint64_t column = 0; /* of the rows that reach this one */
             for (uint32_t r = first; r <= last && i < words; r++)
-                carry[1] |= item->row[r * words + i];
-            uint64_t wide = carry[1];
+                column |= item->row[r * words + i];
+            uint64_t wide = column;
             for (uint32_t shift = 1; shift <= padding; shift++)
-                wide |= carry[1] << shift | carry[0] >> (64 - shift);
+                wide |= column << shift | before >> (64 - shift);
             count += (size_t)__builtin_popcountll(wide);
-            carry[0] = carry[1];
+            before = column;
         }
     }
     return count;
@@ -165,7 +167,7 @@ static double guess_density(struct drawing *drawing, const struct charts *charts
     double density = full;
     for (int round = 0; round < GUESS_ROUNDS; round++) {
         double fill = fill_at(drawing, charts, density, grid);
-        density = fmin(density * (isfinite(fill) ? sqrt(FIRST_FILL / fill) : 0.8), full);
+        density = fmin(density * (isfinite(fill) ? sqrt(FIRST_FILL / fill) : SHRINK), full);
     }
     return density;
 }
@@ -243,7 +245,7 @@ static void finish(struct atlas *atlas, struct charts *charts, struct drawing *d
 
 /* The least power of two that holds `count` charts of one texel each with their padding. */
 static double size_for(size_t count) {
-    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / 0.9;
+    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / SPECK_FILL;
     return exp2(ceil(log2(sqrt(cells))));
 }
 

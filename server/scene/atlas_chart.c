@@ -23,6 +23,7 @@
 #define LITTLE_LEAN_DEG 45.0
 #define SMALL_TEXELS 100.0    /* a region with less area is dissolved */
 #define REFINE_ROUNDS 2       /* growths with the mean normal of the one before */
+#define SAME_COSINE 0.9999f   /* between normals of which another growth would make the same: .8 degrees */
 #define LEAN_STEPS 16         /* steps of lean that growth tells apart */
 #define OVERLAP_TEXELS 0.01   /* what rounding may make of triangles that touch */
 
@@ -191,7 +192,7 @@ static void grow_all(struct builder *b, float min_cos) {
                 grow(b, normal, min_cos);
                 vec3 mean = region_normal(b);
                 if (round == REFINE_ROUNDS || vec3_dot(mean, b->normal[seed]) < b->max_lean_cos ||
-                    vec3_dot(mean, normal) > 0.9999f)
+                    vec3_dot(mean, normal) > SAME_COSINE)
                     break;
                 normal = mean;
             }

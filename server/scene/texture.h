@@ -31,8 +31,4 @@ void texture_release(struct texture *texture);
 void texture_taps(const struct texture *texture, float x, float y, struct texture_taps *taps);
 rgb texture_gather(const struct texture *texture, const struct texture_taps *taps);
 
-/* Copies each valid texel's value outward over up to `radius` invalid ones (for export: other
- * renderers filter over them); `valid` stays 0 there. */
-void texture_dilate(struct texture *texture, int radius);
-
 #endif
