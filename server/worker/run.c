@@ -28,6 +28,7 @@
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/results.h"
 #include "server/worker/tasks.h"
 
 #define CHECKPOINT_SHARE 0.02
@@ -220,29 +221,14 @@ static enum status announce(void *user, const char *type, const char *name,
     return status;
 }
 
-/* The part of an export's input that stands from the first iteration on. */
-static struct export_input input_of(const struct run *run, const struct reconstruction *r) {
-    return (struct export_input){
-        .title = *run->order->name ? run->order->name : "unbake",
-        .mesh = &r->scene->mesh,
-        .segments = &r->segments,
-        .atlas = &r->atlas,
-        .inverse = &r->inverse,
-        .materials = &r->materials,
-        .confidence_count = r->fused.count,
-        .confidence_spread = r->fused.spread,
-        .is_emitter = r->is_emitter,
-        .environment = r->environment.map.pixel ? &r->environment.map : NULL,
-        .environment_confidence = r->environment.map.pixel ? &r->environment.confidence : NULL,
-        .report = r->report,
-        .up = scene_up(r->scene),
-    };
+static const char *title_of(const struct run *run) {
+    return *run->order->name ? run->order->name : "unbake";
 }
 
 static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
     struct run *run = user;
     double start = clock_sec();
-    struct export_input input = input_of(run, r);
+    struct export_input input = results_so_far(r, title_of(run));
     enum status status = export_preview(run->out_dir, &input, announce, run, err);
     double end = clock_sec(), wait = (end - start) / PREVIEW_SHARE;
     if (wait < run->preview_interval_sec)
@@ -254,19 +240,11 @@ static enum status write_preview(void *user, const struct reconstruction *r, str
 
 static enum status write_outputs(struct run *run, const struct reconstruction *r,
                                  struct error *err) {
-    struct export_comparison *comparison =
-        mem_calloc(r->held_out_count ? r->held_out_count : 1, sizeof *comparison);
-    for (size_t i = 0; i < r->held_out_count; i++)
-        comparison[i] = (struct export_comparison){.name = r->held_out[i].name,
-                                                   .photograph = &r->held_out[i].photograph,
-                                                   .render = &r->held_out[i].render,
-                                                   .camera = r->held_out[i].camera};
-    struct export_input input = input_of(run, r);
-    input.comparison = comparison;
-    input.comparison_count = r->held_out_count;
+    struct export_input input;
+    results_make(&input, r, title_of(run));
     tell_stage(run, "export");
     enum status status = export_outputs(run->out_dir, &input, announce, run, err);
-    mem_free(comparison);
+    mem_free((void *)input.comparison);
     return status;
 }
 

@@ -4,19 +4,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/worker/checkpoint.h"
 #include "server/worker/hash64.h"
-
-static double now_sec(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
 
 static void touch(const struct state_array *array, size_t count, size_t every, uint32_t value) {
     for (size_t i = 0; i < count; i++)
@@ -28,14 +22,14 @@ static void touch(const struct state_array *array, size_t count, size_t every, u
 static double raw_write(const char *dir, const struct state_array *array, size_t count) {
     struct error err;
     char *path = file_join(dir, "raw");
-    double start = now_sec();
+    double start = clock_sec();
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
     for (size_t i = 0; i < count; i++)
         if (file_write_all(fd, array[i].data, array[i].bytes, path, &err) != STATUS_OK)
             fprintf(stderr, "%s\n", err.message);
     fsync(fd);
     close(fd);
-    double seconds = now_sec() - start;
+    double seconds = clock_sec() - start;
     unlink(path);
     mem_free(path);
     return seconds;
@@ -55,9 +49,9 @@ int main(int argc, char **argv) {
         total += array[i].bytes;
     }
     touch(array, 3, 1, 1);
-    double start = now_sec();
+    double start = clock_sec();
     uint64_t hash = hash64(array[0].data, array[0].bytes, 0);
-    printf("hash64: %.2f GB/s (%llx)\n", (double)array[0].bytes / (now_sec() - start) * 1e-9,
+    printf("hash64: %.2f GB/s (%llx)\n", (double)array[0].bytes / (clock_sec() - start) * 1e-9,
            (unsigned long long)hash);
     printf("one stream and fsync: %.2f s for %.0f MB\n", raw_write(dir, array, 3),
            (double)total * 1e-6);
@@ -82,15 +76,15 @@ int main(int argc, char **argv) {
                (double)cost.written_bytes * 1e-6, (double)info.st_size * 1e-6);
     }
     checkpoint_close(c);
-    start = now_sec();
+    start = clock_sec();
     bool found;
     long iteration;
     if (checkpoint_open(&c, path, "f", note, &err) != STATUS_OK)
         return fprintf(stderr, "%s\n", err.message), 1;
-    double opened = now_sec();
+    double opened = clock_sec();
     if (checkpoint_load(c, array, 3, &found, &iteration, &err) != STATUS_OK)
         return fprintf(stderr, "%s\n", err.message), 1;
-    printf("open and verify: %.2f s, load: %.2f s\n", opened - start, now_sec() - opened);
+    printf("open and verify: %.2f s, load: %.2f s\n", opened - start, clock_sec() - opened);
     checkpoint_close(c);
     file_remove_tree(dir, &err);
     mem_free(path);

@@ -14,11 +14,11 @@ static double part_sec(struct work *w, size_t part, bool backward) {
     w->backward = backward;
     /* Parts are spread over the view. */
     w->first = part * (w->chunk_count - PART_CHUNKS) / (PARTS - 1);
-    double start = now_sec();
+    double start = clock_sec();
     parallel_for(w->pool, PART_CHUNKS, trace_chunk, w);
     if (backward)
         gradient_reduce(w->gradient, w->log + w->first, PART_CHUNKS, w->pool);
-    return now_sec() - start;
+    return clock_sec() - start;
 }
 
 static double best_sec(struct work *one, struct work *all, bool backward, double best[2]) {

@@ -129,11 +129,6 @@ static void bench_room(const char *name) {
 }
 
 int main(int argc, char **argv) {
-    if (argc > 1) {
-        bench_room(argv[1]);
-        return 0;
-    }
-    bench_room("staircase2");
-    bench_room("bathroom");
+    bench_rooms(argc, argv, bench_room);
     return 0;
 }

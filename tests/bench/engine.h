@@ -5,6 +5,7 @@
 
 #include <time.h>
 
+#include "common/clock.h"
 #include "server/render/film.h"
 #include "server/render/gradient.h"
 #include "server/render/sampler.h"
@@ -17,12 +18,6 @@
 #define ATLAS 2048
 /* As the settings of a job have it by default. */
 #define ROULETTE_DEPTH 4
-
-static inline double now_sec(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* Processor time of all threads: what else runs on the machine hardly moves it. */
 static inline double cpu_sec(void) {
@@ -71,7 +66,7 @@ static inline void trace_chunk(void *user, size_t index, int thread) {
 
 /* Seconds for all paths, in iterations of 32 chunks as an optimiser's; each reduces its gradients. */
 static inline double run(struct work *w, bool backward) {
-    double start = now_sec();
+    double start = clock_sec();
     w->backward = backward;
     for (w->first = 0; w->first < w->chunk_count; w->first += 32) {
         size_t count = w->chunk_count - w->first < 32 ? w->chunk_count - w->first : 32;
@@ -79,7 +74,7 @@ static inline double run(struct work *w, bool backward) {
         if (backward)
             gradient_reduce(w->gradient, w->log + w->first, count, w->pool);
     }
-    return now_sec() - start;
+    return clock_sec() - start;
 }
 
 static inline void work_init(struct work *w, const struct room *room, const struct camera *camera, int threads) {
@@ -173,6 +168,16 @@ static inline void load_view(struct room *room, const char *name, struct camera 
     load(room, name);
     snprintf(path, sizeof path, "rooms/%s/transforms.json", name);
     room_camera(path, "images/014.exr", camera);
+}
+
+/* Measures the rooms of the test data, or the one that the command line names. */
+static inline void bench_rooms(int argc, char **argv, void (*bench)(const char *name)) {
+    if (argc > 1) {
+        bench(argv[1]);
+        return;
+    }
+    bench("staircase2");
+    bench("bathroom");
 }
 
 #endif

@@ -5,20 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <time.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/export/outputs.h"
 #include "server/ingest/bundle.h"
-#include "server/reconstruct/reconstruct.h"
-
-static double now_sec(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
+#include "server/worker/results.h"
 
 static bool never(void *user) {
     (void)user;
@@ -41,9 +34,9 @@ static void print_progress(void *user, const char *stage, double done, double to
 
 static void print_metric(void *user, const char *series, long step, double value) {
     double *last = user;
-    if (now_sec() - *last < 10.0)
+    if (clock_sec() - *last < 10.0)
         return;
-    *last = now_sec();
+    *last = clock_sec();
     printf("%s %ld %.5f\n", series, step, value);
     fflush(stdout);
 }
@@ -91,36 +84,17 @@ static enum status ignore_file(void *user, const char *type, const char *name, c
 }
 
 static enum status write_outputs(const char *dir, const struct reconstruction *r, struct error *err) {
-    struct export_comparison *pair = mem_calloc(r->held_out_count + 1, sizeof *pair);
-    for (size_t i = 0; i < r->held_out_count; i++)
-        pair[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
-                                             &r->held_out[i].render, r->held_out[i].camera};
-    struct export_input input = {
-        .title = "room",
-        .mesh = &r->scene->mesh,
-        .segments = &r->segments,
-        .atlas = &r->atlas,
-        .inverse = &r->inverse,
-        .materials = &r->materials,
-        .confidence_count = r->fused.count,
-        .confidence_spread = r->fused.spread,
-        .is_emitter = r->is_emitter,
-        .environment = r->environment.map.pixel ? &r->environment.map : NULL,
-        .environment_confidence = r->environment.map.pixel ? &r->environment.confidence : NULL,
-        .comparison_count = r->held_out_count,
-        .comparison = pair,
-        .report = r->report,
-        .up = scene_up(r->scene),
-    };
+    struct export_input input;
+    results_make(&input, r, "room");
     enum status status = file_make_dirs(dir, err);
     if (status == STATUS_OK)
         status = export_outputs(dir, &input, ignore_file, NULL, err);
-    mem_free(pair);
+    mem_free((void *)input.comparison);
     return status;
 }
 
 static enum status run(int argc, char **argv, struct error *err) {
-    double last = now_sec(), begin = last;
+    double last = clock_sec(), begin = last;
     struct reconstruct_hooks hooks = {
         .user = &last,
         .stop_requested = never,
@@ -149,7 +123,7 @@ static enum status run(int argc, char **argv, struct error *err) {
     if (status == STATUS_OK)
         status = bundle_load(argv[1], settings_text(&settings, "transforms"), &limits, pool, &scene,
                              NULL, err);
-    printf("loaded in %.1f s\n", now_sec() - begin);
+    printf("loaded in %.1f s\n", clock_sec() - begin);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
     if (status == STATUS_OK)
@@ -159,7 +133,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         struct rusage usage;
         getrusage(RUSAGE_SELF, &usage);
         printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0,
-               now_sec() - begin);
+               clock_sec() - begin);
         mem_free(text);
     }
     reconstruct_release(&r);

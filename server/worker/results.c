@@ -1,0 +1,35 @@
+/* results.c -- see results.h. */
+#include "server/worker/results.h"
+
+#include "common/mem.h"
+
+struct export_input results_so_far(const struct reconstruction *r, const char *title) {
+    const struct environment *e = &r->environment;
+    return (struct export_input){
+        .title = title,
+        .mesh = &r->scene->mesh,
+        .segments = &r->segments,
+        .atlas = &r->atlas,
+        .inverse = &r->inverse,
+        .materials = &r->materials,
+        .confidence_count = r->fused.count,
+        .confidence_spread = r->fused.spread,
+        .is_emitter = r->is_emitter,
+        .environment = e->map.pixel ? &e->map : NULL,
+        .environment_confidence = e->map.pixel ? &e->confidence : NULL,
+        .report = r->report,
+        .up = scene_up(r->scene),
+    };
+}
+
+void results_make(struct export_input *input, const struct reconstruction *r, const char *title) {
+    struct export_comparison *comparison = mem_array(r->held_out_count, sizeof *comparison);
+    for (size_t i = 0; i < r->held_out_count; i++) {
+        const struct held_out *view = &r->held_out[i];
+        comparison[i] =
+            (struct export_comparison){view->name, &view->photograph, &view->render, view->camera};
+    }
+    *input = results_so_far(r, title);
+    input->comparison = comparison;
+    input->comparison_count = r->held_out_count;
+}
