@@ -15,6 +15,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/conjugate.h"
 #include "server/reconstruct/overlap.h"
 
 #define POINTS_PER_FRAME 60
@@ -49,7 +50,8 @@ enum { DRIFT = 1, COLOR = 2, VIGNETTE = 4, FAULTS = 8 };
 struct fit {
     const struct overlaps *o;
     const struct views *views;
-    size_t frames, unknown_count; /* parameters: 3 per frame, 3 of the vignette */
+    size_t frames;                /* parameters are 3 a frame and 3 of the vignette */
+    size_t untold_count;          /* frames whose exposure nobody told */
     bool *told;                   /* [frames] the exposure */
     double (*radius)[3];          /* [looks] s, s^2, s^3 */
     double *trust;                /* [looks] inverse variance by contrast and angle */
@@ -57,6 +59,10 @@ struct fit {
     double scale;                 /* residuals are this much larger than trust says */
     bool all_points;              /* nothing is held back */
 };
+
+static size_t parameter_count(const struct fit *f) {
+    return 3 * f->frames + 3;
+}
 
 static bool held_back(const struct fit *f, size_t point) {
     return !f->all_points && point % HELD_BACK_EVERY == 0;
@@ -100,14 +106,23 @@ static void project(const struct fit *f, int model, double *x) {
         x[3 * f->frames + k] = 0.0;
 }
 
-static void multiply(const struct fit *f, int model, const double *x, double *out) {
+/* The linear system of a fit. */
+struct light_system {
+    const struct fit *fit;
+    int model;
+    double *inverse; /* [parameter_count] the preconditioner */
+};
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct light_system *system = user;
+    const struct fit *f = system->fit;
     for (size_t t = 0; t < f->frames; t++) {
         const double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
         double sigma = f->told[t] ? DRIFT_SIGMA : UNTOLD_SIGMA;
         for (int c = 0; c < 3; c++)
             out[3 * t + (size_t)c] = mean / (sigma * sigma) + (g[c] - mean) / (COLOR_SIGMA * COLOR_SIGMA);
     }
-    for (size_t k = 3 * f->frames; k < 3 * f->frames + 3; k++)
+    for (size_t k = 3 * f->frames; k < parameter_count(f); k++)
         out[k] = x[k] / (VIGNETTE_SIGMA * VIGNETTE_SIGMA);
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
@@ -118,12 +133,12 @@ static void multiply(const struct fit *f, int model, const double *x, double *ou
             scatter(f, p, c, z, out);
         }
     }
-    project(f, model, out);
+    project(f, system->model, out);
 }
 
 /* Sums of weights: one number a frame, one each coefficient of the vignette. */
 static void make_preconditioner(const struct fit *f, double *inverse) {
-    size_t n = 3 * f->frames + 3;
+    size_t n = parameter_count(f);
     for (size_t i = 0; i < n; i++)
         inverse[i] = 1.0;
     for (size_t p = 0; p < f->o->point_count; p++) {
@@ -138,48 +153,33 @@ static void make_preconditioner(const struct fit *f, double *inverse) {
         inverse[i] = 1.0 / inverse[i];
 }
 
-static double dot(const double *a, const double *b, size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++)
-        sum += a[i] * b[i];
-    return sum;
+static void precondition(const void *user, const double *residual, double *out) {
+    const struct light_system *system = user;
+    for (size_t i = 0; i < parameter_count(system->fit); i++)
+        out[i] = system->inverse[i] * residual[i];
 }
 
 /* Improves x by conjugate gradients on the system with the present weights. */
 static void solve_linear(const struct fit *f, int model, double *x) {
-    size_t n = 3 * f->frames + 3;
-    double *memory = mem_calloc(5 * n, sizeof *memory);
-    double *r = memory, *z = r + n, *p = z + n, *q = p + n, *inverse = q + n;
-    make_preconditioner(f, inverse);
+    size_t n = parameter_count(f);
+    double *residual = mem_calloc(2 * n, sizeof *residual);
+    struct light_system light = {f, model, residual + n};
+    const struct conjugate_system system = {n, multiply, precondition, &light};
+    make_preconditioner(f, light.inverse);
     for (size_t point = 0; point < f->o->point_count; point++) {
         size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
         for (int c = 0; c < 3 && !held_back(f, point); c++) {
             double y[OVERLAP_LOOKS_MAX];
             for (size_t i = 0; i < count; i++)
                 y[i] = (double)f->o->look[first + i].value[c];
-            scatter(f, point, c, y, r);
+            scatter(f, point, c, y, residual);
         }
     }
-    project(f, model, r);
-    double goal = CG_TOLERANCE * CG_TOLERANCE * dot(r, r, n), rz = 0.0;
-    multiply(f, model, x, q);
-    for (size_t i = 0; i < n; i++)
-        r[i] -= q[i];
-    for (int step = 0; step < CG_STEPS && dot(r, r, n) > goal; step++) {
-        for (size_t i = 0; i < n; i++)
-            z[i] = inverse[i] * r[i];
-        double next = dot(r, z, n), beta = step > 0 ? next / rz : 0.0;
-        rz = next;
-        for (size_t i = 0; i < n; i++)
-            p[i] = z[i] + beta * p[i];
-        multiply(f, model, p, q);
-        double alpha = rz / dot(p, q, n);
-        for (size_t i = 0; i < n; i++) {
-            x[i] += alpha * p[i];
-            r[i] -= alpha * q[i];
-        }
-    }
-    mem_free(memory);
+    project(f, model, residual);
+    double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(residual, residual, n);
+    conjugate_residual(&system, x, residual);
+    conjugate_solve(&system, CG_STEPS, goal, residual, x);
+    mem_free(residual);
 }
 
 /* --- robustness --------------------------------------------------------------------------------- */
@@ -289,13 +289,13 @@ static double drift_of(const struct fit *f, const double *x) {
         double level = (x[3 * t] + x[3 * t + 1] + x[3 * t + 2]) / 3.0;
         squares += f->told[t] ? level * level : 0.0;
     }
-    return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_count)));
+    return sqrt(squares / fmax(1.0, (double)(f->frames - f->untold_count)));
 }
 
 /* Takes up faults one by one, the one that explains most first. Returns the model; x is its
  * solution. */
 static int choose_model(struct fit *f, double *x) {
-    size_t n = 3 * f->frames + 3, points = f->o->point_count / HELD_BACK_EVERY + 1, used;
+    size_t n = parameter_count(f), points = f->o->point_count / HELD_BACK_EVERY + 1, used;
     double *base = mem_array(points, sizeof *base), *cost = mem_array(points, sizeof *cost);
     double *trial = mem_array(n, sizeof *trial), *best = mem_array(n, sizeof *best);
     int model = 0;
@@ -306,7 +306,7 @@ static int choose_model(struct fit *f, double *x) {
         scale = f->scale;
         held_back_costs(f, x, scale, base);
         for (int fault = DRIFT; fault < FAULTS; fault *= 2) {
-            if ((model & fault) || (fault == DRIFT && f->unknown_count == f->frames))
+            if ((model & fault) || (fault == DRIFT && f->untold_count == f->frames))
                 continue;
             memcpy(trial, x, n * sizeof *trial);
             solve(f, model | fault, trial);
@@ -341,7 +341,7 @@ static void fit_init(struct fit *f, const struct views *views, const struct over
     f->weight = mem_calloc(looks + 1, sizeof *f->weight);
     for (size_t t = 0; t < f->frames; t++) {
         f->told[t] = views->scene->photograph[views->train[t]].exposure_known;
-        f->unknown_count += !f->told[t];
+        f->untold_count += !f->told[t];
     }
     for (size_t i = 0; i < looks; i++) {
         const struct look_at *look = &o->look[i];
@@ -390,7 +390,7 @@ static void fix_gauge(const struct fit *f, int model, double *x) {
             mean[c] += x[3 * t + c] / (double)f->frames;
     }
     double level = (mean[0] + mean[1] + mean[2]) / 3.0;
-    bool level_free = f->unknown_count == f->frames || (model & DRIFT);
+    bool level_free = f->untold_count == f->frames || (model & DRIFT);
     for (size_t t = 0; t < f->frames; t++) {
         for (size_t c = 0; c < 3; c++)
             x[3 * t + c] -= (level_free ? level : 0.0) + (model & COLOR ? mean[c] - level : 0.0);
@@ -422,10 +422,10 @@ void calibrate_light(struct scene *scene, const struct views *views, const struc
     points = points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
     overlaps_make(&overlaps, views, atlas, inverse, points, pool);
     fit_init(&fit, views, &overlaps);
-    double *x = mem_calloc(3 * fit.frames + 3, sizeof *x);
-    *found = (struct light_found){.exposures_solved = fit.unknown_count, .spread_before = spread(&fit, x)};
+    double *x = mem_calloc(parameter_count(&fit), sizeof *x);
+    *found = (struct light_found){.exposures_solved = fit.untold_count, .spread_before = spread(&fit, x)};
     int model = faults ? choose_model(&fit, x) : 0;
-    if (model != 0 || fit.unknown_count > 0) {
+    if (model != 0 || fit.untold_count > 0) {
         fit.all_points = true;
         solve(&fit, model, x);
     }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/conjugate.h"
 
 #define OFFSET_SIGMA 0.3
 #define PRIOR_PX 0.1         /* size of the prior: a photograph moves this far for hardly any evidence */
@@ -18,15 +19,8 @@
 #define CG_STEPS 40
 #define CG_TOLERANCE 1e-3
 
-static double dot(const double *a, const double *b, size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++)
-        sum += a[i] * b[i];
-    return sum;
-}
-
 static double prior_of(const struct pose_frame *frame) {
-    double squares = dot(frame->total, frame->total, POSE_UNKNOWNS);
+    double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
     return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
 }
 
@@ -59,11 +53,24 @@ static void project(const struct pose_solver *s, double *x) {
     }
 }
 
-/* `damping` [POSE_UNKNOWNS * frames] is added to the diagonal of the twists. */
-static void multiply(const struct pose_solver *s, const double *damping, const double *x, double *out) {
+/* A factorised 6 x 6 block for each frame's twist, and the diagonal of the offsets. */
+struct preconditioner {
+    double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]; /* [frames] lower Cholesky factors; owned */
+    double *diagonal;                              /* [unknowns]; owned */
+};
+
+struct twist_system {
+    const struct pose_solver *solver;
+    double *damping; /* [POSE_UNKNOWNS * frames] added to the diagonal of the twists; owned */
+    struct preconditioner preconditioner;
+};
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct twist_system *system = user;
+    const struct pose_solver *s = system->solver;
     size_t twists = POSE_UNKNOWNS * s->frames;
     for (size_t i = 0; i < s->unknowns; i++)
-        out[i] = x[i] * (i < twists ? prior_of(&s->frame[i / POSE_UNKNOWNS]) + damping[i]
+        out[i] = x[i] * (i < twists ? prior_of(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
                                     : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
     for (size_t t = 0; t < s->track_count; t++) {
         const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
@@ -80,12 +87,6 @@ static void multiply(const struct pose_solver *s, const double *damping, const d
     }
     project(s, out);
 }
-
-/* A factorised 6 x 6 block for each frame's twist, and the diagonal of the offsets. */
-struct preconditioner {
-    double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]; /* [frames] lower Cholesky factors; owned */
-    double *diagonal;                    /* [unknowns]; owned */
-};
 
 static void factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
     for (int i = 0; i < POSE_UNKNOWNS; i++) {
@@ -129,8 +130,10 @@ static void preconditioner_release(struct preconditioner *p) {
     mem_free(p->diagonal);
 }
 
-static void precondition(const struct preconditioner *p, const struct pose_solver *s, const double *r,
-                         double *z) {
+static void precondition(const void *user, const double *r, double *z) {
+    const struct twist_system *system = user;
+    const struct pose_solver *s = system->solver;
+    const struct preconditioner *p = &system->preconditioner;
     for (size_t f = 0; f < s->frames; f++) {
         const double(*a)[POSE_UNKNOWNS] = (const double(*)[POSE_UNKNOWNS])p->block[f];
         double *b = z + POSE_UNKNOWNS * f;
@@ -154,10 +157,10 @@ static void precondition(const struct preconditioner *p, const struct pose_solve
 /* Solves for s->x: the twists from 0, the offsets from what they are. */
 void pose_solve(struct pose_solver *s) {
     size_t n = s->unknowns, twists = POSE_UNKNOWNS * s->frames;
-    double *memory = mem_calloc(4 * n + twists, sizeof *memory), *x = s->x;
-    double *r = memory, *z = r + n, *p = z + n, *q = p + n, *damping = q + n, rz = 0.0;
-    struct preconditioner preconditioner;
-    preconditioner_init(&preconditioner, s, damping);
+    double *r = mem_calloc(n, sizeof *r), *x = s->x;
+    struct twist_system twist = {.solver = s, .damping = mem_calloc(twists, sizeof *twist.damping)};
+    const struct conjugate_system system = {n, multiply, precondition, &twist};
+    preconditioner_init(&twist.preconditioner, s, twist.damping);
     for (size_t t = 0; t < s->track_count; t++) {
         double y[POSE_SIGHTS_MAX];
         for (size_t k = 0; k < pose_sight_count(s->track[t]); k++)
@@ -169,23 +172,10 @@ void pose_solve(struct pose_solver *s) {
     for (size_t i = 0; i < twists; i++)
         r[i] -= prior_of(&s->frame[i / POSE_UNKNOWNS]) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
     project(s, r);
-    multiply(s, damping, x, q);
-    for (size_t i = 0; i < n; i++)
-        r[i] -= q[i];
-    double goal = CG_TOLERANCE * CG_TOLERANCE * dot(r, r, n);
-    for (int step = 0; step < CG_STEPS && dot(r, r, n) > goal; step++) {
-        precondition(&preconditioner, s, r, z);
-        double next = dot(r, z, n), beta = step > 0 ? next / rz : 0.0;
-        rz = next;
-        for (size_t i = 0; i < n; i++)
-            p[i] = z[i] + beta * p[i];
-        multiply(s, damping, p, q);
-        double alpha = rz / dot(p, q, n);
-        for (size_t i = 0; i < n; i++) {
-            x[i] += alpha * p[i];
-            r[i] -= alpha * q[i];
-        }
-    }
-    preconditioner_release(&preconditioner);
-    mem_free(memory);
+    conjugate_residual(&system, x, r);
+    double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);
+    conjugate_solve(&system, CG_STEPS, goal, r, x);
+    preconditioner_release(&twist.preconditioner);
+    mem_free(twist.damping);
+    mem_free(r);
 }
