@@ -6,7 +6,8 @@
  *
  * MTL has no specular as ours: Ks is specular, for readers that take Ks for the level of a
  * reflection whose half is that of an index of refraction of 1.5 (Ni), as Blender does. Ns is
- * 1000 (1 - roughness)^2, as Blender turns it back into roughness, Pr roughness, Ke radiance, map_Kd the picture beside it, in sRGB. */
+ * 1000 (1 - roughness)^2, as Blender turns it back into roughness. Pr is roughness, Ke radiance,
+ * map_Kd the picture beside it, in sRGB. */
 #ifndef UNBAKE_EXPORT_MESH_OBJ_H
 #define UNBAKE_EXPORT_MESH_OBJ_H
 
