@@ -279,7 +279,7 @@ out:
 
 static enum status score_views(struct evaluator *e, struct evaluation *v, struct error *err) {
     enum status status = STATUS_OK;
-    double sum = 0.0, squares = 0.0;
+    double sum = 0.0, squares = 0.0, measured = 0.0;
     for (size_t i = 0; i < e->scene.photograph_count && status == STATUS_OK; i++) {
         const struct photograph *p = &e->scene.photograph[i];
         double msre = NAN;
@@ -287,12 +287,14 @@ static enum status score_views(struct evaluator *e, struct evaluation *v, struct
             continue;
         status = score_view(e, p, (uint32_t)i, v, &msre, err);
         v->view_count++;
+        if (!isfinite(msre)) /* not asked for, or no pixel of it can be used */
+            continue;
         sum += msre;
         squares += msre * msre;
+        measured += 1.0;
     }
-    double n = (double)v->view_count;
-    v->msre = sum / n;
-    v->msre_deviation = sqrt(fmax(0.0, squares / n - v->msre * v->msre));
+    v->msre = sum / measured;
+    v->msre_deviation = sqrt(fmax(0.0, squares / measured - v->msre * v->msre));
     if (status == STATUS_OK && v->view_count == 0)
         status = error_set(err, STATUS_INPUT, "%s: no photograph is held out (split test)", e->room);
     return status;

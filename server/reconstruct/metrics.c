@@ -13,40 +13,43 @@ static bool pixel_is_finite(const float *a, const float *b) {
     return true;
 }
 
-double metrics_msre(const struct image *photograph, const struct image *render, double median) {
+/* The mean over the channels of usable pixels of what `square` makes of them. */
+static double mean_square(const struct image *photograph, const struct image *render,
+                          double (*square)(float photograph, float render, double parameter),
+                          double parameter) {
     size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
     double sum = 0.0;
     for (size_t i = 0; i < pixels; i++) {
         const float *r = photograph->pixel + 3 * i, *v = render->pixel + 3 * i;
         if (!pixel_is_finite(r, v))
             continue;
-        for (int c = 0; c < 3; c++) {
-            double difference = (double)v[c] - (double)r[c];
-            sum += difference * difference / ((double)r[c] * (double)r[c] + 0.01 * median * median);
-        }
+        for (int c = 0; c < 3; c++)
+            sum += square(r[c], v[c], parameter);
         count += 3;
     }
-    return count ? sum / (double)count : 0.0;
+    return count ? sum / (double)count : (double)NAN;
+}
+
+static double relative_square(float photograph, float render, double median) {
+    double r = (double)photograph, difference = (double)render - r;
+    return difference * difference / (r * r + 0.01 * median * median);
+}
+
+double metrics_msre(const struct image *photograph, const struct image *render, double median) {
+    return mean_square(photograph, render, relative_square, median);
 }
 
 static double shown(float radiance, double exposure) {
     return (double)image_linear_to_srgb(fminf(fmaxf(radiance * (float)exposure, 0.0f), 1.0f));
 }
 
+static double shown_square(float photograph, float render, double exposure) {
+    double difference = shown(render, exposure) - shown(photograph, exposure);
+    return difference * difference;
+}
+
 double metrics_psnr_db(const struct image *photograph, const struct image *render, double exposure) {
-    size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
-    double sum = 0.0;
-    for (size_t i = 0; i < pixels; i++) {
-        const float *r = photograph->pixel + 3 * i, *v = render->pixel + 3 * i;
-        if (!pixel_is_finite(r, v))
-            continue;
-        for (int c = 0; c < 3; c++) {
-            double difference = shown(v[c], exposure) - shown(r[c], exposure);
-            sum += difference * difference;
-        }
-        count += 3;
-    }
-    return count ? 10.0 * log10((double)count / sum) : 0.0;
+    return 10.0 * log10(1.0 / mean_square(photograph, render, shown_square, exposure));
 }
 
 static double luminance(const struct image *image, size_t pixel, double exposure) {
@@ -90,5 +93,5 @@ double metrics_ssim(const struct image *photograph, const struct image *render, 
             count++;
         }
     }
-    return count ? sum / (double)count : 0.0;
+    return count ? sum / (double)count : (double)NAN;
 }

@@ -1,19 +1,22 @@
-/* metrics.h -- how well a re-render matches a photograph. */
+/* metrics.h -- how well a re-render matches a photograph.
+ *
+ * Pictures are R G B, linear radiance, of one size. Pixels with a non-finite value in either do not
+ * count; where none is left all three are NaN. */
 #ifndef UNBAKE_RECONSTRUCT_METRICS_H
 #define UNBAKE_RECONSTRUCT_METRICS_H
 
 #include "common/image.h"
 
 /* Mean over pixels and channels of (I - R)^2 / (R^2 + 0.01 m^2), R the photograph's radiance, I
- * the render's, m the median radiance of the training photographs. Pixels with a non-finite
- * value in either picture do not count. Pictures are R G B, of one size. */
+ * the render's, m the median radiance of the training photographs. */
 double metrics_msre(const struct image *photograph, const struct image *render, double median_radiance);
 
 /* Peak signal-to-noise ratio in dB of the pictures as shown: sRGB of radiance x exposure,
  * clamped to [0, 1]. Infinite for equal pictures. */
 double metrics_psnr_db(const struct image *photograph, const struct image *render, double exposure);
 
-/* Mean structural similarity (Wang et al. 2004) of the same, on luminance in windows of 8 x 8. */
+/* Mean structural similarity (Wang et al. 2004) of the same, on luminance in windows of 8 x 8 of
+ * which all pixels count. */
 double metrics_ssim(const struct image *photograph, const struct image *render, double exposure);
 
 #endif

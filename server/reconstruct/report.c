@@ -114,21 +114,33 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     view->ssim = metrics_ssim(&view->photograph, &view->render, exposure);
 }
 
+/* Over the views that have a value: none of a view's pixels may be usable. */
+struct mean {
+    double sum, count;
+};
+
+static void mean_add(struct mean *mean, double value) {
+    if (isnan(value))
+        return;
+    mean->sum += value;
+    mean->count += 1.0;
+}
+
 enum status report_held_out(struct reconstruction *r, const struct views *views,
                             const struct reconstruct_hooks *hooks, struct error *err) {
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");
-    double msre = 0.0, psnr = 0.0, ssim = 0.0;
+    struct mean msre = {0}, psnr = {0}, ssim = {0};
     r->held_out = mem_calloc(total + 1, sizeof *r->held_out);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
             continue;
         struct held_out *view = &r->held_out[r->held_out_count++];
         render_view(r, &scene->photograph[i], view, (double)views->median_radiance);
-        msre += view->msre / (double)total;
-        psnr += view->psnr_db / (double)total;
-        ssim += view->ssim / (double)total;
+        mean_add(&msre, view->msre);
+        mean_add(&psnr, view->psnr_db);
+        mean_add(&ssim, view->ssim);
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", view->name);
         json_add_number(entry, "msre", view->msre);
@@ -141,11 +153,11 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     }
     cJSON *metrics = cJSON_AddObjectToObject(r->report, "metrics");
     json_add_int(metrics, "held_out_views", (int64_t)total);
-    if (total > 0) {
-        json_add_number(metrics, "msre", msre);
-        json_add_number(metrics, "psnr_db", psnr);
-        json_add_number(metrics, "ssim", ssim);
-        hooks->metric(hooks->user, "msre", 0, msre);
+    if (msre.count > 0.0) {
+        json_add_number(metrics, "msre", msre.sum / msre.count);
+        json_add_number(metrics, "psnr_db", psnr.sum / psnr.count);
+        json_add_number(metrics, "ssim", ssim.sum / ssim.count);
+        hooks->metric(hooks->user, "msre", 0, msre.sum / msre.count);
     }
     return STATUS_OK;
 }

@@ -28,6 +28,12 @@ int main(void) {
     photograph.pixel[0] = NAN;
     render.pixel[1] = 1e9f;
     CHECK_NEAR(metrics_msre(&photograph, &render, 2.0), 0.01 / 0.29, 1e-6);
+    /* Where no pixel can be used, nothing was measured: that is no perfect score. */
+    for (size_t i = 0; i < 16 * 16 * 3; i++)
+        photograph.pixel[i] = NAN;
+    CHECK(isnan(metrics_msre(&photograph, &render, 2.0)));
+    CHECK(isnan(metrics_psnr_db(&photograph, &render, 1.0)));
+    CHECK(isnan(metrics_ssim(&photograph, &render, 1.0)));
     image_release(&photograph);
     image_release(&render);
     return check_result();
