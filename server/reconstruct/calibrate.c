@@ -77,7 +77,7 @@ static void find_light(struct reconstruction *r, struct views *views, const stru
 static void update_edges(struct reconstruction *r, struct views *views, const struct poses_found *found) {
     for (uint32_t t = 0; t < views->train_count; t++) {
         if (found->shift[t] > 0.0f)
-            views_update_edges(views, &r->segments, t, r->pool);
+            views_update_edges(views, t, r->pool);
     }
 }
 

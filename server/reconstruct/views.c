@@ -32,7 +32,6 @@ struct corner {
 
 struct edge_job {
     struct views *views;
-    const struct segments *segments;
     uint32_t train;
 };
 
@@ -54,7 +53,7 @@ static struct corner trace_corner(const struct edge_job *job, const struct camer
     corner.point = vec3_mad(origin, hit.distance_m, direction);
     corner.normal = vec3_normalize(mesh_cross(&job->views->scene->mesh, hit.triangle));
     corner.distance_m = hit.distance_m;
-    corner.segment = job->segments->of_triangle[hit.triangle];
+    corner.segment = job->views->segments->of_triangle[hit.triangle];
     return corner;
 }
 
@@ -155,10 +154,9 @@ void views_update_median(struct views *v) {
     mem_free(value);
 }
 
-void views_update_edges(struct views *v, const struct segments *segments, uint32_t train,
-                        struct parallel *pool) {
+void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) {
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
-    struct edge_job job = {.views = v, .segments = segments, .train = train};
+    struct edge_job job = {.views = v, .train = train};
     parallel_for(pool, camera->height, mark_row, &job);
     make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
@@ -179,7 +177,7 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
         v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
         v->edge[t] = mem_array((size_t)camera->height * camera->width, 1);
         v->owner[t] = mem_calloc((size_t)camera->height * camera->width, 1);
-        views_update_edges(v, segments, t, pool);
+        views_update_edges(v, t, pool);
     }
     views_update_median(v);
 }

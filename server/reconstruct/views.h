@@ -49,8 +49,7 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
                 const struct accel *accel, struct parallel *pool);
 void views_release(struct views *v);
 /* Marks the pixels that mix surfaces anew, of training photograph `train`, after its camera moved. */
-void views_update_edges(struct views *v, const struct segments *segments, uint32_t train,
-                        struct parallel *pool);
+void views_update_edges(struct views *v, uint32_t train, struct parallel *pool);
 /* Takes the median anew, after exposures changed. */
 void views_update_median(struct views *v);
 
