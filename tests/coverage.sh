@@ -33,5 +33,5 @@ part "common, %" '^common/' -
 part "the client, %" '^client/' -
 part "the engine and its tools, %" '^server/(demo|evaluate|export|reconstruct|render|scene)/' -
 part "all, %" '' -
-bash tests/bench/table.sh "$rows" build/coverage.json
+bash tests/table.sh "$rows" build/coverage.json
 exit $failed

@@ -29,14 +29,6 @@ for source in tests/"$name"/test_*.c tests/"$name"/test_*.sh; do
     [ "$code" -eq 0 ] || [ "$code" -eq 77 ] || failed=$((failed + 1))
 done
 
-awk -F '\t' '
-    BEGIN { print "[" }
-    { printf "%s{\"name\": \"%s\", \"value\": %s, \"goal\": %s, \"better\": \"%s\"}", (NR > 1 ? ",\n" : ""), $1, $2, $3, $4 }
-    END { print "\n]" }' "$rows" >"$build/$name.json"
-printf '\n%-72s %10s %10s\n' what value goal
-awk -F '\t' '{
-    met = ($4 == "higher") ? ($2 + 0 >= $3 + 0) : ($2 + 0 <= $3 + 0)
-    printf "%-72s %10.4g %7s %-2s %s\n", $1, $2, $3, ($4 == "higher" ? "+" : "-"), (met ? "" : "not met")
-}' "$rows"
+tests/table.sh "$rows" "$build/$name.json"
 rm -f "$rows"
 [ "$failed" -eq 0 ]

@@ -69,6 +69,6 @@ for room in ${FIDELITY_ROOMS:-staircase2 bathroom}; do
         measure "${room%/}" "$kind"
     done
 done
-tests/bench/table.sh "$rows" "$build/fidelity.json"
+tests/table.sh "$rows" "$build/fidelity.json"
 echo "pictures: $build/fidelity/ROOM-KIND/*.png"
 rm -f "$rows"

@@ -219,6 +219,6 @@ for part in ${PAPER_ONLY:-fig7 fig8 table1 fig5 speed ablations}; do
     *) echo "paper.sh: PAPER_ONLY has no '$part'" >&2 ;;
     esac
 done
-tests/bench/table.sh "$rows" "$build/paper.json"
+tests/table.sh "$rows" "$build/paper.json"
 echo "outputs and pictures: $dir"
 rm -f "$rows"

@@ -56,5 +56,5 @@ else
     echo "left out: peak memory, time to a quality against Mitsuba 3 (make bench LONG=1)" >&2
 fi
 
-tests/bench/table.sh "$rows" "$build/bench.json"
+tests/table.sh "$rows" "$build/bench.json"
 rm -f "$rows"

@@ -36,5 +36,5 @@ for source in tests/fuzz/test_*.c; do
     [ $crashes = 0 ] || failed=1
 done
 
-bash tests/bench/table.sh "$rows" "$build/fuzz.json"
+bash tests/table.sh "$rows" "$build/fuzz.json"
 exit $failed

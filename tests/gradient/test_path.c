@@ -126,6 +126,21 @@ static void check_parameter(struct box *b, const struct parameter *p) {
     path_batch_free(batch);
 }
 
+/* What does not shine has a derivative by emission too: it would, if it did. */
+static void check_dark_emission(struct box *b) {
+    struct path_settings settings = {.max_depth = 3, .roulette_depth = 99, .seed = 22};
+    struct path_batch *batch = path_batch_new(BATCH, 3);
+    struct gradient_log *log = gradient_log_new(3);
+    rgb radiance[BATCH], one[BATCH];
+    for (int i = 0; i < BATCH; i++)
+        one[i] = (rgb){1.0f, 1.0f, 1.0f};
+    trace(batch, b, &settings, 0, radiance);
+    path_batch_backward(batch, &b->world, one, log);
+    CHECK(log->segment[1].d_emission[0] > 0.0);
+    gradient_log_free(log);
+    path_batch_free(batch);
+}
+
 static void check_parameters(void) {
     struct box b;
     box_init(&b);
@@ -157,18 +172,7 @@ static void check_parameters(void) {
     };
     for (size_t i = 0; i < sizeof glossy / sizeof *glossy; i++)
         check_parameter(&b, &glossy[i]);
-    /* What does not shine has a derivative by emission too: it would, if it did. */
-    struct path_settings settings = {.max_depth = 3, .roulette_depth = 99, .seed = 22};
-    struct path_batch *batch = path_batch_new(BATCH, 3);
-    struct gradient_log *log = gradient_log_new(3);
-    rgb radiance[BATCH], one[BATCH];
-    for (int i = 0; i < BATCH; i++)
-        one[i] = (rgb){1.0f, 1.0f, 1.0f};
-    trace(batch, &b, &settings, 0, radiance);
-    path_batch_backward(batch, &b.world, one, log);
-    CHECK(log->segment[1].d_emission[0] > 0.0);
-    gradient_log_free(log);
-    path_batch_free(batch);
+    check_dark_emission(&b);
     box_release(&b);
 }
 
@@ -199,20 +203,49 @@ static void check_under_sky(void) {
     box_release(&b);
 }
 
-/* d/d(walls' base colour) of sum (mean radiance - target)^2 at one sample per pixel: from two
- * independent estimates without bias, from one with. */
-static void check_loss(void) {
-    enum { PIXELS = 64, ROUNDS = 6000 };
-    struct box b;
-    box_init(&b);
-    box_build(&b);
-    struct path_settings settings = {.max_depth = 3, .roulette_depth = 99, .seed = 23};
-    struct path_batch *batch[2] = {path_batch_new(PIXELS, 3), path_batch_new(PIXELS, 3)};
-    struct gradient_log *log = gradient_log_new(3);
-    const struct parameter walls = {"walls", SEGMENT_COLOR, 0, true, 3};
-    const float target = 0.4f;
-    double mean[PIXELS][3] = {{0}}, slope[PIXELS][3] = {{0}};
-    double two = 0.0, two_square = 0.0, one = 0.0, one_square = 0.0;
+/* --- the loss of two estimates ---------------------------------------------------------------- */
+
+enum { PIXELS = 64, ROUNDS = 6000, SLOPE_PARTS = 48, LOSS_DEPTH = 3 };
+static const float target = 0.4f;
+static const struct parameter walls = {"walls", SEGMENT_COLOR, 0, true, LOSS_DEPTH};
+
+struct loss_rig {
+    struct box box;
+    struct path_batch *batch[2]; /* of the two estimates */
+    struct gradient_log *log;
+    double mean[PIXELS][3];      /* radiance */
+};
+
+/* A mean over the rounds, with what its standard error is made of. */
+struct estimate {
+    double mean, square;
+};
+
+static void estimate_add(struct estimate *e, double value) {
+    e->mean += value / ROUNDS;
+    e->square += value * value / ROUNDS;
+}
+
+static double estimate_error(const struct estimate *e) {
+    return sqrt((e->square - e->mean * e->mean) / ROUNDS);
+}
+
+static void trace_keys(struct loss_rig *rig, int batch, const struct ray *ray, const struct path_key *key,
+                       rgb *radiance) {
+    const struct path_settings settings = {.max_depth = LOSS_DEPTH, .roulette_depth = 99, .seed = 23};
+    path_batch_trace(rig->batch[batch], &rig->box.world, &settings, PIXELS, ray, key, radiance);
+}
+
+/* The derivative by the walls' base colour of the batch's radiances times `adjoint`. */
+static double walk_back(struct loss_rig *rig, int batch, const rgb *adjoint) {
+    gradient_log_clear(rig->log);
+    path_batch_backward(rig->batch[batch], &rig->box.world, adjoint, rig->log);
+    return read_log(rig->log, &walls);
+}
+
+/* The gradient from two halves of one sample a pixel, each with the other's residual (`two`) or with
+ * its own (`one`). */
+static void measure_estimates(struct loss_rig *rig, struct estimate *two, struct estimate *one) {
     for (uint32_t round = 0; round < ROUNDS; round++) {
         struct ray ray[PIXELS];
         struct path_key key[PIXELS];
@@ -222,67 +255,68 @@ static void check_loss(void) {
                 ray[i] = box_ray(i);
                 key[i] = (struct path_key){i, 2 * round + half, 0};
             }
-            path_batch_trace(batch[half], &b.world, &settings, PIXELS, ray, key, radiance[half]);
+            trace_keys(rig, (int)half, ray, key, radiance[half]);
         }
-        double value[2];
-        for (int both = 0; both < 2; both++) { /* 0: each half with the other's residual; 1: its own */
-            value[both] = 0.0;
+        for (int own = 0; own < 2; own++) {
+            double value = 0.0;
             for (int half = 0; half < 2; half++) {
                 for (int i = 0; i < PIXELS; i++) {
-                    rgb from = radiance[both == 0 ? 1 - half : half][i];
+                    rgb from = radiance[own ? half : 1 - half][i];
                     adjoint[i] = (rgb){from.r - target, from.g - target, from.b - target};
                 }
-                gradient_log_clear(log);
-                path_batch_backward(batch[half], &b.world, adjoint, log);
-                value[both] += read_log(log, &walls);
+                value += walk_back(rig, half, adjoint);
             }
+            estimate_add(own ? one : two, value);
         }
-        two += value[0] / ROUNDS;
-        two_square += value[0] * value[0] / ROUNDS;
-        one += value[1] / ROUNDS;
-        one_square += value[1] * value[1] / ROUNDS;
-        /* The truth: mean radiance and mean slope, each pixel and channel apart. */
         for (int i = 0; i < PIXELS; i++) {
-            mean[i][0] += (double)radiance[0][i].r / ROUNDS;
-            mean[i][1] += (double)radiance[0][i].g / ROUNDS;
-            mean[i][2] += (double)radiance[0][i].b / ROUNDS;
+            rig->mean[i][0] += (double)radiance[0][i].r / ROUNDS;
+            rig->mean[i][1] += (double)radiance[0][i].g / ROUNDS;
+            rig->mean[i][2] += (double)radiance[0][i].b / ROUNDS;
         }
     }
-    /* Slopes by pixel, from batches of one pixel many times over. */
+}
+
+/* The derivative of one channel of a pixel's radiance, by many samples of that pixel. */
+static double measure_slope(struct loss_rig *rig, uint32_t pixel, int channel) {
+    struct ray ray[PIXELS];
+    struct path_key key[PIXELS];
     rgb radiance[PIXELS], adjoint[PIXELS];
-    for (uint32_t i = 0; i < PIXELS; i++) {
-        struct ray ray[PIXELS];
-        struct path_key key[PIXELS];
-        for (uint32_t part = 0; part < 48; part++) {
-            for (uint32_t k = 0; k < PIXELS; k++) {
-                ray[k] = box_ray(i);
-                key[k] = (struct path_key){i, 100000, part * PIXELS + k};
-            }
-            path_batch_trace(batch[0], &b.world, &settings, PIXELS, ray, key, radiance);
-            for (int c = 0; c < 3; c++) {
-                for (int k = 0; k < PIXELS; k++)
-                    adjoint[k] = (rgb){c == 0, c == 1, c == 2};
-                gradient_log_clear(log);
-                path_batch_backward(batch[0], &b.world, adjoint, log);
-                slope[i][c] += read_log(log, &walls) / (48.0 * PIXELS);
-            }
+    double sum = 0.0;
+    for (uint32_t part = 0; part < SLOPE_PARTS; part++) {
+        for (uint32_t k = 0; k < PIXELS; k++) {
+            ray[k] = box_ray(pixel);
+            key[k] = (struct path_key){pixel, 100000, part * PIXELS + k};
+            adjoint[k] = (rgb){channel == 0, channel == 1, channel == 2};
         }
+        trace_keys(rig, 0, ray, key, radiance);
+        sum += walk_back(rig, 0, adjoint) / (SLOPE_PARTS * PIXELS);
     }
+    return sum;
+}
+
+/* d/d(walls' base colour) of sum (mean radiance - target)^2 at one sample per pixel: from two
+ * independent estimates without bias, from one with. */
+static void check_loss(void) {
+    struct loss_rig rig = {.batch = {path_batch_new(PIXELS, LOSS_DEPTH), path_batch_new(PIXELS, LOSS_DEPTH)},
+                           .log = gradient_log_new(3)};
+    struct estimate two = {0}, one = {0};
+    box_init(&rig.box);
+    box_build(&rig.box);
+    measure_estimates(&rig, &two, &one);
     double truth = 0.0;
-    for (int i = 0; i < PIXELS; i++)
+    for (uint32_t i = 0; i < PIXELS; i++)
         for (int c = 0; c < 3; c++)
-            truth += 2.0 * (mean[i][c] - (double)target) * slope[i][c];
-    double two_error = sqrt((two_square - two * two) / ROUNDS);
-    double one_error = sqrt((one_square - one * one) / ROUNDS);
-    printf("squared loss: truth %.4f; two estimates %.4f +- %.4f; one %.4f +- %.4f\n", truth, two,
-           two_error, one, one_error);
+            truth += 2.0 * (rig.mean[i][c] - (double)target) * measure_slope(&rig, i, c);
+    double two_error = estimate_error(&two), one_error = estimate_error(&one);
+    printf("squared loss: truth %.4f; two estimates %.4f +- %.4f; one %.4f +- %.4f\n", truth, two.mean,
+           two_error, one.mean, one_error);
     double slack = 0.01 * fabs(truth); /* of the truth's own sampling */
-    CHECK(fabs(two - truth) < 3.5 * two_error + slack);
-    CHECK(fabs(one - truth) > 8.0 * one_error + slack);
-    gradient_log_free(log);
-    path_batch_free(batch[0]);
-    path_batch_free(batch[1]);
-    box_release(&b);
+    CHECK(fabs(two.mean - truth) < 3.5 * two_error + slack);
+    CHECK(fabs(one.mean - truth) > 8.0 * one_error + slack);
+    gradient_log_free(rig.log);
+    path_batch_free(rig.batch[0]);
+    path_batch_free(rig.batch[1]);
+    box_release(&rig.box);
 }
 
 int main(void) {

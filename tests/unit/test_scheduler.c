@@ -68,6 +68,38 @@ static int check_surroundings(const char *dir) {
     return bad;
 }
 
+/* Says what no honest worker would: no JSON, too much of it, files that are not there, not its own or
+ * of another size. An exit status where it cannot even lie. */
+static int lie(struct progress *p, const char *dir) {
+    static const char garbage[] = "\n{\"type\":\n[1,2]\n\"x\"\nnull\n{}\n{\"type\":7}\n\xff\xfe\n"
+                                  "{\"type\":\"progress\",\"stage\":3}\n";
+    if (write(PROGRESS_FD, garbage, sizeof garbage - 1) < 0)
+        return 98;
+    char *huge = mem_alloc(300000);
+    memset(huge, 'x', 300000);
+    huge[299999] = '\n';
+    for (size_t at = 0; at < 300000;) {
+        ssize_t wrote = write(PROGRESS_FD, huge + at, 300000 - at);
+        if (wrote < 0)
+            return 97;
+        at += (size_t)wrote;
+    }
+    mem_free(huge);
+    char *order = file_join(dir, "job.json");
+    struct stat info;
+    if (stat(order, &info) != 0)
+        return 93;
+    mem_free(order);
+    announce(p, dir, "a.txt", "../job.json", (uint64_t)info.st_size);
+    announce(p, dir, "a.txt", "missing.txt", 4);
+    announce(p, dir, "a.txt", "a.txt", 5);
+    char *link = mem_printf("%s/out/link.txt", dir);
+    if (symlink("a.txt", link) == 0)
+        progress_file(p, "output", "link.txt", 5, SCENE_A, "text/plain");
+    mem_free(link);
+    return 0;
+}
+
 static int play(const char *role, const char *dir, int attempt) {
     struct progress p = {PROGRESS_FD};
     signal(SIGTERM, on_term);
@@ -113,32 +145,9 @@ static int play(const char *role, const char *dir, int attempt) {
         return bad ? PROGRESS_EXIT_INPUT : 0;
     }
     if (strcmp(role, "liar") == 0) {
-        static const char garbage[] = "\n{\"type\":\n[1,2]\n\"x\"\nnull\n{}\n{\"type\":7}\n\xff\xfe\n"
-                                      "{\"type\":\"progress\",\"stage\":3}\n";
-        if (write(PROGRESS_FD, garbage, sizeof garbage - 1) < 0)
-            return 98;
-        char *huge = mem_alloc(300000);
-        memset(huge, 'x', 300000);
-        huge[299999] = '\n';
-        for (size_t at = 0; at < 300000;) {
-            ssize_t wrote = write(PROGRESS_FD, huge + at, 300000 - at);
-            if (wrote < 0)
-                return 97;
-            at += (size_t)wrote;
-        }
-        mem_free(huge);
-        char *order = file_join(dir, "job.json");
-        struct stat info;
-        if (stat(order, &info) != 0)
-            return 93;
-        mem_free(order);
-        announce(&p, dir, "a.txt", "../job.json", (uint64_t)info.st_size);
-        announce(&p, dir, "a.txt", "missing.txt", 4);
-        announce(&p, dir, "a.txt", "a.txt", 5);
-        char *link = mem_printf("%s/out/link.txt", dir);
-        if (symlink("a.txt", link) == 0)
-            progress_file(&p, "output", "link.txt", 5, SCENE_A, "text/plain");
-        mem_free(link);
+        int bad = lie(&p, dir);
+        if (bad)
+            return bad;
     }
     progress_stage(&p, "prepare");
     progress_step(&p, "refine", 3, 4, 1.5);

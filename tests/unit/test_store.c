@@ -193,22 +193,28 @@ static void test_reconcile(void) {
 
 /* --- jobs -------------------------------------------------------------------------------------- */
 
-static void test_queue(void) {
-    char *dir = fresh_dir();
+/* What the checks of the queue hand on to each other. */
+struct queue {
     struct store *store;
-    bool existed, replayed;
+    int64_t low, old, young; /* running; by priority -1, 1, 1 */
+    int64_t id;              /* waits */
+};
+
+static void check_order(struct queue *q) {
+    struct store *store = q->store;
+    bool existed;
     int64_t next = 0, ids[8];
     enum job_wanted wanted[8];
     size_t count;
     int attempt;
-    OK(store_open(&store, dir, &err));
     IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
     add_ready_scene(store, SCENE_A);
     OK(store_scene_add(store, SCENE_B, "unchecked", 1, 0, &existed, &err));
     int64_t waits = add_job(store, SCENE_B, 100);
-    int64_t low = add_job(store, SCENE_A, -1), old = add_job(store, SCENE_A, 1);
-    int64_t young = add_job(store, SCENE_A, 1);
-    int64_t order[] = {old, young, low};
+    q->low = add_job(store, SCENE_A, -1);
+    q->old = add_job(store, SCENE_A, 1);
+    q->young = add_job(store, SCENE_A, 1);
+    int64_t order[] = {q->old, q->young, q->low};
     for (size_t i = 0; i < 3; i++) {
         OK(store_job_next(store, 0, &next, &err));
         CHECK(next == order[i]);
@@ -218,69 +224,90 @@ static void test_queue(void) {
     OK(store_scene_reject(store, SCENE_B, "[]", &err));
     OK(store_job_next(store, 0, &next, &err));
     CHECK(next == waits);
-    OK(store_job_pause(store, young, &err));
+    OK(store_job_pause(store, q->young, &err));
     OK(store_job_running(store, 8, ids, wanted, &count, &err));
-    CHECK(count == 3 && ids[0] == low && wanted[2] == JOB_WANT_PAUSE && wanted[0] == JOB_WANT_RUN);
+    CHECK(count == 3 && ids[0] == q->low && wanted[2] == JOB_WANT_PAUSE && wanted[0] == JOB_WANT_RUN);
+}
 
-    /* Limits, unknown and rejected scenes. */
+/* Limits, keys, unknown and rejected scenes. */
+static void check_adding(struct queue *q) {
     struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
                           .max_attempts = 3, .idempotency_key = "k1", .request_sha256 = "r1"};
-    int64_t id, again;
-    IS(store_job_add(store, &new, 1, &id, &replayed, &err), STATUS_LIMIT);
-    OK(store_job_add(store, &new, 2, &id, &replayed, &err));
+    bool replayed;
+    int64_t again;
+    IS(store_job_add(q->store, &new, 1, &q->id, &replayed, &err), STATUS_LIMIT);
+    OK(store_job_add(q->store, &new, 2, &q->id, &replayed, &err));
     CHECK(!replayed);
     /* The same key answers with the same job, even when the queue is full. */
-    OK(store_job_add(store, &new, 1, &again, &replayed, &err));
-    CHECK(replayed && again == id);
+    OK(store_job_add(q->store, &new, 1, &again, &replayed, &err));
+    CHECK(replayed && again == q->id);
     new.request_sha256 = "r2";
-    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
+    IS(store_job_add(q->store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
     new.idempotency_key = NULL;
     new.scene_id = SCENE_B;
-    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
+    IS(store_job_add(q->store, &new, 100, &again, &replayed, &err), STATUS_CONFLICT);
     new.scene_id = "nothing";
-    IS(store_job_add(store, &new, 100, &again, &replayed, &err), STATUS_NOT_FOUND);
+    IS(store_job_add(q->store, &new, 100, &again, &replayed, &err), STATUS_NOT_FOUND);
+}
 
-    /* Edits. */
+static void check_edits(const struct queue *q) {
     struct job job;
-    OK(store_job_get(store, id, &job, &err));
+    OK(store_job_get(q->store, q->id, &job, &err));
     int64_t revision = job.revision;
     job_release(&job);
     struct job_patch patch = {.name = "new", .priority = INT_MIN, .shared = -1};
-    OK(store_job_patch(store, id, revision, &patch, &err));
+    OK(store_job_patch(q->store, q->id, revision, &patch, &err));
     patch.name = "newer";
-    IS(store_job_patch(store, id, revision, &patch, &err), STATUS_CONFLICT);
+    IS(store_job_patch(q->store, q->id, revision, &patch, &err), STATUS_CONFLICT);
     patch = (struct job_patch){.labels = "{\"a\":\"b\"}", .priority = 7, .shared = -1};
-    OK(store_job_patch(store, id, -1, &patch, &err));
-    OK(store_job_get(store, id, &job, &err));
+    OK(store_job_patch(q->store, q->id, -1, &patch, &err));
+    OK(store_job_get(q->store, q->id, &job, &err));
     CHECK_STRING(job.name, "new");
     CHECK_STRING(job.labels, "{\"a\":\"b\"}");
     CHECK(job.priority == 7 && job.revision == revision + 2);
     job_release(&job);
-    IS(store_job_patch(store, 999, -1, &patch, &err), STATUS_NOT_FOUND);
+    IS(store_job_patch(q->store, 999, -1, &patch, &err), STATUS_NOT_FOUND);
+}
 
-    /* Pages. */
+static void check_pages(const struct queue *q) {
     struct job jobs[3];
-    OK(store_job_list(store, NULL, -1, 0, 3, jobs, &count, &err));
-    CHECK(count == 3 && jobs[0].id == id && jobs[2].id == old);
+    size_t count;
+    OK(store_job_list(q->store, NULL, -1, 0, 3, jobs, &count, &err));
+    CHECK(count == 3 && jobs[0].id == q->id && jobs[2].id == q->old);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
-    OK(store_job_list(store, NULL, JOB_RUNNING, young, 3, jobs, &count, &err));
-    CHECK(count == 2 && jobs[0].id == old && jobs[1].id == low);
+    OK(store_job_list(q->store, NULL, JOB_RUNNING, q->young, 3, jobs, &count, &err));
+    CHECK(count == 2 && jobs[0].id == q->old && jobs[1].id == q->low);
     for (size_t i = 0; i < count; i++)
         job_release(&jobs[i]);
+}
 
-    IS(store_job_delete(store, young, &err), STATUS_CONFLICT);
-    OK(store_job_delete(store, id, &err));
-    IS(store_job_get(store, id, &job, &err), STATUS_NOT_FOUND);
-    CHECK(events_of(store, id) == 0);
-    int64_t fresh = add_job(store, SCENE_A, 0);
-    CHECK(fresh > id);
+static void check_removal(const struct queue *q) {
+    struct store *store = q->store;
     struct store_counts counts;
+    struct job job;
+    IS(store_job_delete(store, q->young, &err), STATUS_CONFLICT);
+    OK(store_job_delete(store, q->id, &err));
+    IS(store_job_get(store, q->id, &job, &err), STATUS_NOT_FOUND);
+    CHECK(events_of(store, q->id) == 0);
+    int64_t fresh = add_job(store, SCENE_A, 0);
+    CHECK(fresh > q->id);
     OK(store_count(store, &counts, &err));
     CHECK(counts.jobs_by_state[JOB_RUNNING] == 3 && counts.jobs_by_state[JOB_QUEUED] == 2);
     CHECK(counts.scenes_by_state[SCENE_REJECTED] == 1 && counts.attempts == 3);
-    OK(store_probe(store, &err));
-    store_close(store);
+}
+
+static void test_queue(void) {
+    char *dir = fresh_dir();
+    struct queue queue;
+    OK(store_open(&queue.store, dir, &err));
+    check_order(&queue);
+    check_adding(&queue);
+    check_edits(&queue);
+    check_pages(&queue);
+    check_removal(&queue);
+    OK(store_probe(queue.store, &err));
+    store_close(queue.store);
     drop_dir(dir);
 }
 
