@@ -78,27 +78,53 @@ static inline vec3 look_anywhere(int frame) {
     return spread(frame * 7 + 3, 0.0f);
 }
 
+/* What a mesh needs beside itself to be rendered. */
+struct model {
+    struct segments segments;
+    struct atlas atlas;
+    struct inverse_uv inverse;
+    struct materials materials;
+    struct world world;
+};
+
+/* Matt and of one grey, with nothing that emits; model_light is to follow. */
+static inline void model_init(struct model *m, const struct mesh *mesh, uint32_t texture_size, float gray,
+                              struct parallel *pool) {
+    struct error err = {0};
+    segments_from_object_id(&m->segments, mesh);
+    CHECK(atlas_make(&m->atlas, mesh, &m->segments, texture_size, 0.0f, &err) == STATUS_OK);
+    inverse_uv_make(&m->inverse, &m->atlas, mesh->triangle_count, pool);
+    materials_init(&m->materials, &m->inverse, OBJECTS, rgb_gray(gray), 1.0f, 0.0f);
+}
+
+static inline void model_light(struct model *m, const struct mesh *mesh, rgb lamp, const struct image *environment,
+                               struct parallel *pool) {
+    struct error err = {0};
+    m->materials.emission[LAMP] = lamp;
+    CHECK(world_init(&m->world, mesh, &m->segments, &m->atlas, &m->materials, environment, pool, &err) ==
+          STATUS_OK);
+}
+
+static inline void model_release(struct model *m) {
+    world_release(&m->world);
+    materials_release(&m->materials);
+    inverse_uv_release(&m->inverse);
+    atlas_release(&m->atlas);
+    segments_release(&m->segments);
+}
+
 /* Photographs of scene->mesh in its true colours by FRAMES cameras, which look at target(frame); every
  * fifth of them is held out. environment may be NULL. */
 static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct image *environment,
                                    vec3 target(int frame), struct parallel *pool) {
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials truth;
-    struct world world;
-    struct error err = {0};
-    segments_from_object_id(&segments, &scene->mesh);
-    CHECK(atlas_make(&atlas, &scene->mesh, &segments, 128, 0.0f, &err) == STATUS_OK);
-    inverse_uv_make(&inverse, &atlas, scene->mesh.triangle_count, pool);
-    materials_init(&truth, &inverse, OBJECTS, rgb_gray(0.5f), 1.0f, 0.0f);
-    for (size_t i = 0; i < inverse.valid_count; i++) {
-        uint32_t texel = inverse.valid[i];
-        rgb color = wall_color[segments.of_triangle[inverse.triangle[texel]]];
-        memcpy(truth.base_color.texel[texel], &color, sizeof color);
+    struct model truth;
+    model_init(&truth, &scene->mesh, 128, 0.5f, pool);
+    for (size_t i = 0; i < truth.inverse.valid_count; i++) {
+        uint32_t texel = truth.inverse.valid[i];
+        rgb color = wall_color[truth.segments.of_triangle[truth.inverse.triangle[texel]]];
+        memcpy(truth.materials.base_color.texel[texel], &color, sizeof color);
     }
-    truth.emission[LAMP] = lamp;
-    CHECK(world_init(&world, &scene->mesh, &segments, &atlas, &truth, environment, pool, &err) == STATUS_OK);
+    model_light(&truth, &scene->mesh, lamp, environment, pool);
     struct path_settings path = {.max_depth = 8, .roulette_depth = 5, .seed = 99};
     scene->photograph = mem_calloc(FRAMES, sizeof *scene->photograph);
     scene->photograph_count = FRAMES;
@@ -109,7 +135,7 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
         photo->name = mem_printf("frame %d", f);
         photo->camera = look(spread(f, 0.4f), target(f));
         struct image image;
-        film_render(&world, &photo->camera, 64, &path, (uint32_t)f, pool, &image);
+        film_render(&truth.world, &photo->camera, 64, &path, (uint32_t)f, pool, &image);
         photo->pixel = mem_array(WIDTH * HEIGHT, sizeof *photo->pixel);
         for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
             for (size_t c = 0; c < 3; c++)
@@ -117,11 +143,7 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
         }
         image_release(&image);
     }
-    world_release(&world);
-    materials_release(&truth);
-    inverse_uv_release(&inverse);
-    atlas_release(&atlas);
-    segments_release(&segments);
+    model_release(&truth);
 }
 
 static inline void make_scene(struct scene *scene, struct parallel *pool) {

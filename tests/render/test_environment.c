@@ -210,13 +210,20 @@ static void test_exposures(const struct scene *scene, bool only_long) {
     mem_free(sdr.photograph);
 }
 
-/* A few frames show something else in the same directions, brighter or darker: it changes little. */
-static void test_outliers(const struct scene *scene) {
+/* The same pixels under photographs of their own, whose claims a test may change; photograph[] is the
+ * caller's (mem_free). */
+static struct scene altered(const struct scene *scene) {
     struct scene other = *scene;
-    struct rig rig;
-    struct environment e;
     other.photograph = mem_array(scene->photograph_count, sizeof *other.photograph);
     memcpy(other.photograph, scene->photograph, scene->photograph_count * sizeof *other.photograph);
+    return other;
+}
+
+/* A few frames show something else in the same directions, brighter or darker: it changes little. */
+static void test_outliers(const struct scene *scene) {
+    struct scene other = altered(scene);
+    struct rig rig;
+    struct environment e;
     for (size_t f = 0; f < scene->photograph_count; f += 6)
         other.photograph[f].gain = rgb_gray(f % 12 == 0 ? 0.1f : 5.0f);
     rig_init(&rig, &other, 2);
@@ -233,11 +240,9 @@ static void test_outliers(const struct scene *scene) {
 
 /* Cameras turned by up to a pixel: light and frame mix at the window's rim, which speaks softly. */
 static void test_wrong_poses(const struct scene *scene) {
-    struct scene other = *scene;
+    struct scene other = altered(scene);
     struct rig rig;
     struct environment e;
-    other.photograph = mem_array(scene->photograph_count, sizeof *other.photograph);
-    memcpy(other.photograph, scene->photograph, scene->photograph_count * sizeof *other.photograph);
     for (size_t f = 0; f < scene->photograph_count; f++) {
         struct camera *c = &other.photograph[f].camera;
         c->cx += 2.0f * fmodf((float)f * 0.618f, 1.0f) - 1.0f; /* as good as a turn by as many pixels */
@@ -287,33 +292,20 @@ static double mean_variance(const struct world *world, const struct camera *came
  * the lamp keeps its share. */
 static void test_reach(struct parallel *pool, const struct image *sky) {
     struct mesh mesh;
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials materials;
-    struct world world;
-    struct error err;
+    struct model model;
     make_open_mesh(&mesh, 0.8f);
-    segments_from_object_id(&segments, &mesh);
-    CHECK(atlas_make(&atlas, &mesh, &segments, 64, 0.0f, &err) == STATUS_OK);
-    inverse_uv_make(&inverse, &atlas, mesh.triangle_count, pool);
-    materials_init(&materials, &inverse, OBJECTS, rgb_gray(0.6f), 1.0f, 0.0f);
-    materials.emission[LAMP] = rgb_gray(2.0f);
-    CHECK(world_init(&world, &mesh, &segments, &atlas, &materials, sky, pool, &err) == STATUS_OK);
+    model_init(&model, &mesh, 64, 0.6f, pool);
+    model_light(&model, &mesh, rgb_gray(2.0f), sky, pool);
     struct camera camera = look((vec3){3.5f, 1.5f, 2.8f}, (vec3){1, 1, 1.5f});
-    double with = mean_variance(&world, &camera, pool);
-    float chance = world.lights->environment_chance;
-    lights_set_environment(world.lights, sky, NULL);
-    double without = mean_variance(&world, &camera, pool);
+    double with = mean_variance(&model.world, &camera, pool);
+    float chance = model.world.lights->environment_chance;
+    lights_set_environment(model.world.lights, sky, NULL);
+    double without = mean_variance(&model.world, &camera, pool);
     printf("variance with the reach over without: %.3f; chance of the environment %.3f\n", with / without,
            (double)chance);
     CHECK_THAT(with < 0.7 * without, "%g of the variance", with / without);
-    CHECK(world.lights->environment_chance == 0.5f && chance > 0.05f && chance < 0.95f);
-    world_release(&world);
-    materials_release(&materials);
-    inverse_uv_release(&inverse);
-    atlas_release(&atlas);
-    segments_release(&segments);
+    CHECK(model.world.lights->environment_chance == 0.5f && chance > 0.05f && chance < 0.95f);
+    model_release(&model);
     mesh_release(&mesh);
 }
 
