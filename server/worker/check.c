@@ -51,10 +51,9 @@ enum status task_check(const struct order *order, struct progress *progress, str
             status = flush(order->dir, err);
         if (status == STATUS_OK)
             progress_scene(progress, bundle_facts(&scene));
-        if (status == STATUS_OK)
-            scene_release(&scene);
-        else
+        if (status != STATUS_OK)
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
+        scene_release(&scene);
     }
     cJSON_Delete(problems);
     parallel_free(pool);

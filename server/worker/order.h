@@ -31,10 +31,10 @@ struct order {
     const cJSON *settings;  /* object */
     int64_t job_id;
     int attempt;
+    double checkpoint_interval_sec;
     /* kind "deliver" */
     const char *url, *secret, *body, *message_id;
     bool allow_private;
-    double checkpoint_interval_sec;
 };
 
 enum status order_read(struct order *order, const char *dir, struct error *err);
