@@ -117,7 +117,7 @@ void field_print(struct client *c, const char *name, const char *value) {
     buf_init(&clean, 1 << 16);
     terminal_clean(&clean_name, name);
     terminal_clean(&clean, value);
-    fprintf(c->out.out, "%s%-14s%s %s\n", terminal_colour(&c->out, COLOUR_DIM), buf_text(&clean_name),
+    fprintf(c->out.out, "%s%-16s%s %s\n", terminal_colour(&c->out, COLOUR_DIM), buf_text(&clean_name),
             terminal_colour(&c->out, COLOUR_NONE), buf_text(&clean));
     buf_release(&clean);
     buf_release(&clean_name);

@@ -68,6 +68,7 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     struct reply reply;
     struct error err;
     struct buf path;
+    char kept[40];
     int code = CLIENT_OK;
     reply_init(&reply);
     buf_init(&path, 4096);
@@ -82,8 +83,12 @@ static int one(struct client *c, const struct collection *what, const char *id, 
         print_removed(c, what, id, reply.json, dry_run);
     else if (c->json)
         client_print_json(c, reply.json);
-    else if (verb == VERB_SHOW || !c->quiet)
+    else if (verb == VERB_SHOW)
         what->print_one(c, reply.json);
+    else if (!c->quiet) {
+        keeping_sentence(kept, reply.json);
+        printf("%s %.12s is %s\n", what->one, id, *kept ? kept : "kept until it is removed");
+    }
     buf_release(&path);
     reply_release(&reply);
     return code;

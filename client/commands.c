@@ -77,8 +77,9 @@ static const struct command table[] = {
      "is in the column `expires`.\n",
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes keep 3f2a91c0 --pin\n"
      "  unbake scenes rm 3f2a91c0 --dry-run\n", 0, ANY_NUMBER, collection_options, scenes_run},
-    {"uploads", "[show|keep|rm UPLOAD...]", "list uploads that can be resumed, show, keep or give them up",
-     "`unbake submit` of the same room goes on where an upload stopped.\n",
+    {"uploads", "[show|keep|rm UPLOAD...]", "list uploads, show, keep or give them up",
+     "`unbake submit` of the same room goes on where an upload stopped. One that is whole has become\n"
+     "a scene.\n",
      "  unbake uploads\n  unbake uploads keep 5f0c77d2a5e14b0e8f6f0c9f4b6f8d11 --keep-days 7\n", 0, ANY_NUMBER,
      collection_options, uploads_run},
     {"collect", "", "remove what has expired, now (admins)",

@@ -30,7 +30,7 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
     struct reply reply;
     struct error err;
     int code = CLIENT_OK;
-    char path[80];
+    char path[80], kept[40];
     reply_init(&reply);
     snprintf(path, sizeof path, "/v1/jobs/%lld%s", (long long)id, suffix);
     /* Only the members that are named change: whatever else did meanwhile stays. */
@@ -40,9 +40,12 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
         code = client_fail(c, &reply, &err);
     else if (c->json)
         client_print_json(c, reply.json);
-    else if (!c->quiet)
-        printf("job %lld is %s, priority %.0f: %s\n", (long long)id, member_text(reply.json, "state"),
-               member_number(reply.json, "priority", 0.0), member_text(reply.json, "name"));
+    else if (!c->quiet) {
+        keeping_sentence(kept, reply.json);
+        printf("job %lld is %s, priority %.0f%s%s: %s\n", (long long)id, member_text(reply.json, "state"),
+               member_number(reply.json, "priority", 0.0), *kept ? ", " : "", kept,
+               member_text(reply.json, "name"));
+    }
     reply_release(&reply);
     return code;
 }

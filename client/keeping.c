@@ -41,3 +41,10 @@ void keeping_text(char out[16], const cJSON *thing) {
     else if (!isnan(at))
         format_duration(out, fmax(at - (double)time(NULL), 0.0));
 }
+
+void keeping_sentence(char out[40], const cJSON *thing) {
+    char left[16];
+    keeping_text(left, thing);
+    snprintf(out, 40, "%s%s", !*left ? "" : is_pinned(thing) ? "kept for good" : "removed in ",
+             is_pinned(thing) ? "" : left);
+}

@@ -17,5 +17,7 @@ enum status keeping_describe(const struct options *o, cJSON *body, struct error 
 void keeping_text(char out[16], const cJSON *thing);
 /* The same in full: "never: pinned", or the time; borrowed. */
 const char *keeping_time(const cJSON *thing);
+/* "kept for good", "removed in 3d04h", or "". */
+void keeping_sentence(char out[40], const cJSON *thing);
 
 #endif

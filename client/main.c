@@ -50,7 +50,7 @@ static int check_words(struct client *c, const struct command *command, size_t c
         return CLIENT_OK;
     error_set(&err, STATUS_INPUT, "%s takes %s%s", command->name,
               *command->arguments ? command->arguments : "no further words",
-              count < command->words_min ? ", which is missing" : "");
+              count < command->words_min ? ", which is missing" : *command->arguments ? " and nothing more" : "");
     error_hint(&err, "`unbake %s --help` has an example", command->name);
     return client_fail(c, NULL, &err);
 }

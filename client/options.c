@@ -55,7 +55,7 @@ static enum status check_value(const struct option *option, const char *text, st
     if (option->kind == OPTION_SECONDS) {
         double value = strtod(text, &end);
         if (end == text || *end || !isfinite(value) || value < 0.0 || value > 1e9)
-            return error_set(err, STATUS_INPUT, "--%s takes a number of seconds, not \"%s\"",
+            return error_set(err, STATUS_INPUT, "--%s takes a number, 0 or more, not \"%s\"",
                              option->name, text);
     }
     return STATUS_OK;

@@ -15,7 +15,7 @@ enum option_kind {
     OPTION_TEXT,
     OPTION_LIST,   /* a text that may be given again and again */
     OPTION_WHOLE,  /* a whole number of at most 9 digits, may be negative */
-    OPTION_SECONDS /* a number of seconds, 0 or more */
+    OPTION_SECONDS /* a number of seconds (or what the help says), 0 or more */
 };
 
 struct option {

@@ -287,6 +287,8 @@ static enum status transport_failed(struct attempt *a, CURLcode code, const char
     error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);
     if (code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CACERT_BADFILE)
         return error_hint(err, "--ca FILE names the certificates to trust");
+    if (code == CURLE_SSL_CONNECT_ERROR)
+        return error_hint(err, "does it speak https, or should the URL begin with http://?");
     return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
 }
 

@@ -5,6 +5,8 @@
 #include <fcntl.h>
 #include <microhttpd.h>
 #include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -26,6 +28,7 @@
 #define LIBRARY_THREADS 4
 #define CLERK_THREADS 4
 #define POOL_BYTES ((size_t)64 << 10)  /* a connection's head and buffers; a larger head gets 431 */
+#define UNSENT_BYTES (256 << 10) /* of a reply that wait in the kernel for a slow reader */
 #define DRAIN_BYTES ((size_t)64 << 20) /* read and forgotten after a refusal, so that it is seen */
 
 /* One request on its way. Belongs to the library's thread but for the time that a clerk has it. */
@@ -432,6 +435,8 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
     struct listener *l = user;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         int fd = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+        int unsent = UNSENT_BYTES; /* megabytes each, otherwise */
+        setsockopt(fd, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
         *socket_context = guard_add(l->guard, fd);
     } else {
         guard_remove(l->guard, *socket_context);

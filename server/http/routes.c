@@ -104,7 +104,10 @@ static struct response *no_route(const struct request *r) {
     if (!*allow)
         return problem_full(r, 404, "there is nothing at this path",
                             "GET / and GET /openapi.json say what there is", NULL);
-    struct response *reply = problem(r, 405, "here only %s can be done", allow);
+    char detail[96];
+    snprintf(detail, sizeof detail, "here only %s can be done", allow);
+    bool is_other = r->method == METHOD_COUNT && strstr(allow, "POST");
+    struct response *reply = problem_full(r, 405, detail, is_other ? "curl -T sends PUT unless -X POST is given" : "", NULL);
     response_field(reply, "Allow", "%s", allow);
     return reply;
 }

@@ -95,8 +95,14 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
     struct scene_row row;
     enum status status = store_scene_get(store, scene_id, &row, err);
     if (status == STATUS_OK && row.state != SCENE_READY) {
-        error_set(err, STATUS_INPUT, "the scene %.12s was rejected", scene_id);
-        status = error_hint(err, "GET /v1/scenes/%.12s lists its problems.", scene_id);
+        cJSON *problems = cJSON_Parse(row.problems);
+        const char *first = cJSON_GetStringValue(
+            cJSON_GetObjectItemCaseSensitive(cJSON_GetArrayItem(problems, 0), "reason"));
+        error_set(err, STATUS_INPUT, "the scene %.12s was rejected%s%.300s", scene_id, first ? ": " : "",
+                  first ? first : "");
+        status = error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
+                            scene_id, scene_id);
+        cJSON_Delete(problems);
     }
     scene_row_release(&row);
     return status;

@@ -92,7 +92,8 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
         return error_set(err, STATUS_NOT_FOUND, "there is no scene %s", job->scene_id);
     if (state == SCENE_REJECTED) {
         error_set(err, STATUS_CONFLICT, "scene %s was rejected", job->scene_id);
-        return error_hint(err, "GET /v1/scenes/%.12s lists its problems.", job->scene_id);
+        return error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
+                          job->scene_id, job->scene_id);
     }
     status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?",
                      "n", (int)JOB_QUEUED);

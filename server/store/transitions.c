@@ -211,6 +211,8 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
         return status;
     if (!job_is_terminal(now.state) || (now.state == JOB_SUCCEEDED && !from))
         status = forbidden(&now, "retried", err);
+    if (status == STATUS_CONFLICT && now.state == JOB_SUCCEEDED)
+        error_hint(err, "name the stage to do anew (retry --from STAGE), or extend it");
     if (status == STATUS_OK)
         status = revive(store, &now, max_attempts, err);
     if (status == STATUS_OK)

@@ -18,6 +18,14 @@ for library in $libraries; do
     grep -qw -- "$library" deploy/Dockerfile || fail "deploy/Dockerfile lacks $library"
 done
 
+# --- what the programs load is what the container's second stage has ---
+runtime=$(sed -n '/^FROM debian:12-slim$/,$p' deploy/Dockerfile)
+for library in $(objdump -p "$build/unbaked" "$build/unbake" 2>/dev/null | awk '$1 == "NEEDED" && $2 !~ /^lib(c|m)\.so/ {print $2}' | sort -u); do
+    file=$(ldconfig -p | awk -v name="$library" '$1 == name {print $NF; exit}')
+    package=$(dpkg-query -S "$file" 2>/dev/null || dpkg-query -S "$(realpath "$file")" 2>/dev/null) || continue
+    grep -qw -- "${package%%:*}" <<<"$runtime" || fail "deploy/Dockerfile's second stage lacks ${package%%:*} ($library)"
+done
+
 # --- installing ---
 make -s install B="$build" PREFIX=/usr ZSH_COMPLETIONS=/usr/share/zsh/vendor-completions DESTDIR="$work/root" \
     >"$work/out" 2>&1 || fail "make install: $(tail -n 5 "$work/out")"

@@ -52,7 +52,8 @@ call POST /v1/uploads -H "$tus" -H 'Upload-Length: 100'; upload=$(header locatio
 run 0 uploads keep "${upload##*/}" --keep-days 2 --json; so '.expires_at != null and .pinned == false'
 change "$upload" '{"expires_at":"2020-01-01T00:00:00Z"}'; expect 200
 run 0 collect --dry-run --json; so '(.items | map(.kind)) == ["upload", "scene"]'
-run 0 uploads keep "${upload##*/}" --pin; has "$out" "never: pinned"
+run 0 uploads keep "${upload##*/}" --pin; has "$out" "kept for good"
+run 0 uploads show "${upload##*/}"; has "$out" "never: pinned"
 run 0 uploads; has "$out" pinned
 call HEAD "$upload" -H "$tus"; expect 200; equal "$(header upload-expires)" ""
 for wrong in '{"expires_at":5}' '{"pinned":1}' '{"name":"x"}'; do
