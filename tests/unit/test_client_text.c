@@ -112,8 +112,8 @@ static void test_options(void) {
         {"--name", "--name needs a value: --name NAME", ""},
         {"--priority=1.5", "--priority takes a whole number, not \"1.5\"", ""},
         {"--priority=99999999999", "--priority takes a whole number, not \"99999999999\"", ""},
-        {"--retry=-1", "--retry takes a number of seconds, not \"-1\"", ""},
-        {"--retry=nan", "--retry takes a number of seconds, not \"nan\"", ""},
+        {"--retry=-1", "--retry takes a number, 0 or more, not \"-1\"", ""},
+        {"--retry=nan", "--retry takes a number, 0 or more, not \"nan\"", ""},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK(parse(&o, &err, 1, &bad[i].word) == STATUS_INPUT);
