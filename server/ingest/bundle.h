@@ -42,7 +42,4 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
                         struct parallel *pool, struct scene *scene, cJSON *problems,
                         struct error *err);
 
-/* What a scene holds, for its `facts`: counts, bounds, exposures, warnings; the caller's. */
-cJSON *bundle_facts(const struct scene *scene);
-
 #endif

@@ -10,6 +10,7 @@
 #include "common/mem.h"
 #include "common/parallel.h"
 #include "server/ingest/bundle.h"
+#include "server/ingest/facts.h"
 #include "server/worker/tasks.h"
 
 static enum status flush(const char *dir, struct error *err) {
@@ -50,7 +51,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
         if (status == STATUS_OK)
             status = flush(order->dir, err);
         if (status == STATUS_OK)
-            progress_scene(progress, bundle_facts(&scene));
+            progress_scene(progress, facts_of(&scene));
         if (status != STATUS_OK)
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
         scene_release(&scene);

@@ -1,5 +1,6 @@
 /* test_bundle.c -- a whole bundle: transforms.json as it comes, beside a mesh and two pictures. */
 #include "server/ingest/bundle.h"
+#include "server/ingest/facts.h"
 
 #include <sys/stat.h>
 
@@ -60,7 +61,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MUST((status == STATUS_OK) == (cJSON_GetArraySize(problems) == 0));
     if (status == STATUS_OK) {
         MUST(scene.photograph_count > 0);
-        cJSON *facts = bundle_facts(&scene);
+        cJSON *facts = facts_of(&scene);
         check_json(facts);
         cJSON_Delete(facts);
     } else {

@@ -1,6 +1,7 @@
 /* Bundles: a small good one in several shapes, a table of bad ones that must each name the file
  * and the place, and the real rooms. */
 #include "server/ingest/bundle.h"
+#include "server/ingest/facts.h"
 
 #include <sys/stat.h>
 #include <zlib.h>
@@ -97,7 +98,7 @@ static void test_good(void) {
     CHECK_NEAR(depth_m, 2.0, 1e-6);
     CHECK_NEAR(x, 4.0 + 7.0 * 0.1, 1e-5);
     CHECK_NEAR(y, 3.0 - 7.5 * 0.05, 1e-5);
-    cJSON *facts = bundle_facts(&scene);
+    cJSON *facts = facts_of(&scene);
     CHECK(cJSON_GetObjectItem(facts, "frame_count")->valueint == 3);
     CHECK(cJSON_GetObjectItem(facts, "hdr_count")->valueint == 2);
     CHECK(cJSON_GetObjectItem(cJSON_GetObjectItem(facts, "exposure"), "unknown_count")->valueint == 1);
@@ -502,7 +503,7 @@ static void test_real(const char *root, const char *room, const char *transforms
     enum status status = bundle_load(dir, transforms, &limits, pool, &scene, problems, &err);
     CHECK_THAT(status == STATUS_OK, "%s: %s", room, err.message);
     if (status == STATUS_OK) {
-        cJSON *facts = bundle_facts(&scene);
+        cJSON *facts = facts_of(&scene);
         char *text = json_text(facts);
         printf("%s %s: %s\n", room, transforms ? transforms : "", text);
         CHECK(scene.photograph_count >= frames && scene.mesh.triangle_count >= triangles);

@@ -1,0 +1,11 @@
+/* facts.h -- what a scene holds, as the service tells it. */
+#ifndef UNBAKE_INGEST_FACTS_H
+#define UNBAKE_INGEST_FACTS_H
+
+#include "common/json.h"
+#include "server/scene/scene.h"
+
+/* An object: counts of the mesh and the photographs, bounds, exposures, warnings; the caller's. */
+cJSON *facts_of(const struct scene *scene);
+
+#endif
