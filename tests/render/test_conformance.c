@@ -114,17 +114,24 @@ int main(void) {
     room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", NULL, 0, NULL, 0);
     room_camera("conformance/room_transforms.json", "primal_all.exr", &camera);
 
-    struct estimate direct = {.room = &room, .camera = &camera, .settings = {2, 99, 11}};
+    struct estimate direct = {.room = &room,
+                              .camera = &camera,
+                              .settings = {.max_depth = 2, .roulette_depth = 99, .seed = 11}};
     run(&direct);
     compare(&direct, PRIMAL, "primal_direct");
     finish(&direct);
 
-    struct estimate all = {.room = &room, .camera = &camera, .settings = {32, 6, 12}};
+    struct estimate all = {.room = &room,
+                           .camera = &camera,
+                           .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 12}};
     run(&all);
     compare(&all, PRIMAL, "primal_all");
     finish(&all);
 
-    struct estimate d = {.room = &room, .camera = &camera, .settings = {9, 99, 13}, .derivatives = true};
+    struct estimate d = {.room = &room,
+                         .camera = &camera,
+                         .settings = {.max_depth = 9, .roulette_depth = 99, .seed = 13},
+                         .derivatives = true};
     run(&d);
     compare(&d, BASE_LEFT, "d_base_color_left");
     compare(&d, BASE_TALL, "d_base_color_tall");
@@ -143,7 +150,9 @@ int main(void) {
     room_read_image("hdri/lythwood_room_1k.hdr", &sky);
     room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", (int[]){1, 8}, 2,
               &sky, 0);
-    struct estimate open = {.room = &room, .camera = &camera, .settings = {32, 6, 14}};
+    struct estimate open = {.room = &room,
+                            .camera = &camera,
+                            .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 14}};
     run(&open);
     compare(&open, PRIMAL, "primal_env");
     finish(&open);
