@@ -96,7 +96,7 @@ static void walk_backwards(void *self, size_t chunk, struct look_batch *b) {
     struct listing1 *l = self;
     gradient_log_clear(l->log[chunk]);
     if (b->look_count > 0)
-        path_batch_backward(b->paths, &l->o->r->world, b->d_radiance, l->log[chunk]);
+        path_batch_backward(b->paths, b->d_radiance, l->log[chunk]);
 }
 
 static void iterate(void *self, double fraction) {

@@ -87,7 +87,7 @@ struct shade_block {
     struct lanes3 light_corner, light_edge1, light_edge2, radiance;
     float light_density[LANES];      /* by area */
     struct lanes3 light_direction;   /* world */
-    float light_distance[LANES], light_pdf[LANES];
+    float light_pdf[LANES];
     /* Results: rays to trace. */
     struct lanes3 shadow_origin, shadow_direction;
     float shadow_far[LANES];

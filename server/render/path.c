@@ -53,7 +53,7 @@ struct shadow {
 };
 
 struct path_batch {
-    size_t capacity, count;
+    size_t capacity;
     int max_depth, depth_count;       /* depths used by the last trace */
     bool ended;                       /* vertices of the last depth used do not scatter */
     size_t vertex_count[MAX_DEPTH];
@@ -219,13 +219,12 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
         find_rows(s, world->guide, count);
     for (int i = 0; i < count; i++) {
         if (s->pick[i] < lights->environment_chance)
-            continue;
-        float pick = lights_rescale(lights, s->pick[i]);
+            continue; /* see sample_environment */
         if (!world->guide) {
             load_light(s, v, i, lights_pick(lights, s->pick[i]));
             continue;
         }
-        float factor;
+        float pick = lights_rescale(lights, s->pick[i]), factor;
         uint32_t entry = guide_pick(world->guide, lights, s->guide_row[i], pick, &factor);
         load_light(s, v, i, &lights->triangle[entry]);
         s->light_density[i] *= factor;
@@ -409,7 +408,6 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
         b->ray[i] = (struct accel_ray){ray[i].origin, 0.0f, ray[i].direction, INFINITY};
         radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
     }
-    b->count = count;
     b->depth_count = 0;
     b->flight_count = count;
     for (int depth = 0; depth < settings->max_depth && b->flight_count > 0; depth++) {
@@ -488,9 +486,7 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
     }
 }
 
-void path_batch_backward(struct path_batch *b, const struct world *world, const rgb *d_radiance,
-                         struct gradient_log *log) {
-    (void)world; /* all that it has to say was kept with the vertices */
+void path_batch_backward(struct path_batch *b, const rgb *d_radiance, struct gradient_log *log) {
     for (int depth = b->depth_count - 1; depth >= 0; depth--) {
         size_t count = b->vertex_count[depth];
         gradient_log_reserve(log, count);

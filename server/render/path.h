@@ -56,10 +56,9 @@ void path_batch_trace(struct path_batch *batch, const struct world *world,
                       const struct path_key *key, rgb *radiance);
 
 /* Appends to `log` the derivatives for d_radiance[count], the loss's derivative by each ray's
- * radiance, of the paths that path_batch_trace left in the batch. Materials must not have changed
- * in between. */
-void path_batch_backward(struct path_batch *batch, const struct world *world,
-                         const rgb *d_radiance, struct gradient_log *log);
+ * radiance, of the paths that path_batch_trace left in the batch, with the materials as they were
+ * then. */
+void path_batch_backward(struct path_batch *batch, const rgb *d_radiance, struct gradient_log *log);
 
 /* Calls tap(user, shadow, count, ray) before each group of rays is traced; shadow tells rays that
  * only ask whether anything is in the way. For benches that measure the same rays elsewhere. */

@@ -63,7 +63,7 @@ static void backward_chunk(void *user, size_t index, int thread) {
     for (size_t i = first; i < first + count; i++)
         w->radiance[i] = rgb_gray(rng_to_float(rng_mix32((uint32_t)(i / SPP))) / SPP);
     gradient_log_clear(w->log[index]);
-    path_batch_backward(w->batch[thread], &w->room->world, w->radiance + first, w->log[index]);
+    path_batch_backward(w->batch[thread], w->radiance + first, w->log[index]);
 }
 
 static double round_sec(struct work *w, struct moments *m) {

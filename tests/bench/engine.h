@@ -60,7 +60,7 @@ static inline void trace_chunk(void *user, size_t index, int thread) {
                      w->key + first, w->radiance + first);
     if (w->backward) {
         gradient_log_clear(w->log[index]);
-        path_batch_backward(w->batch[thread], &w->room->world, w->radiance + first, w->log[index]);
+        path_batch_backward(w->batch[thread], w->radiance + first, w->log[index]);
     }
 }
 

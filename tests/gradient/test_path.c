@@ -103,7 +103,7 @@ static void check_parameter(struct box *b, const struct parameter *p) {
     for (uint32_t g = 0; g < groups; g++) {
         trace(batch, b, &settings, g, radiance);
         gradient_log_clear(log);
-        path_batch_backward(batch, &b->world, one, log);
+        path_batch_backward(batch, one, log);
         double ours = read_log(log, p);
         nudge(b, p, h);
         double up = trace(batch, b, &settings, g, radiance);
@@ -135,7 +135,7 @@ static void check_dark_emission(struct box *b) {
     for (int i = 0; i < BATCH; i++)
         one[i] = (rgb){1.0f, 1.0f, 1.0f};
     trace(batch, b, &settings, 0, radiance);
-    path_batch_backward(batch, &b->world, one, log);
+    path_batch_backward(batch, one, log);
     CHECK(log->segment[1].d_emission[0] > 0.0);
     gradient_log_free(log);
     path_batch_free(batch);
@@ -239,7 +239,7 @@ static void trace_keys(struct loss_rig *rig, int batch, const struct ray *ray, c
 /* The derivative by the walls' base colour of the batch's radiances times `adjoint`. */
 static double walk_back(struct loss_rig *rig, int batch, const rgb *adjoint) {
     gradient_log_clear(rig->log);
-    path_batch_backward(rig->batch[batch], &rig->box.world, adjoint, rig->log);
+    path_batch_backward(rig->batch[batch], adjoint, rig->log);
     return read_log(rig->log, &walls);
 }
 

@@ -75,7 +75,7 @@ static void estimate_pixel(void *user, size_t pixel, int thread) {
             for (int i = 0; i < GROUP_SPP; i++)
                 adjoint[i] = (rgb){channel == 0, channel == 1, channel == 2};
             gradient_log_clear(log);
-            path_batch_backward(batch, &e->room->world, adjoint, log);
+            path_batch_backward(batch, adjoint, log);
             read_log(log, channel, value);
         }
         for (int p = 0; p < PICTURES; p++) {

@@ -161,7 +161,7 @@ static void work_chunk(void *user, size_t index, int thread) {
     }
     path_batch_trace(w->batch[thread], &w->box->world, &settings, CHUNK_PATHS, ray, key, radiance);
     gradient_log_clear(w->log[index]);
-    path_batch_backward(w->batch[thread], &w->box->world, radiance, w->log[index]);
+    path_batch_backward(w->batch[thread], radiance, w->log[index]);
 }
 
 static void check_threads(void) {
