@@ -324,7 +324,10 @@ int daemon_command(int argc, char **argv) {
     size_t count;
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
     if (code < 0 && in.word_count > 0) {
-        fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
+        if (command_find(in.words[0]))
+            fprintf(stderr, "unbaked: a command goes before its options: unbaked %s ...\n", in.words[0]);
+        else
+            fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
         code = EXIT_USAGE;
     } else if (code < 0 && invocation_has(&in, "--help")) {
         command_help(command_table(&count), stdout);

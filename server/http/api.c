@@ -22,34 +22,12 @@
 #define RESERVE_BYTES ((uint64_t)16 << 20)
 #define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
 
-static bool has_row(struct store *store, const char *folder, const char *name) {
-    enum status status;
-    int64_t id;
-    if (strcmp(folder, "uploads") == 0) {
-        struct upload_row row;
-        status = store_upload_get(store, name, &row, NULL, 0, NULL);
-        bool is_finished = status == STATUS_OK && *row.scene_id; /* its file is elsewhere */
-        upload_row_release(&row);
-        return status != STATUS_NOT_FOUND && !is_finished;
-    }
-    if (strcmp(folder, "jobs") == 0) {
-        struct job job;
-        if (!field_number(name, 1, INT64_MAX, &id))
-            return false;
-        status = store_job_get(store, id, &job, NULL);
-        if (status == STATUS_OK)
-            job_release(&job);
-    } else {
-        struct scene_row row;
-        status = store_scene_get(store, name, &row, NULL);
-        if (status == STATUS_OK)
-            scene_row_release(&row);
-    }
-    return status != STATUS_NOT_FOUND; /* in doubt, keep the files */
-}
+static const char *const folders[] = {
+    [STORE_FILES_SCENE] = "scenes", [STORE_FILES_JOB] = "jobs", [STORE_FILES_UPLOAD] = "uploads"};
 
-/* Removes what is in DATA/folder: all of it, or what the store has no row for. */
-static enum status sweep(const struct api *api, const char *folder, bool keep_known, struct error *err) {
+/* Removes what is in DATA/folder: all of it, or (kind not NULL) what the store has no row for. */
+static enum status sweep(const struct api *api, const char *folder, const enum store_files *kind,
+                         struct error *err) {
     char *path = file_join(api->config.data_dir, folder);
     enum status status = file_make_dirs(path, err);
     DIR *dir = status == STATUS_OK ? opendir(path) : NULL;
@@ -58,7 +36,7 @@ static enum status sweep(const struct api *api, const char *folder, bool keep_kn
     struct dirent *entry;
     while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
         if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 ||
-            (keep_known && has_row(api->store, folder, entry->d_name)))
+            (kind && store_has_files(api->store, *kind, entry->d_name)))
             continue;
         char *inner = file_join(path, entry->d_name);
         log_info("removing %s, left over from an earlier run", inner);
@@ -88,13 +66,11 @@ enum status api_new(struct api **out, const struct api_config *config, struct st
     if (status == STATUS_OK)
         status = partials_recover(api->partials, err);
     if (status == STATUS_OK)
-        status = sweep(api, "uploads", true, err);
-    if (status == STATUS_OK)
-        status = sweep(api, "trash", false, err);
-    if (status == STATUS_OK)
-        status = sweep(api, "scenes", true, err);
-    if (status == STATUS_OK)
-        status = sweep(api, "jobs", true, err);
+        status = sweep(api, "trash", NULL, err);
+    for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++) {
+        enum store_files kind = (enum store_files)i;
+        status = sweep(api, folders[i], &kind, err);
+    }
     api_renew_reserve(api);
     if (status == STATUS_OK) {
         store_on_change(store, hub_changed, api->hub);

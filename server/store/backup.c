@@ -47,7 +47,7 @@ enum status store_backup(struct store *store, const char *path, struct error *er
     if (status == STATUS_OK)
         status = sql_open(&copy, path, SQL_ROLLBACK, 0, err);
     if (status == STATUS_OK) {
-        status = sql_check(&copy, err);
+        status = sql_check(&copy, NULL, err);
         sql_close(&copy);
     }
     return status;

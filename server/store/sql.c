@@ -254,8 +254,10 @@ static enum status configure(struct sql *sql, enum sql_journal journal, int page
     return status;
 }
 
-enum status sql_check(struct sql *sql, struct error *err) {
-    enum status status = expect(sql, "PRAGMA quick_check(1)", "ok", err);
+enum status sql_check(struct sql *sql, const char *table, struct error *err) {
+    char *pragma = table ? mem_printf("PRAGMA quick_check('%s')", table) : mem_strdup("PRAGMA quick_check(1)");
+    enum status status = expect(sql, pragma, "ok", err);
+    mem_free(pragma);
     if (status == STATUS_INTERNAL && err)
         status = err->status = STATUS_CORRUPT;
     return status;

@@ -40,8 +40,9 @@ enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal
                      struct error *err);
 void sql_close(struct sql *sql);
 
-/* SQLite's quick_check: reads the whole file; STATUS_CORRUPT names the first thing found. */
-enum status sql_check(struct sql *sql, struct error *err);
+/* SQLite's quick_check of the whole file, or of one table with its indices; reads all of that.
+ * STATUS_CORRUPT names the first thing found. */
+enum status sql_check(struct sql *sql, const char *table, struct error *err);
 
 /* Runs several statements, none of which takes values. */
 enum status sql_script(struct sql *sql, const char *text, struct error *err);

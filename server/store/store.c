@@ -9,6 +9,7 @@
 #include "server/store/internal.h"
 
 #define EVENTS_PER_JOB 20000
+#define TABLES_MAX 32 /* more than there are */
 
 int64_t store_now_ms(void) {
     struct timespec now;
@@ -67,6 +68,30 @@ static enum status migrate(struct store *store, struct error *err) {
     return status;
 }
 
+/* Damage to what decides is found before anything is decided. Events and outputs, which grow with every
+ * job that ever ran, tell of theirs when they are read: a restart must not take longer every day. */
+static enum status check_tables(struct store *store, struct error *err) {
+    char *names[TABLES_MAX];
+    size_t count = 0;
+    sqlite3_stmt *stmt;
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT name FROM sqlite_schema WHERE type = 'table'"
+                                   " AND name NOT IN ('events', 'outputs') LIMIT ?",
+                                   "n", TABLES_MAX);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (row)
+            names[count++] = sql_dup(stmt, 0);
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (status == STATUS_OK)
+            status = sql_check(&store->sql, names[i], err);
+        mem_free(names[i]);
+    }
+    return status;
+}
+
 enum status store_open(struct store **out, const char *dir, struct error *err) {
     *out = NULL;
     struct store *store = mem_calloc(1, sizeof *store);
@@ -75,7 +100,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     char *path = file_join(dir, "state.db");
     enum status status = sql_open(&store->sql, path, SQL_WAL, 0, err);
     if (status == STATUS_OK)
-        status = sql_check(&store->sql, err);
+        status = check_tables(store, err);
     if (status == STATUS_OK)
         status = migrate(store, err);
     if (status == STATUS_OK)
@@ -119,6 +144,19 @@ enum status store_probe(struct store *store, struct error *err) {
     if (status == STATUS_OK && found != now)
         status = error_set(err, STATUS_CORRUPT, "%s: a row read back differs", store->sql.path);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+bool store_has_files(struct store *store, enum store_files kind, const char *id) {
+    static const char *const text[] = {
+        [STORE_FILES_SCENE] = "SELECT 1 FROM scenes WHERE id = ?",
+        [STORE_FILES_JOB] = "SELECT 1 FROM jobs WHERE id = ?",
+        [STORE_FILES_UPLOAD] = "SELECT 1 FROM uploads WHERE id = ? AND scene_id = ''",
+    };
+    int64_t found = 0;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, &found, NULL, text[kind], "t", id);
+    store_unlock(store);
+    return status != STATUS_OK || found != 0;
 }
 
 static enum status count_by_state(struct store *store, const char *text, int64_t *counts,

@@ -33,6 +33,11 @@ const char *store_library_version(void); /* SQLite's */
 /* Writes and reads back a row: what /readyz asks. */
 enum status store_probe(struct store *store, struct error *err);
 
+/* Whether files that go by that id belong to a row; true in doubt, lest they be removed. Cheap: at
+ * start every folder is asked about. */
+enum store_files { STORE_FILES_SCENE, STORE_FILES_JOB, STORE_FILES_UPLOAD /* not yet a scene */ };
+bool store_has_files(struct store *store, enum store_files kind, const char *id);
+
 /* Writes a consistent copy to the empty file `path` while others go on using the store. */
 enum status store_backup(struct store *store, const char *path, struct error *err);
 
