@@ -1,9 +1,11 @@
 /* test_slow_clients.c -- a crowd that is slow on purpose: heads, bodies, parts of uploads and replies
  * at a byte a second. A good client beside it is served at once, and the crowd is closed in time. */
 #include <errno.h>
+#include <linux/sockios.h>
 #include <netinet/tcp.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
 
 #include "common/clock.h"
@@ -137,6 +139,19 @@ static bool drip(struct slow *crowd, int count) {
     return open;
 }
 
+/* Bytes of replies that wait unsent in the kernel: in all, and of the worst connection. */
+static long unsent_bytes(long *worst) {
+    long sum = 0;
+    for (int fd = 3; fd < 3 * CROWD_MAX; fd++) {
+        int waiting = 0;
+        if (state_of(fd) != TCP_ESTABLISHED || ioctl(fd, SIOCOUTQNSD, &waiting) != 0)
+            continue;
+        sum += waiting;
+        *worst = waiting > *worst ? waiting : *worst;
+    }
+    return sum;
+}
+
 int main(void) {
     struct rig rig;
     struct rlimit files;
@@ -159,8 +174,12 @@ int main(void) {
     for (int i = 0; i < count; i++)
         attack(&crowd[i], &rig, (enum kind)(i % KIND_COUNT), job, upload);
     double deadline = clock_sec() + 60;
-    while (drip(crowd, count) && clock_sec() < deadline)
+    long unsent = 0, worst = 0;
+    while (drip(crowd, count) && clock_sec() < deadline) {
+        long now = unsent_bytes(&worst);
+        unsent = now > unsent ? now : unsent;
         usleep(500000);
+    }
     atomic_store(&good.stop, true);
     pthread_join(thread, NULL);
 
@@ -179,6 +198,8 @@ int main(void) {
     }
     qsort(good.latency, good.count, sizeof *good.latency, by_size);
     CHECK(good.count > 20);
+    CHECK_THAT(worst > 0 && worst < 1 << 20, "%ld bytes wait in the kernel for one reader", worst);
+    figure("MiB that wait in the kernel for slow readers", (double)unsent / (1 << 20), 100, "lower");
     figure("slow clients still open after 60 s", open, 0, "lower");
     figure("seconds until the last slow client is closed", fmax(fmax(last[0], last[1]), fmax(last[2], last[3])), 10, "lower");
     figure("a good client's 99th percentile beside them, ms", 1e3 * good.latency[good.count * 99 / 100], 50, "lower");
