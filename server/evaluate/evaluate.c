@@ -13,6 +13,7 @@
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/metrics.h"
+#include "server/reconstruct/orient.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 
@@ -319,9 +320,13 @@ enum status evaluate_outputs(const char *room, const char *outputs,
                              struct evaluation *v, struct error *err) {
     struct evaluator e = {.settings = settings, .pool = pool, .room = room};
     memset(v, 0, sizeof *v);
+    size_t turned;
     enum status status = load_room(&e, err);
     if (status != STATUS_OK)
         return status;
+    status = orient_mesh(&e.scene, pool, &turned, err); /* emitters shine where the outputs have their front */
+    if (status != STATUS_OK)
+        goto out;
     status = recovered_load(outputs, &e.scene.mesh, pool, &e.recovered, err);
     if (status != STATUS_OK)
         goto out;

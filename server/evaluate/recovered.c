@@ -131,6 +131,17 @@ static enum status read_scene_ply(const char *dir, struct charted *c, struct err
     return status;
 }
 
+/* Whether corner k of a triangle of scene.ply is where `mesh` has its corner (k, or with the second and
+ * third swapped) for all k: outputs may have turned what the room has inside out, and the other way round. */
+static bool is_there(const struct charted *c, const struct mesh *mesh, size_t t, bool swapped) {
+    for (size_t k = 0; k < 3; k++) {
+        vec3 a = c->position[c->index[t][k]], b = mesh->position[mesh->index[t][swapped ? (3 - k) % 3 : k]];
+        if (memcmp(&a, &b, sizeof a) != 0)
+            return false;
+    }
+    return true;
+}
+
 /* The atlas and the segments of `mesh` from scene.ply. */
 static enum status take_charts(struct recovered *r, const struct charted *c, const struct mesh *mesh,
                                uint32_t width, uint32_t height, struct error *err) {
@@ -141,12 +152,12 @@ static enum status take_charts(struct recovered *r, const struct charted *c, con
     r->atlas.corner = mem_array(mesh->triangle_count, sizeof *r->atlas.corner);
     r->segments.of_triangle = mem_array(mesh->triangle_count, sizeof *r->segments.of_triangle);
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        for (int k = 0; k < 3; k++) {
-            vec3 a = c->position[c->index[t][k]], b = mesh->position[mesh->index[t][k]];
-            vec2 st = c->st[c->index[t][k]];
-            if (memcmp(&a, &b, sizeof a) != 0)
-                return error_set(err, STATUS_INPUT, "scene.ply: triangle %zu is not where the room "
-                                 "has it: the outputs belong to another room", t);
+        bool swapped = !is_there(c, mesh, t, false);
+        if (swapped && !is_there(c, mesh, t, true))
+            return error_set(err, STATUS_INPUT, "scene.ply: triangle %zu is not where the room "
+                             "has it: the outputs belong to another room", t);
+        for (size_t k = 0; k < 3; k++) {
+            vec2 st = c->st[c->index[t][swapped ? (3 - k) % 3 : k]];
             r->atlas.corner[t][k] = vec2_make(st.x * (float)width, (1.0f - st.y) * (float)height);
         }
         r->segments.of_triangle[t] = c->segment[t];

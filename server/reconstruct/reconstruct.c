@@ -11,6 +11,7 @@
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/refine.h"
+#include "server/reconstruct/orient.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
 #include "server/reconstruct/views.h"
@@ -27,6 +28,7 @@ struct run {
     const struct reconstruct_hooks *hooks;
     struct views views;
     struct optimiser *optimiser; /* of listing1 or refine; owned */
+    size_t turned;               /* triangles whose back was taken for the front */
     cJSON *stages;               /* owned by the report */
 };
 
@@ -70,6 +72,26 @@ static void make_segments(struct reconstruction *r) {
     json_add_string(r->report, "segmentation", given ? "given" : "automatic");
 }
 
+static void add_prepare_figures(const struct run *run) {
+    const struct reconstruction *r = run->r;
+    const struct mesh *mesh = &r->scene->mesh;
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
+    json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
+    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
+    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
+    json_add_int(figures, "triangles_turned", (int64_t)run->turned);
+    json_add_int(figures, "segments", (int64_t)r->segments.count);
+    json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
+    json_add_int(figures, "texture_width", r->atlas.width);
+    json_add_int(figures, "texture_height", r->atlas.height);
+    json_add_number(figures, "texels_per_metre", (double)r->atlas.texels_per_metre);
+    json_add_int(figures, "valid_texels", (int64_t)r->inverse.valid_count);
+    json_add_number(figures, "atlas_utilisation",
+                    (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
+    json_add_int(figures, "training_photographs", (int64_t)run->views.train_count);
+    json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
+}
+
 static enum status prepare(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -77,10 +99,12 @@ static enum status prepare(struct run *run, struct error *err) {
         return error_set(err, STATUS_INPUT,
                          "segmentation=given, but the mesh has no object_id per face");
     hold_out(r);
+    enum status status = orient_mesh(r->scene, r->pool, &run->turned, err);
+    if (status != STATUS_OK)
+        return status;
     make_segments(r);
-    enum status status =
-        atlas_make(&r->atlas, mesh, &r->segments, (uint32_t)settings_number(r->settings, "texture_size"),
-                   (float)settings_number(r->settings, "texels_per_metre"), err);
+    status = atlas_make(&r->atlas, mesh, &r->segments, (uint32_t)settings_number(r->settings, "texture_size"),
+                        (float)settings_number(r->settings, "texels_per_metre"), err);
     if (status != STATUS_OK)
         return status;
     inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
@@ -93,20 +117,7 @@ static enum status prepare(struct run *run, struct error *err) {
         return status;
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
     calibrate(r, &run->views, run->hooks);
-    cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
-    json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
-    json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
-    json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
-    json_add_int(figures, "segments", (int64_t)r->segments.count);
-    json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
-    json_add_int(figures, "texture_width", r->atlas.width);
-    json_add_int(figures, "texture_height", r->atlas.height);
-    json_add_number(figures, "texels_per_metre", (double)r->atlas.texels_per_metre);
-    json_add_int(figures, "valid_texels", (int64_t)r->inverse.valid_count);
-    json_add_number(figures, "atlas_utilisation",
-                    (double)r->inverse.valid_count / ((double)r->atlas.width * (double)r->atlas.height));
-    json_add_int(figures, "training_photographs", (int64_t)run->views.train_count);
-    json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
+    add_prepare_figures(run);
     return STATUS_OK;
 }
 
