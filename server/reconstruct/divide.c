@@ -6,6 +6,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/reconstruct/color_prior.h"
 #include "server/reconstruct/highlight.h"
 #include "server/reconstruct/robust.h"
 #include "server/render/sampler.h"
@@ -23,16 +24,19 @@
 #define OUTLIER_FLOOR 0.03f
 /* A look has half its weight where this part of it is highlight. */
 #define HIGHLIGHT_PART 0.2f
+/* Base colour by which looks are weighed. Were it a texel's own, bright texels would count for more than
+ * dark ones wherever neighbours are averaged, and dark tiles between white joints turn grey. */
+#define TYPICAL_BASE_COLOR 0.5f
 /* Less white light than this share of the median radiance tells nothing of base colour. */
 #define DARKEST 1e-4f
-#define NEUTRAL_BASE_COLOR 0.5f
 /* A base colour of which a look says more than this is not one. */
 #define MOST 4.0f
+/* Variance of base colour by light of others at which what photographs show of a texel counts as much as
+ * what its base colour reflects, and the share of the former from which it is taken as it is. */
+#define MIXING_TOLD 0.01f
+#define MOSTLY_KNOWN 0.9f
 /* Looks of this share of the greatest weight are compared with each other. */
 #define NEAR_WEIGHT 0.3f
-/* Variance by light of others at which a texel counts half in its segment's mean. */
-#define MIXING_FLOOR 0.01
-#define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
 
 /* What is gathered of one texel. */
 struct texel_looks {
@@ -79,6 +83,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     float mixing = views_mixing(d->views, view, at->triangle);
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
+    rgb typical = rgb_scale(white, TYPICAL_BASE_COLOR);
     rgb gloss = rgb_gray(0.0f);
     if (m->specular[segment] > 0.0f) {
         struct highlight highlight;
@@ -86,16 +91,16 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
         highlight_gather(&highlight, scratch, d->field, at, wo, &level,
                          sampler_key(KEY_DIVIDE, texel, view->train), SAMPLES, LIGHT_SAMPLES);
         gloss = highlight.radiance[0][0];
-        float part = rgb_mean(gloss) / fmaxf(rgb_mean(shown), 0.01f * median) * (1.0f / HIGHLIGHT_PART);
+        float both = fmaxf(rgb_mean(typical) + rgb_mean(gloss), 0.01f * median);
+        float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
-    const rgb expected = fused_radiance(&d->r->fused, texel);
-    rgb deviation = noise_deviation(d->noise, d->views, view, expected);
+    rgb deviation = noise_deviation(d->noise, d->views, view, fused_radiance(&d->r->fused, texel));
     rgb base = rgb_clamp(divide_channels(rgb_sub(shown, gloss), white, DARKEST * median), -MOST, MOST);
     rgb noise = rgb_clamp(divide_channels(deviation, white, DARKEST * median), 0.0f, MOST);
     looks->look[looks->count++] = (struct robust_sample){
         base, logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
-        weight * noise_weight(d->noise, d->views, view, expected, mixing),
+        weight * noise_weight(d->noise, d->views, view, typical, mixing),
         sqrtf(rgb_dot(noise, noise)) * noise_draw(view), mixing * rgb_dot(base, base)};
 }
 
@@ -197,50 +202,6 @@ void divide_texels(struct divide *d, size_t first, size_t count) {
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &range);
 }
 
-/* The mean over a segment's texels and their variance about it; those of the whole room where none of
- * the segment was measured; neutral for emitters. Texels that may have light of others count less. */
-static struct color_prior *segment_priors(const struct divide *d) {
-    const struct reconstruction *r = d->r;
-    /* red, green, blue, squares, weights; the last entry is that of the whole room */
-    double(*sum)[5] = mem_calloc(r->segments.count + 1, sizeof *sum);
-    struct color_prior *prior = mem_array(r->segments.count, sizeof *prior);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        const struct measured *m = &d->measured[r->inverse.valid[i]];
-        size_t segment = segment_of(r, r->inverse.valid[i]);
-        if (!(m->weight > 0.0f))
-            continue;
-        double weight = 1.0 / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
-        rgb v = measured_value(m);
-        const double value[5] = {(double)v.r, (double)v.g, (double)v.b, (double)rgb_dot(v, v), 1.0};
-        for (int k = 0; k < 5; k++) {
-            sum[segment][k] += weight * value[k];
-            sum[r->segments.count][k] += weight * value[k];
-        }
-    }
-    for (size_t s = 0; s < r->segments.count; s++) {
-        const double *from = sum[s][4] > 0.0 ? sum[s] : sum[r->segments.count];
-        prior[s] = (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f};
-        if (r->is_emitter[s] || !(from[4] > 0.0))
-            continue;
-        rgb mean = rgb_make((float)(from[0] / from[4]), (float)(from[1] / from[4]), (float)(from[2] / from[4]));
-        float variance = (float)(from[3] / from[4]) - rgb_dot(mean, mean);
-        prior[s] = (struct color_prior){mean, fmaxf(variance, LEAST_VARIANCE)};
-    }
-    mem_free(sum);
-    return prior;
-}
-
-/* The same of each chart: that of its segment. */
-static struct color_prior *chart_priors(const struct divide *d) {
-    const struct reconstruction *r = d->r;
-    struct color_prior *of_segment = segment_priors(d);
-    struct color_prior *prior = mem_array(r->atlas.chart_count, sizeof *prior);
-    for (size_t i = 0; i < r->scene->mesh.triangle_count; i++)
-        prior[r->atlas.chart_of_triangle[i]] = of_segment[r->segments.of_triangle[i]];
-    mem_free(of_segment);
-    return prior;
-}
-
 /* What was measured as it is, and the priors where nothing was. */
 static void keep_noise(struct divide *d, const struct color_prior *prior) {
     struct reconstruction *r = d->r;
@@ -256,19 +217,27 @@ static void keep_noise(struct divide *d, const struct color_prior *prior) {
     }
 }
 
+/* Replaces what photographs tell of the light that a texel sends out by what its base colour reflects, as
+ * far as they may have told of other surfaces: beside a window a thin frame would else shine like it. */
+static void send_out(const struct divide *d, uint32_t texel, uint16_t radiance[3]) {
+    const struct measured *m = &d->measured[texel];
+    float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
+    rgb white;
+    if (known > MOSTLY_KNOWN || d->r->is_emitter[segment_of(d->r, texel)] || !divide_white(d, texel, &white))
+        return;
+    rgb reflected = rgb_mul(texel_color(d->r, texel), white);
+    set_half(radiance, rgb_mad(rgb_scale(reflected, 1.0f - known), known, fused_radiance(&d->r->fused, texel)));
+}
+
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     struct reconstruction *r = d->r;
-    struct color_prior *prior = chart_priors(d);
+    struct color_prior *prior = color_priors(r, d->measured);
     if (d->denoises)
         denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,
                 &r->materials.base_color, r->pool);
     else
         keep_noise(d, prior);
     mem_free(prior);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i], segment = segment_of(r, texel);
-        rgb white;
-        if (!(d->measured[texel].weight > 0.0f) && !r->is_emitter[segment] && divide_white(d, texel, &white))
-            set_half(radiance[texel], rgb_mul(texel_color(r, texel), white));
-    }
+    for (size_t i = 0; i < r->inverse.valid_count; i++)
+        send_out(d, r->inverse.valid[i], radiance[r->inverse.valid[i]]);
 }

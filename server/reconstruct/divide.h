@@ -3,7 +3,7 @@
  * For each photograph of a texel, (shown - gloss) / white is its base colour; the robust mean over the
  * photographs is taken, weighted as in fuse.h and less where the highlight is a large part of what
  * is shown. Then the noise of the photographs is taken out (denoise.h). Texels that no photograph
- * measured get what is beside them, or the mean of their segment where nothing near is known. */
+ * measured get what is beside them, or what is to be expected of them (color_prior.h). */
 #ifndef UNBAKE_RECONSTRUCT_DIVIDE_H
 #define UNBAKE_RECONSTRUCT_DIVIDE_H
 
@@ -35,8 +35,8 @@ void divide_texels(struct divide *d, size_t first, size_t count);
 /* What a white diffuse surface at the texel sends towards its normal; false where it is not valid. */
 bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
 
-/* After all texels: writes r->materials.base_color, and what those send out that no photograph sees
- * to radiance. */
+/* After all texels: writes r->materials.base_color, and to radiance, [height][width], what those send out
+ * that no photograph sees, or none sees cleanly. */
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]);
 
 #endif

@@ -24,6 +24,8 @@
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
 #define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_MIXED 0.3f
+/* Share of what a segment was observed to show from which a texel is one of those observed. */
+#define AS_BRIGHT 0.7f
 #define NEUTRAL_BASE_COLOR 0.5f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
 #define SLICE_PROBES 1024 /* work between two questions whether to stop */
@@ -102,27 +104,39 @@ static void set_lights(struct solve *s, bool decided) {
     world_update_lights(&r->world);
 }
 
+/* What arrives at a segment, over the texels that show about what it was observed to show, if there are
+ * any: beside a window light falls off steeply, and a dim end must not be held against a bright one. */
+struct arrived {
+    double all[4], bright[4]; /* red, green, blue, texels */
+};
+
+static void add_arrived(double sum[4], rgb white) {
+    sum[0] += (double)white.r;
+    sum[1] += (double)white.g;
+    sum[2] += (double)white.b;
+    sum[3] += 1.0;
+}
+
 /* Fills `arrived`: the mean over a segment's texels of what a white surface there would send out. */
 static void average_arrived(const struct solve *s) {
     const struct reconstruction *r = s->r;
-    double(*sum)[4] = mem_calloc(r->segments.count, sizeof *sum);
+    struct arrived *sum = mem_calloc(r->segments.count, sizeof *sum);
     for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
         uint32_t texel = r->inverse.valid[i];
+        size_t segment = r->segments.of_triangle[r->inverse.triangle[texel]];
         rgb white;
         if (!(r->fused.count[texel] > 0.0f) || !divide_white(&s->divide, texel, &white))
             continue;
-        double *to = sum[r->segments.of_triangle[r->inverse.triangle[texel]]];
-        to[0] += (double)white.r;
-        to[1] += (double)white.g;
-        to[2] += (double)white.b;
-        to[3] += 1.0;
+        add_arrived(sum[segment].all, white);
+        if (rgb_mean(fused_radiance(&r->fused, texel)) > AS_BRIGHT * rgb_mean(r->evidence[segment].shown))
+            add_arrived(sum[segment].bright, white);
     }
     for (size_t i = 0; i < r->segments.count; i++) {
         struct emitter_evidence *e = &r->evidence[i];
+        const double *from = sum[i].bright[3] > 0.0 ? sum[i].bright : sum[i].all;
         e->arrived = e->shown; /* without evidence a segment reflects what it shows */
-        if (sum[i][3] > 0.0)
-            e->arrived = rgb_make((float)(sum[i][0] / sum[i][3]), (float)(sum[i][1] / sum[i][3]),
-                                  (float)(sum[i][2] / sum[i][3]));
+        if (from[3] > 0.0)
+            e->arrived = rgb_make((float)(from[0] / from[3]), (float)(from[1] / from[3]), (float)(from[2] / from[3]));
     }
     mem_free(sum);
 }

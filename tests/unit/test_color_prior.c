@@ -1,0 +1,80 @@
+/* color_prior.h: a chart that photographs show well expects its own colour, one that they do not show that
+ * of the surfaces around it, and one that they show in mixed pixels only hardly more than that. */
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/reconstruct/color_prior.h"
+#include "tests/check.h"
+
+#define WALLS 5
+#define SIDE 32 /* texels of a wall */
+
+/* Walls of 1 x 1 m in the plane z = 0, a row of them: white, hidden, mixed, and 20 m further black, and a
+ * lamp. Each has its own segment and chart. */
+enum { WHITE, HIDDEN, MIXED, BLACK, LAMP };
+static const float left[WALLS] = {0, 1, 2, 20, 21};
+
+static vec3 position[WALLS * 4];
+static uint32_t indices[WALLS * 2][3], of_triangle[WALLS * 2];
+static vec2 corner[WALLS * 2][3];
+static struct measured measured[WALLS * SIDE * SIDE];
+
+static void make_walls(void) {
+    for (uint32_t w = 0; w < WALLS; w++) {
+        for (uint32_t k = 0; k < 4; k++)
+            position[4 * w + k] = (vec3){left[w] + (float)(k & 1), (float)(k >> 1), 0.0f};
+        const uint32_t two[2][3] = {{0, 1, 2}, {1, 3, 2}};
+        for (uint32_t t = 0; t < 2; t++) {
+            of_triangle[2 * w + t] = w;
+            for (uint32_t k = 0; k < 3; k++) {
+                uint32_t at = two[t][k];
+                indices[2 * w + t][k] = 4 * w + at;
+                corner[2 * w + t][k] = (vec2){(float)(SIDE * (at & 1)), (float)(SIDE * (w + (at >> 1)))};
+            }
+        }
+    }
+}
+
+static void show(uint32_t wall, float value, float mixing) {
+    for (uint32_t i = wall * SIDE * SIDE; i < (wall + 1) * SIDE * SIDE; i++) {
+        uint16_t half = image_half_from_float(value);
+        measured[i] = (struct measured){.weight = 1.0f, .value = {half, half, half},
+                                        .mixing = image_half_from_float(mixing)};
+    }
+}
+
+int main(void) {
+    make_walls();
+    bool is_emitter[WALLS] = {[LAMP] = true};
+    struct scene scene = {.mesh = {.vertex_count = WALLS * 4, .position = position, .triangle_count = WALLS * 2,
+                                   .index = indices}};
+    struct reconstruction r = {.scene = &scene, .pool = parallel_new(1), .is_emitter = is_emitter};
+    r.segments = (struct segments){.count = WALLS, .of_triangle = of_triangle};
+    r.atlas = (struct atlas){.width = SIDE, .height = WALLS * SIDE, .texels_per_metre = SIDE, .chart_count = WALLS,
+                             .chart_of_triangle = of_triangle, .corner = corner};
+    inverse_uv_make(&r.inverse, &r.atlas, scene.mesh.triangle_count, r.pool);
+    show(WHITE, 0.9f, 0.0f);
+    show(MIXED, 3.0f, 20.0f);
+    show(BLACK, 0.05f, 0.0f);
+    show(LAMP, 4.0f, 0.0f);
+
+    struct color_prior *prior = color_priors(&r, measured);
+    CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
+    CHECK_THAT(fabsf(prior[BLACK].mean.g - 0.05f) < 0.01f, "%g", (double)prior[BLACK].mean.g);
+    CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
+    CHECK_THAT(prior[HIDDEN].mean.g > 0.75f, "the white wall is beside it: %g", (double)prior[HIDDEN].mean.g);
+    CHECK_THAT(prior[MIXED].mean.g < 1.2f, "%g", (double)prior[MIXED].mean.g);
+    CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
+
+    /* Where nothing is known at all, grey; and nothing is known well. */
+    mem_free(prior);
+    memset(measured, 0, sizeof measured);
+    prior = color_priors(&r, measured);
+    for (int w = 0; w < WALLS; w++)
+        CHECK_THAT(prior[w].mean.r > 0.3f && prior[w].mean.r < 0.7f && prior[w].variance > 0.1f, "%d", w);
+    mem_free(prior);
+    inverse_uv_release(&r.inverse);
+    parallel_free(r.pool);
+    return check_result();
+}
