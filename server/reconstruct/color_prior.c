@@ -13,7 +13,7 @@
 #define NEUTRAL_BASE_COLOR 0.5f
 /* Share of a segment's texels that must be measured cleanly for its own mean to count as much as its
  * surroundings; it counts with the square of that share. */
-#define SHARE_KNOWN 0.03
+#define SHARE_KNOWN 0.003
 /* A cube tells when so many clean texels were measured in it. */
 #define LEAST_WEIGHT 8.0
 #define STRIDE 3 /* valid texels from one that is asked to the next */

@@ -80,7 +80,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     uint32_t segment = segment_of(d->r, texel);
     float median = d->views->median_radiance;
     float weight = view->weight * views_trust(d->views, view, at->triangle);
-    float mixing = views_mixing(d->views, view, at->triangle);
+    float mixing = views_mixing(d->views, view, at->triangle, shown);
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
     rgb typical = rgb_scale(white, TYPICAL_BASE_COLOR);

@@ -72,7 +72,7 @@ static void look_all(const struct fuse_job *job, const struct surface_point *p, 
             photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
             l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
             add_look(l, &s, &view, view.weight * views_trust(v, &view, p->triangle),
-                     views_mixing(v, &view, p->triangle), LOG_FLOOR * v->median_radiance);
+                     views_mixing(v, &view, p->triangle, s.radiance), LOG_FLOOR * v->median_radiance);
         }
     }
 }

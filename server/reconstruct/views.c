@@ -21,6 +21,13 @@
 /* Surfaces that meet at an edge sharper than this (cosine between normals) are lit differently. */
 #define CREASE_COSINE 0.8f
 
+/* How far from a look-up near an edge it is asked how bright the light is that may have got into it, and
+ * how many times brighter than the look-up it must be to make a difference. */
+#define MIXING_PIXELS 2.0f
+#define MIXING_FREE 2.0f
+#define MOST_MIXING 1000.0f
+#define DARKEST 1e-3f /* shown radiance, as a share of the median */
+
 #define NO_SURFACE UINT32_MAX
 
 struct corner {
@@ -249,9 +256,28 @@ float views_trust(const struct views *v, const struct view *view, uint32_t trian
     return trust[views_edge(v, view, triangle)];
 }
 
-float views_mixing(const struct views *v, const struct view *view, uint32_t triangle) {
+/* The greatest of what is shown around a place, or `least`. */
+static float brightest_around(const struct photograph *photo, float x, float y, float least) {
+    static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+    for (int i = 0; i < 8; i++) {
+        struct photograph_sample beside;
+        float px = x + MIXING_PIXELS * along[i][0], py = y + MIXING_PIXELS * along[i][1];
+        if (px >= 0.0f && py >= 0.0f && px < (float)photo->camera.width && py < (float)photo->camera.height &&
+            photograph_sample(photo, px, py, &beside))
+            least = fmaxf(least, rgb_mean(beside.radiance));
+    }
+    return least;
+}
+
+float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown) {
     static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
-    return variance[views_edge(v, view, triangle)];
+    int edge = views_edge(v, view, triangle);
+    if (edge == 0)
+        return 0.0f;
+    float own = fmaxf(rgb_mean(shown), DARKEST * v->median_radiance);
+    float times = brightest_around(&v->scene->photograph[v->train[view->train]], view->x, view->y, own) / own;
+    times = fmaxf(times * (1.0f / MIXING_FREE), 1.0f);
+    return fminf(variance[edge] * times * times, MOST_MIXING);
 }
 
 /* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show

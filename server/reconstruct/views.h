@@ -69,8 +69,9 @@ int views_edge(const struct views *v, const struct view *view, uint32_t triangle
 float views_trust(const struct views *v, const struct view *view, uint32_t triangle);
 
 /* Variance, as a share of what is shown squared, that light of other surfaces may have added to a look-up
- * at a place of the triangle. Neighbouring look-ups share it: no mean takes it away. */
-float views_mixing(const struct views *v, const struct view *view, uint32_t triangle);
+ * at a place of the triangle that shows `shown`: the more, the brighter its surroundings are. Neighbouring
+ * look-ups share it: no mean takes it away. */
+float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown);
 
 /* Whether all four pixels that a look-up at the view's place reads are clean. */
 bool views_clean(const struct views *v, const struct view *view);
