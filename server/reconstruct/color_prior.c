@@ -73,10 +73,10 @@ static void grids_release(struct grids *g) {
 static struct evidence *grids_cell(const struct grids *g, int level, vec3 point) {
     uint32_t last = (1u << (LEVELS - 1)) - 1u;
     vec3 at = vec3_scale(vec3_sub(point, g->lower), g->scale);
-    uint32_t place[3] = {(uint32_t)at.x, (uint32_t)at.y, (uint32_t)at.z};
+    const float place[3] = {at.x, at.y, at.z};
     size_t index = 0;
     for (int axis = 0; axis < 3; axis++) {
-        uint32_t finest = place[axis] < last ? place[axis] : last;
+        uint32_t finest = (uint32_t)clampf(place[axis], 0.0f, (float)last);
         index = index << level | finest >> (LEVELS - 1 - level);
     }
     return &g->cell[level][index];

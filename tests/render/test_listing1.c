@@ -67,12 +67,27 @@ static void test_stop_in_solve(struct scene *scene) {
     settings_release(&s);
 }
 
+#define INSIDE_OUT 2 /* a wall as a careless model would have it */
+
+static void turn_inside_out(struct mesh *mesh, int64_t object) {
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        uint32_t *v = mesh->index[t], second = v[1];
+        if (mesh->object_id[t] != object)
+            continue;
+        v[1] = v[2];
+        v[2] = second;
+    }
+}
+
 static void test_recovers(struct scene *scene) {
+    turn_inside_out(&scene->mesh, INSIDE_OUT);
     struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":700,\"report_samples\":32,"
                                       "\"texels_per_iteration\":512}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
+    const cJSON *prepare = cJSON_GetObjectItem(r.report, "prepare");
+    CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(prepare, "triangles_turned")) == 2.0);
     double error[OBJECTS] = {0}, bias[OBJECTS] = {0}, count[OBJECTS] = {0};
     for (size_t i = 0; i < r.inverse.valid_count; i++) {
         uint32_t texel = r.inverse.valid[i];
