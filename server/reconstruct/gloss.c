@@ -47,11 +47,11 @@
 #define PRIOR_SPECULAR 0.5f
 #define PRIOR_WEIGHT 1.0f
 /* What a segment is taken for of which the photographs tell neither that it is glossy nor, by so many
- * standard errors, that it is matt: half way to an ordinary dielectric. Either way its base colour
+ * standard errors at each roughness, that it is matt: half way to an ordinary dielectric. Either way its base colour
  * is then off by 2 %. */
 #define UNKNOWN_ROUGHNESS 0.5f
 #define UNKNOWN_SPECULAR (0.5f * PRIOR_SPECULAR)
-#define MATT_ERRORS 3.0
+#define MATT_ERRORS 1.0
 
 #define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
 #define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */

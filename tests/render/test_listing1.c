@@ -112,7 +112,7 @@ static void test_recovers(struct scene *scene) {
             CHECK_NEAR(e->g, lamp_radiance.g, 0.05f * lamp_radiance.g);
             CHECK_NEAR(e->b, lamp_radiance.b, 0.05f * lamp_radiance.b);
         } else {
-            CHECK_THAT(rms < 0.06 && fabs(bias[o] / count[o]) < 0.04, "object %d: %.4f", o, rms);
+            CHECK_THAT(rms < 0.06 && fabs(bias[o] / count[o]) < 0.03, "object %d: %.4f", o, rms);
             CHECK(rgb_is_black(*e));
         }
     }
