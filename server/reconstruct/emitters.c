@@ -81,19 +81,11 @@ static float median(struct channel_values *v) {
  * window may stand behind a thin frame: a pixel that mixes surfaces speaks only when it is clearly
  * brighter than all around it, one near an edge when it is no darker than its surroundings. */
 static bool outshines(const struct photograph *photo, float x, float y, rgb radiance, int edge) {
-    float own = rgb_mean(radiance), most = 0.0f, sum = 0.0f, count = 0.0f;
-    for (int i = 0; i < 8 && edge > 0; i++) {
-        static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
-        struct photograph_sample beside;
-        float px = x + RING_PIXELS * along[i][0], py = y + RING_PIXELS * along[i][1];
-        if (px < 0.0f || py < 0.0f || px >= (float)photo->camera.width ||
-            py >= (float)photo->camera.height || !photograph_sample(photo, px, py, &beside))
-            continue;
-        most = fmaxf(most, rgb_mean(beside.radiance));
-        sum += rgb_mean(beside.radiance);
-        count += 1.0f;
-    }
-    return edge == VIEWS_EDGE ? own > OUTSHINES * most : own * count >= sum;
+    float own = rgb_mean(radiance);
+    if (edge == 0)
+        return true;
+    struct photograph_ring ring = photograph_ring(photo, x, y, RING_PIXELS);
+    return edge == VIEWS_EDGE ? own > OUTSHINES * ring.brightest : own * ring.count >= ring.sum;
 }
 
 static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {

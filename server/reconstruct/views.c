@@ -256,27 +256,15 @@ float views_trust(const struct views *v, const struct view *view, uint32_t trian
     return trust[views_edge(v, view, triangle)];
 }
 
-/* The greatest of what is shown around a place, or `least`. */
-static float brightest_around(const struct photograph *photo, float x, float y, float least) {
-    static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
-    for (int i = 0; i < 8; i++) {
-        struct photograph_sample beside;
-        float px = x + MIXING_PIXELS * along[i][0], py = y + MIXING_PIXELS * along[i][1];
-        if (px >= 0.0f && py >= 0.0f && px < (float)photo->camera.width && py < (float)photo->camera.height &&
-            photograph_sample(photo, px, py, &beside))
-            least = fmaxf(least, rgb_mean(beside.radiance));
-    }
-    return least;
-}
-
 float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown) {
     static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
     int edge = views_edge(v, view, triangle);
     if (edge == 0)
         return 0.0f;
     float own = fmaxf(rgb_mean(shown), DARKEST * v->median_radiance);
-    float times = brightest_around(&v->scene->photograph[v->train[view->train]], view->x, view->y, own) / own;
-    times = fmaxf(times * (1.0f / MIXING_FREE), 1.0f);
+    struct photograph_ring ring =
+        photograph_ring(&v->scene->photograph[v->train[view->train]], view->x, view->y, MIXING_PIXELS);
+    float times = fmaxf(fmaxf(ring.brightest, own) / own * (1.0f / MIXING_FREE), 1.0f);
     return fminf(variance[edge] * times * times, MOST_MIXING);
 }
 

@@ -78,3 +78,20 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     sample->clip_radiance = rgb_make(photo->clip * r, photo->clip * g, photo->clip * b);
     return true;
 }
+
+struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px) {
+    static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+    struct photograph_ring ring = {0.0f, 0.0f, 0.0f};
+    for (int i = 0; i < 8; i++) {
+        struct photograph_sample at;
+        float px = x + radius_px * along[i][0], py = y + radius_px * along[i][1];
+        if (px < 0.0f || py < 0.0f || px >= (float)photo->camera.width || py >= (float)photo->camera.height ||
+            !photograph_sample(photo, px, py, &at))
+            continue;
+        float brightness = rgb_mean(at.radiance);
+        ring.brightest = fmaxf(ring.brightest, brightness);
+        ring.sum += brightness;
+        ring.count += 1.0f;
+    }
+    return ring;
+}

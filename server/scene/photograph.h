@@ -57,4 +57,11 @@ static inline float photograph_trust(const struct photograph *photo) {
 bool photograph_sample(const struct photograph *photo, float x, float y,
                        struct photograph_sample *sample);
 
+/* How bright (mean of the channels) the picture is at eight places around one; those outside of it or masked
+ * do not count. */
+struct photograph_ring {
+    float brightest, sum, count;
+};
+struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px);
+
 #endif
