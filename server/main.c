@@ -24,10 +24,10 @@
 #include "server/admin/admin.h"
 #include "server/admin/folder.h"
 #include "server/commands.h"
-#include "server/http/api.h"
 #include "server/http/collector.h"
-#include "server/http/events.h"
+#include "server/http/hub.h"
 #include "server/http/listener.h"
+#include "server/http/service.h"
 #include "server/job/scheduler.h"
 #include "server/notify.h"
 #include "server/render/accel.h"
@@ -161,7 +161,7 @@ static enum status build(struct daemon *d, struct error *err) {
     if (status == STATUS_OK)
         status = scheduler_new(&d->scheduler, &work, d->store, err);
     if (status == STATUS_OK)
-        status = api_new(&d->api, &limits, d->store, d->scheduler, err);
+        status = service_new(&d->api, &limits, d->store, d->scheduler, err);
     if (status == STATUS_OK)
         status = listener_start(&d->listener, &network, d->api, err);
     if (status == STATUS_OK)
@@ -307,7 +307,7 @@ static int run_daemon(struct config *config, const char *port_file) {
     admin_stop(d.admin);
     listener_stop(d.listener);
     collector_stop(d.collector);
-    api_free(d.api);
+    service_free(d.api);
     scheduler_free(d.scheduler);
     store_close(d.store);
     if (d.lock_fd >= 0)
@@ -321,7 +321,6 @@ static int run_daemon(struct config *config, const char *port_file) {
 
 int daemon_command(int argc, char **argv) {
     struct invocation in;
-    size_t count;
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
     if (code < 0 && in.word_count > 0) {
         if (command_find(in.words[0]))
@@ -330,8 +329,7 @@ int daemon_command(int argc, char **argv) {
             fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
         code = EXIT_USAGE;
     } else if (code < 0 && invocation_has(&in, "--help")) {
-        command_help(command_table(&count), stdout);
-        code = EXIT_SUCCESS;
+        code = COMMAND_HELP;
     } else if (code < 0 && invocation_has(&in, "--version")) {
         print_version();
         code = EXIT_SUCCESS;
@@ -346,5 +344,12 @@ int daemon_command(int argc, char **argv) {
 
 int main(int argc, char **argv) {
     const struct command *command = argc > 1 ? command_find(argv[1]) : NULL;
-    return command ? command->run(argc - 1, argv + 1) : daemon_command(argc, argv);
+    int words = command ? 1 : 0; /* that name the command */
+    if (!command)
+        command = command_table(&(size_t){0});
+    int code = command->run(argc - words, argv + words);
+    if (code != COMMAND_HELP && code != COMMAND_MISUSED)
+        return code;
+    command_help(command, code == COMMAND_HELP ? stdout : stderr);
+    return code == COMMAND_HELP ? EXIT_SUCCESS : EXIT_USAGE;
 }

@@ -37,7 +37,7 @@ struct api_config {
     size_t library_count;
 };
 
-struct hub;      /* events.h */
+struct hub;      /* hub.h */
 struct digests;  /* digests.h */
 struct partials; /* partial.h */
 struct listener; /* listener.h */
@@ -56,24 +56,5 @@ struct api {
     struct tally *tally; /* of requests */
     atomic_ullong uploaded_bytes;
 };
-
-/* Makes the data folder's parts, removes what an earlier life left half done (uploads, trash,
- * files without a row), and listens to the store's changes. Before any other thread. */
-enum status api_new(struct api **api, const struct api_config *config, struct store *store,
-                    struct scheduler *scheduler, struct error *err);
-void api_free(struct api *api);
-
-/* DATA/reserve is a file of nothing that is given up when the disk is full and something is to be
- * removed: the database needs room to say so. False when it is gone already. */
-bool api_spend_reserve(struct api *api);
-void api_renew_reserve(struct api *api); /* where there is room for it again */
-
-/* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
-enum status api_discard(struct api *api, const char *path, struct error *err);
-
-/* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
-struct response *api_check_room(struct api *api, const struct request *r, uint64_t bytes);
-/* The same when the caller keeps so much that `bytes` more pass user_max_bytes. */
-struct response *api_check_share(struct api *api, const struct request *r, uint64_t bytes);
 
 #endif

@@ -7,12 +7,8 @@
 
 #include "common/mem.h"
 #include "server/http/field.h"
-#include "server/http/handlers.h"
 #include "server/http/problem.h"
-#include "server/http/routes.h"
-
-#define COOKIE_NAME "unbake_token"
-#define COOKIE_AGE_SEC (30 * 24 * 3600)
+#include "server/http/route.h"
 
 bool auth_is_open(const struct api *api) {
     return api->config.access == API_ACCESS_OPEN ||
@@ -23,10 +19,10 @@ bool auth_is_open(const struct api *api) {
 
 /* The cookie's value, cut out of `cookies`; false where it is absent. */
 static bool read_cookie(const char *cookies, char token[TOKEN_SIZE]) {
-    size_t name = strlen(COOKIE_NAME);
+    size_t name = strlen(AUTH_COOKIE);
     for (const char *at = cookies; *at; at += strspn(at, "; ")) {
         size_t length = strcspn(at, ";");
-        if (length > name && at[name] == '=' && memcmp(at, COOKIE_NAME, name) == 0) {
+        if (length > name && at[name] == '=' && memcmp(at, AUTH_COOKIE, name) == 0) {
             snprintf(token, TOKEN_SIZE, "%.*s", (int)(length - name - 1), at + name + 1);
             return true;
         }
@@ -46,7 +42,7 @@ static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
     return cookies && read_cookie(cookies, token);
 }
 
-static struct response *unauthorized(const struct request *r, const char *detail) {
+struct response *auth_refuse(const struct request *r, const char *detail) {
     struct response *reply = problem_full(r, 401, detail,
         "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
     response_field(reply, "WWW-Authenticate", "Bearer realm=\"unbaked\"");
@@ -66,11 +62,11 @@ struct response *auth_check(struct api *api, struct request *r) {
     if (status == STATUS_NOT_FOUND && is_open)
         r->caller = (struct caller){.role = ROLE_ADMIN}; /* of another daemon, or of another time */
     else if (status == STATUS_NOT_FOUND)
-        return unauthorized(r, "the token is not, or no longer, valid");
+        return auth_refuse(r, "the token is not, or no longer, valid");
     else if (status != STATUS_OK)
         return problem_from(r, &err);
     else if (!has_token && !is_open)
-        return unauthorized(r, "this daemon asks for a token");
+        return auth_refuse(r, "this daemon asks for a token");
     if (r->caller.role >= r->route->access - ROUTE_VIEWER)
         return NULL;
     if (r->route->access == ROUTE_ADMIN)
@@ -144,61 +140,4 @@ bool auth_scene(struct api *api, const struct request *r, enum access needed, st
         return true;
     scene_row_release(row);
     return false;
-}
-
-/* --- /v1/session ------------------------------------------------------------------------- */
-
-static struct response *describe(const struct api *api, const struct caller *caller) {
-    cJSON *value = cJSON_CreateObject();
-    json_add_string(value, "user", *caller->name ? caller->name : NULL);
-    json_add_string(value, "role", role_name(caller->role));
-    json_add_bool(value, "open", auth_is_open(api));
-    return response_json(200, value);
-}
-
-struct response *session_get(struct api *api, struct request *r) {
-    return describe(api, &r->caller);
-}
-
-/* Over TLS, ours or (as it says) a proxy's, the cookie stays there. */
-static void set_cookie(const struct api *api, const struct request *r, struct response *reply,
-                       const char *token, int age_sec) {
-    const char *scheme = request_field(r, "X-Forwarded-Proto");
-    bool is_tls = api->config.is_tls || (scheme && strcmp(scheme, "https") == 0);
-    response_field(reply, "Set-Cookie", COOKIE_NAME "=%s; Path=/; Max-Age=%d; HttpOnly; SameSite=Strict%s",
-                   token, age_sec, is_tls ? "; Secure" : "");
-}
-
-struct response *session_add(struct api *api, struct request *r) {
-    cJSON *body = NULL;
-    struct error err;
-    struct caller caller;
-    const char *token = NULL;
-    enum status status =
-        json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err);
-    if (status == STATUS_OK)
-        status = json_string(body, "token", "the request body", NULL, &token, &err);
-    struct response *reply = NULL;
-    if (status != STATUS_OK)
-        reply = problem(r, 400, "%s", err.message);
-    else if (!token)
-        reply = problem(r, 400, "the request body has no \"token\"");
-    else
-        status = store_token_find(api->store, token, &caller, &err);
-    if (!reply && status == STATUS_NOT_FOUND)
-        reply = unauthorized(r, "the token is not, or no longer, valid");
-    if (!reply && status != STATUS_OK)
-        reply = problem_from(r, &err);
-    if (!reply) {
-        reply = describe(api, &caller);
-        set_cookie(api, r, reply, token, COOKIE_AGE_SEC);
-    }
-    cJSON_Delete(body);
-    return reply;
-}
-
-struct response *session_delete(struct api *api, struct request *r) {
-    struct response *reply = response_new(204);
-    set_cookie(api, r, reply, "", 0);
-    return reply;
 }

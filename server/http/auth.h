@@ -8,12 +8,17 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
+#define AUTH_COOKIE "unbake_token"
+
 /* Whether callers without a token are let in, as admins. */
 bool auth_is_open(const struct api *api);
 
 /* Fills r->caller; NULL, or the refusal: 401 without a valid token, 403 where the token's role may
  * not use the route at all. */
 struct response *auth_check(struct api *api, struct request *r);
+
+/* 401 with what a caller without a valid token is told. */
+struct response *auth_refuse(const struct request *r, const char *detail);
 
 /* The job or scene that the path names at its third part. False with *refusal: 404 where there is
  * none that the caller may read, in the same words whether it exists or not; 403 where `needed`

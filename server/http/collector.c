@@ -11,6 +11,7 @@
 #include "server/http/keeping.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 #include "server/http/views.h"
 
 #define ROUND_MAX 500
@@ -38,11 +39,11 @@ static enum status remove_expired(struct api *api, const struct expired *e, cons
     if (e->kind == EXPIRED_SCENE)
         pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_expired_delete(api->store, e, now, err);
-    if (status == STATUS_NO_SPACE && api_spend_reserve(api))
+    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
         status = store_expired_delete(api->store, e, now, err);
     if (status == STATUS_OK)
         status = e->kind == EXPIRED_UPLOAD ? partial_forget(api->partials, e->id, err)
-                                           : api_discard(api, path, err);
+                                           : space_discard(api, path, err);
     if (e->kind == EXPIRED_SCENE)
         pthread_mutex_unlock(&api->scene_mutex);
     return status;
@@ -107,7 +108,7 @@ static void *run(void *user) {
         partials_tend(c->api->partials);
         if (collector_run(c->api, false, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
-        api_renew_reserve(c->api);
+        space_renew_reserve(c->api);
         pthread_mutex_lock(&c->mutex);
         clock_gettime(CLOCK_MONOTONIC, &until);
         double seconds = (double)until.tv_sec + 1e-9 * (double)until.tv_nsec + c->interval_sec;

@@ -1,12 +1,11 @@
-/* events.c -- the requests for events, and for a job as it will be; see events.h. */
-#include "server/http/events.h"
-
+/* events.c -- the requests for events, and for a job as it will be. */
 #include <stdio.h>
 
 #include "common/protocol.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
+#include "server/http/hub.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 

@@ -16,7 +16,7 @@ struct response *system_openapi(struct api *api, struct request *r);
 struct response *system_version(struct api *api, struct request *r);
 struct response *system_settings(struct api *api, struct request *r);
 
-/* auth.c */
+/* session.c */
 struct response *session_get(struct api *api, struct request *r);
 struct response *session_add(struct api *api, struct request *r);
 struct response *session_delete(struct api *api, struct request *r);

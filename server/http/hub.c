@@ -1,5 +1,5 @@
-/* hub.c -- the open event streams, and the text that each of them sends; see events.h. */
-#include "server/http/events.h"
+/* hub.c -- the open event streams, and the text that each of them sends; see hub.h. */
+#include "server/http/hub.h"
 
 #include <pthread.h>
 #include <stdio.h>

@@ -15,6 +15,7 @@
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 #include "server/http/views.h"
 
 #define NAME_MAX_BYTES 200
@@ -355,9 +356,9 @@ struct response *jobs_add(struct api *api, struct request *r) {
         params = NULL;
     }
     if (!reply && !dry_run)
-        reply = api_check_room(api, r, 0);
+        reply = space_check_room(api, r, 0);
     if (!reply && !dry_run)
-        reply = api_check_share(api, r, 0);
+        reply = space_check_share(api, r, 0);
     if (!reply)
         reply = dry_run ? dry_run_reply(&scene, &settings) : add_job(api, r, &w, &scene);
     if (has_scene)
@@ -442,12 +443,12 @@ struct response *jobs_delete(struct api *api, struct request *r) {
         return measure_job(api, r, id);
     struct error err;
     enum status status = store_job_delete(api->store, id, &err);
-    if (status == STATUS_NO_SPACE && api_spend_reserve(api))
+    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
         status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
         char path[40];
         snprintf(path, sizeof path, "jobs/%lld", (long long)id);
-        status = api_discard(api, path, &err);
+        status = space_discard(api, path, &err);
     }
     return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
 }

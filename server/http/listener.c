@@ -17,10 +17,10 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/events.h"
-#include "server/http/head.h"
-#include "server/http/problem.h"
 #include "server/http/auth.h"
+#include "server/http/head.h"
+#include "server/http/hub.h"
+#include "server/http/problem.h"
 #include "server/http/routes.h"
 #include "server/http/tally.h"
 #include "server/http/tls.h"
@@ -216,7 +216,7 @@ static void reply_early(struct exchange *x) {
                                                       : MHD_CONNECTION_INFO_CONNECTION_FD);
     struct response *reply = x->reply;
     struct buf text;
-    request_drop_body(&x->request);
+    routes_drop_body(&x->request);
     buf_init(&text, 16384);
     buf_printf(&text, "HTTP/1.1 %d Refused\r\nConnection: close\r\nX-Request-Id: %s\r\nContent-Length: %llu\r\n",
                reply->status, x->request.id, (unsigned long long)reply->length);
@@ -322,7 +322,7 @@ static struct response *begin(struct exchange *x, const char *method, const char
     if (!refusal)
         refusal = routes_begin(l->api, r);
     if (refusal)
-        request_drop_body(r);
+        routes_drop_body(r);
     if (refusal && r->has_body)
         refusal->must_close = true; /* nobody will read the body */
     if (!refusal && r->has_body)
@@ -426,6 +426,7 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     if (code == MHD_REQUEST_TERMINATED_TIMEOUT_REACHED)
         guard_forsake(x->guarded);
     guard_enter(l->guard, x->guarded, GUARD_IDLE);
+    routes_drop_body(&x->request);
     request_release(&x->request);
     mem_free(x);
 }

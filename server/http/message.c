@@ -9,8 +9,6 @@
 
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/http/upload.h"
-#include "server/http/uploads.h"
 
 void request_release(struct request *r) {
     target_release(&r->target);
@@ -19,15 +17,7 @@ void request_release(struct request *r) {
         mem_free(r->fields[i].value);
     }
     mem_free(r->fields);
-    request_drop_body(r);
-}
-
-void request_drop_body(struct request *r) {
     buf_release(&r->body);
-    upload_free(r->upload);
-    r->upload = NULL;
-    uploads_drop(r->patch);
-    r->patch = NULL;
 }
 
 const char *request_field(const struct request *r, const char *name) {

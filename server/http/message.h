@@ -47,9 +47,8 @@ struct request {
     bool wants_rest;           /* routes_rest must run before more of the body is taken */
 };
 
+/* After routes_drop_body, which knows what upload and patch are. */
 void request_release(struct request *r);
-/* Forgets what came of the body, on disk too: the request is refused. */
-void request_drop_body(struct request *r);
 /* The value of the first field of that name (case does not matter), NULL where absent; borrowed. */
 const char *request_field(const struct request *r, const char *name);
 

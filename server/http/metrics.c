@@ -6,7 +6,7 @@
 
 #include "common/file.h"
 #include "common/protocol.h"
-#include "server/http/events.h"
+#include "server/http/hub.h"
 #include "server/http/handlers.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"

@@ -19,6 +19,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/sha256.h"
+#include "server/http/space.h"
 #include "server/http/upload.h"
 
 #define COMMIT_BYTES ((uint64_t)64 << 20) /* counted at least so often; a kill costs hashing them again */
@@ -584,7 +585,7 @@ enum status partial_forget(struct partials *p, const char *id, struct error *err
 
 enum status partial_remove(struct partials *p, const char *id, struct error *err) {
     enum status status = store_upload_delete(p->api->store, id, err);
-    if (status == STATUS_NO_SPACE && api_spend_reserve(p->api))
+    if (status == STATUS_NO_SPACE && space_spend_reserve(p->api))
         status = store_upload_delete(p->api->store, id, err);
     return status == STATUS_OK ? partial_forget(p, id, err) : status;
 }

@@ -6,7 +6,6 @@
 
 #include "common/protocol.h"
 #include "server/http/auth.h"
-#include "server/http/events.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
@@ -211,4 +210,12 @@ struct response *routes_rest(struct api *api, struct request *r) {
 
 struct response *routes_finish(struct api *api, struct request *r) {
     return r->route->handle(api, r);
+}
+
+void routes_drop_body(struct request *r) {
+    buf_release(&r->body);
+    upload_free(r->upload);
+    r->upload = NULL;
+    uploads_drop(r->patch);
+    r->patch = NULL;
 }

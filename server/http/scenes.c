@@ -10,6 +10,7 @@
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 #include "server/http/upload.h"
 #include "server/http/views.h"
 
@@ -154,10 +155,10 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     char *path = mem_printf("scenes/%s", row.id);
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
-    if (status == STATUS_NO_SPACE && api_spend_reserve(api))
+    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
         status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
-        status = api_discard(api, path, &err);
+        status = space_discard(api, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
         reply = keeping_would_free(api, r, is_gone ? path : "scenes/none");

@@ -8,11 +8,12 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 #include "server/http/embedded.h"
-#include "server/http/events.h"
+#include "server/http/hub.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 
 /* --- the web page -------------------------------------------------------------------------- */
 
@@ -96,7 +97,7 @@ struct response *system_readyz(struct api *api, struct request *r) {
     struct error err;
     if (store_probe(api->store, &err) != STATUS_OK || probe_disk(api, r, &err) != STATUS_OK)
         return problem_full(r, 503, err.message, err.hint, NULL);
-    struct response *full = api_check_room(api, r, 0);
+    struct response *full = space_check_room(api, r, 0);
     bool waits = scheduler_waits_for_disk(api->scheduler);
     if (!full && !waits)
         return status_reply("ready");

@@ -14,6 +14,7 @@
 #include "common/mem.h"
 #include "server/http/field.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 
 /* Every so many bytes: start writing them out, so that the sync at the end is short, and look
  * whether others have filled the disk meanwhile. */
@@ -63,9 +64,9 @@ static struct response *check_request(const struct request *r) {
 struct response *upload_begin(struct api *api, struct request *r) {
     struct response *refusal = check_request(r);
     if (!refusal)
-        refusal = api_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
+        refusal = space_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (!refusal)
-        refusal = api_check_share(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
+        refusal = space_check_share(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (refusal)
         return refusal;
     struct error err;
@@ -108,8 +109,8 @@ struct response *upload_data(struct api *api, struct request *r, const void *dat
     u->step_start = u->bytes;
     if (u->is_reserved)
         return NULL;
-    struct response *refusal = api_check_room(api, r, 0);
-    return refusal ? refusal : api_check_share(api, r, u->bytes);
+    struct response *refusal = space_check_room(api, r, 0);
+    return refusal ? refusal : space_check_share(api, r, u->bytes);
 }
 
 struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]) {

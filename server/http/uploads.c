@@ -20,6 +20,7 @@
 #include "server/http/keeping.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
+#include "server/http/space.h"
 #include "server/http/views.h"
 
 #define METADATA_MAX 1000 /* bytes; it is given back in a field */
@@ -177,8 +178,8 @@ static struct response *read_creation(struct api *api, const struct request *r, 
     row->length = (uint64_t)length;
     refusal = read_metadata(r, row);
     if (!refusal)
-        refusal = api_check_room(api, r, row->length);
-    return refusal ? refusal : api_check_share(api, r, row->length);
+        refusal = space_check_room(api, r, row->length);
+    return refusal ? refusal : space_check_share(api, r, row->length);
 }
 
 struct response *uploads_add(struct api *api, struct request *r) {
@@ -294,7 +295,7 @@ struct response *uploads_begin(struct api *api, struct request *r) {
         return tagged(problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld",
                               partial_room(p->claim), (long long)r->content_length));
     uint64_t unreserved = partial_unreserved(p->claim);
-    refusal = unreserved ? api_check_room(api, r, unreserved) : NULL;
+    refusal = unreserved ? space_check_room(api, r, unreserved) : NULL;
     return refusal ? tagged(refusal) : NULL;
 }
 

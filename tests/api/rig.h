@@ -12,8 +12,8 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/http/api.h"
 #include "server/http/listener.h"
+#include "server/http/service.h"
 #include "tests/check.h"
 
 struct rig {
@@ -43,7 +43,7 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
     struct api_config config = {.data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
         .max_upload_bytes = 8 << 20, .max_streams = stream_max, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
         .server_names = "lab.example.org"};
-    rig_must(api_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "api_new");
+    rig_must(service_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "service_new");
     struct listener_config network = {.address = "127.0.0.1", .connection_max = connection_max, .limits = *limits};
     rig_must(listener_start(&rig->listener, &network, rig->api, &err), &err, "listener_start");
 }
@@ -65,7 +65,7 @@ static inline void rig_start(struct rig *rig, const struct guard_limits *limits,
 static inline void rig_stop(struct rig *rig) {
     listener_quiesce(rig->listener);
     listener_stop(rig->listener);
-    api_free(rig->api);
+    service_free(rig->api);
     scheduler_free(rig->scheduler);
     store_close(rig->store);
     file_remove_tree(rig->dir, NULL);

@@ -15,8 +15,8 @@
 
 #include "common/log.h"
 #include "common/sha256.h"
-#include "server/http/api.h"
 #include "server/http/partial.h"
+#include "server/http/service.h"
 #include "server/worker/checkpoint.h"
 #include "tests/chaos/cut.h"
 
@@ -261,7 +261,7 @@ static inline void promises_check(const struct promises *p, const char *data, co
     if (status == STATUS_OK)
         status = scheduler_new(&scheduler, &work, store, &err);
     if (status == STATUS_OK)
-        status = api_new(&api, &config, store, scheduler, &err);
+        status = service_new(&api, &config, store, scheduler, &err);
     if (status == STATUS_OK)
         status = store_probe(store, &err);
     if (status != STATUS_OK)
@@ -277,7 +277,7 @@ static inline void promises_check(const struct promises *p, const char *data, co
         else
             promise_check_checkpoint(it, data, fingerprint, b);
     }
-    api_free(api);
+    service_free(api);
     scheduler_free(scheduler);
     store_close(store);
     promise_check_integrity(data, b);

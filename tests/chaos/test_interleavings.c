@@ -55,7 +55,7 @@ static void serve(const char *folder, FILE *in, FILE *out) {
     }
     listener_quiesce(rig.listener);
     listener_stop(rig.listener);
-    api_free(rig.api);
+    service_free(rig.api);
     scheduler_free(rig.scheduler);
     store_close(rig.store);
     exit(0);

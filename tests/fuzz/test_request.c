@@ -21,6 +21,7 @@
 #include "server/http/auth.h"
 #include "server/http/head.h"
 #include "server/http/listener.h"
+#include "server/http/service.h"
 #include "tests/fuzz/fuzz.h"
 
 #define SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
@@ -105,11 +106,11 @@ static void start_daemon(void) {
     struct api_config config = {.data_dir = lab.dir, .max_attempts = 2, .queue_limit = 50, .max_upload_bytes = 1 << 20,
                                 .user_max_bytes = 1 << 21, .max_streams = 5, .keepalive_sec = 15, .upload_keep_ms = 3600000,
                                 .server_names = "lab.example.org", .libraries = libraries, .library_count = 1};
-    must(api_new(&lab.api, &config, lab.store, lab.scheduler, &err), &err);
+    must(service_new(&lab.api, &config, lab.store, lab.scheduler, &err), &err);
 }
 
 static void stop_daemon(void) {
-    api_free(lab.api);
+    service_free(lab.api);
     scheduler_free(lab.scheduler);
     store_close(lab.store);
     file_remove_tree(lab.dir, NULL);
@@ -189,7 +190,7 @@ static struct response *serve(struct request *r, char *text, const char *end) {
     if (!reply)
         reply = routes_begin(lab.api, r);
     if (reply)
-        request_drop_body(r);
+        routes_drop_body(r);
     if (!reply && r->has_body)
         reply = send_body(r, text ? text : "", length);
     return reply ? reply : routes_finish(lab.api, r);
@@ -246,6 +247,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             read_stream(reply->stream);
     }
     response_free(reply);
+    routes_drop_body(&r);
     request_release(&r);
     free(text);
     if (is_changed)

@@ -1,4 +1,4 @@
-/* events.h -- what happens, as it happens: the events of a job or of all jobs, as Server-Sent Events
+/* hub.h -- what happens, as it happens: the events of a job or of all jobs, as Server-Sent Events
  * or JSON lines, and the replies that wait for something to happen.
  *
  * 1. The database is the queue: a stream holds the id it has sent up to and one batch of text, so
@@ -7,8 +7,8 @@
  *    not read is gone altogether it gets a `resync`.
  * 2. hub_changed only marks and wakes; the text is made on the stream's own thread.
  * 3. Lock order: hub, then listener, then libmicrohttpd. The store is never called with any. */
-#ifndef UNBAKE_HTTP_EVENTS_H
-#define UNBAKE_HTTP_EVENTS_H
+#ifndef UNBAKE_HTTP_HUB_H
+#define UNBAKE_HTTP_HUB_H
 
 #include <stdbool.h>
 #include <stddef.h>

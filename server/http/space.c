@@ -1,99 +1,21 @@
-/* api.c -- see api.h. */
-#include "server/http/api.h"
+/* space.c -- see space.h. */
+#include "server/http/space.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/digests.h"
-#include "server/http/events.h"
-#include "server/http/field.h"
-#include "server/http/partial.h"
 #include "server/http/problem.h"
-#include "server/http/tally.h"
 
 #define RESERVE_BYTES ((uint64_t)16 << 20)
 #define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
 
-static const char *const folders[] = {
-    [STORE_FILES_SCENE] = "scenes", [STORE_FILES_JOB] = "jobs", [STORE_FILES_UPLOAD] = "uploads"};
-
-/* Removes what is in DATA/folder: all of it, or (kind not NULL) what the store has no row for. */
-static enum status sweep(const struct api *api, const char *folder, const enum store_files *kind,
-                         struct error *err) {
-    char *path = file_join(api->config.data_dir, folder);
-    enum status status = file_make_dirs(path, err);
-    DIR *dir = status == STATUS_OK ? opendir(path) : NULL;
-    if (status == STATUS_OK && !dir)
-        status = error_set_errno(err, errno, "cannot list folder %s", path);
-    struct dirent *entry;
-    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 ||
-            (kind && store_has_files(api->store, *kind, entry->d_name)))
-            continue;
-        char *inner = file_join(path, entry->d_name);
-        log_info("removing %s, left over from an earlier run", inner);
-        status = file_remove_tree(inner, err);
-        mem_free(inner);
-    }
-    if (dir)
-        closedir(dir);
-    mem_free(path);
-    return status;
-}
-
-enum status api_new(struct api **out, const struct api_config *config, struct store *store,
-                    struct scheduler *scheduler, struct error *err) {
-    struct api *api = mem_calloc(1, sizeof *api);
-    api->config = *config;
-    api->store = store;
-    api->scheduler = scheduler;
-    pthread_mutex_init(&api->scene_mutex, NULL);
-    api->tally = tally_new();
-    api->hub = hub_new(config->keepalive_sec);
-    api->digests = digests_new();
-    api->partials = partials_new(api);
-    *out = api;
-    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
-                                    config->upload_keep_ms, err);
-    if (status == STATUS_OK)
-        status = partials_recover(api->partials, err);
-    if (status == STATUS_OK)
-        status = sweep(api, "trash", NULL, err);
-    for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++) {
-        enum store_files kind = (enum store_files)i;
-        status = sweep(api, folders[i], &kind, err);
-    }
-    api_renew_reserve(api);
-    if (status == STATUS_OK) {
-        store_on_change(store, hub_changed, api->hub);
-        return STATUS_OK;
-    }
-    api_free(api);
-    *out = NULL;
-    return status;
-}
-
-void api_free(struct api *api) {
-    if (!api)
-        return;
-    store_on_change(api->store, NULL, NULL);
-    partials_free(api->partials);
-    hub_free(api->hub);
-    tally_free(api->tally);
-    digests_free(api->digests);
-    pthread_mutex_destroy(&api->scene_mutex);
-    mem_free(api);
-}
-
-bool api_spend_reserve(struct api *api) {
+bool space_spend_reserve(struct api *api) {
     char *path = file_join(api->config.data_dir, "reserve");
     bool spent = unlink(path) == 0;
     if (spent)
@@ -102,7 +24,7 @@ bool api_spend_reserve(struct api *api) {
     return spent;
 }
 
-void api_renew_reserve(struct api *api) {
+void space_renew_reserve(struct api *api) {
     char *path = file_join(api->config.data_dir, "reserve");
     uint64_t room = 0;
     /* Not all that there is: others need it more. */
@@ -119,7 +41,7 @@ void api_renew_reserve(struct api *api) {
     mem_free(path);
 }
 
-enum status api_discard(struct api *api, const char *path, struct error *err) {
+enum status space_discard(struct api *api, const char *path, struct error *err) {
     char *from = file_join(api->config.data_dir, path);
     char *to = file_join(api->config.data_dir, "trash/XXXXXX");
     enum status status = STATUS_OK;
@@ -141,11 +63,11 @@ enum status api_discard(struct api *api, const char *path, struct error *err) {
 out:
     mem_free(from);
     mem_free(to);
-    api_renew_reserve(api);
+    space_renew_reserve(api);
     return status;
 }
 
-struct response *api_check_room(struct api *api, const struct request *r, uint64_t bytes) {
+struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes) {
     struct error err;
     uint64_t room;
     if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK)
@@ -161,7 +83,7 @@ struct response *api_check_room(struct api *api, const struct request *r, uint64
     return problem_full(r, 507, detail, "delete jobs or scenes that nobody needs", NULL);
 }
 
-struct response *api_check_share(struct api *api, const struct request *r, uint64_t bytes) {
+struct response *space_check_share(struct api *api, const struct request *r, uint64_t bytes) {
     struct error err;
     uint64_t kept, limit = api->config.user_max_bytes;
     if (limit == 0 || r->caller.user_id == 0)

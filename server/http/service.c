@@ -1,0 +1,86 @@
+/* service.c -- see service.h. */
+#include "server/http/service.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <string.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/http/digests.h"
+#include "server/http/hub.h"
+#include "server/http/partial.h"
+#include "server/http/space.h"
+#include "server/http/tally.h"
+
+static const char *const folders[] = {
+    [STORE_FILES_SCENE] = "scenes", [STORE_FILES_JOB] = "jobs", [STORE_FILES_UPLOAD] = "uploads"};
+
+/* Removes what is in DATA/folder: all of it, or (kind not NULL) what the store has no row for. */
+static enum status sweep(const struct api *api, const char *folder, const enum store_files *kind,
+                         struct error *err) {
+    char *path = file_join(api->config.data_dir, folder);
+    enum status status = file_make_dirs(path, err);
+    DIR *dir = status == STATUS_OK ? opendir(path) : NULL;
+    if (status == STATUS_OK && !dir)
+        status = error_set_errno(err, errno, "cannot list folder %s", path);
+    struct dirent *entry;
+    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 ||
+            (kind && store_has_files(api->store, *kind, entry->d_name)))
+            continue;
+        char *inner = file_join(path, entry->d_name);
+        log_info("removing %s, left over from an earlier run", inner);
+        status = file_remove_tree(inner, err);
+        mem_free(inner);
+    }
+    if (dir)
+        closedir(dir);
+    mem_free(path);
+    return status;
+}
+
+enum status service_new(struct api **out, const struct api_config *config, struct store *store,
+                        struct scheduler *scheduler, struct error *err) {
+    struct api *api = mem_calloc(1, sizeof *api);
+    api->config = *config;
+    api->store = store;
+    api->scheduler = scheduler;
+    pthread_mutex_init(&api->scene_mutex, NULL);
+    api->tally = tally_new();
+    api->hub = hub_new(config->keepalive_sec);
+    api->digests = digests_new();
+    api->partials = partials_new(api);
+    *out = api;
+    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
+                                    config->upload_keep_ms, err);
+    if (status == STATUS_OK)
+        status = partials_recover(api->partials, err);
+    if (status == STATUS_OK)
+        status = sweep(api, "trash", NULL, err);
+    for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++) {
+        enum store_files kind = (enum store_files)i;
+        status = sweep(api, folders[i], &kind, err);
+    }
+    space_renew_reserve(api);
+    if (status == STATUS_OK) {
+        store_on_change(store, hub_changed, api->hub);
+        return STATUS_OK;
+    }
+    service_free(api);
+    *out = NULL;
+    return status;
+}
+
+void service_free(struct api *api) {
+    if (!api)
+        return;
+    store_on_change(api->store, NULL, NULL);
+    partials_free(api->partials);
+    hub_free(api->hub);
+    tally_free(api->tally);
+    digests_free(api->digests);
+    pthread_mutex_destroy(&api->scene_mutex);
+    mem_free(api);
+}

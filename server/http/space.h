@@ -1,0 +1,24 @@
+/* space.h -- room on the disk of the data folder: who may have more of it, and how it is given back. */
+#ifndef UNBAKE_HTTP_SPACE_H
+#define UNBAKE_HTTP_SPACE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "server/http/api.h"
+#include "server/http/message.h"
+
+/* DATA/reserve is a file of nothing that is given up when the disk is full and something is to be
+ * removed: the database needs room to say so. False when it is gone already. */
+bool space_spend_reserve(struct api *api);
+void space_renew_reserve(struct api *api); /* where there is room for it again */
+
+/* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
+enum status space_discard(struct api *api, const char *path, struct error *err);
+
+/* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
+struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);
+/* The same when the caller keeps so much that `bytes` more pass user_max_bytes. */
+struct response *space_check_share(struct api *api, const struct request *r, uint64_t bytes);
+
+#endif
