@@ -11,8 +11,10 @@
 #define UNBAKE_JOB_ATTEMPT_H
 
 #include "common/json.h"
-#include "server/job/scheduler.h"
+#include "server/job/figures.h"
+#include "server/job/scheduler_config.h"
 #include "server/job/supervisor.h"
+#include "server/store/store.h"
 
 enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 

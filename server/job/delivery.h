@@ -7,8 +7,9 @@
 #ifndef UNBAKE_JOB_DELIVERY_H
 #define UNBAKE_JOB_DELIVERY_H
 
-#include "server/job/scheduler.h"
+#include "server/job/scheduler_config.h"
 #include "server/job/supervisor.h"
+#include "server/store/store.h"
 
 struct delivery {
     int64_t id; /* of the message; 0: empty */

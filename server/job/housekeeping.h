@@ -2,7 +2,8 @@
 #ifndef UNBAKE_JOB_HOUSEKEEPING_H
 #define UNBAKE_JOB_HOUSEKEEPING_H
 
-#include "server/job/scheduler.h"
+#include "server/job/scheduler_config.h"
+#include "server/store/store.h"
 
 /* Removes the checkpoints of jobs that succeeded longer than checkpoint_keep_sec ago (those of all
  * others stay, since a retry goes on from them) and the events of jobs that ended longer than

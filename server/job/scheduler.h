@@ -10,23 +10,8 @@
 
 #include "common/error.h"
 #include "server/job/figures.h"
+#include "server/job/scheduler_config.h"
 #include "server/store/store.h"
-
-struct scheduler_config {
-    const char *data_dir;           /* borrowed; holds scenes/ID/, jobs/ID/ */
-    const char *worker_binary;      /* /proc/self/exe */
-    int max_running;                /* jobs at once */
-    int user_max_running;           /* of them, of one user; 0: all */
-    int thread_count;               /* shared between running jobs; 0: all processors */
-    uint64_t worker_memory_bytes;   /* 0: no limit */
-    double checkpoint_interval_sec;
-    double stop_grace_sec;          /* SIGTERM to SIGKILL */
-    double checkpoint_keep_sec;     /* of a job that has succeeded */
-    double event_keep_sec;          /* of a job that has ended */
-    uint64_t low_disk_bytes;        /* with less free space, work waits; 0: never */
-    bool webhook_private;           /* webhooks may go to private addresses */
-    bool sandbox;
-};
 
 struct scheduler; /* opaque */
 

@@ -5,6 +5,7 @@
  * (https://sqlite.org/backup.html), so that it is the database as of its last page. */
 #include "common/file.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define PAGES_AT_ONCE 1024
 

@@ -5,7 +5,7 @@
 #include "common/json.h"
 #include "common/protocol.h"
 #include "server/store/internal.h"
-#include "server/store/users.h"
+#include "server/store/store.h"
 
 #define PRUNE_EVERY 64 /* events; until then a job has so many too many */
 

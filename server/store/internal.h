@@ -6,7 +6,6 @@
 #include <stdatomic.h>
 
 #include "server/store/sql.h"
-#include "server/store/store.h"
 
 struct store {
     pthread_mutex_t mutex; /* around every use of sql */
@@ -24,7 +23,7 @@ struct store {
 extern const char *const schema_steps[];
 extern const int schema_version; /* the number of steps */
 
-/* Reading: the mutex alone. Writing: the mutex and a transaction. store_end commits or, where
+/* transaction.c. Reading: the mutex alone. Writing: the mutex and a transaction. store_end commits or, where
  * `status` is not STATUS_OK, rolls back; unlocks; and tells the subscriber about `changed_job`
  * (0: a scene) after a commit. */
 void store_lock(struct store *store);

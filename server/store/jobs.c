@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define COLUMNS                                                                                \
     "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \

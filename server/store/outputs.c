@@ -9,6 +9,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define COLUMNS "name, bytes, sha256, content_type, updated_ms, attempt"
 

@@ -11,6 +11,7 @@
 
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define COLUMNS                                                                                \
     "id, name, state, bytes, created_ms, problems, facts, (SELECT users.name FROM scene_owners" \

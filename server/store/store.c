@@ -1,8 +1,7 @@
-/* store.c -- opening, migrating and closing state.db, and its transactions; see store.h. */
+/* store.c -- opening, migrating and closing state.db, and figures of all of it; see store.h. */
 #include "server/store/store.h"
 
 #include <sys/stat.h>
-#include <time.h>
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -10,37 +9,6 @@
 
 #define EVENTS_PER_JOB 20000
 #define TABLES_MAX 32 /* more than there are */
-
-int64_t store_now_ms(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
-
-void store_lock(struct store *store) {
-    pthread_mutex_lock(&store->mutex);
-}
-
-void store_unlock(struct store *store) {
-    pthread_mutex_unlock(&store->mutex);
-}
-
-enum status store_begin(struct store *store, struct error *err) {
-    store_lock(store);
-    enum status status = sql_begin(&store->sql, err);
-    if (status != STATUS_OK)
-        store_unlock(store);
-    return status;
-}
-
-enum status store_end(struct store *store, enum status status, int64_t changed_job,
-                      struct error *err) {
-    status = sql_end(&store->sql, status, err);
-    store_unlock(store);
-    if (status == STATUS_OK && changed_job != STORE_NOTHING_CHANGED && store->changed)
-        store->changed(store->changed_user, changed_job);
-    return status;
-}
 
 /* Each step and its version number are one transaction: a crash leaves a whole version. */
 static enum status migrate(struct store *store, struct error *err) {

@@ -29,6 +29,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 struct present {
     int64_t id;

@@ -8,6 +8,7 @@
 #include <math.h>
 
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define HALF_LIFE_SEC 86400.0
 

@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define COLUMNS                                                                                \
     "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash," \

@@ -7,6 +7,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 #define RETRY_FIRST_MS 2000.0
 #define RETRY_MOST_MS 600000.0

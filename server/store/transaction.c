@@ -1,0 +1,35 @@
+/* transaction.c -- the store's clock, its mutex, and transactions under it; see internal.h. */
+#include <time.h>
+
+#include "server/store/internal.h"
+
+int64_t store_now_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+void store_lock(struct store *store) {
+    pthread_mutex_lock(&store->mutex);
+}
+
+void store_unlock(struct store *store) {
+    pthread_mutex_unlock(&store->mutex);
+}
+
+enum status store_begin(struct store *store, struct error *err) {
+    store_lock(store);
+    enum status status = sql_begin(&store->sql, err);
+    if (status != STATUS_OK)
+        store_unlock(store);
+    return status;
+}
+
+enum status store_end(struct store *store, enum status status, int64_t changed_job,
+                      struct error *err) {
+    status = sql_end(&store->sql, status, err);
+    store_unlock(store);
+    if (status == STATUS_OK && changed_job != STORE_NOTHING_CHANGED && store->changed)
+        store->changed(store->changed_user, changed_job);
+    return status;
+}
