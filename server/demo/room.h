@@ -12,24 +12,13 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
+#include "server/demo/objects.h"
 #include "server/demo/shapes.h"
 #include "server/render/world.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/segment.h"
-
-#define ROOM_WIDTH 5.0f  /* metres along x */
-#define ROOM_HEIGHT 2.8f /* along y */
-#define ROOM_DEPTH 4.0f  /* along z */
-
-enum room_object {
-    ROOM_FLOOR, ROOM_CEILING, ROOM_WALL_WEST, ROOM_WALL_EAST, ROOM_WALL_NORTH, ROOM_WALL_SOUTH,
-    ROOM_CARPET, ROOM_TABLE_TOP, ROOM_TABLE_LEGS, ROOM_DOOR, ROOM_DOOR_FRAME, ROOM_SHELVES,
-    ROOM_BOOKS, ROOM_GLOBE, ROOM_CHEST, ROOM_VASE, ROOM_PAINTING_LARGE, ROOM_PAINTING_SMALL,
-    ROOM_PICTURE_FRAMES, ROOM_SOFA, ROOM_LAMP_FRAMES, ROOM_WALL_EMITTER, ROOM_CEILING_EMITTER,
-    ROOM_OBJECT_COUNT
-};
 
 struct room {
     struct mesh mesh;

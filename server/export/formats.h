@@ -2,7 +2,7 @@
 #ifndef UNBAKE_EXPORT_FORMATS_H
 #define UNBAKE_EXPORT_FORMATS_H
 
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 #include "server/export/parts.h"
 
 #define FORMATS_BASE_COLOR "base_color.png" /* must be in the folder before the others are written */

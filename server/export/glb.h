@@ -26,7 +26,7 @@
 #ifndef UNBAKE_EXPORT_GLB_H
 #define UNBAKE_EXPORT_GLB_H
 
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 #include "server/export/parts.h"
 
 /* `base_color` is the PNG that goes into the file. The same input gives the same bytes; STATUS_LIMIT

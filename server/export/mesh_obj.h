@@ -11,7 +11,7 @@
 #ifndef UNBAKE_EXPORT_MESH_OBJ_H
 #define UNBAKE_EXPORT_MESH_OBJ_H
 
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 #include "server/export/parts.h"
 
 /* The same input gives the same bytes. STATUS_LIMIT where they would be 4 GiB or more. */

@@ -12,7 +12,7 @@
 #ifndef UNBAKE_EXPORT_MITSUBA_H
 #define UNBAKE_EXPORT_MITSUBA_H
 
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 #include "server/export/parts.h"
 
 /* The same input gives the same bytes. `shapes` is the other file's name. */

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "common/image.h"
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 
 /* What a texture or preview shows. */
 enum picture_kind {

@@ -4,7 +4,7 @@
 #define UNBAKE_EXPORT_VIEWS_JSON_H
 
 #include "common/json.h"
-#include "server/export/outputs.h"
+#include "server/export/input.h"
 
 /* One frame for each comparison, in order, with its lens; the caller's. */
 cJSON *views_json(const struct export_comparison *comparison, size_t count);

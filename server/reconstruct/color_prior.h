@@ -8,7 +8,7 @@
 #define UNBAKE_RECONSTRUCT_COLOR_PRIOR_H
 
 #include "server/reconstruct/denoise.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 
 /* [chart_count] from measured[height][width]; the caller's. Emitters' are neutral. */
 struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured);

@@ -14,7 +14,7 @@
 #include "server/reconstruct/incident.h"
 #include "server/reconstruct/noise.h"
 #include "server/reconstruct/probes.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 struct divide {

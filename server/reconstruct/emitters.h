@@ -10,7 +10,7 @@
 #define UNBAKE_RECONSTRUCT_EMITTERS_H
 
 #include "server/reconstruct/look.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 /* What is known of a segment's light. */

@@ -12,7 +12,7 @@
 
 #include "common/parallel.h"
 #include "server/reconstruct/probes.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 /* Writes r->materials.roughness and .specular. */

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 #include "server/render/path.h"
 

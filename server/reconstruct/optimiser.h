@@ -14,7 +14,7 @@
 
 #include "server/reconstruct/emission.h"
 #include "server/reconstruct/pass.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 
 #define OPTIMISER_CURVE_POINTS 256
 #define OPTIMISER_ARRAYS 24

@@ -13,7 +13,7 @@
 
 #include "server/reconstruct/choose.h"
 #include "server/reconstruct/look.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 #define PASS_CHUNK_TEXELS 32 /* a look batch has room for so many texels */

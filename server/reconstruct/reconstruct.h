@@ -8,72 +8,11 @@
 #ifndef UNBAKE_RECONSTRUCT_RECONSTRUCT_H
 #define UNBAKE_RECONSTRUCT_RECONSTRUCT_H
 
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
 #include "common/error.h"
-#include "common/json.h"
 #include "common/parallel.h"
 #include "common/settings.h"
-#include "server/reconstruct/environment.h"
-#include "server/reconstruct/state.h"
-#include "server/reconstruct/fuse.h"
-#include "server/render/world.h"
-#include "server/scene/inverse_uv.h"
-#include "server/scene/materials.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/scene/scene.h"
-
-struct reconstruction; /* the present state, for previews and outputs */
-struct emitter_evidence;
-
-/* What the surroundings offer. All are called from the thread that runs reconstruct_run. */
-struct reconstruct_hooks {
-    void *user;
-    bool (*stop_requested)(void *user);
-    void (*stage)(void *user, const char *stage);
-    void (*progress)(void *user, const char *stage, double done, double total, double eta_sec);
-    void (*metric)(void *user, const char *series, long step, double value);
-    void (*log)(void *user, const char *message);
-    /* True when a checkpoint / preview is due (the surroundings keep the clock). */
-    bool (*checkpoint_due)(void *user);
-    bool (*preview_due)(void *user);
-    /* Commits all arrays as the newest checkpoint, or fails and leaves the one before. */
-    enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array,
-                                   size_t count, struct error *err);
-    /* Fills the arrays from the newest complete checkpoint; *found false and arrays untouched when there
-     * is none. An array whose stored size differs is STATUS_CORRUPT. */
-    enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found,
-                                   struct error *err);
-    enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
-};
-
-/* A held-out photograph and what the recovered room looks like from there. */
-struct held_out {
-    const char *name;                /* borrowed from the scene, both */
-    const struct camera *camera;
-    struct image photograph, render; /* linear radiance, R G B, of one size; owned */
-    double msre, psnr_db, ssim;
-};
-
-struct reconstruction {
-    struct scene *scene;             /* borrowed */
-    const struct settings *settings; /* borrowed */
-    struct parallel *pool;           /* borrowed */
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials materials;
-    struct world world;
-    struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
-    struct noise noise;              /* of the photographs' pixels */
-    struct fused fused;              /* what the photographs show of each texel */
-    bool *is_emitter;                /* [segment_count]; owned */
-    struct emitter_evidence *evidence; /* [segment_count] why; owned */
-    size_t held_out_count;
-    struct held_out *held_out;       /* [held_out_count]; owned */
-    cJSON *report;                   /* object: figures of each stage, filled as they are known; owned */
-};
 
 /* Runs all stages up to `report`. Solves unknown exposures in `scene`. STATUS_CANCELLED when
  * stopped (a checkpoint was saved). Whatever it returns, *r is to be released. */

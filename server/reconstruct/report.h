@@ -3,7 +3,7 @@
 #ifndef UNBAKE_RECONSTRUCT_REPORT_H
 #define UNBAKE_RECONSTRUCT_REPORT_H
 
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A held-out frame

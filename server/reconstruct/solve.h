@@ -12,7 +12,7 @@
 #define UNBAKE_RECONSTRUCT_SOLVE_H
 
 #include "common/error.h"
-#include "server/reconstruct/reconstruct.h"
+#include "server/reconstruct/reconstruction.h"
 #include "server/reconstruct/views.h"
 
 /* Writes r->materials, r->is_emitter, r->evidence and the lights of r->world, and adds "solve" to

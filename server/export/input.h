@@ -1,0 +1,52 @@
+/* input.h -- what the files of a job are made from: the room as it was recovered, and its report. */
+#ifndef UNBAKE_EXPORT_INPUT_H
+#define UNBAKE_EXPORT_INPUT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/image.h"
+#include "common/json.h"
+#include "server/scene/atlas.h"
+#include "server/scene/camera.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
+#include "server/scene/mesh.h"
+#include "server/scene/segment.h"
+
+#define EXPORT_MARGIN 16         /* texels */
+#define EXPORT_PREVIEW_SIZE 1024 /* texels */
+
+/* A held-out view: both pictures in linear radiance, R G B, of one size. */
+struct export_comparison {
+    const char *name;               /* the photograph's, for labels */
+    const struct image *photograph; /* saturated or masked pixels as they are */
+    const struct image *render;
+    const struct camera *camera;    /* that took it */
+};
+
+/* All borrowed. */
+struct export_input {
+    const char *title;                 /* the job's or the scene's name */
+    const struct mesh *mesh;
+    const struct segments *segments;
+    const struct atlas *atlas;
+    const struct inverse_uv *inverse;
+    const struct materials *materials;
+    const float *confidence_count;     /* [height][width] observations; NULL while not known: */
+    const float *confidence_spread;    /* [height][width] their spread;  then no preview of it */
+    const bool *is_emitter;            /* [segment_count] */
+    const struct image *environment;   /* R G B; NULL: no distant light; */
+    const struct image *environment_confidence; /* count, spread; NULL as the former */
+    size_t comparison_count;
+    const struct export_comparison *comparison;
+    /* An object. report.json is this plus "segments" (one entry each) and "files". The page draws
+     * these members when they are there, and shows all others as tables:
+     *   "series": {"loss": [[step, value], ...], ...}   one curve each
+     *   "stages": [{"name": "refine", "seconds": 12.3}, ...]
+     *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */
+    const cJSON *report;
+    vec3 up; /* the axis of the room that points up, see scene_up; 0: y */
+};
+
+#endif
