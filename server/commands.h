@@ -14,7 +14,8 @@ struct command {
     const char *details;   /* for the manual; "" if the summary says all */
     const char *example;
     const struct flag *flags; /* NULL: it reads its words by itself */
-    int (*run)(int argc, char **argv); /* argv[0] is the command's name */
+    /* argv[0] is the command's name. An exit status, COMMAND_HELP or COMMAND_MISUSED. */
+    int (*run)(int argc, char **argv);
 };
 
 /* The first is the daemon. */

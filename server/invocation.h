@@ -37,6 +37,10 @@ struct invocation {
     {"--data", "DIR", "the same as --set data_dir=DIR"},                                       \
     {"--set", "NAME=VALUE", "an option; wins over the file"}
 
+/* What a command returns instead of an exit status to have its help printed: it was asked for, or the
+ * words are wrong. */
+enum { COMMAND_HELP = 256, COMMAND_MISUSED };
+
 /* Reads argv[1...]. Faults are told on stderr, all those of the configuration at once. -1 to go
  * on, or the exit status. Needs invocation_release in any case. `config_file` is read where no
  * --config or --data is given and it is there; NULL: none. */

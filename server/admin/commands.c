@@ -15,7 +15,6 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/admin/admin.h"
-#include "server/commands.h"
 
 #define HELP_FLAG {"--help", NULL, "print this help"}
 
@@ -36,18 +35,14 @@ static int fail(const struct error *err) {
     return err->status == STATUS_INPUT ? EXIT_USAGE : EXIT_FAILURE;
 }
 
-/* -1 to go on, or the exit status. */
-static int begin(struct invocation *in, const char *name, int argc, char **argv, const struct flag *flags,
-                 size_t words_min, size_t words_max) {
+/* -1 to go on, or what the command returns. */
+static int begin(struct invocation *in, int argc, char **argv, const struct flag *flags, size_t words_min,
+                 size_t words_max) {
     int code = invocation_read(in, argc, argv, flags, CONFIG_FILE_DEFAULT);
-    if (code < 0 && invocation_has(in, "--help")) {
-        command_help(command_find(name), stdout);
-        return EXIT_SUCCESS;
-    }
-    if (code < 0 && (in->word_count < words_min || in->word_count > words_max)) {
-        command_help(command_find(name), stderr);
-        return EXIT_USAGE;
-    }
+    if (code < 0 && invocation_has(in, "--help"))
+        return COMMAND_HELP;
+    if (code < 0 && (in->word_count < words_min || in->word_count > words_max))
+        return COMMAND_MISUSED;
     log_set_level(LOG_WARNING);
     return code;
 }
@@ -86,7 +81,7 @@ int token_command(int argc, char **argv) {
     struct invocation in;
     struct error err;
     cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd, code = begin(&in, "token", argc, argv, token_flags, 1, 2);
+    int fd, code = begin(&in, argc, argv, token_flags, 1, 2);
     const char *action = code < 0 ? in.words[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
@@ -154,7 +149,7 @@ int backup_command(int argc, char **argv) {
     struct error err;
     uint64_t bytes = 0;
     cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd = -1, code = begin(&in, "backup", argc, argv, backup_flags, 1, 1);
+    int fd = -1, code = begin(&in, argc, argv, backup_flags, 1, 1);
     json_add_string(request, "command", "backup");
     if (code < 0) {
         enum status status = admin_call(in.config.data_dir, request, &reply, &fd, &err);
@@ -179,7 +174,7 @@ int backup_command(int argc, char **argv) {
 
 int check_config_command(int argc, char **argv) {
     struct invocation in;
-    int code = begin(&in, "check-config", argc, argv, check_config_flags, 0, 1);
+    int code = begin(&in, argc, argv, check_config_flags, 0, 1);
     struct buf problems;
     struct error err;
     buf_init(&problems, (size_t)1 << 20);

@@ -23,7 +23,6 @@
 #include "common/protocol.h"
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
-#include "server/commands.h"
 #include "server/http/tls.h"
 #include "server/worker/sandbox.h"
 
@@ -235,10 +234,8 @@ int doctor_command(int argc, char **argv) {
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port;
     int code = invocation_read(&in, argc, argv, doctor_flags, CONFIG_FILE_DEFAULT);
-    if (code < 0 && (invocation_has(&in, "--help") || in.word_count > 0)) {
-        code = in.word_count > 0 ? EXIT_USAGE : EXIT_SUCCESS;
-        command_help(command_find("doctor"), in.word_count > 0 ? stderr : stdout);
-    }
+    if (code < 0 && (invocation_has(&in, "--help") || in.word_count > 0))
+        code = in.word_count > 0 ? COMMAND_MISUSED : COMMAND_HELP;
     if (code < 0) {
         struct doctor doctor = {.config = &in.config}, *d = &doctor;
         bool runs = daemon_runs(in.config.data_dir);
