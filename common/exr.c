@@ -315,7 +315,7 @@ struct destination {
 static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t stride, float *to) {
     if (type == EXR_PIXEL_HALF)
         for (size_t x = 0; x < width; x++)
-            to[x * stride] = image_half_to_float((uint16_t)(from[2 * x] | from[2 * x + 1] << 8));
+            to[x * stride] = image_float_from_half((uint16_t)(from[2 * x] | from[2 * x + 1] << 8));
     else
         for (size_t x = 0; x < width; x++) {
             uint32_t bits = (uint32_t)from[4 * x] | (uint32_t)from[4 * x + 1] << 8 |

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "common/error.h"
 
@@ -41,6 +42,14 @@ struct image_info {
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
                 const char *const *channel); /* zero pixels; names are copied */
 void image_release(struct image *image);
+
+/* The same in two steps, for sizes that a file tells: sets size and channel names, without pixels;
+ * STATUS_LIMIT when the sizes pass the limits, STATUS_INPUT when one is 0. `name` is for messages. */
+enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
+                         uint32_t channel_count, const char *const *channel, struct error *err);
+
+/* Zero pixels for an image that has its header. */
+void image_allocate(struct image *image);
 
 /* Index of a channel by its exact name; -1 when absent. */
 int image_channel(const struct image *image, const char *name);
@@ -81,6 +90,17 @@ float image_linear_to_srgb(float value);
 
 /* IEEE 754 half precision, round to nearest even; overflow becomes infinity. */
 uint16_t image_half_from_float(float value);
-float image_float_from_half(uint16_t half);
+/* Without a branch, for loops that the compiler vectorises. In integers but for one product of
+ * normal numbers, so that a thread which flushes subnormals to zero reads the same. */
+static inline float image_float_from_half(uint16_t half) {
+    uint32_t exponent = half & 0x7c00, mantissa = half & 0x3ff;
+    float small = (float)(int32_t)mantissa * 0x1p-24f, value;
+    uint32_t small_bits, bits = (uint32_t)(half & 0x7fff) << 13;
+    memcpy(&small_bits, &small, sizeof small_bits);
+    bits += exponent == 0x7c00 ? 224u << 23 : 112u << 23;
+    bits = (exponent == 0 ? small_bits : bits) | (uint32_t)(half & 0x8000) << 16;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
 
 #endif

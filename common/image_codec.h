@@ -1,13 +1,11 @@
-/* image_codec.h -- what image.c and its codecs (exr.c, hdr.c, jpeg.c, png.c) share; private
- * to them.
+/* image_codec.h -- what the codecs (exr.c, hdr.c, jpeg.c, png.c) and what chooses among them
+ * share; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
  * whole, so probing a large file costs as little as reading its header. A codec fills *image
  * only through image_header and image_allocate, which enforce the limits of image.h. */
 #ifndef UNBAKE_COMMON_IMAGE_CODEC_H
 #define UNBAKE_COMMON_IMAGE_CODEC_H
-
-#include <string.h>
 
 #include "common/image.h"
 
@@ -23,33 +21,11 @@ struct image_source {
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
                          size_t length);
 
-/* Sets size and channel names of an empty image, without pixels; STATUS_LIMIT when the sizes
- * pass the limits, STATUS_INPUT when one is 0. */
-enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
-                         uint32_t channel_count, const char *const *channel, struct error *err);
-
-/* Zero pixels for an image that has its header. */
-void image_allocate(struct image *image);
-
-/* image_float_from_half without a branch, for loops that the compiler vectorises. In integers
- * but for one product of normal numbers, so that a thread which flushes subnormals to zero
- * reads the same. */
-static inline float image_half_to_float(uint16_t half) {
-    uint32_t exponent = half & 0x7c00, mantissa = half & 0x3ff;
-    float small = (float)(int32_t)mantissa * 0x1p-24f, value;
-    uint32_t small_bits, bits = (uint32_t)(half & 0x7fff) << 13;
-    memcpy(&small_bits, &small, sizeof small_bits);
-    bits += exponent == 0x7c00 ? 224u << 23 : 112u << 23;
-    bits = (exponent == 0 ? small_bits : bits) | (uint32_t)(half & 0x8000) << 16;
-    memcpy(&value, &bits, sizeof value);
-    return value;
-}
-
 /* The names of a colour picture's channels, for image_header. */
 extern const char *const image_rgba[4];
 
 /* One reader per format. With `probe` they stop after the header. The source's first bytes
- * were recognised by image.c. On error the caller releases *image. */
+ * were recognised. On error the caller releases *image. */
 enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err);
 enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
