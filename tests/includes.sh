@@ -1,6 +1,6 @@
 #!/bin/bash
-# Fails when a folder includes what the design forbids it, or a library's header is included by
-# another file than the one that owns it.
+# Fails when a folder includes what the design forbids it, a library's header is included by another
+# file than the one that owns it, or units (x.c with x.h) include each other in a circle.
 set -u
 bad=0
 
@@ -55,4 +55,14 @@ own 'openexr' common/exr.c
 own 'png\.h' common/png.c
 own 'jpeglib\.h' common/jpeg.c
 own 'seccomp\.h' server/worker/sandbox.c
+
+# Each unit and one that it includes, a pair a line.
+units() {
+    grep -roE '^#include "[^"]+"' common client server --include='*.[ch]' |
+        sed -E 's|^(.*)\.[ch]:#include "(.*)\.h"|\1 \2|' | awk '$1 != $2'
+}
+if ! circle=$(units | tsort 2>&1 >/dev/null); then
+    printf 'these include each other:\n%s\n' "$circle"
+    bad=1
+fi
 exit $bad
