@@ -27,6 +27,16 @@ void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t c
     image_allocate(image);
 }
 
+void image_init_rgb(struct image *image, uint32_t width, uint32_t height) {
+    image_init(image, width, height, 3, (const char *const[]){"R", "G", "B"});
+}
+
+void image_take_rgb(const struct image *from, struct image *image) {
+    image_init_rgb(image, from->width, from->height);
+    for (size_t i = 0; i < (size_t)from->width * from->height; i++)
+        memcpy(image->pixel + 3 * i, from->pixel + from->channel_count * i, 3 * sizeof *image->pixel);
+}
+
 void image_release(struct image *image) {
     mem_free(image->channel);
     mem_free(image->pixel);

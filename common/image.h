@@ -41,9 +41,12 @@ struct image_info {
 
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
                 const char *const *channel); /* zero pixels; names are copied */
+void image_init_rgb(struct image *image, uint32_t width, uint32_t height); /* channels R G B */
+/* The first three channels of `from`, which are R G B, as a new picture. */
+void image_take_rgb(const struct image *from, struct image *image);
 void image_release(struct image *image);
 
-/* The same in two steps, for sizes that a file tells: sets size and channel names, without pixels;
+/* As image_init in two steps, for sizes that a file tells: sets size and channel names, without pixels;
  * STATUS_LIMIT when the sizes pass the limits, STATUS_INPUT when one is 0. `name` is for messages. */
 enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
                          uint32_t channel_count, const char *const *channel, struct error *err);

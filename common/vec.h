@@ -5,6 +5,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#define PI 3.14159265358979323846
+
 typedef struct vec2 { float x, y; } vec2;
 typedef struct vec3 { float x, y, z; } vec3;
 /* Linear Rec. 709 colour: radiance, reflectance or throughput. */
@@ -64,7 +66,6 @@ static inline bool rgb_is_finite(rgb a) {
     return isfinite(a.r) && isfinite(a.g) && isfinite(a.b);
 }
 static inline bool rgb_is_black(rgb a) { return a.r == 0.0f && a.g == 0.0f && a.b == 0.0f; }
-
 
 /* An orthonormal frame around unit n (Duff et al. 2017). */
 static inline void vec3_frame(vec3 n, vec3 *s, vec3 *t) {

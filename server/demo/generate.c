@@ -56,18 +56,13 @@ static char *frame_path(const struct generator *g, const char *folder, uint32_t 
 /* --- pictures ----------------------------------------------------------------------------- */
 
 static void render_frame(struct generator *g, uint32_t frame) {
-    static const char *const names[] = {"R", "G", "B"};
     struct path_settings path = {.max_depth = (int)g->settings->max_depth, .roulette_depth = 4,
                                  .seed = g->settings->seed};
     struct image film; /* has standard errors too */
-    struct image *picture = &g->picture[frame];
     film_render(&g->room.world, &g->camera[frame],
                 is_test(g, frame) ? g->settings->test_spp : g->settings->spp, &path, frame,
                 g->pool, &film);
-    image_init(picture, film.width, film.height, 3, names);
-    for (size_t i = 0; i < (size_t)film.width * film.height; i++)
-        for (size_t c = 0; c < 3; c++)
-            picture->pixel[3 * i + c] = film.pixel[film.channel_count * i + c];
+    image_take_rgb(&film, &g->picture[frame]);
     image_release(&film);
 }
 

@@ -123,8 +123,6 @@ static double training_median(const struct scene *scene) {
     return median;
 }
 
-static const char *const rgb_names[] = {"R", "G", "B"};
-
 /* The photograph's radiance and, in the same way clipped, what the recovered room shows there.
  * Masked pixels are NaN, which metrics_msre leaves out. */
 static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
@@ -134,8 +132,8 @@ static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t 
     struct image film; /* has standard errors too */
     uint32_t width = p->camera.width, height = p->camera.height;
     film_render(&e->recovered.world, &p->camera, e->settings->spp, &path, view, e->pool, &film);
-    image_init(photograph, width, height, 3, rgb_names);
-    image_init(render, width, height, 3, rgb_names);
+    image_init_rgb(photograph, width, height);
+    image_init_rgb(render, width, height);
     for (uint32_t y = 0; y < height; y++) {
         for (uint32_t x = 0; x < width; x++) {
             size_t pixel = (size_t)y * width + x;
@@ -179,7 +177,7 @@ static enum status write_pair(const struct evaluator *e, const char *what, const
     enum { GAP = 4 };
     struct image pair;
     const struct image *side[2] = {a, b};
-    image_init(&pair, 2 * a->width + GAP, a->height, 3, rgb_names);
+    image_init_rgb(&pair, 2 * a->width + GAP, a->height);
     for (int k = 0; k < 2; k++) {
         struct rgb_columns columns = find_rgb(side[k], prefix);
         for (uint32_t y = 0; y < a->height; y++) {

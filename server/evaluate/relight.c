@@ -13,10 +13,7 @@
 #include "server/ingest/transforms.h"
 #include "server/render/film.h"
 
-#define PI 3.14159265358979323846
 #define ROULETTE_DEPTH 5
-
-static const char *const rgb_names[] = {"R", "G", "B"};
 
 struct relight_settings relight_default_settings(void) {
     return (struct relight_settings){.view = "0", .environment_scale = 1.0f, .up = 'y', .lights = true,
@@ -85,7 +82,7 @@ static vec3 to_picture(vec3 d, char up, float turn) {
 void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out) {
     struct lights *lights = lights_new(picture);
     float turn = turn_deg * (float)(PI / 180.0);
-    image_init(out, picture->width, picture->height, 3, rgb_names);
+    image_init_rgb(out, picture->width, picture->height);
     for (uint32_t y = 0; y < out->height; y++) {
         for (uint32_t x = 0; x < out->width; x++) {
             double phi = 2.0 * PI * ((double)x + 0.5) / out->width;
@@ -139,12 +136,6 @@ static enum status change_environment(struct world *world, const char *outputs,
 
 /* --- the picture -------------------------------------------------------------------------------- */
 
-static void take_colors(const struct image *film, struct image *image) {
-    image_init(image, film->width, film->height, 3, rgb_names);
-    for (size_t i = 0; i < (size_t)film->width * film->height; i++)
-        memcpy(image->pixel + 3 * i, film->pixel + film->channel_count * i, 3 * sizeof *image->pixel);
-}
-
 enum status relight(const char *outputs, const struct relight_settings *settings, struct parallel *pool,
                     struct image *image, struct error *err) {
     struct path_settings path = {.max_depth = (int)settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
@@ -169,7 +160,7 @@ enum status relight(const char *outputs, const struct relight_settings *settings
             room.materials.emission[s] = rgb_gray(0.0f);
         world_update_lights(&room.world);
         film_render(&room.world, &camera, settings->spp, &path, 0, pool, &film);
-        take_colors(&film, image);
+        image_take_rgb(&film, image);
         image_release(&film);
     }
     recovered_release(&room);

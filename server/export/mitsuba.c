@@ -11,7 +11,6 @@
 #include "common/mem.h"
 #include "server/export/sink.h"
 
-#define PI 3.14159265358979323846
 #define SENSORS_MAX 100
 #define SPP 64
 #define MAX_DEPTH 16

@@ -10,8 +10,6 @@
 
 #define COMPARISON_GAP 4 /* pixels between the pictures */
 
-static const char *const rgb_channel[] = {"R", "G", "B"};
-
 /* --- the margin: nearest valid texel ------------------------------------------------------ */
 
 struct margin {
@@ -95,6 +93,7 @@ static rgb value_at(const struct export_input *input, enum picture_kind kind, si
 
 void picture_texture(const struct export_input *input, enum picture_kind kind,
                      const uint32_t *source, struct image *image) {
+    static const char *const rgb_channel[] = {"R", "G", "B"};
     static const char *const gray_channel[] = {"Y"};
     static const char *const confidence_channel[] = {"count", "spread"};
     static const struct { uint32_t count; const char *const *name; } channels[] = {
@@ -159,7 +158,7 @@ void picture_preview(const struct export_input *input, enum picture_kind kind,
     if (kind == PICTURE_CONFIDENCE)
         for (size_t i = 0; i < inverse->valid_count; i++)
             count_max = fmaxf(count_max, input->confidence_count[inverse->valid[i]]);
-    image_init(image, width, height, 3, rgb_channel);
+    image_init_rgb(image, width, height);
     for (uint32_t y = 0; y < height; y++) {
         for (uint32_t x = 0; x < width; x++) {
             rgb sum = {0.0f, 0.0f, 0.0f};
@@ -196,7 +195,7 @@ void picture_environment(const struct export_input *input, struct image *image) 
         }
     }
     float scale = roots > 0.0 ? ENVIRONMENT_GRAY * (float)(seen * seen / (roots * roots)) : 1.0f;
-    image_init(image, map->width / step, map->height / step, 3, rgb_channel);
+    image_init_rgb(image, map->width / step, map->height / step);
     for (uint32_t y = 0; y < image->height; y++) {
         for (uint32_t x = 0; x < image->width; x++) {
             float *out = &image->pixel[((size_t)y * image->width + x) * 3];
@@ -251,7 +250,7 @@ static rgb difference_color(rgb photograph, rgb render, float floor) {
 void picture_comparison(const struct export_comparison *comparison, struct image *image) {
     const struct image *photograph = comparison->photograph, *render = comparison->render;
     uint32_t width = photograph->width, height = photograph->height;
-    image_init(image, 3 * width + 2 * COMPARISON_GAP, height, 3, rgb_channel);
+    image_init_rgb(image, 3 * width + 2 * COMPARISON_GAP, height);
     for (size_t i = 0; i < (size_t)image->width * height * 3; i++)
         image->pixel[i] = 1.0f;
     float scale = picture_scale(photograph);

@@ -20,8 +20,6 @@
  * below it on all but mirrors; a lamp whose own light is less than half of what falls on it is
  * missed. */
 #define EMITTER_SHARE 0.4f
-/* Base colour of an emitter, which its own light hides. */
-#define NEUTRAL_BASE_COLOR 0.5f
 /* A base colour below this tells too little of the light that fell on it. */
 #define DARKEST_BASE_COLOR 0.02f
 /* Iteration number that keeps the decision's random numbers apart from the optimiser's. */

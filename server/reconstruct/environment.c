@@ -15,7 +15,6 @@
 #include "common/quantile.h"
 #include "server/reconstruct/fill.h"
 
-#define PI 3.14159265358979323846
 /* A point so far away that every camera of a room sees it in the same direction, in metres. */
 #define FAR_M 1e6f
 /* Places over a cell, along each side, at most. */

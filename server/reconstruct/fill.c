@@ -7,7 +7,6 @@
 #include "common/mem.h"
 #include "common/vec.h"
 
-#define PI 3.14159265358979323846
 /* What spreads is at most this many times the typical known luminance. */
 #define SPREAD_LIMIT 4.0
 #define SWEEPS 32

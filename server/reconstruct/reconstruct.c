@@ -16,8 +16,7 @@
 #include "server/reconstruct/solve.h"
 #include "server/reconstruct/views.h"
 
-/* Where every surface starts: a mid grey, half rough, half glossy. */
-#define NEUTRAL_BASE_COLOR 0.5f
+/* Where every surface starts, with a neutral base colour: half rough, half glossy. */
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 

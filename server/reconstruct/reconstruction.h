@@ -18,6 +18,9 @@
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
 
+/* Of a surface of which nothing is known, and of an emitter, whose own light hides it. */
+#define NEUTRAL_BASE_COLOR 0.5f
+
 struct reconstruction; /* the present state, for previews and outputs */
 struct emitter_evidence;
 

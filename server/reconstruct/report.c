@@ -19,8 +19,7 @@
 
 /* The photograph's radiance as an R G B picture; masked pixels become NaN. */
 static void photograph_radiance(const struct photograph *photo, struct image *image) {
-    static const char *const names[] = {"R", "G", "B"};
-    image_init(image, photo->camera.width, photo->camera.height, 3, names);
+    image_init_rgb(image, photo->camera.width, photo->camera.height);
     for (uint32_t y = 0; y < image->height; y++) {
         for (uint32_t x = 0; x < image->width; x++) {
             float *out = image->pixel + 3 * ((size_t)y * image->width + x);
@@ -77,15 +76,10 @@ static void clip_image(struct image *image, const struct photograph *photo) {
 /* The room as recovered, from a camera, as an R G B picture. */
 static void render_radiance(struct reconstruction *r, const struct camera *camera,
                             const struct path_settings *path, struct image *image) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image film; /* has standard errors too */
     film_render(&r->world, camera, (uint32_t)settings_number(r->settings, "report_samples"), path, 0,
                 r->pool, &film);
-    image_init(image, film.width, film.height, 3, names);
-    for (size_t i = 0; i < (size_t)film.width * film.height; i++) {
-        for (size_t c = 0; c < 3; c++)
-            image->pixel[3 * i + c] = film.pixel[film.channel_count * i + c];
-    }
+    image_take_rgb(&film, image);
     image_release(&film);
 }
 

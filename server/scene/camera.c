@@ -14,7 +14,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#define HALF_PI 1.57079632679489661923
+#define HALF_PI (0.5 * PI)
 #define FOLD_STEPS 4096    /* of the march towards the fold */
 #define NEWTON_STEPS 50
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */

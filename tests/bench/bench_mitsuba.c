@@ -58,7 +58,7 @@ static void write_room(const struct room *room, const struct camera *c, const ch
     room_must(mesh_ply_write(path, &room->mesh, &room->segments, &room->atlas, &err), &err);
     mem_free(path);
     struct image image;
-    image_init(&image, room->atlas.width, room->atlas.height, 3, (const char *const[]){"R", "G", "B"});
+    image_init_rgb(&image, room->atlas.width, room->atlas.height);
     for (size_t i = 0; i < (size_t)image.width * image.height; i++)
         memcpy(image.pixel + 3 * i, room->materials.base_color.texel[i], 3 * sizeof(float));
     path = file_join(dir, "base_color.exr");

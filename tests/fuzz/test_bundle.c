@@ -24,13 +24,12 @@ static void put(const char *name, const void *data, size_t size) {
 }
 
 static void start(void) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image image;
     dir = file_join(fuzz_folder(), "bundle");
     MUST(file_make_dirs(dir, NULL) == STATUS_OK);
     put("mesh.ply", mesh, sizeof mesh - 1);
     put("points.ply", "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", 50);
-    image_init(&image, 16, 12, 3, names);
+    image_init_rgb(&image, 16, 12);
     char *png = file_join(dir, "a.png"), *exr = file_join(dir, "b.exr");
     MUST(image_write_png(png, &image, 1.0f, NULL) == STATUS_OK);
     MUST(image_write_exr(exr, &image, IMAGE_HALF, false, NULL) == STATUS_OK);

@@ -47,10 +47,9 @@ static void put(const char *name, const void *data, size_t size) {
 }
 
 static void put_texture(const char *name, float value) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image image;
     char *path = file_join(outputs, name);
-    image_init(&image, TEXELS, TEXELS, 3, names);
+    image_init_rgb(&image, TEXELS, TEXELS);
     for (size_t i = 0; i < (size_t)TEXELS * TEXELS * 3; i++)
         image.pixel[i] = value;
     MUST(image_write_exr(path, &image, IMAGE_HALF, false, NULL) == STATUS_OK);

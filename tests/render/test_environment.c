@@ -9,7 +9,6 @@
 #include "tests/render/small_room.h"
 #include "tests/render/shell.h"
 
-#define PI 3.14159265358979323846
 #define SKY_WIDTH 256
 
 /* Blue above, brown below, a sun of some degrees in view of the window (which looks along -z). */
@@ -29,8 +28,7 @@ static vec3 direction_of(const struct image *map, uint32_t x, uint32_t y) {
 }
 
 static void make_sky(struct image *sky) {
-    static const char *const names[] = {"R", "G", "B"};
-    image_init(sky, SKY_WIDTH, SKY_WIDTH / 2, 3, names);
+    image_init_rgb(sky, SKY_WIDTH, SKY_WIDTH / 2);
     for (uint32_t i = 0; i < sky->width * sky->height; i++) {
         rgb value = sky_at(direction_of(sky, i % sky->width, i / sky->width));
         memcpy(sky->pixel + 3 * i, &value, sizeof value);
@@ -431,9 +429,8 @@ static vec3 brightest(const struct image *map) {
 }
 
 static void test_orient(void) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image picture, out;
-    image_init(&picture, 64, 33, 3, names);
+    image_init_rgb(&picture, 64, 33);
     picture.pixel[3 * (16 * 64)] = 1.0f; /* half a cell from -z, on the horizon */
     const struct {
         char up;

@@ -6,7 +6,6 @@
 #include "server/render/film.h"
 #include "tests/render/box.h"
 
-#define PI 3.14159265358979323846
 
 /* Integral of f cos over the hemisphere by midpoints. */
 static double albedo(float base, float roughness, float specular, float cosine) {

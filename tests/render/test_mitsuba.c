@@ -52,8 +52,8 @@ static struct camera look(vec3 from, vec3 at) {
 
 /* A sky whose every quarter has a colour of its own. */
 static void make_sky(struct image *sky, struct image *known) {
-    static const char *const rgb_names[] = {"R", "G", "B"}, *const known_names[] = {"count", "spread"};
-    image_init(sky, 32, 16, 3, rgb_names);
+    static const char *const known_names[] = {"count", "spread"};
+    image_init_rgb(sky, 32, 16);
     image_init(known, 32, 16, 2, known_names);
     for (uint32_t y = 0; y < 16; y++) {
         for (uint32_t x = 0; x < 32; x++) {

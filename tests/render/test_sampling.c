@@ -8,7 +8,6 @@
 #include "tests/render/box.h"
 #include "tests/render/chi_square.h"
 
-#define PI 3.14159265358979323846
 #define ROWS 24
 #define COLUMNS 48
 #define CELLS (ROWS * COLUMNS)

@@ -38,9 +38,8 @@ static bool make_folder(const char *name) {
 }
 
 static void put_picture(const char *name, uint32_t width, uint32_t height, float value, bool exr) {
-    static const char *const rgb_names[3] = {"R", "G", "B"};
     struct image image;
-    image_init(&image, width, height, 3, rgb_names);
+    image_init_rgb(&image, width, height);
     for (size_t i = 0; i < (size_t)width * height * 3; i++)
         image.pixel[i] = value;
     char *path = file_join(work, name);

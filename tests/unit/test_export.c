@@ -103,10 +103,9 @@ static void test_margin(void) {
 
 /* One exposure for both; equal pictures differ nowhere; signs by colour. */
 static void test_comparison(void) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image photograph, render, picture;
-    image_init(&photograph, 10, 1, 3, names);
-    image_init(&render, 10, 1, 3, names);
+    image_init_rgb(&photograph, 10, 1);
+    image_init_rgb(&render, 10, 1);
     for (int i = 0; i < 30; i++)
         photograph.pixel[i] = render.pixel[i] = 2.0f;
     for (int c = 0; c < 3; c++) {
@@ -208,10 +207,10 @@ static void test_views(const char *dir, const struct camera *wanted) {
 
 /* Distant light adds two files and a preview, in which what was filled in is dimmed. */
 static void test_environment(const char *dir, struct export_input *in, struct announced *heard) {
-    static const char *const names[] = {"R", "G", "B"}, *const known_names[] = {"count", "spread"};
+    static const char *const known_names[] = {"count", "spread"};
     struct image map, known, back;
     struct error err;
-    image_init(&map, 8, 4, 3, names);
+    image_init_rgb(&map, 8, 4);
     image_init(&known, 8, 4, 2, known_names);
     for (int i = 0; i < 32; i++) {
         for (int c = 0; c < 3; c++)
@@ -296,7 +295,6 @@ static void test_left_out(const char *dir, struct parallel *pool) {
 }
 
 int main(void) {
-    static const char *const names[] = {"R", "G", "B"};
     char dir[] = "/tmp/unbake-export-XXXXXX";
     struct parallel *pool = parallel_new(1);
     struct room room;
@@ -311,7 +309,7 @@ int main(void) {
         count[i] = (float)(i % 9), spread[i] = 0.1f;
     bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
     struct image photograph;
-    image_init(&photograph, 16, 12, 3, names);
+    image_init_rgb(&photograph, 16, 12);
     struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.5f,
                             .k = {0.1f, -0.02f}, .p = {0.001f, 0.002f}};
     camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};

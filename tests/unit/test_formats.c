@@ -364,7 +364,6 @@ static void test_limit(void) {
 
 int main(void) {
     char dir[] = "/tmp/unbake-formats-XXXXXX";
-    static const char *const names[] = {"R", "G", "B"};
     struct parallel *pool = parallel_new(1);
     struct room room;
     struct parts parts;
@@ -373,7 +372,7 @@ int main(void) {
     CHECK(mkdtemp(dir) != NULL);
     CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
     room.materials.specular[ROOM_FLOOR] = 0.0f;
-    image_init(&picture, 5, 3, 3, names); /* odd, for the padding */
+    image_init_rgb(&picture, 5, 3); /* odd, for the padding */
     char *png = file_join(dir, FORMATS_BASE_COLOR), *glb = file_join(dir, "scene.glb");
     CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
     struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.0f};

@@ -112,9 +112,8 @@ static void exr_round_trip(uint32_t channel_count, enum image_exr_type type, boo
 }
 
 static void exr_same_bytes(void) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image image;
-    image_init(&image, 100, 100, 3, names);
+    image_init_rgb(&image, 100, 100);
     for (size_t i = 0; i < 30000; i++)
         image.pixel[i] = sinf((float)i);
     for (int tiled = 0; tiled < 2; tiled++) {
@@ -192,10 +191,9 @@ static void exr_kinds(void) {
 /* ------------------------------------------------------------------------- PNG and JPEG */
 
 static void png_round_trip(void) {
-    static const char *const names[] = {"R", "G", "B"};
     struct image image, back;
     struct image_info info;
-    image_init(&image, 256, 3, 3, names);
+    image_init_rgb(&image, 256, 3);
     for (uint32_t x = 0; x < 256; x++)
         for (uint32_t y = 0; y < 3; y++)
             for (uint32_t c = 0; c < 3; c++)

@@ -4,8 +4,7 @@
 #include "tests/check.h"
 
 static void fill(struct image *image, float value) {
-    static const char *const names[] = {"R", "G", "B"};
-    image_init(image, 16, 16, 3, names);
+    image_init_rgb(image, 16, 16);
     for (size_t i = 0; i < 16 * 16 * 3; i++)
         image->pixel[i] = value;
 }
