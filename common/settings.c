@@ -16,59 +16,59 @@
 #define UNKNOWN_MAX 50 /* names that are no settings: so many are told, the others counted */
 
 static const struct setting table[] = {
-    {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03",
+    {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03", "listing1",
      "listing1: first step size of base colour; it falls over the run"},
-    {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true",
+    {"calibrate", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
      "look for faults of the capture (exposure, colour, vignette, poses, blur) and put them right"},
-    {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "2",
+    {"cameras_per_texel", SETTING_INT, "", 1, 64, NULL, "2", NULL,
      "photographs that one visit of a texel is compared with"},
-    {"choose", SETTING_CHOICE, "", 0, 0, "texels|pixels", "texels",
+    {"choose", SETTING_CHOICE, "", 0, 0, "texels|pixels", "texels", NULL,
      "what an optimiser step looks at: texels evenly over the surface, or pixels evenly over the photographs"},
-    {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "5",
+    {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "5", NULL,
      "base colour is corrected in blocks of 2^n texels a side; listing1 goes on from there to single texels"},
-    {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true",
-     "take the photographs' noise out of solved base colour"},
-    {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.002",
+    {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true", "solve",
+     "solve: take the photographs' noise out of base colour"},
+    {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.002", NULL,
      "first step size of emission, in logarithms of radiance"},
-    {"emitters", SETTING_CHOICE, "", 0, 0, "decide|any", "decide",
+    {"emitters", SETTING_CHOICE, "", 0, 0, "decide|any", "decide", "listing1",
      "which segments emit: decided from the evidence; or, of listing1, any may to the end"},
-    {"estimates", SETTING_CHOICE, "", 0, 0, "two|one", "two",
+    {"estimates", SETTING_CHOICE, "", 0, 0, "two|one", "two", NULL,
      "of a look's radiance in the loss: two independent ones, or one, whose squared error is biased"},
-    {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "1024",
-     "directions from which light is gathered at each point where it is"},
-    {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10",
+    {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "1024", "solve",
+     "solve: directions from which light is gathered at each point where it is"},
+    {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
-    {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0",
+    {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
      "optimiser steps; 0: as many as time_limit_sec holds"},
-    {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16",
+    {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16", NULL,
      "length of a path from the camera, in segments"},
-    {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve",
+    {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve", NULL,
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
-    {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15",
+    {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
      "time between preview pictures while the job runs"},
-    {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64",
+    {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64", NULL,
      "samples per pixel of the held-out re-renders"},
-    {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
+    {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1",
      "listing1: first step size of roughness"},
-    {"roulette_depth", SETTING_INT, "segments", 2, 32, NULL, "4",
+    {"roulette_depth", SETTING_INT, "segments", 2, 32, NULL, "4", NULL,
      "segment from which Russian roulette may end a path"},
-    {"samples_per_camera", SETTING_INT, "paths", 2, 4096, NULL, "16",
+    {"samples_per_camera", SETTING_INT, "paths", 2, 4096, NULL, "16", NULL,
      "paths for each texel and photograph, split into two independent halves"},
-    {"seed", SETTING_INT, "", 0, 9007199254740991.0, NULL, "1",
+    {"seed", SETTING_INT, "", 0, 9007199254740991.0, NULL, "1", NULL,
      "names the random numbers: the same seed gives the same bytes"},
-    {"segmentation", SETTING_CHOICE, "", 0, 0, "auto|given|automatic", "auto",
+    {"segmentation", SETTING_CHOICE, "", 0, 0, "auto|given|automatic", "auto", NULL,
      "objects from the mesh's object_id, from its shape, or (auto) from whichever is there"},
-    {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01",
+    {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1",
      "listing1: first step size of specular"},
-    {"texels_per_iteration", SETTING_INT, "texels", 64, 16777216, NULL, "4096",
+    {"texels_per_iteration", SETTING_INT, "texels", 64, 16777216, NULL, "4096", NULL,
      "texels chosen in one optimiser step"},
-    {"texels_per_metre", SETTING_REAL, "texels/m", 0, 100000, NULL, "0",
+    {"texels_per_metre", SETTING_REAL, "texels/m", 0, 100000, NULL, "0", NULL,
      "density of the textures; 0: the greatest that texture_size holds"},
-    {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048",
+    {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048", NULL,
      "side of the square textures"},
-    {"time_limit_sec", SETTING_REAL, "s", 1, 2592000, NULL, "600",
+    {"time_limit_sec", SETTING_REAL, "s", 1, 2592000, NULL, "600", NULL,
      "working time after which the optimiser stops; ignored when iterations is given"},
-    {"transforms", SETTING_TEXT, "", 0, 0, NULL, "transforms.json",
+    {"transforms", SETTING_TEXT, "", 0, 0, NULL, "transforms.json", NULL,
      "the file of the bundle that lists photographs and cameras"},
 };
 
@@ -113,30 +113,27 @@ static int choice_index(const char *choices, const char *word) {
     return -1;
 }
 
-static void set_default(struct settings *s, size_t i) {
-    const struct setting *t = &table[i];
+/* The default of what is kept in `number`. */
+static double default_number(const struct setting *t) {
     switch (t->type) {
+    case SETTING_BOOL: return strcmp(t->default_text, "true") == 0;
+    case SETTING_CHOICE: return choice_index(t->choices, t->default_text);
     case SETTING_INT:
     case SETTING_REAL:
-        s->number[i] = strtod(t->default_text, NULL);
-        break;
-    case SETTING_BOOL:
-        s->number[i] = strcmp(t->default_text, "true") == 0;
-        break;
-    case SETTING_CHOICE:
-        s->number[i] = choice_index(t->choices, t->default_text);
-        break;
-    case SETTING_TEXT:
-        s->text[i] = mem_strdup(t->default_text);
-        break;
+    case SETTING_TEXT: break;
     }
+    return strtod(t->default_text, NULL);
 }
 
 void settings_init(struct settings *s) {
     s->number = mem_calloc(TABLE_COUNT, sizeof *s->number);
     s->text = mem_calloc(TABLE_COUNT, sizeof *s->text);
-    for (size_t i = 0; i < TABLE_COUNT; i++)
-        set_default(s, i);
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        if (table[i].type == SETTING_TEXT)
+            s->text[i] = mem_strdup(table[i].default_text);
+        else
+            s->number[i] = default_number(&table[i]);
+    }
 }
 
 void settings_release(struct settings *s) {
@@ -229,50 +226,80 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
     return false;
 }
 
-static void add_problem(cJSON *problems, const char *name, const char *reason, const char *hint) {
-    if (!problems)
+/* What is wrong with an object of settings. */
+struct faults {
+    cJSON *problems; /* borrowed; NULL: nobody wants a list */
+    size_t count;
+    char first[256];
+};
+
+static void add_fault(struct faults *f, const char *name, const char *reason, const char *hint) {
+    if (f->count++ == 0)
+        snprintf(f->first, sizeof f->first, "%.80s: %.160s", name, reason);
+    if (!f->problems)
         return;
     cJSON *problem = cJSON_CreateObject();
     json_add_string(problem, "name", name);
     json_add_string(problem, "reason", reason);
-    if (hint)
+    if (*hint)
         json_add_string(problem, "hint", hint);
-    cJSON_AddItemToArray(problems, problem);
+    cJSON_AddItemToArray(f->problems, problem);
+}
+
+static void add_unknown(struct faults *f, const char *name) {
+    char hint[128] = "";
+    const char *nearest = settings_nearest(name);
+    if (nearest)
+        snprintf(hint, sizeof hint, "did you mean %s?", nearest);
+    if (f->count < UNKNOWN_MAX)
+        add_fault(f, name, "there is no such setting", hint);
+    else
+        f->count++;
+}
+
+/* Takes back what the method does not use; f: NULL where the method itself is a fault. */
+static void check_method(struct settings *s, const cJSON *object, struct faults *f) {
+    char reason[256], hint[128], chosen[NAME_MAX_LENGTH];
+    int method = index_of("method");
+    choice_at(table[method].choices, (int)s->number[method], chosen, sizeof chosen);
+    for (const cJSON *value = object->child; value; value = value->next) {
+        int i = index_of(value->string);
+        const struct setting *t = i < 0 ? NULL : &table[i];
+        if (!t || !t->method || strcmp(t->method, chosen) == 0 || s->number[i] == default_number(t))
+            continue;
+        s->number[i] = default_number(t);
+        if (!f)
+            continue;
+        snprintf(reason, sizeof reason, "only method=%s uses it, and the method is %s", t->method, chosen);
+        snprintf(hint, sizeof hint, "leave it out, or set method=%s", t->method);
+        add_fault(f, t->name, reason, hint);
+    }
 }
 
 enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
                            struct error *err) {
+    struct faults faults = {.problems = problems};
+    bool method_is_good = true;
     if (!cJSON_IsObject(object)) {
-        add_problem(problems, "settings", "must be an object of names and values", NULL);
+        add_fault(&faults, "settings", "must be an object of names and values", "");
         return error_set(err, STATUS_INPUT, "settings must be a JSON object");
     }
-    size_t bad = 0;
-    char first[256] = "";
     for (const cJSON *value = object->child; value; value = value->next) {
-        char reason[256] = "", hint[128] = "";
+        char reason[256] = "";
         int i = index_of(value->string);
-        if (i < 0 && bad >= UNKNOWN_MAX) {
-            bad++;
-            continue;
-        }
         if (i < 0) {
-            snprintf(reason, sizeof reason, "there is no such setting");
-            const char *nearest = settings_nearest(value->string);
-            if (nearest)
-                snprintf(hint, sizeof hint, "did you mean %s?", nearest);
-        } else if (apply_one(s, (size_t)i, value, reason, sizeof reason)) {
-            continue;
-        } else {
-            snprintf(hint, sizeof hint, "%.120s", table[i].help);
+            add_unknown(&faults, value->string);
+        } else if (!apply_one(s, (size_t)i, value, reason, sizeof reason)) {
+            add_fault(&faults, value->string, reason, table[i].help);
+            method_is_good = method_is_good && strcmp(value->string, "method") != 0;
         }
-        add_problem(problems, value->string, reason, *hint ? hint : NULL);
-        if (bad++ == 0)
-            snprintf(first, sizeof first, "%.80s: %.160s", value->string, reason);
     }
-    if (bad == 0)
+    check_method(s, object, method_is_good ? &faults : NULL);
+    if (faults.count == 0)
         return STATUS_OK;
-    return bad == 1 ? error_set(err, STATUS_INPUT, "setting %s", first)
-                    : error_set(err, STATUS_INPUT, "setting %s (and %zu more)", first, bad - 1);
+    return faults.count == 1
+               ? error_set(err, STATUS_INPUT, "setting %s", faults.first)
+               : error_set(err, STATUS_INPUT, "setting %s (and %zu more)", faults.first, faults.count - 1);
 }
 
 enum status settings_parse_assignment(const char *text, cJSON *object, struct error *err) {
@@ -342,6 +369,8 @@ cJSON *settings_describe(void) {
         }
         add_value(entry, "default", i, &defaults);
         json_add_string(entry, "help", t->help);
+        if (t->method)
+            json_add_string(entry, "method", t->method);
         cJSON_AddItemToArray(list, entry);
     }
     settings_release(&defaults);

@@ -21,6 +21,7 @@ struct setting {
     double minimum, maximum;    /* inclusive, for numbers */
     const char *choices;        /* "a|b|c" for SETTING_CHOICE */
     const char *default_text;
+    const char *method;         /* the only one that uses it; NULL: every method does */
     const char *help;           /* one sentence */
 };
 
@@ -46,7 +47,8 @@ bool settings_is(const struct settings *s, const char *name, const char *word);
 const char *settings_text(const struct settings *s, const char *name); /* borrowed */
 
 /* Checks a JSON object and applies it over *s. All problems at once: each appends an object
- * {"name", "reason", "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. */
+ * {"name", "reason", "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. A setting that
+ * the method does not use is one, unless its value is the default: what settings_to_json wrote is taken. */
 enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
                            struct error *err);
 

@@ -21,6 +21,9 @@ field '.invalid_params[] | select(.name == "settings.textur_size") | .hint' | gr
 post /v1/jobs '{"scene":"nothex"}'; expect 422
 post /v1/jobs '{"scene":"00000000000000000000"}'; expect 422 "an unknown scene"
 post /v1/jobs "{\"scene\":\"$scene\",\"settings\":[]}"; expect 422
+post /v1/jobs "{\"scene\":\"$scene\",\"settings\":{\"emitters\":\"any\"}}"; expect 422 "a setting of the other method"
+equal "$(field '.invalid_params[0] | .name, .reason' | tr '\n' ' ')" \
+    "settings.emitters only method=listing1 uses it, and the method is solve "
 post /v1/jobs "{\"scene\":\"$scene\",\"name\":\"\"}"; expect 422
 post /v1/jobs "{\"scene\":\"$scene\",\"name\":7}"; expect 422
 post /v1/jobs "{\"scene\":\"$scene\",\"priority\":1.5}"; expect 422

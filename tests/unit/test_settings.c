@@ -54,6 +54,39 @@ static void test_problems_all_at_once(void) {
     settings_release(&s);
 }
 
+/* How many problems settings of that text have; *reason: of the last. */
+static int problems_of(const char *text, char reason[200]) {
+    struct settings s;
+    struct error err;
+    cJSON *object = parse(text), *problems = cJSON_CreateArray();
+    settings_init(&s);
+    enum status status = settings_apply(&s, object, problems, &err);
+    int count = cJSON_GetArraySize(problems);
+    CHECK((status == STATUS_OK) == (count == 0));
+    const cJSON *last = cJSON_GetArrayItem(problems, count - 1);
+    snprintf(reason, 200, "%s", count ? cJSON_GetStringValue(cJSON_GetObjectItem(last, "reason")) : "");
+    cJSON_Delete(problems);
+    cJSON_Delete(object);
+    settings_release(&s);
+    return count;
+}
+
+/* What the method would not look at is a problem, wherever the method stands. */
+static void test_method(void) {
+    char reason[200];
+    CHECK(problems_of("{\"emitters\":\"any\"}", reason) == 1);
+    CHECK_STRING(reason, "only method=listing1 uses it, and the method is solve");
+    CHECK(problems_of("{\"denoise\":false,\"gather_samples\":64,\"method\":\"listing1\"}", reason) == 2);
+    CHECK_STRING(reason, "only method=solve uses it, and the method is listing1");
+    CHECK(problems_of("{\"base_color_rate\":0.1,\"roughness_rate\":0.1,\"specular_rate\":0.1}", reason) == 3);
+    CHECK(problems_of("{\"emitters\":\"any\",\"method\":\"listing1\"}", reason) == 0);
+    CHECK(problems_of("{\"method\":\"solve\",\"denoise\":false,\"estimates\":\"one\",\"choose\":\"pixels\"}",
+                      reason) == 0);
+    /* The default changes nothing; a method that is none has no settings of its own. */
+    CHECK(problems_of("{\"emitters\":\"decide\"}", reason) == 0);
+    CHECK(problems_of("{\"emitters\":\"any\",\"method\":\"guess\"}", reason) == 1);
+}
+
 static void test_assignments(void) {
     cJSON *object = cJSON_CreateObject();
     struct error err;
@@ -78,6 +111,7 @@ static void test_assignments(void) {
 int main(void) {
     test_table();
     test_problems_all_at_once();
+    test_method();
     test_assignments();
     return check_result();
 }
