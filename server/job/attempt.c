@@ -516,6 +516,16 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
     return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, a->memory_step, err);
 }
 
+/* What the archive was unpacked to: a check that was killed could not tidy up. A ready scene needs it,
+ * of another only the archive is kept. */
+static void remove_unpacked(const struct attempt *a) {
+    struct error err;
+    char *files = file_join(a->dir, "files");
+    if (file_remove_tree(files, &err) != STATUS_OK)
+        log_warning("scene %.12s: %s", a->scene_id, err.message);
+    mem_free(files);
+}
+
 static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v,
                                 struct error *err) {
     if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
@@ -526,20 +536,30 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
         text = json_text(a->facts);
         status = store_scene_ready(store, a->scene_id, text, err);
     } else {
-        if (cJSON_GetArraySize(a->problems) == 0) {
+        bool waits = v->outcome == OUTCOME_BLOCKED; /* the content is not at fault */
+        remove_unpacked(a);
+        if (waits || cJSON_GetArraySize(a->problems) == 0) {
             cJSON *problem = cJSON_CreateObject();
             json_add_string(problem, "file", "");
             json_add_string(problem, "reason",
                             a->killed           ? "its check took too long"
                             : v->reason[0] != 0 ? v->reason
                                                 : "its check ended without a result");
+            if (waits)
+                json_add_string(problem, "hint", "It is checked again when there is more room.");
             cJSON_AddItemToArray(a->problems, problem);
         }
         text = json_text(a->problems);
-        status = store_scene_reject(store, a->scene_id, text, err);
+        status = waits ? store_scene_postpone(store, a->scene_id, text, err)
+                       : store_scene_reject(store, a->scene_id, text, err);
     }
     mem_free(text);
     return status;
+}
+
+bool attempt_lacks_room(const struct attempt *a) {
+    return a->phase == ATTEMPT_ENDED && WIFEXITED(a->wait_status) &&
+           WEXITSTATUS(a->wait_status) == PROGRESS_EXIT_NO_SPACE;
 }
 
 void attempt_charge(struct attempt *a, struct store *store, struct figures *figures) {

@@ -61,6 +61,9 @@ void attempt_listen(struct attempt *a, struct store *store, struct figures *figu
  * makes up for it. */
 void attempt_charge(struct attempt *a, struct store *store, struct figures *figures);
 
+/* Whether an ended attempt was too large for the disk. */
+bool attempt_lacks_room(const struct attempt *a);
+
 /* Enters the outcome of an ended attempt and empties it. */
 enum status attempt_settle(struct attempt *a, struct store *store, struct figures *figures,
                            struct error *err);

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "common/clock.h"
+#include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
@@ -44,6 +45,7 @@ struct scheduler {
     double housekeeping_at; /* as clock_sec */
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
+    uint64_t check_room;   /* free bytes with which scenes that had too little are checked again; 0: none wait */
     struct delivery delivery[DELIVERIES];
     double outbox_at;       /* when the next message's time comes, as clock_sec */
     struct pollfd *poll;  /* [1 + 2 * slot_count + DELIVERIES] */
@@ -158,13 +160,38 @@ static void start_jobs(struct scheduler *s) {
     }
 }
 
+/* A check that is tried in vain fills the disk for a moment, so there must clearly be more room than
+ * there was: an eighth. */
+static void postpone_check(struct scheduler *s) {
+    uint64_t room = 0;
+    struct error err;
+    if (file_free_bytes(s->config.data_dir, &room, &err) != STATUS_OK)
+        log_warning("%s", err.message);
+    s->check_room = room + room / 8 + 1;
+}
+
+static enum status check_again(struct scheduler *s, struct error *err) {
+    uint64_t room;
+    if (s->check_room == 0)
+        return STATUS_OK;
+    enum status status = file_free_bytes(s->config.data_dir, &room, err);
+    if (status != STATUS_OK || room < s->check_room)
+        return status;
+    status = store_scene_check_again(s->store, err);
+    if (status == STATUS_OK)
+        s->check_room = 0;
+    return status;
+}
+
 static void start_check(struct scheduler *s) {
     struct attempt *slot = &s->slot[s->slot_count - 1];
     char id[SCENE_ID_SIZE];
     struct error err;
     if (slot->phase != ATTEMPT_EMPTY)
         return;
-    enum status status = store_scene_next_unchecked(s->store, id, &err);
+    enum status status = check_again(s, &err);
+    if (status == STATUS_OK)
+        status = store_scene_next_unchecked(s->store, id, &err);
     if (status == STATUS_NOT_FOUND)
         return;
     if (status == STATUS_OK)
@@ -258,6 +285,8 @@ static int keep_deadlines(struct scheduler *s) {
     double now = clock_sec(), sleep = s->must_retry ? RETRY_SEC : (double)INFINITY;
     if (any_alive(s) || s->disk.is_low)
         sleep = fmin(sleep, fmax(s->disk.looked_at + DISK_LOOK_SEC - now, 0.01));
+    if (s->check_room)
+        sleep = fmin(sleep, DISK_LOOK_SEC);
     if (!atomic_load(&s->stopping))
         sleep = fmin(sleep, fmax(s->housekeeping_at - now, 0.0));
     for (size_t i = 0; i < s->slot_count; i++) {
@@ -311,8 +340,11 @@ static void listen_and_settle(struct scheduler *s) {
         struct attempt *a = &s->slot[i];
         struct error err;
         attempt_listen(a, s->store, &s->figures);
+        bool is_postponed = i + 1 == s->slot_count && attempt_lacks_room(a);
         if (a->phase == ATTEMPT_ENDED && attempt_settle(a, s->store, &s->figures, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
+        else if (is_postponed)
+            postpone_check(s);
         running += a->phase == ATTEMPT_ALIVE;
     }
     atomic_store(&s->running, running);
@@ -363,6 +395,8 @@ static void keep_house(struct scheduler *s) {
 enum status scheduler_run(struct scheduler *s, struct error *err) {
     size_t requeued;
     enum status status = store_reconcile(s->store, &requeued, err);
+    if (status == STATUS_OK)
+        status = store_scene_check_again(s->store, err);
     if (status != STATUS_OK)
         return status;
     if (requeued)

@@ -4,6 +4,8 @@
  *                     ▲  └─────> rejected
  *                     └────────────┘ (uploaded again)
  *
+ * One in `checking` that has problems waits for room on the disk.
+ *
  * `receiving` exists only while the bytes arrive, and then only in memory: a row means that the
  * archive is complete and on disk. */
 #include <stdio.h>
@@ -55,6 +57,13 @@ static enum status state_of(struct store *store, const char *id, int64_t *state,
     return sql_int(&store->sql, -1, state, err, "SELECT state FROM scenes WHERE id = ?", "t", id);
 }
 
+/* Whether its check is under way or about to be. */
+static enum status is_in_check(struct store *store, const char *id, int64_t *is_so, struct error *err) {
+    return sql_int(&store->sql, 0, is_so, err,
+                   "SELECT 1 FROM scenes WHERE id = ? AND state = ? AND problems = '[]'", "tn", id,
+                   (int)SCENE_CHECKING);
+}
+
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err) {
     int64_t state = -1;
@@ -68,7 +77,7 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
                          "INSERT INTO scenes (id, name, state, bytes, created_ms)"
                          " VALUES (?, ?, ?, ?, ?)",
                          "ttnii", id, name, (int)SCENE_CHECKING, (int64_t)bytes, store_now_ms());
-    else if (status == STATUS_OK && state == SCENE_REJECTED)
+    else if (status == STATUS_OK && (state == SCENE_REJECTED || state == SCENE_CHECKING))
         status = sql_run(&store->sql, err,
                          "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
                          (int)SCENE_CHECKING, id);
@@ -110,6 +119,21 @@ enum status store_scene_ready(struct store *store, const char *id, const char *f
 enum status store_scene_reject(struct store *store, const char *id, const char *problems,
                                struct error *err) {
     return conclude(store, id, SCENE_REJECTED, problems, "{}", err);
+}
+
+enum status store_scene_postpone(struct store *store, const char *id, const char *problems,
+                                 struct error *err) {
+    return conclude(store, id, SCENE_CHECKING, problems, "{}", err);
+}
+
+enum status store_scene_check_again(struct store *store, struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err,
+                     "UPDATE scenes SET problems = '[]' WHERE state = ? AND problems <> '[]'", "n",
+                     (int)SCENE_CHECKING);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
@@ -218,7 +242,7 @@ enum status store_scene_patch(struct store *store, const char *id, const char *n
 
 enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
                                bool *is_gone, struct error *err) {
-    int64_t state = -1, others = 0, job = 0;
+    int64_t state = -1, others = 0, job = 0, in_check = 0;
     *is_gone = false;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
@@ -230,7 +254,9 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
         status = sql_int(&store->sql, 0, &others, err,
                          "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1",
                          "ti", id, owner_id);
-    if (status == STATUS_OK && state == SCENE_CHECKING && !others)
+    if (status == STATUS_OK)
+        status = is_in_check(store, id, &in_check, err);
+    if (status == STATUS_OK && in_check && !others)
         status = error_set(err, STATUS_CONFLICT, "scene %s is being checked", id);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &job, err,
@@ -260,7 +286,7 @@ enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZ
     bool found = false;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT id FROM scenes WHERE state = ?"
+                                   "SELECT id FROM scenes WHERE state = ? AND problems = '[]'"
                                    " ORDER BY created_ms, id LIMIT 1",
                                    "n", (int)SCENE_CHECKING);
     if (status == STATUS_OK)

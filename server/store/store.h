@@ -62,8 +62,8 @@ struct scene_row {
 void scene_row_release(struct scene_row *row);
 
 /* A complete, durable upload by user owner_id: the row starts in `checking`. Content that is there
- * already is no error: *existed is set, the user owns it too, and nothing else changes, but a
- * rejected one is checked again. */
+ * already is no error: *existed is set, the user owns it too, and nothing else changes, but one that
+ * was rejected or waits for room is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err);
 enum status store_scene_ready(struct store *store, const char *id, const char *facts,
@@ -86,12 +86,18 @@ enum status store_scene_patch(struct store *store, const char *id, const char *n
                               const struct keeping *keeping, struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
- * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A dry run changes nothing. */
+ * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A
+ * dry run changes nothing. */
 enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
                                bool *is_gone, struct error *err);
-/* The oldest scene in `checking`; STATUS_NOT_FOUND when there is none. */
+/* The oldest scene in `checking` that does not wait for room; STATUS_NOT_FOUND when there is none. */
 enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
                                        struct error *err);
+/* A check that found too little room, as `problems` says: the scene stays in `checking`, can be removed
+ * while it waits, and is no next one before store_scene_check_again, which makes all of them so. */
+enum status store_scene_postpone(struct store *store, const char *id, const char *problems,
+                                 struct error *err);
+enum status store_scene_check_again(struct store *store, struct error *err);
 
 /* --- jobs -------------------------------------------------------------------------------- */
 

@@ -136,6 +136,24 @@ if [ "$(id -u)" -eq 0 ] && mkdir "$work/disk" && mount -t tmpfs -o size=90m none
     run 0 scenes rm "$("$build/unbake" scenes -q | head -n 1)"
     [ -z "$(ls -A "$data/scenes")$(ls -A "$data/jobs")" ] || fail "left: $(ls "$data/scenes" "$data/jobs")"
     rm "$work/disk/filler"
+
+    # --- a room that does not fit when it is unpacked is no faulty room: it waits for more space ---
+    make_room "$work/wide"
+    head -c 2000000 /dev/urandom | base64 -w 100 | sed "s/\$/$(printf '%1500s')/" >"$work/wide/notes.txt" # 40 MB; packed, 2
+    tar -C "$work/wide" -czf "$work/wide.tar.gz" .
+    head -c 50m /dev/zero >"$work/disk/filler"
+    call POST /v1/scenes -T "$work/wide.tar.gz"; expect 201
+    wide=$(field .id)
+    short() { field_is "/v1/scenes/$wide" '.state + " " + (.problems[0].reason // "" | .[0:9])' "checking disk full"; }
+    wait_for 60 short
+    run 0 scenes show "$wide"; has "$out" "notes.txt"
+    run 0 submit --scene "$wide" $quick -q
+    first=$out
+    call DELETE "/v1/scenes/$wide"; expect 409 "a job waits for it"
+    field_is "/v1/jobs/$first" .state queued || fail "the job did not wait: $(cat "$work/body")"
+    rm "$work/disk/filler"
+    run 0 watch "$first" -q
+    field_is "/v1/scenes/$wide" .state ready || fail "the scene: $(cat "$work/body")"
     daemon_end TERM || fail "the daemon did not end with 0"
     umount "$mounted" && mounted=
 fi

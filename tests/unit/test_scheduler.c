@@ -21,6 +21,8 @@
 #define SCENE_A "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 #define SCENE_B "bbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbbb"
 #define SCENE_C "cccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccccc"
+#define SCENE_D "dddddddddddddddddddddddddddddddddddddddddddddddddddddddddddddddd"
+#define SCENE_E "eeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeeee"
 
 /* Whoever waits for another process looks this often, WAIT_US apart: five minutes, since a disk
  * that is busy with others' work makes each commit wait. */
@@ -159,10 +161,20 @@ static int play(const char *role, const char *dir, int attempt) {
     return 0;
 }
 
-static int play_check(const char *role) {
+/* "large" fits the disk once there is a file "room" in the data folder. */
+static int play_check(const char *role, const char *dir) {
     struct progress p = {PROGRESS_FD};
+    char *files = file_join(dir, "files"), *room = file_join(dir, "../../room");
+    if (file_make_dirs(files, &err) != STATUS_OK)
+        return 92;
     if (strcmp(role, "crash") == 0)
         abort();
+    if (strcmp(role, "large") == 0 && access(room, F_OK) != 0) {
+        progress_end(&p, STATUS_NO_SPACE, "cannot write mesh.ply", "");
+        return PROGRESS_EXIT_NO_SPACE;
+    }
+    mem_free(files);
+    mem_free(room);
     if (strcmp(role, "bad") == 0) {
         progress_problem(&p, "mesh.ply", "face 3 has no area", NULL);
         progress_problem(&p, "images/1.png", "is truncated", "copy it again");
@@ -190,7 +202,7 @@ static int worker(const char *dir) {
         char *name = file_join(dir, "archive");
         if (file_read(name, &archive, &err) != STATUS_OK)
             return 95;
-        return play_check(buf_text(&archive));
+        return play_check(buf_text(&archive), dir);
     }
     cJSON *settings = cJSON_GetObjectItem(order, "settings");
     if (json_string(settings, "role", "settings", "", &role, &err) != STATUS_OK ||
@@ -330,6 +342,49 @@ static void check_whole_life(struct daemon *d, int64_t id, int states) {
     for (size_t i = 0; i < count; i++)
         output_row_release(&rows[i]);
     mem_free(rows);
+}
+
+/* A scene's problems, as soon as it has some. */
+static void expect_problems(struct daemon *d, const char *id, enum scene_state state, const char *part) {
+    struct scene_row row = {0};
+    for (int i = 0; i < WAIT_TRIES; i++) {
+        scene_row_release(&row);
+        OK(store_scene_get(d->store, id, &row, &err));
+        if (strcmp(row.problems, "[]") != 0)
+            break;
+        usleep(WAIT_US);
+    }
+    CHECK_THAT(row.state == state && strstr(row.problems, part), "scene %.3s is %s: %s", id,
+               scene_state_name(row.state), row.problems);
+    scene_row_release(&row);
+    char *files = mem_printf("%s/scenes/%s/files", d->dir, id);
+    CHECK_THAT(access(files, F_OK) != 0, "%s is left", files);
+    mem_free(files);
+}
+
+/* A scene for which the disk has no room is not at fault: it waits, and so do its jobs, while others go
+ * on; it can be removed; and it is checked again when it is sent again, when the daemon starts, and
+ * when there is more room (tests/api/test_retention.sh). */
+static void test_no_room(struct daemon *d) {
+    bool is_gone;
+    char *room = file_join(d->dir, "room");
+    daemon_start(d, 1, "/proc/self/exe");
+    add_scene(d, SCENE_D, "large");
+    expect_problems(d, SCENE_D, SCENE_CHECKING, "disk full: cannot write mesh.ply");
+    add_scene(d, SCENE_D, "large");
+    expect_problems(d, SCENE_D, SCENE_CHECKING, "disk full");
+    add_scene(d, SCENE_E, "crash");
+    expect_problems(d, SCENE_E, SCENE_REJECTED, "crashed");
+    OK(store_scene_delete(d->store, SCENE_D, -1, false, &is_gone, &err));
+    add_scene(d, SCENE_D, "large");
+    expect_problems(d, SCENE_D, SCENE_CHECKING, "disk full");
+    int64_t job = submit(d, SCENE_D, "good");
+    daemon_stop(d);
+    OK(file_replace(room, "", 0, &err));
+    daemon_start(d, 1, "/proc/self/exe");
+    expect(d, job, JOB_SUCCEEDED, 1, "", "");
+    daemon_stop(d);
+    mem_free(room);
 }
 
 static void test_outcomes(struct daemon *d) {
@@ -529,6 +584,7 @@ int main(int argc, char **argv) {
         return 1;
     test_daemon_killed(&d); /* first: it forks, and this process has no threads yet */
     test_outcomes(&d);
+    test_no_room(&d);
     test_wishes(&d);
     test_false_start(&d);
     OK(file_remove_tree(d.dir, &err));
