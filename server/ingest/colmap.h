@@ -3,12 +3,12 @@
  *
  * COLMAP's poses are world-to-camera and its axes ours. Its unit of length is arbitrary: it must be
  * that of the mesh, which comes out of the same reconstruction. Photographs are sorted by name; their
- * names are below images/ where there is such a folder. Camera models: SIMPLE_PINHOLE, PINHOLE,
- * SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE. */
+ * names are below images/ where there is such a folder. */
 #ifndef UNBAKE_INGEST_COLMAP_H
 #define UNBAKE_INGEST_COLMAP_H
 
 #include "common/error.h"
+#include "server/ingest/colmap_cameras.h"
 #include "server/ingest/findings.h"
 #include "server/ingest/transforms.h"
 
@@ -22,11 +22,7 @@ char *colmap_find(const char *root);
 enum status colmap_read(const char *root, const char *images, struct transforms *t, struct findings *f,
                         struct error *err);
 
-/* The two files from memory. `prefix` goes before the photographs' names. */
-struct colmap_cameras;
-struct colmap_cameras *colmap_cameras_parse(const void *data, size_t size, const char *name, bool binary,
-                                            struct error *err); /* NULL on error */
-void colmap_cameras_free(struct colmap_cameras *cameras);
+/* The file of images from memory. `prefix` goes before the photographs' names. */
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
                                 const struct colmap_cameras *cameras, const char *prefix,
                                 struct transforms *t, struct findings *f, struct error *err);

@@ -1,0 +1,26 @@
+/* colmap_cameras.h -- the lenses of a COLMAP reconstruction, from cameras.bin or cameras.txt.
+ *
+ * Camera models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE,
+ * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE. Counts that a file promises are held against the bytes that
+ * are there. */
+#ifndef UNBAKE_INGEST_COLMAP_CAMERAS_H
+#define UNBAKE_INGEST_COLMAP_CAMERAS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/error.h"
+#include "server/ingest/transforms.h"
+
+struct colmap_cameras; /* opaque */
+
+/* From data[size]; `name` is for messages. NULL on error, which is STATUS_INPUT. */
+struct colmap_cameras *colmap_cameras_parse(const void *data, size_t size, const char *name, bool binary,
+                                            struct error *err);
+void colmap_cameras_free(struct colmap_cameras *c); /* NULL is fine */
+
+/* The lens of the camera of that number; borrowed; NULL where there is none. */
+const struct lens *colmap_cameras_find(const struct colmap_cameras *c, uint32_t id);
+
+#endif
