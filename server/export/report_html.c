@@ -1,17 +1,14 @@
-/* report_html.c -- see report_html.h. Every text that came from outside goes through put_text. */
+/* report_html.c -- see report_html.h. Every text that came from outside goes through html.h. */
 #include "server/export/report_html.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
-#include "common/file.h"
 #include "common/mem.h"
+#include "server/export/html.h"
 
-#define PICTURE_LIMIT ((size_t)1 << 26) /* bytes of one embedded PNG */
-#define CURVE_POINTS 480                /* more are thinned */
-#define SEGMENT_ROWS 60                 /* the rest is in report.json */
-#define LIST_ITEMS 16                   /* of a list that has no section of its own; likewise */
+#define CURVE_POINTS 480 /* more are thinned */
+#define SEGMENT_ROWS 60  /* the rest is in report.json */
 
 static const char style[] =
     ":root{color-scheme:light dark;--ink:#1d2229;--soft:#667080;--line:#d9dde3;--page:#f6f7f9;"
@@ -41,100 +38,6 @@ static const char style[] =
     "svg line{stroke:var(--line)}"
     "@media print{.card,figure{break-inside:avoid}}";
 
-/* --- text --------------------------------------------------------------------------------- */
-
-static void put_text(struct buf *out, const char *text) {
-    for (const char *c = text; *c; c++) {
-        switch (*c) {
-        case '<': buf_puts(out, "&lt;"); break;
-        case '>': buf_puts(out, "&gt;"); break;
-        case '&': buf_puts(out, "&amp;"); break;
-        case '"': buf_puts(out, "&quot;"); break;
-        default: buf_append(out, c, 1);
-        }
-    }
-}
-
-/* "mean_base_color" -> "mean base color" */
-static void put_key(struct buf *out, const char *key) {
-    char *words = mem_strdup(key);
-    for (char *c = words; *c; c++)
-        if (*c == '_')
-            *c = ' ';
-    put_text(out, words);
-    mem_free(words);
-}
-
-static void put_number(struct buf *out, double value) {
-    if ((value == floor(value) || fabs(value) >= 1000.0) && fabs(value) < 1e15)
-        buf_printf(out, "%.0f", value);
-    else
-        buf_printf(out, "%.4g", value);
-}
-
-/* Any value in a table's cell; objects and arrays of them as nested tables. */
-static void put_value(struct buf *out, const cJSON *value) {
-    if (cJSON_IsNumber(value)) {
-        put_number(out, value->valuedouble);
-    } else if (cJSON_IsString(value)) {
-        put_text(out, value->valuestring);
-    } else if (cJSON_IsBool(value)) {
-        buf_puts(out, cJSON_IsTrue(value) ? "yes" : "no");
-    } else if (cJSON_IsObject(value)) {
-        buf_puts(out, "<table>");
-        for (const cJSON *member = value->child; member; member = member->next) {
-            buf_puts(out, "<tr><th>");
-            put_key(out, member->string);
-            buf_puts(out, "</th><td>");
-            put_value(out, member);
-            buf_puts(out, "</td></tr>");
-        }
-        buf_puts(out, "</table>");
-    } else if (cJSON_IsArray(value)) {
-        int items = cJSON_GetArraySize(value);
-        if (items > LIST_ITEMS)
-            buf_printf(out, " %d entries, in report.json", items);
-        for (const cJSON *item = value->child; item && items <= LIST_ITEMS; item = item->next) {
-            put_value(out, item);
-            if (item->next && !cJSON_IsObject(item))
-                buf_puts(out, ", ");
-        }
-    } else {
-        buf_puts(out, "–");
-    }
-}
-
-static void put_base64(struct buf *out, const unsigned char *data, size_t length) {
-    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < length; i += 3) {
-        uint32_t word = (uint32_t)data[i] << 16;
-        if (i + 1 < length)
-            word |= (uint32_t)data[i + 1] << 8;
-        if (i + 2 < length)
-            word |= data[i + 2];
-        char four[4] = {digit[word >> 18], digit[word >> 12 & 63],
-                        i + 1 < length ? digit[word >> 6 & 63] : '=',
-                        i + 2 < length ? digit[word & 63] : '='};
-        buf_append(out, four, 4);
-    }
-}
-
-static enum status put_image(struct buf *out, const struct report_picture *picture,
-                             struct error *err) {
-    struct buf file;
-    buf_init(&file, PICTURE_LIMIT);
-    enum status status = file_read(picture->path, &file, err);
-    if (status == STATUS_OK) {
-        buf_puts(out, "<img alt=\"");
-        put_text(out, picture->title);
-        buf_puts(out, "\" src=\"data:image/png;base64,");
-        put_base64(out, (const unsigned char *)file.data, file.length);
-        buf_puts(out, "\">");
-    }
-    buf_release(&file);
-    return status;
-}
-
 /* --- curves ------------------------------------------------------------------------------- */
 
 struct point {
@@ -154,57 +57,82 @@ static struct point *read_series(const cJSON *series, size_t *count) {
     return point;
 }
 
-/* Logarithmic in y where all values are positive and span a factor of 8. */
-static void put_curve(struct buf *out, const char *name, const cJSON *series) {
-    enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
+/* A curve and the frame that it is drawn in. Logarithmic in y where all values are positive and span a
+ * factor of 8. */
+enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
+
+struct curve {
     size_t count;
-    struct point *point = read_series(series, &count);
+    struct point *point; /* [count] owned */
+    bool logarithmic;
+    double top, range;   /* of values, or of their logarithms */
+    double steps;        /* from the first to the last */
+};
+
+static void curve_init(struct curve *c, const cJSON *series) {
     double low = INFINITY, high = -INFINITY;
-    for (size_t i = 0; i < count; i++) {
-        low = fmin(low, point[i].value);
-        high = fmax(high, point[i].value);
+    c->point = read_series(series, &c->count);
+    for (size_t i = 0; i < c->count; i++) {
+        low = fmin(low, c->point[i].value);
+        high = fmax(high, c->point[i].value);
     }
-    bool logarithmic = count && low > 0.0 && high > 8.0 * low;
-    double from = logarithmic ? log(low) : low, to = logarithmic ? log(high) : high;
-    double range = to > from ? to - from : 1.0;
-    double steps = count ? point[count - 1].step - point[0].step : 0.0;
+    c->logarithmic = c->count && low > 0.0 && high > 8.0 * low;
+    double from = c->logarithmic ? log(low) : low;
+    c->top = c->logarithmic ? log(high) : high;
+    c->range = c->top > from ? c->top - from : 1.0;
+    c->steps = c->count ? c->point[c->count - 1].step - c->point[0].step : 0.0;
+}
+
+static void put_axes(struct buf *out, const struct curve *c) {
+    for (int i = 0; i <= 4; i++) {
+        double y = TOP + (HEIGHT - TOP - BOTTOM) * i / 4.0;
+        double value = c->top - c->range * i / 4.0;
+        buf_printf(out, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
+                   "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>",
+                   LEFT, WIDTH - RIGHT, y, y, LEFT - 6, y + 4.0, c->logarithmic ? exp(value) : value);
+    }
+    buf_printf(out, "<text x=\"%d\" y=\"%d\">%.4g</text>"
+               "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text>",
+               LEFT, HEIGHT - 6, c->point[0].step, WIDTH - RIGHT, HEIGHT - 6, c->point[c->count - 1].step);
+}
+
+static void put_path(struct buf *out, const struct curve *c) {
+    size_t stride = (c->count + CURVE_POINTS - 1) / CURVE_POINTS;
+    buf_puts(out, "<path d=\"");
+    for (size_t i = 0; i < c->count;) {
+        const struct point *p = &c->point[i];
+        double value = c->logarithmic ? log(p->value) : p->value;
+        buf_printf(out, "%c%.1f %.1f", i ? 'L' : 'M',
+                   LEFT + (WIDTH - LEFT - RIGHT) * (p->step - c->point[0].step) / c->steps,
+                   TOP + (HEIGHT - TOP - BOTTOM) * (c->top - value) / c->range);
+        bool is_last = i + 1 == c->count;
+        i = is_last || i + stride < c->count ? i + stride : c->count - 1; /* the last is never thinned out */
+    }
+    buf_puts(out, "\"/>");
+}
+
+static void put_curve(struct buf *out, const char *name, const cJSON *series) {
+    struct curve c;
+    curve_init(&c, series);
     buf_puts(out, "<figure>");
-    if (count >= 2 && steps > 0.0) {
+    if (c.count >= 2 && c.steps > 0.0) {
         buf_printf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\">", WIDTH, HEIGHT);
-        for (int i = 0; i <= 4; i++) {
-            double y = TOP + (HEIGHT - TOP - BOTTOM) * i / 4.0;
-            double value = to - range * i / 4.0;
-            buf_printf(out, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
-                       "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>",
-                       LEFT, WIDTH - RIGHT, y, y, LEFT - 6, y + 4.0,
-                       logarithmic ? exp(value) : value);
-        }
-        buf_printf(out, "<text x=\"%d\" y=\"%d\">%.4g</text>"
-                   "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text><path d=\"",
-                   LEFT, HEIGHT - 6, point[0].step, WIDTH - RIGHT, HEIGHT - 6,
-                   point[count - 1].step);
-        size_t stride = (count + CURVE_POINTS - 1) / CURVE_POINTS;
-        for (size_t i = 0; i < count; i += i + 1 < count && i + stride >= count ? count - 1 - i
-                                                                                : stride) {
-            double value = logarithmic ? log(point[i].value) : point[i].value;
-            buf_printf(out, "%c%.1f %.1f", i ? 'L' : 'M',
-                       LEFT + (WIDTH - LEFT - RIGHT) * (point[i].step - point[0].step) / steps,
-                       TOP + (HEIGHT - TOP - BOTTOM) * (to - value) / range);
-        }
-        buf_puts(out, "\"/></svg>");
+        put_axes(out, &c);
+        put_path(out, &c);
+        buf_puts(out, "</svg>");
     }
     buf_puts(out, "<figcaption>");
-    put_key(out, name);
+    html_key(out, name);
     buf_puts(out, "<span>");
-    if (count) {
+    if (c.count) {
         buf_puts(out, "last: ");
-        put_number(out, point[count - 1].value);
-        buf_puts(out, logarithmic ? ", logarithmic scale" : "");
+        html_number(out, c.point[c.count - 1].value);
+        buf_puts(out, c.logarithmic ? ", logarithmic scale" : "");
     } else {
         buf_puts(out, "no value was reported");
     }
     buf_puts(out, "</span></figcaption></figure>");
-    mem_free(point);
+    mem_free(c.point);
 }
 
 /* --- sections ----------------------------------------------------------------------------- */
@@ -215,12 +143,12 @@ static enum status put_textures(struct buf *out, const struct report_page *page,
     buf_puts(out, "<h2>Textures</h2><div class=grid>");
     for (size_t i = 0; i < page->texture_count && status == STATUS_OK; i++) {
         buf_puts(out, "<figure>");
-        status = put_image(out, &page->texture[i], err);
+        status = html_picture(out, page->texture[i].path, page->texture[i].title, err);
         buf_puts(out, "<figcaption>");
-        put_text(out, page->texture[i].title);
+        html_text(out, page->texture[i].title);
         if (page->texture[i].caption) {
             buf_puts(out, "<span>");
-            put_text(out, page->texture[i].caption);
+            html_text(out, page->texture[i].caption);
             buf_puts(out, "</span>");
         }
         buf_puts(out, "</figcaption></figure>");
@@ -243,16 +171,16 @@ static enum status put_comparisons(struct buf *out, const struct report_page *pa
     for (size_t i = 0; i < page->comparison_count && status == STATUS_OK; i++) {
         buf_puts(out, "<figure><div class=heads><span>photograph</span><span>re-render</span>"
                       "<span>difference</span></div>");
-        status = put_image(out, &page->comparison[i], err);
+        status = html_picture(out, page->comparison[i].path, page->comparison[i].title, err);
         buf_puts(out, "<figcaption>");
-        put_text(out, page->comparison[i].title);
+        html_text(out, page->comparison[i].title);
         buf_puts(out, "<span>");
         for (const cJSON *m = view ? view->child : NULL; m; m = m->next) {
             if (!cJSON_IsNumber(m))
                 continue;
-            put_key(out, m->string);
+            html_key(out, m->string);
             buf_puts(out, " ");
-            put_number(out, m->valuedouble);
+            html_number(out, m->valuedouble);
             buf_puts(out, "&ensp;");
         }
         buf_puts(out, "</span></figcaption></figure>");
@@ -289,7 +217,7 @@ static void put_stages(struct buf *out, const cJSON *stages) {
         if (!name || !isfinite(seconds))
             continue;
         buf_puts(out, "<tr><th>");
-        put_key(out, name);
+        html_key(out, name);
         buf_printf(out, "</th><td class=n>%.2f s</td><td style=\"width:60%%\"><span class=bar "
                    "style=\"width:%.1f%%\"></span></td></tr>",
                    seconds, longest > 0.0 ? fmax(100.0 * seconds / longest, 0.3) : 0.0);
@@ -318,11 +246,11 @@ static void put_swatch(struct buf *out, const cJSON *color) {
 static void put_segment(struct buf *out, const cJSON *segment) {
     static const char *const plain[] = {"area_m2", "texels", "roughness", "specular"};
     buf_puts(out, "<tr><td>");
-    put_value(out, cJSON_GetObjectItemCaseSensitive(segment, "id"));
+    html_value(out, cJSON_GetObjectItemCaseSensitive(segment, "id"));
     buf_puts(out, "</td>");
     for (size_t i = 0; i < sizeof plain / sizeof *plain; i++) {
         buf_puts(out, "<td class=n>");
-        put_value(out, cJSON_GetObjectItemCaseSensitive(segment, plain[i]));
+        html_value(out, cJSON_GetObjectItemCaseSensitive(segment, plain[i]));
         buf_puts(out, "</td>");
     }
     buf_puts(out, "<td>");
@@ -369,15 +297,15 @@ static void put_others(struct buf *out, const cJSON *report, bool plain) {
             continue;
         if (plain) {
             buf_puts(out, "<tr><th>");
-            put_key(out, member->string);
+            html_key(out, member->string);
             buf_puts(out, "</th><td>");
-            put_value(out, member);
+            html_value(out, member);
             buf_puts(out, "</td></tr>");
         } else {
             buf_puts(out, "<div class=card><b>");
-            put_key(out, member->string);
+            html_key(out, member->string);
             buf_puts(out, "</b>");
-            put_value(out, member);
+            html_value(out, member);
             buf_puts(out, "</div>");
         }
     }
@@ -390,11 +318,11 @@ static void put_files(struct buf *out, const cJSON *files) {
     for (const cJSON *file = files->child; file; file = file->next) {
         const cJSON *name = cJSON_GetObjectItemCaseSensitive(file, "name");
         buf_puts(out, "<tr><th><a href=\"");
-        put_value(out, name);
+        html_value(out, name);
         buf_puts(out, "\">");
-        put_value(out, name);
+        html_value(out, name);
         buf_puts(out, "</a></th><td>");
-        put_value(out, cJSON_GetObjectItemCaseSensitive(file, "about"));
+        html_value(out, cJSON_GetObjectItemCaseSensitive(file, "about"));
         buf_puts(out, "</td></tr>");
     }
     buf_puts(out, "</table></div>");
@@ -404,11 +332,11 @@ enum status report_html(const struct report_page *page, struct buf *out, struct 
     const cJSON *report = page->report;
     buf_puts(out, "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport "
                   "content=\"width=device-width,initial-scale=1\"><title>");
-    put_text(out, page->title);
+    html_text(out, page->title);
     buf_puts(out, " – unbake</title><style>");
     buf_puts(out, style);
     buf_puts(out, "</style><h1>");
-    put_text(out, page->title);
+    html_text(out, page->title);
     buf_puts(out, "</h1><p class=soft>Materials and lights recovered by unbake. Colours are linear "
                   "Rec. 709; radiance is in units in which a frame of exposure 1 maps radiance 1 "
                   "to pixel value 1.</p><div class=card><table>");
