@@ -51,7 +51,7 @@
  * is then off by 2 %. */
 #define UNKNOWN_ROUGHNESS 0.5f
 #define UNKNOWN_SPECULAR (0.5f * PRIOR_SPECULAR)
-#define MATT_ERRORS 1.0
+#define MATT_ERRORS 3.0
 
 #define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
 #define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
@@ -163,8 +163,8 @@ static void predict(const struct gloss_job *job, const struct patch *patch, uint
     }
 }
 
-static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge, struct incident *scratch,
-                          struct gloss_point *point) {
+static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge, size_t least,
+                          struct incident *scratch, struct gloss_point *point) {
     struct patch patch;
     struct view view[VIEWS_ASKED];
     size_t shown_count = 0;
@@ -178,7 +178,7 @@ static bool look_at_texel(const struct gloss_job *job, uint32_t texel, int edge,
         if (patch_shown(job->views, &view[i], &patch, edge, &point->look[shown_count].shown))
             view[shown_count++] = view[i];
     }
-    if (shown_count < VIEWS_LEAST)
+    if (shown_count < least)
         return false;
     for (size_t i = 0; i < shown_count; i++)
         predict(job, &patch, texel, view[i].train, scratch, &point->look[i]);
@@ -192,8 +192,8 @@ static size_t points_of(const struct gloss_job *job, size_t segment) {
     return points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
 }
 
-/* Looks at some texels of a segment; returns their number. */
-static size_t look_at_segment(const struct gloss_job *job, size_t segment, int edge, int thread) {
+/* Looks at some texels of a segment that `least` photographs show; returns their number. */
+static size_t look_at_segment(const struct gloss_job *job, size_t segment, int edge, size_t least, int thread) {
     struct gloss_point *point = &job->point[(size_t)thread * POINTS_MOST];
     size_t points = points_of(job, segment);
     uint32_t texels = job->texels.first[segment + 1] - job->texels.first[segment];
@@ -204,7 +204,7 @@ static size_t look_at_segment(const struct gloss_job *job, size_t segment, int e
     for (size_t i = 0; i < tries && count < points; i++) {
         /* Spread evenly over the segment wherever the sequence is cut off. */
         size_t at = all ? i : rng_below(sampler_reverse((uint32_t)i), texels);
-        count += look_at_texel(job, texel[at], edge, &job->scratch[thread], &point[count]);
+        count += look_at_texel(job, texel[at], edge, least, &job->scratch[thread], &point[count]);
     }
     return count;
 }
@@ -283,18 +283,19 @@ static bool is_glossy(const struct gloss_point *point, size_t count, size_t k, s
     return part > GAIN_LEAST && errors > GAIN_ERRORS;
 }
 
-/* Whether no highlight that could be told from matt reflection is there: of a dielectric, at any roughness. */
-static bool is_matt(const struct gloss_point *point, size_t count) {
+/* How sure it is, from 0 to 1, that no highlight which could be told from matt reflection is there: of a
+ * dielectric, at any roughness. */
+static float surely_matt(const struct gloss_point *point, size_t count) {
     size_t m = 1;
+    double least = MATT_ERRORS;
     while (specular_of[m] < PRIOR_SPECULAR)
         m++;
     for (size_t k = 0; k < ROUGHNESSES && levels.roughness[k] <= GLOSS_ROUGHEST; k++) {
         double part, errors;
         compare(point, count, k, m, &part, &errors);
-        if (errors > -MATT_ERRORS)
-            return false;
+        least = fmin(least, -errors);
     }
-    return true;
+    return (float)fmax(least / MATT_ERRORS, 0.0);
 }
 
 /* Offset in [-0.5, 0.5] of a parabola's least through three values of which the middle is least. */
@@ -308,20 +309,45 @@ static float interpolate(const float *value, size_t at, double offset) {
     return value[at] + (float)offset * beside;
 }
 
+/* Between the guess for unknown segments and a matt one. */
+static void set_matt(struct materials *materials, size_t segment, float share) {
+    materials->roughness[segment] = UNKNOWN_ROUGHNESS + share * (1.0f - UNKNOWN_ROUGHNESS);
+    materials->specular[segment] = (1.0f - share) * UNKNOWN_SPECULAR;
+}
+
+/* Whether a segment that is nowhere seen clean is darker than even the guess for unknown ones would have it:
+ * at grazing angles that reflects a window. Pixels that mix surfaces, and single photographs, can tell that:
+ * base colour explains whatever is brighter. */
+static bool is_too_dark(const struct gloss_job *job, size_t segment, int thread) {
+    struct gloss_point *point = &job->point[(size_t)thread * POINTS_MOST];
+    double sum[ROUGHNESSES][SPECULARS], part, errors;
+    size_t count = look_at_segment(job, segment, VIEWS_EDGE, 1, thread), k = 0, m = 0;
+    if (count < 2)
+        return false;
+    misfits(point, count, job->views->median_radiance, sum);
+    while (levels.roughness[k] < UNKNOWN_ROUGHNESS)
+        k++;
+    while (specular_of[m] < UNKNOWN_SPECULAR)
+        m++;
+    compare(point, count, k, m, &part, &errors);
+    return part < -GAIN_LEAST && errors < -GAIN_ERRORS;
+}
+
 static void fit_segment(void *user, size_t segment, int thread) {
     const struct gloss_job *job = user;
     struct materials *materials = &job->r->materials;
     struct gloss_point *point = &job->point[(size_t)thread * POINTS_MOST];
     double sum[ROUGHNESSES][SPECULARS];
     size_t count = 0, k = ROUGHNESSES - 1, m = 0;
-    materials->roughness[segment] = UNKNOWN_ROUGHNESS;
-    materials->specular[segment] = UNKNOWN_SPECULAR;
+    set_matt(materials, segment, 0.0f);
     if (job->r->is_emitter[segment])
         return; /* its own light hides it */
     for (int edge = 0; edge < VIEWS_EDGE && count < POINTS_ENOUGH; edge++)
-        count = look_at_segment(job, segment, edge, thread);
-    if (count < 2)
+        count = look_at_segment(job, segment, edge, VIEWS_LEAST, thread);
+    if (count < 2) {
+        set_matt(materials, segment, is_too_dark(job, segment, thread) ? 1.0f : 0.0f);
         return;
+    }
     misfits(point, count, job->views->median_radiance, sum);
     for (size_t i = 0; i < ROUGHNESSES * SPECULARS; i++) {
         size_t other_k = i / SPECULARS, other_m = i % SPECULARS;
@@ -329,10 +355,7 @@ static void fit_segment(void *user, size_t segment, int thread) {
             k = other_k, m = other_m;
     }
     if (m == 0 || !is_glossy(point, count, k, m)) {
-        if (is_matt(point, count)) {
-            materials->roughness[segment] = 1.0f;
-            materials->specular[segment] = 0.0f;
-        }
+        set_matt(materials, segment, surely_matt(point, count));
         return;
     }
     double along = 0.0, across = 0.0;
