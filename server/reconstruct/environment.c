@@ -301,7 +301,7 @@ static void join_pole(struct environment *e, size_t row) {
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-static void note_figures(struct environment *e) {
+void environment_update_figures(struct environment *e) {
     size_t cells = (size_t)e->map.width * e->map.height, spread_count = 0;
     double all = 0.0, seen = 0.0, luminance = 0.0, seen_luminance = 0.0;
     float *spread = mem_array(cells, sizeof *spread);
@@ -319,20 +319,25 @@ static void note_figures(struct environment *e) {
     e->seen_share = seen / all;
     e->median_spread = (double)quantile(spread, spread_count, 0.5);
     e->luminance = luminance / all;
-    e->seen_luminance = seen_luminance / seen;
+    e->seen_luminance = seen > 0.0 ? seen_luminance / seen : 0.0;
     mem_free(spread);
 }
 
-bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
+/* Empty map and confidence. */
+static void make_images(struct environment *e, uint32_t width) {
     static const char *const map_channels[] = {"R", "G", "B"};
     static const char *const confidence_channels[] = {"count", "spread"};
+    image_init(&e->map, width, width / 2, 3, map_channels);
+    image_init(&e->confidence, width, width / 2, 2, confidence_channels);
+}
+
+bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
     struct gather g = {.views = views, .e = e};
     struct seen seen = {0.0, 0.0};
     *e = (struct environment){0};
     uint32_t width = find_windows(&g, pool);
     if (width > 0) {
-        image_init(&e->map, width, width / 2, 3, map_channels);
-        image_init(&e->confidence, width, width / 2, 2, confidence_channels);
+        make_images(e, width);
         g.scratch = mem_array((size_t)parallel_thread_count(pool) * 3 * g.window_count, sizeof *g.scratch);
         g.seen = mem_calloc(e->map.height, sizeof *g.seen);
         parallel_for(pool, e->map.height, gather_row, &g);
@@ -347,7 +352,7 @@ bool environment_make(struct environment *e, const struct views *views, struct p
     bool any = seen.angle > 0.0;
     if (any) {
         fill_sphere(&e->map, &e->confidence);
-        note_figures(e);
+        environment_update_figures(e);
         e->saturated_share = seen.saturated / seen.angle;
         e->photograph_count = g.window_count;
     } else {
@@ -357,6 +362,25 @@ bool environment_make(struct environment *e, const struct views *views, struct p
     mem_free(g.scratch);
     mem_free(g.window);
     return any;
+}
+
+void environment_make_unseen(struct environment *e) {
+    *e = (struct environment){0};
+    make_images(e, ENVIRONMENT_MIN_WIDTH);
+}
+
+bool environment_is_seen(const struct environment *e, vec3 direction) {
+    uint32_t width = e->map.width, height = e->map.height;
+    double phi = atan2((double)direction.x, (double)-direction.z);
+    double theta = acos(fmin(fmax((double)direction.y, -1.0), 1.0));
+    double column = (phi < 0.0 ? phi + 2.0 * PI : phi) / (2.0 * PI) * (double)width;
+    double row = theta / PI * (double)(height - 1) + 0.5;
+    size_t x = (size_t)column < width ? (size_t)column : width - 1;
+    return e->confidence.pixel[2 * ((size_t)row * width + x)] > 0.0f;
+}
+
+vec3 environment_direction(const struct environment *e, size_t column, size_t row) {
+    return cell_at(&e->map, column, row).centre;
 }
 
 void environment_release(struct environment *e) {

@@ -39,7 +39,18 @@ struct environment {
  * limits above. Exposures must be known. *e is to be released in any case. False when no
  * photograph looks out anywhere. The same for any number of threads. */
 bool environment_make(struct environment *e, const struct views *views, struct parallel *pool);
+/* A black map of the least width of which nothing was seen. */
+void environment_make_unseen(struct environment *e);
 void environment_release(struct environment *e);
+
+/* Whether a photograph shows what is in a unit direction. */
+bool environment_is_seen(const struct environment *e, vec3 direction);
+
+/* Unit direction of the centre of a pixel of the map. */
+vec3 environment_direction(const struct environment *e, size_t column, size_t row);
+
+/* Takes the means anew, after what was filled in changed. */
+void environment_update_figures(struct environment *e);
 
 /* The figures as an object for the report; the caller's. */
 cJSON *environment_figures(const struct environment *e);

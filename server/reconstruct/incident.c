@@ -93,7 +93,7 @@ static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
     memcpy(basis, value, sizeof value);
 }
 
-static vec3 cosine_direction(const vec3 frame[3], vec2 u) {
+vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     vec2 circle = bsdf_circle(u.x);
     float r = sqrtf(u.y);
     vec3 d = vec3_scale(frame[2], sqrtf(fmaxf(0.0f, 1.0f - u.y)));
@@ -116,7 +116,7 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
         size_t ways = samples - done < ways_a_chunk ? samples - done : ways_a_chunk;
         size_t lit = light_samples * (done + ways) / samples - lights_done;
         for (size_t i = 0; i < ways; i++)
-            in->direction[i] = cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
+            in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
         incident_trace(in, field, at, ways);
         incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
         float chunk[IRRADIANCE_MOMENTS][3] = {{0}};

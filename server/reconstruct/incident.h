@@ -33,6 +33,9 @@ struct incident {
     uint8_t occluded[INCIDENT_CHUNK];
 };
 
+/* A direction about frame[2], distributed by its cosine, from u in [0, 1)^2. */
+vec3 incident_cosine_direction(const vec3 frame[3], vec2 u);
+
 /* Fills radiance and light_pdf for direction[0..count). */
 void incident_trace(struct incident *in, const struct light_field *field,
                     const struct surface_point *at, size_t count);

@@ -14,6 +14,7 @@
 #include "server/reconstruct/orient.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
+#include "server/reconstruct/unseen_light.h"
 #include "server/reconstruct/views.h"
 
 /* Where every surface starts, with a neutral base colour: half rough, half glossy. */
@@ -126,7 +127,6 @@ static void make_environment(struct run *run) {
     if (!environment_make(&r->environment, &run->views, r->pool))
         return;
     world_set_environment(&r->world, &r->environment.map, r->pool);
-    json_add(r->report, "environment", environment_figures(&r->environment));
 }
 
 static enum status fuse_photographs(struct run *run, struct error *err) {
@@ -134,6 +134,9 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     make_environment(run);
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
+    unseen_light_estimate(run->r);
+    if (run->r->environment.map.pixel)
+        json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     return STATUS_OK;
 }
 

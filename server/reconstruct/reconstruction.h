@@ -63,6 +63,7 @@ struct reconstruction {
     struct materials materials;
     struct world world;
     struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
+    double unseen_share;             /* of rays from surfaces: those that go where nothing is known */
     struct noise noise;              /* of the photographs' pixels */
     struct fused fused;              /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */

@@ -24,6 +24,8 @@
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
 #define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_MIXED 0.3f
+/* So much more is asked where all light that arrives is an estimate (unseen_light.h): it may be half. */
+#define EMITTER_SHARE_UNSEEN 0.25f
 /* Share of what a segment was observed to show from which a texel is one of those observed. */
 #define AS_BRIGHT 0.7f
 #define NEUTRAL_BASE_COLOR 0.5f
@@ -148,7 +150,8 @@ static void decide_emitters(struct solve *s) {
         struct emitter_evidence *e = &r->evidence[i];
         float shown = rgb_mean(e->shown);
         e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
-        r->is_emitter[i] = e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE);
+        r->is_emitter[i] = e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) +
+                                          EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
     }
 }
 
