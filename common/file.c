@@ -194,6 +194,13 @@ enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err
     return STATUS_OK;
 }
 
+bool file_is_in(const char *dir, const char *name) {
+    char *path = file_join(dir, name);
+    bool found = access(path, F_OK) == 0;
+    mem_free(path);
+    return found;
+}
+
 char *file_join(const char *dir, const char *name) {
     size_t length = strlen(dir);
     return mem_printf("%s%s%s", dir, length && dir[length - 1] == '/' ? "" : "/", name);

@@ -41,6 +41,9 @@ enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, s
 /* Bytes free to an unprivileged process on the file system of `path`. */
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err);
 
+/* Whether there is something of that name in the folder. */
+bool file_is_in(const char *dir, const char *name);
+
 /* "a" + "b" -> "a/b"; the caller's (mem_free). */
 char *file_join(const char *dir, const char *name);
 

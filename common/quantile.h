@@ -7,5 +7,6 @@
 /* value[share x count] of the values in order, share in [0, 1]: .5 is the (upper) median. 0 when there is
  * none. Sorts the values; none may be NaN. */
 float quantile(float *value, size_t count, double share);
+double quantile_double(double *value, size_t count, double share);
 
 #endif

@@ -102,6 +102,15 @@ bool auth_job(struct api *api, const struct request *r, enum access needed, stru
     return false;
 }
 
+int64_t auth_job_id(struct api *api, const struct request *r, enum access needed, struct response **refusal) {
+    struct job job;
+    if (!auth_job(api, r, needed, &job, refusal))
+        return 0;
+    int64_t id = job.id;
+    job_release(&job);
+    return id;
+}
+
 enum status auth_find_scene(struct api *api, const struct request *r, const char *id,
                             struct scene_row *row, struct error *err) {
     enum access access;

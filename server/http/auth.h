@@ -25,6 +25,8 @@ struct response *auth_refuse(const struct request *r, const char *detail);
  * is ACCESS_CHANGE and the caller may only read. What is found is the caller's to release. */
 bool auth_job(struct api *api, const struct request *r, enum access needed, struct job *job,
               struct response **refusal);
+/* The job's number alone, 0 with *refusal. */
+int64_t auth_job_id(struct api *api, const struct request *r, enum access needed, struct response **refusal);
 bool auth_scene(struct api *api, const struct request *r, enum access needed, struct scene_row *row,
                 struct response **refusal);
 /* The scene of that id, or its beginning of 8 digits or more, where the caller may read it. */

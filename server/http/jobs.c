@@ -25,16 +25,6 @@
 #define WEBHOOK_SECRET_MOST 200
 #define LABEL_MAX_BYTES 100
 
-/* The number of the job in the path, which the caller may change; or *refusal. */
-static int64_t own_job(struct api *api, const struct request *r, struct response **refusal) {
-    struct job job;
-    if (!auth_job(api, r, ACCESS_CHANGE, &job, refusal))
-        return 0;
-    int64_t id = job.id;
-    job_release(&job);
-    return id;
-}
-
 /* The reply that shows a job as it is now; takes it. */
 static struct response *show_job(const struct request *r, struct job *job, int status) {
     char etag[48];
@@ -389,7 +379,7 @@ static int64_t expected_revision(const struct request *r, struct response **refu
 
 struct response *jobs_patch(struct api *api, struct request *r) {
     struct response *reply = NULL;
-    int64_t id = own_job(api, r, &reply);
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &reply);
     int64_t revision = reply ? -1 : expected_revision(r, &reply);
     if (reply)
         return reply;
@@ -436,7 +426,7 @@ static struct response *measure_job(struct api *api, const struct request *r, in
 struct response *jobs_delete(struct api *api, struct request *r) {
     bool dry_run;
     struct response *refusal = keeping_dry_run(r, &dry_run);
-    int64_t id = refusal ? 0 : own_job(api, r, &refusal);
+    int64_t id = refusal ? 0 : auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;
     if (dry_run)
@@ -456,7 +446,7 @@ struct response *jobs_delete(struct api *api, struct request *r) {
 static struct response *act(struct api *api, const struct request *r,
                             enum status (*action)(struct api *api, int64_t id, struct error *err)) {
     struct response *refusal = NULL;
-    int64_t id = own_job(api, r, &refusal);
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;
     struct error err;
@@ -494,7 +484,7 @@ struct response *jobs_retry(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     const char *from = target_query(&r->target, "from");
     bool keeps_checkpoint;
-    int64_t id = own_job(api, r, &refusal);
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
         refusal = problem_full(r, 400, "from must name a stage",
                                "load, prepare, fuse, solve, refine, report, export", NULL);
@@ -554,7 +544,7 @@ struct response *jobs_extend(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     struct job job;
     struct error err;
-    int64_t id = own_job(api, r, &refusal);
+    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)

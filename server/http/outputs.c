@@ -22,19 +22,9 @@
 #define LOG_BYTES_DEFAULT 65536
 #define LOG_BYTES_MAX (1 << 20)
 
-/* The number of the job in the path, which the caller may read; or *refusal. */
-static int64_t known_job(struct api *api, const struct request *r, struct response **refusal) {
-    struct job job;
-    if (!auth_job(api, r, ACCESS_READ, &job, refusal))
-        return 0;
-    int64_t id = job.id;
-    job_release(&job);
-    return id;
-}
-
 struct response *outputs_list(struct api *api, struct request *r) {
     struct response *refusal = NULL;
-    int64_t id = known_job(api, r, &refusal);
+    int64_t id = auth_job_id(api, r, ACCESS_READ, &refusal);
     if (refusal)
         return refusal;
     struct output_row *rows = NULL;
@@ -135,7 +125,7 @@ static struct response *send_file(struct api *api, const struct request *r, int 
 
 struct response *outputs_get(struct api *api, struct request *r) {
     struct response *reply = NULL;
-    int64_t id = known_job(api, r, &reply);
+    int64_t id = auth_job_id(api, r, ACCESS_READ, &reply);
     if (reply)
         return reply;
     char *name = target_rest(&r->target, 4);
@@ -187,7 +177,7 @@ struct response *jobs_log(struct api *api, struct request *r) {
     int64_t bytes = LOG_BYTES_DEFAULT;
     if (wanted && !field_number(wanted, 1, LOG_BYTES_MAX, &bytes))
         return problem(r, 400, "bytes must be a number from 1 to %d", LOG_BYTES_MAX);
-    int64_t id = known_job(api, r, &refusal);
+    int64_t id = auth_job_id(api, r, ACCESS_READ, &refusal);
     if (refusal)
         return refusal;
     char path[48];

@@ -7,7 +7,6 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -135,10 +134,7 @@ static enum status load_transforms(const char *root, const char *name, struct tr
  * becomes their name. */
 static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
                                 struct error *err) {
-    char *path = file_join(root, *name);
-    bool is_there = access(path, F_OK) == 0;
-    mem_free(path);
-    if (is_there || strcmp(*name, BUNDLE_TRANSFORMS) != 0)
+    if (file_is_in(root, *name) || strcmp(*name, BUNDLE_TRANSFORMS) != 0)
         return load_transforms(root, *name, t, f, err);
     char *colmap = colmap_find(root);
     const char *trajectory = trajectory_find(root);
@@ -221,10 +217,7 @@ static char *find_mesh(const char *root, const char *transforms_name, const stru
                        struct findings *f) {
     if (t->mesh || t->point_cloud) {
         const char *name = t->mesh ? t->mesh : t->point_cloud;
-        char *path = file_join(root, name);
-        bool there = access(path, F_OK) == 0;
-        mem_free(path);
-        if (there && (t->mesh || has_faces(root, name)))
+        if (file_is_in(root, name) && (t->mesh || has_faces(root, name)))
             return mem_strdup(name);
         if (t->mesh) {
             findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);

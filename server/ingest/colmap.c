@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -147,13 +146,6 @@ enum status colmap_images_parse(const void *data, size_t size, const char *name,
 
 /* --- files ---------------------------------------------------------------------------------- */
 
-static bool is_there(const char *root, const char *name) {
-    char *path = file_join(root, name);
-    bool there = access(path, F_OK) == 0;
-    mem_free(path);
-    return there;
-}
-
 char *colmap_find(const char *root) {
     static const char *const folders[] = {"", "sparse/0/", "sparse/", "colmap/sparse/0/", "dense/sparse/"};
     static const char *const kinds[] = {"bin", "txt"};
@@ -161,7 +153,7 @@ char *colmap_find(const char *root) {
         for (size_t k = 0; k < 2; k++) {
             char *images = mem_printf("%simages.%s", folders[i], kinds[k]);
             char *cameras = mem_printf("%scameras.%s", folders[i], kinds[k]);
-            bool found = is_there(root, images) && is_there(root, cameras);
+            bool found = file_is_in(root, images) && file_is_in(root, cameras);
             mem_free(cameras);
             if (found)
                 return images;
@@ -189,7 +181,7 @@ enum status colmap_read(const char *root, const char *images, struct transforms 
     bool binary = strcmp(path_extension(images), "bin") == 0;
     char *cameras = mem_printf("%.*scameras.%s", (int)(base - images), images, binary ? "bin" : "txt");
     char *path = file_join(root, cameras);
-    const char *prefix = is_there(root, "images") ? "images/" : "";
+    const char *prefix = file_is_in(root, "images") ? "images/" : "";
     struct colmap_cameras *found = NULL;
     struct mapping file;
     struct error own = {0};

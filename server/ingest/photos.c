@@ -6,7 +6,6 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "common/file.h"
 #include "common/image.h"
@@ -45,22 +44,15 @@ struct loading {
 
 /* --- finding files ----------------------------------------------------------------------- */
 
-static bool exists(const char *dir, const char *name) {
-    char *path = file_join(dir, name);
-    bool found = access(path, F_OK) == 0;
-    mem_free(path);
-    return found;
-}
-
 /* The file of a frame: as named or, as instant-ngp takes names without one, with an extension
  * added. NULL when there is none. */
 static char *find_picture(const char *dir, const char *name) {
     static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "PNG", "JPG", "JPEG", "EXR"};
-    if (exists(dir, name))
+    if (file_is_in(dir, name))
         return mem_strdup(name);
     for (size_t i = 0; i < sizeof extensions / sizeof *extensions; i++) {
         char *longer = mem_printf("%s.%s", name, extensions[i]);
-        if (exists(dir, longer))
+        if (file_is_in(dir, longer))
             return longer;
         mem_free(longer);
     }

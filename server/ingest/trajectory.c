@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "common/file.h"
 #include "common/json.h"
@@ -25,11 +24,7 @@
 const char *trajectory_find(const char *root) {
     static const char *const kinds[][2] = {{TRAJECTORY, PARAMETERS}, {POSES, INTRINSIC}};
     for (size_t i = 0; i < 2; i++) {
-        char *poses = file_join(root, kinds[i][0]), *lens = file_join(root, kinds[i][1]);
-        bool found = access(poses, F_OK) == 0 && access(lens, F_OK) == 0;
-        mem_free(poses);
-        mem_free(lens);
-        if (found)
+        if (file_is_in(root, kinds[i][0]) && file_is_in(root, kinds[i][1]))
             return kinds[i][0];
     }
     return NULL;

@@ -11,10 +11,10 @@
 #include "server/reconstruct/light_fit.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/reconstruct/conjugate.h"
 
 /* Standard deviations, in logarithms: of a look at a flat, frontal place; that a grazing one adds
@@ -198,31 +198,25 @@ void light_fit_residuals(const struct light_fit *f, const double *x, size_t poin
     }
 }
 
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* New weights and scale from the residuals; `gentle` weights do not give up on far ones. */
 static void reweight(struct light_fit *f, const double *x, bool gentle) {
     size_t looks = f->o->start[f->o->point_count], used = 0;
-    double *square = mem_array(looks + 1, sizeof *square), *sorted = mem_array(looks + 1, sizeof *sorted);
+    double *square = mem_array(looks + 1, sizeof *square), *known = mem_array(looks + 1, sizeof *known);
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         light_fit_residuals(f, x, p, f->weight + first, square + first);
         for (size_t i = 0; i < count && !light_fit_is_held_back(f, p); i++) {
             if (isfinite(square[first + i]))
-                sorted[used++] = square[first + i];
+                known[used++] = square[first + i];
         }
     }
-    qsort(sorted, used, sizeof *sorted, compare_doubles);
-    f->scale = used ? fmax(1.0, 1.48 * sqrt(sorted[used / 2])) : 1.0;
+    f->scale = fmax(1.0, 1.48 * sqrt(quantile_double(known, used, 0.5)));
     for (size_t i = 0; i < looks; i++) {
         double e = square[i] / (f->scale * f->scale);
         double robust = gentle ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + 0.25 * e);
         f->weight[i] = f->trust[i] * robust / (f->scale * f->scale);
     }
-    mem_free(sorted);
+    mem_free(known);
     mem_free(square);
 }
 

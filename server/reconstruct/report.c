@@ -2,9 +2,9 @@
 #include "server/reconstruct/report.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/mem.h"
+#include "common/quantile.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/film.h"
@@ -32,11 +32,6 @@ static void photograph_radiance(const struct photograph *photo, struct image *im
     }
 }
 
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The factor by which the render is brighter than the photograph, by the median of ratios. */
 static double fit_gain(const struct image *photograph, const struct image *render) {
     size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
@@ -50,8 +45,7 @@ static double fit_gain(const struct image *photograph, const struct image *rende
         if (isfinite(p) && isfinite(r) && p > 0.0 && r > 0.0)
             ratio[count++] = r / p;
     }
-    qsort(ratio, count, sizeof *ratio, compare_doubles);
-    double gain = count ? ratio[count / 2] : 1.0;
+    double gain = count ? quantile_double(ratio, count, 0.5) : 1.0;
     mem_free(ratio);
     return gain;
 }

@@ -156,11 +156,9 @@ static enum status page_of_job(struct store *store, const struct caller *who, in
     sqlite3_stmt *stmt;
     bool found = false;
     enum status status =
-        sql_query(&store->sql, &stmt, err,
+        sql_first(&store->sql, &stmt, &found, err,
                   "SELECT state, pruned_id, revision, owner_id, shared FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
                   "ini", job_id, who == NULL || who->role == ROLE_ADMIN, who ? who->user_id : 0);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         page->state = (enum job_state)sqlite3_column_int(stmt, 0);
         page->pruned_id = sqlite3_column_int64(stmt, 1);

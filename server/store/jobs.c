@@ -64,11 +64,9 @@ static enum status find_replay(struct store *store, const struct job_new *job, c
                                int64_t *id, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false, same = false;
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT id, request_sha256 FROM jobs WHERE idempotency_key = ?",
                                    "t", key);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         *id = sqlite3_column_int64(stmt, 0);
         same = strcmp(sql_text(stmt, 1), job->request_sha256 ? job->request_sha256 : "") == 0;
@@ -154,10 +152,8 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
     bool found = false;
     *job = (struct job){.eta_sec = -1.0};
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS " FROM jobs WHERE id = ?", "i", id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         fill(job, stmt);
         sqlite3_reset(stmt);

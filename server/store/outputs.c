@@ -83,11 +83,9 @@ enum status store_output_get(struct store *store, int64_t job_id, const char *na
     *row = (struct output_row){0};
     store_lock(store);
     enum status status =
-        sql_query(&store->sql, &stmt, err,
+        sql_first(&store->sql, &stmt, &found, err,
                   "SELECT " COLUMNS " FROM outputs WHERE job_id = ? AND name = ?", "it", job_id,
                   name);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         fill(row, stmt);
         sqlite3_reset(stmt);

@@ -142,10 +142,8 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
     bool found = false;
     *row = (struct scene_row){0};
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS " FROM scenes WHERE id = ?", "t", id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         fill(row, stmt);
         sqlite3_reset(stmt);
@@ -169,13 +167,11 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
     bool found = false, another = false;
     store_lock(store);
     /* 'g' follows every hex digit. */
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS " FROM scenes"
                                    " WHERE id >= ?3 AND id < ?3 || 'g' AND " IS_READABLE
                                    " LIMIT 2",
                                    "nit", (int)sees_all(who), who ? who->user_id : 0, prefix);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         fill(row, stmt);
         status = sql_step(&store->sql, stmt, &another, err);
@@ -285,12 +281,10 @@ enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZ
     sqlite3_stmt *stmt;
     bool found = false;
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT id FROM scenes WHERE state = ? AND problems = '[]'"
                                    " ORDER BY created_ms, id LIMIT 1",
                                    "n", (int)SCENE_CHECKING);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         snprintf(id, SCENE_ID_SIZE, "%s", sql_text(stmt, 0));
         sqlite3_reset(stmt);

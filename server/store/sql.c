@@ -165,6 +165,16 @@ enum status sql_run(struct sql *sql, struct error *err, const char *text, const 
     return status;
 }
 
+enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err,
+                      const char *text, const char *types, ...) {
+    va_list args;
+    va_start(args, types);
+    enum status status = query(sql, stmt, text, types, args, err);
+    va_end(args);
+    *row = false;
+    return status == STATUS_OK ? sql_step(sql, *stmt, row, err) : status;
+}
+
 enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err,
                     const char *text, const char *types, ...) {
     sqlite3_stmt *stmt;

@@ -55,6 +55,9 @@ enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, c
                       const char *types, ...);
 /* *row tells whether there is one more; after the last the statement is reset. */
 enum status sql_step(struct sql *sql, sqlite3_stmt *stmt, bool *row, struct error *err);
+/* As sql_query, and steps to the first row, if there is one: *row. sqlite3_reset is the caller's then. */
+enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err,
+                      const char *text, const char *types, ...);
 /* The first column of the first row as an integer, or `fallback` when there is no row. */
 enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err,
                     const char *text, const char *types, ...);

@@ -46,11 +46,9 @@ static enum status job_begin(struct store *store, int64_t id, struct present *no
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_query(&store->sql, &stmt, err,
+    status = sql_first(&store->sql, &stmt, &found, err,
                        "SELECT state, wanted, attempt, attempts_left FROM jobs WHERE id = ?", "i",
                        id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         *now = (struct present){
             .id = id,

@@ -22,10 +22,8 @@ enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_se
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_query(&store->sql, &stmt, err, "SELECT weight FROM usage WHERE owner_id = ?", "i",
+    status = sql_first(&store->sql, &stmt, &found, err, "SELECT weight FROM usage WHERE owner_id = ?", "i",
                        owner_id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         before = sqlite3_column_double(stmt, 0);
         sqlite3_reset(stmt);

@@ -75,10 +75,8 @@ enum status store_upload_get(struct store *store, const char *id, struct upload_
     bool found = false;
     *row = (struct upload_row){0};
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS " FROM uploads WHERE id = ?", "t", id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         fill(row, stmt);
         if (hash && (size_t)sqlite3_column_bytes(stmt, 10) == hash_size)

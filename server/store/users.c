@@ -169,12 +169,10 @@ enum status store_token_find(struct store *store, const char *token, struct call
     sha256_of(secret, SECRET_DIGITS, hash);
     store_lock(store);
     enum status status =
-        sql_query(&store->sql, &stmt, err,
+        sql_first(&store->sql, &stmt, &found, err,
                   "SELECT users.id, role, name, hash FROM tokens JOIN users ON users.id = user_id"
                   " WHERE tokens.id = ?",
                   "i", id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         caller->user_id = sqlite3_column_int64(stmt, 0);
         caller->token_id = id;

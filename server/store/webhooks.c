@@ -24,11 +24,9 @@ enum status store_webhook_post(struct store *store, int64_t job_id, int attempt,
     sqlite3_stmt *stmt;
     bool found = false;
     enum status status =
-        sql_query(&store->sql, &stmt, err,
+        sql_first(&store->sql, &stmt, &found, err,
                   "SELECT url, secret, name, labels FROM webhooks JOIN jobs ON jobs.id = job_id WHERE job_id = ?",
                   "i", job_id);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (!found)
         return status;
     char *url = sql_dup(stmt, 0), *secret = sql_dup(stmt, 1);
@@ -70,12 +68,10 @@ enum status store_outbox_next(struct store *store, int64_t after, struct outbox_
     int64_t now = store_now_ms(), never = now + (int64_t)(2.0 * RETRY_MOST_MS);
     store_lock(store);
     enum status status =
-        sql_query(&store->sql, &stmt, err,
+        sql_first(&store->sql, &stmt, &found, err,
                   "SELECT id, job_id, url, secret, body, tries FROM outbox"
                   " WHERE (next_ms <= ? OR next_ms > ?) AND id > ? ORDER BY id LIMIT 1",
                   "iii", now, never, after);
-    if (status == STATUS_OK)
-        status = sql_step(&store->sql, stmt, &found, err);
     if (found) {
         *row = (struct outbox_row){.id = sqlite3_column_int64(stmt, 0), .job_id = sqlite3_column_int64(stmt, 1),
                                    .url = sql_dup(stmt, 2), .secret = sql_dup(stmt, 3), .body = sql_dup(stmt, 4),
