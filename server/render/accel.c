@@ -15,6 +15,10 @@
 
 #include "common/mem.h"
 
+/* From here on triangles are small beside the room, as a scan's are: to cut them for tighter boxes
+ * then costs more in a deeper hierarchy than it spares (5 % of all time at 370,000 triangles). */
+#define FINE_MESH_TRIANGLES 100000
+
 struct accel {
     RTCDevice device;
     RTCScene scene;
@@ -134,7 +138,8 @@ enum status accel_new(struct accel **result, const struct mesh *mesh, struct par
         goto out;
     }
     a->scene = rtcNewScene(a->device);
-    rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_HIGH);
+    bool fine = mesh->triangle_count >= FINE_MESH_TRIANGLES;
+    rtcSetSceneBuildQuality(a->scene, fine ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
     geometry = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (!attach_mesh(geometry, mesh)) {
         status = device_error(rtcGetDeviceError(a->device), "taking the mesh", err);

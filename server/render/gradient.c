@@ -1,7 +1,7 @@
 /* gradient.c -- see gradient.h.
  *
  * gradient_reduce works in three steps:
- *   1. each log's entries are put in order of tiles by a counting sort, stable, logs in parallel;
+ *   1. each log's entries are copied in order of tiles by a counting sort, stable, logs in parallel;
  *      an entry that straddles tiles goes to each of them;
  *   2. each tile adds its entries, log by log, into a dense scratch tile, then writes the touched
  *      texels to a place of its own in the output arrays, tiles in parallel;
@@ -17,7 +17,7 @@
 
 #define MIN_TILE_SHIFT 6
 #define MAX_TILES_ACROSS 32
-#define AHEAD 32 /* entries under way to the cache */
+#define AHEAD 3 /* logs whose entries are under way to the cache */
 
 typedef float float4 __attribute__((vector_size(16)));
 
@@ -30,7 +30,7 @@ struct tile {
 /* A log in order of tiles. */
 struct sorted_log {
     size_t capacity;
-    uint32_t *entry; /* numbers of the log's entries; owned */
+    struct gradient_entry *entry; /* copies: a tile's lie side by side; owned */
     uint32_t *start; /* [tile_count + 1] owned */
 };
 
@@ -178,7 +178,7 @@ static void sort_log(void *user, size_t index, int thread) {
     }
     for (size_t i = 0; i < log->entry_count; i++)
         for (int k = entry_tiles(r->g, &log->entry[i], tile); k-- > 0;)
-            sorted->entry[start[tile[k]]++] = (uint32_t)i;
+            sorted->entry[start[tile[k]]++] = log->entry[i];
     /* Each start has moved to its tile's end, the next one's start. */
     memmove(start + 1, start, s->tile_count * sizeof *start);
     start[0] = 0;
@@ -201,6 +201,13 @@ static void add_entry(const struct gradient_entry *e, unsigned shift, uint32_t t
     }
 }
 
+/* Has the entries of a tile in a log fetched. */
+static void fetch_run(const struct sorted_log *sorted, size_t tile) {
+    const struct gradient_entry *end = sorted->entry + sorted->start[tile + 1];
+    for (const struct gradient_entry *e = sorted->entry + sorted->start[tile]; e < end; e += 2)
+        __builtin_prefetch(e);
+}
+
 static void sum_tile(void *user, size_t index, int thread) {
     const struct reduce *r = user;
     struct gradient *g = r->g;
@@ -210,20 +217,13 @@ static void sum_tile(void *user, size_t index, int thread) {
         return;
     struct tile *tile = &s->tile[thread];
     uint32_t tile_y = (uint32_t)index / s->tiles_x, tile_x = (uint32_t)index - tile_y * s->tiles_x;
-    /* Entries are listed, and fetched, well before they are added. */
-    const struct gradient_entry *ahead[AHEAD];
-    size_t listed = 0;
     for (size_t l = 0; l < r->log_count; l++) {
         const struct sorted_log *sorted = &s->sorted[l];
-        for (uint32_t i = sorted->start[index]; i < sorted->start[index + 1]; i++, listed++) {
-            if (listed >= AHEAD)
-                add_entry(ahead[listed % AHEAD], s->tile_shift, tile_x, tile_y, tile);
-            ahead[listed % AHEAD] = &r->log[l]->entry[sorted->entry[i]];
-            __builtin_prefetch(ahead[listed % AHEAD]);
-        }
+        if (l + AHEAD < r->log_count)
+            fetch_run(sorted + AHEAD, index);
+        for (uint32_t i = sorted->start[index]; i < sorted->start[index + 1]; i++)
+            add_entry(&sorted->entry[i], s->tile_shift, tile_x, tile_y, tile);
     }
-    for (size_t i = listed > AHEAD ? listed - AHEAD : 0; i < listed; i++)
-        add_entry(ahead[i % AHEAD], s->tile_shift, tile_x, tile_y, tile);
     size_t at = s->place[index];
     uint32_t left = tile_x << s->tile_shift, top = tile_y << s->tile_shift;
     uint32_t mask = (1u << s->tile_shift) - 1;
