@@ -60,6 +60,11 @@ struct export {
 
 /* --- putting files in place --------------------------------------------------------------- */
 
+static enum status pass_on(const struct export *e, const char *type, const char *name,
+                           const char *content_type, struct error *err) {
+    return e->announce ? e->announce(e->user, type, name, content_type, err) : STATUS_OK;
+}
+
 /* Lists a file that is in place, then tells of it. */
 static enum status tell(struct export *e, const char *type, const char *name,
                         const char *content_type, const char *about, struct error *err) {
@@ -70,7 +75,7 @@ static enum status tell(struct export *e, const char *type, const char *name,
         json_add_string(file, "about", about);
         cJSON_AddItemToArray(e->files, file);
     }
-    return e->announce(e->user, type, name, content_type, err);
+    return pass_on(e, type, name, content_type, err);
 }
 
 enum image_format { FORMAT_PNG, FORMAT_EXR_HALF, FORMAT_EXR_FLOAT };
@@ -101,7 +106,7 @@ static enum status put_bytes(struct export *e, const char *name, const char *con
     char *path = file_join(e->dir, name);
     enum status status = file_replace(path, data, length, err);
     if (status == STATUS_OK)
-        status = e->announce(e->user, EVENT_OUTPUT, name, content_type, err);
+        status = pass_on(e, EVENT_OUTPUT, name, content_type, err);
     mem_free(path);
     return status;
 }

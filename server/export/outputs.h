@@ -36,7 +36,7 @@
 #include "server/export/input.h"
 
 /* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or
- * EVENT_OUTPUT, `name` is relative to the folder. A failure ends the export. */
+ * EVENT_OUTPUT, `name` is relative to the folder. A failure ends the export. NULL: nobody is told. */
 typedef enum status export_announce(void *user, const char *type, const char *name,
                                     const char *content_type, struct error *err);
 

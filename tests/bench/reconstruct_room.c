@@ -73,22 +73,12 @@ static enum status no_preview(void *user, const struct reconstruction *r, struct
     return STATUS_OK;
 }
 
-static enum status ignore_file(void *user, const char *type, const char *name, const char *content_type,
-                               struct error *err) {
-    (void)user;
-    (void)type;
-    (void)name;
-    (void)content_type;
-    (void)err;
-    return STATUS_OK;
-}
-
 static enum status write_outputs(const char *dir, const struct reconstruction *r, struct error *err) {
     struct export_input input;
     results_make(&input, r, "room");
     enum status status = file_make_dirs(dir, err);
     if (status == STATUS_OK)
-        status = export_outputs(dir, &input, ignore_file, NULL, err);
+        status = export_outputs(dir, &input, NULL, NULL, err);
     mem_free((void *)input.comparison);
     return status;
 }

@@ -328,12 +328,6 @@ static double wall_error(const struct reconstruction *r, int *emitters) {
     return sqrt(sum / count);
 }
 
-static enum status hear(void *user, const char *type, const char *name, const char *content_type,
-                        struct error *err) {
-    (void)user, (void)type, (void)name, (void)content_type, (void)err;
-    return STATUS_OK;
-}
-
 static void write_outputs(const char *dir, const struct reconstruction *r) {
     struct export_comparison comparison[FRAMES];
     struct error err;
@@ -343,7 +337,7 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
     struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
                               r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
                               &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}};
-    CHECK_THAT(export_outputs(dir, &in, hear, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 
 static double mean_of(const struct image *image) {

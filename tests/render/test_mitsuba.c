@@ -27,16 +27,6 @@ static const char *find_python(void) {
     return access("build/mitsuba/bin/python", X_OK) == 0 ? "build/mitsuba/bin/python" : NULL;
 }
 
-static enum status hear(void *user, const char *type, const char *name, const char *content_type,
-                        struct error *err) {
-    (void)user;
-    (void)type;
-    (void)name;
-    (void)content_type;
-    (void)err;
-    return STATUS_OK;
-}
-
 /* Off centre, so that the principal point counts. */
 static struct camera look(vec3 from, vec3 at) {
     struct camera c = {.width = WIDTH, .height = HEIGHT, .fx = 45.0f, .fy = 45.0f,
@@ -130,7 +120,7 @@ static void try(struct room *room, const struct image *sky, const struct image *
         .confidence_spread = zero, .is_emitter = is_emitter, .environment = sky,
         .environment_confidence = known, .comparison_count = VIEWS, .comparison = comparison,
         .report = report};
-    enum status status = export_outputs(dir, &in, hear, NULL, &err);
+    enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     for (int v = 0; v < VIEWS && status == STATUS_OK; v++)
         compare(dir, v, &picture[v], python);
