@@ -1,8 +1,9 @@
 /* meter.c -- see meter.h. */
 #include "client/meter.h"
-#include "common/clock.h"
 
 #include <math.h>
+
+#include "common/clock.h"
 
 #define SMOOTHING_SEC 4.0 /* how far back the rate remembers */
 #define MEASURE_SEC 0.25  /* shorter spans say little */

@@ -104,10 +104,8 @@ static void on_revoked(void *user) {
     hub_recheck(d->api->hub);
 }
 
-static enum status build(struct daemon *d, struct error *err) {
-    const struct config *c = d->config;
-    libraries(d->libraries);
-    struct scheduler_config work = {
+static struct scheduler_config scheduler_options(const struct config *c) {
+    return (struct scheduler_config){
         .data_dir = c->data_dir,
         .worker_binary = "/proc/self/exe",
         .max_running = (int)c->max_running,
@@ -122,7 +120,10 @@ static enum status build(struct daemon *d, struct error *err) {
         .webhook_private = c->webhook_private,
         .sandbox = c->sandbox,
     };
-    struct api_config limits = {
+}
+
+static struct api_config api_options(const struct config *c, const struct api_library *list) {
+    return (struct api_config){
         .data_dir = c->data_dir,
         .max_attempts = (int)c->max_attempts,
         .queue_limit = (size_t)c->queue_limit,
@@ -138,20 +139,34 @@ static enum status build(struct daemon *d, struct error *err) {
         .access = read_access(c->access),
         .is_tls = *c->tls_certificate != '\0',
         .server_names = c->server_names,
-        .libraries = d->libraries,
+        .libraries = list,
         .library_count = LIBRARY_COUNT,
     };
-    struct listener_config network = {
+}
+
+/* *address is where `listen` says, in the caller's memory; *is_loopback: nobody else can reach it. */
+static enum status listener_options(const struct config *c, struct listener_config *network,
+                                    char address[CONFIG_ADDRESS_SIZE], bool *is_loopback, struct error *err) {
+    *network = (struct listener_config){
+        .address = address,
         .connection_max = (unsigned)c->max_connections,
         .certificate_file = *c->tls_certificate ? c->tls_certificate : NULL,
         .key_file = c->tls_key,
         .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec,
                    (double)c->body_min_bytes_per_sec},
     };
+    return config_address(c->listen, address, &network->port, is_loopback, err);
+}
+
+static enum status build(struct daemon *d, struct error *err) {
+    const struct config *c = d->config;
     char address[CONFIG_ADDRESS_SIZE];
-    network.address = address;
     bool is_loopback;
-    enum status status = config_address(c->listen, address, &network.port, &is_loopback, err);
+    struct listener_config network;
+    libraries(d->libraries);
+    const struct scheduler_config work = scheduler_options(c);
+    const struct api_config limits = api_options(c, d->libraries);
+    enum status status = listener_options(c, &network, address, &is_loopback, err);
     if (status == STATUS_OK)
         status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)
@@ -204,14 +219,19 @@ static void reload(struct daemon *d) {
         log_error("SIGHUP: %s; the old certificate stays in use", err.message);
 }
 
+static sigset_t handled_signals(void) {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGHUP);
+    return set;
+}
+
 static void *wait_for_signal(void *user) {
     struct daemon *d = user;
-    sigset_t asked;
+    sigset_t asked = handled_signals();
     int number;
-    sigemptyset(&asked);
-    sigaddset(&asked, SIGTERM);
-    sigaddset(&asked, SIGINT);
-    sigaddset(&asked, SIGHUP);
     while ((number = next_signal(d, &asked)) == SIGHUP)
         reload(d);
     log_info("%s: stopping", number == SIGINT ? "SIGINT" : "SIGTERM");
@@ -232,11 +252,7 @@ static void raise_descriptor_limit(void) {
 
 /* SIGTERM, SIGINT and SIGHUP go to one thread that waits for them; all others inherit the block. */
 static void prepare_signals(void) {
-    sigset_t asked;
-    sigemptyset(&asked);
-    sigaddset(&asked, SIGTERM);
-    sigaddset(&asked, SIGINT);
-    sigaddset(&asked, SIGHUP);
+    sigset_t asked = handled_signals();
     pthread_sigmask(SIG_BLOCK, &asked, NULL);
     signal(SIGPIPE, SIG_IGN);
 }

@@ -36,20 +36,20 @@ static double shear(double m[3][3]) {
     return worst;
 }
 
-/* Makes m a rotation; the sentence of what forbids it, or NULL. */
+/* Makes m a rotation; NULL, or what forbids it. */
 static const char *make_rotation(double m[3][3], double *scale) {
     double det = determinant(m), largest = 0.0;
     for (int i = 0; i < 9; i++)
         largest = fmax(largest, fabs(m[i / 3][i % 3]));
     if (!(fabs(det) > 1e-9 * largest * largest * largest))
-        return "transform_matrix is singular";
+        return "is singular";
     if (det < 0.0)
-        return "transform_matrix mirrors space (its determinant is negative)";
+        return "mirrors space (its determinant is negative)";
     *scale = cbrt(det);
     for (int i = 0; i < 9; i++)
         m[i / 3][i % 3] /= *scale;
     if (!(shear(m) < SHEAR_LIMIT))
-        return "transform_matrix is not a rotation: its axes are not at right angles and of one length";
+        return "is not a rotation: its axes are not at right angles and of one length";
     for (int step = 0; step < 6; step++) {
         double next[3][3];
         newton_step(m, next);
@@ -59,7 +59,7 @@ static const char *make_rotation(double m[3][3], double *scale) {
     return NULL;
 }
 
-enum status pose_from_matrix(const double matrix[3][4], enum pose_axes axes,
+enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
                              struct rigid *world_from_camera, struct rigid *camera_from_world,
                              bool *scaled, struct error *err) {
     double m[3][3], t[3], scale = 1.0;
@@ -67,15 +67,15 @@ enum status pose_from_matrix(const double matrix[3][4], enum pose_axes axes,
         for (int j = 0; j < 4; j++)
             if (!isfinite(matrix[i][j]) || fabs(matrix[i][j]) > 1e9)
                 return error_set(err, STATUS_INPUT,
-                                 "transform_matrix holds a number that is not finite or too large "
-                                 "in row %d, column %d", i + 1, j + 1);
+                                 "%s holds a number that is not finite or too large in row %d, column %d",
+                                 what, i + 1, j + 1);
         t[i] = matrix[i][3];
         for (int j = 0; j < 3; j++)
             m[i][j] = matrix[i][j];
     }
     const char *fault = make_rotation(m, &scale);
     if (fault)
-        return error_set(err, STATUS_INPUT, "%s", fault);
+        return error_set(err, STATUS_INPUT, "%s %s", what, fault);
     *scaled = fabs(scale - 1.0) > 1e-3;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {

@@ -12,8 +12,9 @@ enum pose_axes { POSE_RIGHT_DOWN_FORWARD, POSE_RIGHT_UP_BACK /* OpenGL, nerfstud
 
 /* matrix[3][4]: camera-to-world, rows first. Its rotation may carry one uniform scale, which
  * is taken out (*scaled tells), and rounding errors, which are taken out too. STATUS_INPUT:
- * not finite, singular, mirrored, or not a rotation to within 2 %. */
-enum status pose_from_matrix(const double matrix[3][4], enum pose_axes axes,
+ * not finite, singular, mirrored, or not a rotation to within 2 %; the message begins with `what`,
+ * the user's word for the matrix. */
+enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
                              struct rigid *world_from_camera, struct rigid *camera_from_world,
                              bool *scaled, struct error *err);
 

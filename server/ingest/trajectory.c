@@ -73,8 +73,8 @@ static void add_frame(struct transforms *t, double m[4][4], const struct lens *l
     bool scaled;
     if (!is_finite(m)) {
         (*lost_count)++;
-    } else if (pose_from_matrix((const double(*)[4])m, POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
-                                &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
+    } else if (pose_from_matrix((const double(*)[4])m, "the matrix", POSE_RIGHT_DOWN_FORWARD,
+                                &frame.world_from_camera, &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
         findings_problem(f, name, "%s: %s", place, err.message);
     } else {
         t->frame[t->frame_count++] = frame;

@@ -237,8 +237,8 @@ static void read_pose(struct context *c, struct transforms_frame *frame) {
     }
     struct error err;
     bool scaled = false;
-    if (pose_from_matrix((const double(*)[4])m, POSE_RIGHT_UP_BACK, &frame->world_from_camera,
-                         &frame->camera_from_world, &scaled, &err) != STATUS_OK)
+    if (pose_from_matrix((const double(*)[4])m, "transform_matrix", POSE_RIGHT_UP_BACK,
+                         &frame->world_from_camera, &frame->camera_from_world, &scaled, &err) != STATUS_OK)
         problem(c, err.message);
     c->scaled_count += scaled;
 }

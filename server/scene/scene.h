@@ -9,7 +9,7 @@
 
 struct scene {
     struct mesh mesh;
-    struct mesh_report mesh_report;
+    struct mesh_report mesh_report; /* what was dropped of it */
     size_t photograph_count;
     struct photograph *photograph; /* [photograph_count]; owned */
     size_t warning_count;

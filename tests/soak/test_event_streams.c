@@ -13,6 +13,7 @@
 #include <time.h>
 
 #include "common/clock.h"
+#include "common/quantile.h"
 #include "tests/api/rig.h"
 #include "tests/figures.h"
 
@@ -154,11 +155,6 @@ static void pump(int clients, long step, double seconds) {
     }
 }
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static long command(FILE *to, FILE *from, const char *text) {
     char line[64] = "";
     fprintf(to, "%s\n", text);
@@ -166,17 +162,60 @@ static long command(FILE *to, FILE *from, const char *text) {
     return fgets(line, sizeof line, from) ? strtol(line, NULL, 10) : -1;
 }
 
-int main(void) {
-    int clients = (int)figures_count("UNBAKE_CLIENTS", 100, 1000), down[2], up[2];
-    long paced = figures_count("UNBAKE_EVENTS", 20, 300), storm = figures_count("UNBAKE_STORM", 200, 1000);
-    struct rlimit limit;
-    getrlimit(RLIMIT_NOFILE, &limit);
-    limit.rlim_cur = limit.rlim_max;
-    setrlimit(RLIMIT_NOFILE, &limit);
-    if (limit.rlim_max < (rlim_t)clients * 2 + 200)
-        CHECK_SKIP("only %ld descriptors", (long)limit.rlim_max);
+/* Has the server publish `count` events, and the clients read until they have them all. */
+static void publish_to(FILE *to, FILE *from, int clients, long first, long count, double pause_sec, double most_sec) {
+    char text[64];
+    fprintf(to, "p %ld %ld %g\n", first, count, pause_sec);
+    fflush(to);
+    pump(clients, first + count, most_sec);
+    fgets(text, sizeof text, from);
+}
+
+/* Events at a steady pace: seconds until a client has one, half of them and 99 %. */
+static void keep_pace(FILE *to, FILE *from, int clients, long count, double *median, double *late) {
+    latency_max = (size_t)clients * (size_t)count;
+    latency = mem_calloc(latency_max, sizeof *latency);
+    publish_to(to, from, clients, 0, count, 0.1, (double)count * 0.1 + 60.0);
+    CHECK_THAT(latency_count == latency_max, "%zu of %zu events came", latency_count, latency_max);
+    *median = quantile_double(latency, latency_count, 0.5);
+    *late = quantile_double(latency, latency_count, 0.99);
+    mem_free(latency);
+    latency = NULL;
+}
+
+/* Events pour in while connections break off: returns the seconds that it took. */
+static double storm(FILE *to, FILE *from, int clients, long first, long count) {
+    delivered = 0;
+    for (int i = 0; i < clients; i++)
+        client[i].drop_after = (long)draw(30000) + 1;
+    double start = clock_sec();
+    publish_to(to, from, clients, first, count, 0.001, 600.0);
+    double took = clock_sec() - start;
+    for (int i = 0; i < clients; i++)
+        CHECK_THAT(client[i].next_step == first + count, "client %d has %ld of %ld", i, client[i].next_step,
+                   first + count);
+    CHECK_THAT(gap_count == 0 && repeat_count == 0, "%ld gaps, %ld repeated", gap_count, repeat_count);
+    CHECK(delivered == (long)clients * count);
+    return took;
+}
+
+static void open_clients(int clients) {
+    epoll_fd = epoll_create1(EPOLL_CLOEXEC);
+    client = mem_calloc((size_t)clients, sizeof *client);
+    for (int i = 0; i < clients; i++) {
+        buf_init(&client[i].text, 1 << 22);
+        client[i].drop_after = -1;
+        open_client(&client[i]);
+    }
+    pump(clients, 1, 1.0); /* the snapshots */
+}
+
+/* Starts the server's process, which says its port and job; its number, or -1. */
+static pid_t start_server(int clients, FILE **to, FILE **from) {
+    int down[2], up[2];
+    char text[64];
     if (pipe(down) != 0 || pipe(up) != 0)
-        return 1;
+        return -1;
     pid_t pid = fork();
     if (pid == 0) {
         prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -184,51 +223,30 @@ int main(void) {
         close(up[0]);
         serve(fdopen(down[0], "r"), fdopen(up[1], "w"), (unsigned)clients);
     }
-    FILE *to = fdopen(down[1], "w"), *from = fdopen(up[0], "r");
-    char text[64];
-    if (!fgets(text, sizeof text, from) || sscanf(text, "%d %lld", &port, &job) != 2)
+    *to = fdopen(down[1], "w");
+    *from = fdopen(up[0], "r");
+    return fgets(text, sizeof text, *from) && sscanf(text, "%d %lld", &port, &job) == 2 ? pid : -1;
+}
+
+int main(void) {
+    int clients = (int)figures_count("UNBAKE_CLIENTS", 100, 1000);
+    long paced = figures_count("UNBAKE_EVENTS", 20, 300), stormy = figures_count("UNBAKE_STORM", 200, 1000);
+    struct rlimit limit;
+    FILE *to, *from;
+    double median, late;
+    getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = limit.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &limit);
+    if (limit.rlim_max < (rlim_t)clients * 2 + 200)
+        CHECK_SKIP("only %ld descriptors", (long)limit.rlim_max);
+    pid_t pid = start_server(clients, &to, &from);
+    if (pid < 0)
         return 1;
-    epoll_fd = epoll_create1(EPOLL_CLOEXEC);
-    client = mem_calloc((size_t)clients, sizeof *client);
     long empty_kib = command(to, from, "m");
-    for (int i = 0; i < clients; i++) {
-        buf_init(&client[i].text, 1 << 22);
-        client[i].drop_after = -1;
-        open_client(&client[i]);
-    }
-    pump(clients, 1, 1.0); /* the snapshots */
+    open_clients(clients);
     long idle_kib = command(to, from, "m");
-
-    /* A steady pace. */
-    latency_max = (size_t)clients * (size_t)paced;
-    latency = mem_calloc(latency_max, sizeof *latency);
-    snprintf(text, sizeof text, "p 0 %ld 0.1", paced);
-    fprintf(to, "%s\n", text);
-    fflush(to);
-    pump(clients, paced, (double)paced * 0.1 + 60.0);
-    fgets(text, sizeof text, from);
-    qsort(latency, latency_count, sizeof *latency, compare);
-    CHECK_THAT(latency_count == latency_max, "%zu of %zu events came", latency_count, latency_max);
-    double median = latency[latency_count / 2], late = latency[(size_t)((double)latency_count * 0.99)];
-    mem_free(latency);
-    latency = NULL;
-
-    /* The storm. */
-    delivered = 0;
-    for (int i = 0; i < clients; i++)
-        client[i].drop_after = (long)draw(30000) + 1;
-    double start = clock_sec();
-    snprintf(text, sizeof text, "p %ld %ld 0.001", paced, storm);
-    fprintf(to, "%s\n", text);
-    fflush(to);
-    pump(clients, paced + storm, 600.0);
-    fgets(text, sizeof text, from);
-    double took = clock_sec() - start;
-    for (int i = 0; i < clients; i++)
-        CHECK_THAT(client[i].next_step == paced + storm, "client %d has %ld of %ld", i, client[i].next_step,
-                   paced + storm);
-    CHECK_THAT(gap_count == 0 && repeat_count == 0, "%ld gaps, %ld repeated", gap_count, repeat_count);
-    CHECK(delivered == (long)clients * storm);
+    keep_pace(to, from, clients, paced, &median, &late);
+    double took = storm(to, from, clients, paced, stormy);
     long busy_kib = command(to, from, "m");
     printf("%d clients: %.1f MiB before, %.1f MiB idle, %.1f MiB after; events after %.1f ms (median), %.1f ms (99 %%); "
            "storm: %ld events in %.0f s over %ld connections\n",

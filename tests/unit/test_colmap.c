@@ -130,8 +130,8 @@ static void test_refused(void) {
     };
     static const char *const problems[][2] = {
         {"1 1 0 0 0 0 0 0 8 a.png\n\n", "image a.png: there is no camera 8"},
-        {"1 0 0 0 0 0 0 0 7 a.png\n\n", "image a.png: its pose:"},
-        {"1 1 0 0 0 inf 0 0 7 a.png\n\n", "image a.png: its pose:"},
+        {"1 0 0 0 0 0 0 0 7 a.png\n\n", "image a.png: its pose holds a number that is not finite"},
+        {"1 1 0 0 0 inf 0 0 7 a.png\n\n", "image a.png: its pose holds a number that is not finite"},
         {"1 1 0 0 0 0 0 0 7 ../a.png\n\n", "leads out"},
     };
     struct error err;

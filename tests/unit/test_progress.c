@@ -34,62 +34,68 @@ static double number(const cJSON *object, const char *key) {
     return value;
 }
 
-int main(void) {
-    int ends[2];
-    CHECK(pipe(ends) == 0);
-    CHECK(fcntl(ends[1], F_SETPIPE_SZ, 1 << 20) > 0);
-    struct progress p = {.fd = ends[1]};
+static void test_lines(struct progress *p, int fd) {
     cJSON *line;
-
-    progress_stage(&p, "refine");
-    line = hear(ends[0]);
+    progress_stage(p, "refine");
+    line = hear(fd);
     CHECK_STRING(text(line, "type"), "stage");
     CHECK_STRING(text(line, "stage"), "refine");
     cJSON_Delete(line);
 
-    progress_step(&p, "refine", 3, 10, INFINITY); /* no number in JSON: unknown */
-    line = hear(ends[0]);
+    progress_step(p, "refine", 3, 10, INFINITY); /* no number in JSON: unknown */
+    line = hear(fd);
     CHECK_STRING(text(line, "type"), "progress");
     CHECK(number(line, "done") == 3 && number(line, "total") == 10);
     CHECK(number(line, "eta_sec") == -77.0);
     cJSON_Delete(line);
 
-    progress_metric(&p, "loss", 120, 0.5);
-    line = hear(ends[0]);
+    progress_metric(p, "loss", 120, 0.5);
+    line = hear(fd);
     CHECK(number(line, "step") == 120 && number(line, "value") == 0.5);
     cJSON_Delete(line);
 
-    progress_file(&p, "output", "a.exr", 1ull << 40, "abc", "image/x-exr");
-    line = hear(ends[0]);
+    progress_file(p, "output", "a.exr", 1ull << 40, "abc", "image/x-exr");
+    line = hear(fd);
     CHECK_STRING(text(line, "type"), "output");
     CHECK(number(line, "bytes") == 1099511627776.0);
     cJSON_Delete(line);
 
-    progress_problem(&p, "a\nb\".png", "is \"odd\"", NULL);
-    line = hear(ends[0]);
+    progress_problem(p, "a\nb\".png", "is \"odd\"", NULL);
+    line = hear(fd);
     CHECK_STRING(text(line, "file"), "a\nb\".png");
     CHECK_STRING(text(line, "hint"), "");
     cJSON_Delete(line);
+}
 
-    /* A message too long for a line is cut, also where every byte is written as six, and never
-     * inside a character. */
+/* A message too long for a line is cut, also where every byte is written as six, and never inside a
+ * character. */
+static void test_long_message(struct progress *p, int fd) {
     char *large = mem_alloc(100001);
     memset(large, 1, 100000);
     large[100000] = '\0';
-    progress_log(&p, "info", large);
-    cJSON_Delete(hear(ends[0]));
+    progress_log(p, "info", large);
+    cJSON_Delete(hear(fd));
     for (size_t i = 0; i + 2 < 100000; i += 2)
         memcpy(large + i, "\xc3\xa9", 2);
     large[0] = 'x';
     large[1] = 'y';
     memmove(large + 1, large + 2, 99000);
-    progress_end(&p, STATUS_IO, large, "");
-    line = hear(ends[0]);
+    progress_end(p, STATUS_IO, large, "");
+    cJSON *line = hear(fd);
     CHECK_STRING(text(line, "status"), "io");
     size_t length = strlen(text(line, "message"));
     CHECK(length > 1000 && (length - 1) % 2 == 0);
     cJSON_Delete(line);
     mem_free(large);
+}
+
+int main(void) {
+    int ends[2];
+    CHECK(pipe(ends) == 0);
+    CHECK(fcntl(ends[1], F_SETPIPE_SZ, 1 << 20) > 0);
+    struct progress p = {.fd = ends[1]};
+    test_lines(&p, ends[0]);
+    test_long_message(&p, ends[0]);
 
     /* Nobody listens any more: no signal, no waiting, no more tries. */
     signal(SIGPIPE, SIG_IGN);

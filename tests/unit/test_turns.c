@@ -23,14 +23,8 @@ static int64_t owner_next(int limit) {
     return owner;
 }
 
-int main(void) {
-    char *dir = fresh_dir();
-    int64_t id;
-    int attempt;
-    OK(store_open(&store, dir, &err));
-    add_ready_scene(store, SCENE_A);
-
-    /* Whoever used least is first, whatever the others' priorities. */
+/* Whoever used least is first, whatever the others' priorities. */
+static void test_least_used(void) {
     CHECK(job_of(1, 100) > 0 && job_of(2, 0) > 0 && job_of(3, 50) > 0);
     OK(store_usage_add(store, 1, 100.0, &err));
     OK(store_usage_add(store, 2, 10.0, &err));
@@ -45,8 +39,13 @@ int main(void) {
     OK(store_usage_add(store, 3, 0.0, &err));
     OK(store_usage_add(store, 3, -5.0, &err));
     CHECK(owner_next(0) == 3);
+}
 
-    /* What runs already counts against the limit of running jobs, the user's own only. */
+/* What runs already counts against the limit of running jobs, the user's own only. Returns a job of user 3
+ * that runs. */
+static int64_t test_running(void) {
+    int64_t id;
+    int attempt;
     OK(store_job_next(store, 1, &id, &err));
     OK(store_job_start(store, id, &attempt, &err));
     int64_t second = job_of(3, 0);
@@ -54,22 +53,29 @@ int main(void) {
     OK(store_job_succeed(store, id, attempt, &err));
     CHECK(owner_next(1) == 3);
     OK(store_job_start(store, second, &attempt, &err));
+    return second;
+}
 
-    /* One user's queue is full, others' is not; nobody has no limit. */
+/* One user's queue is full, others' is not; nobody has no limit. */
+static void test_full_queue(void) {
     CHECK(job_of(2, 0) > 0 && job_of(2, 0) > 0);
     CHECK(job_of(2, 0) == -(int64_t)STATUS_LIMIT);
     CHECK(job_of(3, 0) > 0);
     for (int i = 0; i < 5; i++)
         CHECK(job_of(0, 0) > 0);
     CHECK(owner_next(1) == 0); /* nobody has used nothing */
+}
 
-    /* Ten users with a job after another: turns differ by one at most. */
+/* Ten users with a job after another: turns differ by one at most. */
+static void test_ten_users(void) {
     int started[10] = {0};
     for (int user = 11; user <= 20; user++)
         for (int i = 0; i < 3; i++)
             CHECK(job_of(user, 0) > 0);
     for (;;) {
         struct job job;
+        int64_t id;
+        int attempt;
         if (store_job_next(store, 1, &id, &err) != STATUS_OK)
             break;
         OK(store_job_get(store, id, &job, &err));
@@ -85,13 +91,27 @@ int main(void) {
         }
         job_release(&job);
     }
+}
 
+/* Scenes and outputs; `job` is the third user's. */
+static void test_bytes(int64_t job) {
     uint64_t bytes;
     OK(store_user_bytes(store, 0, &bytes, &err));
     CHECK(bytes == 10);
-    OK(store_output_put(store, second, 1, EVENT_OUTPUT, "a.exr", 1000, SCENE_A, "x/y", &err));
+    OK(store_output_put(store, job, 1, EVENT_OUTPUT, "a.exr", 1000, SCENE_A, "x/y", &err));
     OK(store_user_bytes(store, 3, &bytes, &err));
     CHECK_THAT(bytes == 1000, "%llu bytes", (unsigned long long)bytes);
+}
+
+int main(void) {
+    char *dir = fresh_dir();
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    test_least_used();
+    int64_t running = test_running();
+    test_full_queue();
+    test_ten_users();
+    test_bytes(running);
     store_close(store);
     drop_dir(dir);
     return check_result();
