@@ -9,6 +9,8 @@
 #include "server/job/scheduler.h"
 #include "server/store/store.h"
 
+#define API_NAME_MAX_BYTES 200 /* of the name that a user gives a scene, an upload or a job */
+
 struct api_library {
     const char *name, *version;
 };

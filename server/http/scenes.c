@@ -100,8 +100,8 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
     for (const cJSON *member = (*body)->child; member; member = member->next) {
         if (strcmp(member->string, "name") == 0) {
             *name = cJSON_GetStringValue(member);
-            if (!*name || !**name || strlen(*name) > 200)
-                problem_param(params, "name", NULL, "must be text of 1 to 200 bytes");
+            if (!*name || !**name || strlen(*name) > API_NAME_MAX_BYTES)
+                problem_param(params, "name", NULL, "must be text of 1 to %d bytes", API_NAME_MAX_BYTES);
         } else if (!keeping_read(keeping, member, params)) {
             problem_param(params, member->string, "there are name, pinned, expires_at", "is not known here");
         }

@@ -56,8 +56,8 @@ static struct response *check_request(const struct request *r) {
         return problem(r, 400, "X-Content-SHA256 is not 64 hex digits");
     if (digest && !field_digest(digest, hex))
         return problem(r, 400, "Repr-Digest has no sha-256 that can be read");
-    if (name && (strlen(name) > 200 || *name == '\0'))
-        return problem(r, 400, "name must have 1 to 200 bytes, not %zu", strlen(name));
+    if (name && (strlen(name) > API_NAME_MAX_BYTES || *name == '\0'))
+        return problem(r, 400, "name must have 1 to %d bytes, not %zu", API_NAME_MAX_BYTES, strlen(name));
     return NULL;
 }
 

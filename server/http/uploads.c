@@ -24,7 +24,6 @@
 #include "server/http/views.h"
 
 #define METADATA_MAX 1000 /* bytes; it is given back in a field */
-#define NAME_MAX_BYTES 200
 
 enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
 
@@ -126,7 +125,7 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
         memcpy(row->sha256, bytes, SCENE_ID_SIZE);
     } else if ((key_length == 4 && memcmp(key, "name", 4) == 0) ||
                (key_length == 8 && memcmp(key, "filename", 8) == 0 && !row->name)) {
-        if (!is_text || used == 0 || used > NAME_MAX_BYTES)
+        if (!is_text || used == 0 || used > API_NAME_MAX_BYTES)
             return false;
         mem_free(row->name);
         row->name = mem_strdup(bytes);

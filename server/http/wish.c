@@ -1,0 +1,145 @@
+/* wish.c -- see wish.h. */
+#include "server/http/wish.h"
+
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/url.h"
+#include "server/http/api.h"
+#include "server/http/body.h"
+#include "server/http/keeping.h"
+#include "server/http/problem.h"
+
+#define PRIORITY_MAX 100
+#define LABELS_MAX 32
+#define LABEL_MAX_BYTES 100
+#define WEBHOOK_SECRET_LEAST 16
+#define WEBHOOK_SECRET_MOST 200
+
+void wish_release(struct wish *w) {
+    cJSON_Delete(w->body);
+    mem_free(w->labels);
+}
+
+static bool check_string(const cJSON *member, size_t max, cJSON *params) {
+    if (cJSON_IsString(member) && *member->valuestring && strlen(member->valuestring) <= max)
+        return true;
+    problem_param(params, member->string, NULL, "must be text of 1 to %zu bytes", max);
+    return false;
+}
+
+static void read_labels(struct wish *w, const cJSON *member, cJSON *params) {
+    size_t count = 0;
+    bool good = cJSON_IsObject(member);
+    for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
+        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES &&
+               *label->string && strlen(label->string) <= LABEL_MAX_BYTES;
+    if (good && count <= LABELS_MAX)
+        w->labels = json_text(member);
+    else
+        problem_param(params, "labels", NULL, "must be an object of at most %d texts, each name and "
+                      "text of at most %d bytes", LABELS_MAX, LABEL_MAX_BYTES);
+}
+
+static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
+    double value = cJSON_IsNumber(member) ? member->valuedouble : NAN;
+    if (fabs(value) <= PRIORITY_MAX && value == floor(value))
+        w->priority = (int)value;
+    else
+        problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX,
+                      PRIORITY_MAX);
+}
+
+/* {"url", "secret"}: both, and nothing else. */
+static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
+    const char *url = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "url"));
+    const char *secret = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "secret"));
+    struct url parts;
+    struct error err;
+    size_t length = secret ? strlen(secret) : 0;
+    if (!url || !secret || cJSON_GetArraySize(member) != 2)
+        problem_param(params, "webhook", "the secret signs the messages, and so tells them from others'",
+                      "must be an object of two texts, url and secret");
+    else if (length < WEBHOOK_SECRET_LEAST || length > WEBHOOK_SECRET_MOST)
+        problem_param(params, "webhook", NULL, "must have a secret of %d to %d bytes", WEBHOOK_SECRET_LEAST,
+                      WEBHOOK_SECRET_MOST);
+    else if (url_parse(url, &parts, &err) != STATUS_OK)
+        problem_param(params, "webhook", NULL, "%s", err.message);
+    w->webhook_url = url;
+    w->webhook_secret = secret;
+}
+
+/* "first", "last" or the number of a job. */
+static void read_order(struct wish *w, const cJSON *member, cJSON *params) {
+    double before = cJSON_IsNumber(member) ? member->valuedouble : 0.0;
+    const char *word = cJSON_IsString(member) ? member->valuestring : "";
+    w->place = JOB_PLACE_KEEP;
+    if (strcmp(word, "first") == 0)
+        w->place = JOB_PLACE_FIRST;
+    else if (strcmp(word, "last") == 0)
+        w->place = JOB_PLACE_LAST;
+    else if (before >= 1 && before < 9e15 && before == floor(before))
+        w->place = JOB_PLACE_BEFORE;
+    else
+        problem_param(params, "order", NULL, "must be \"first\", \"last\" or the number of the job to go before");
+    w->before = (int64_t)before;
+}
+
+struct response *wish_read(const struct request *r, struct wish *w, bool is_new, cJSON *params) {
+    memset(w, 0, sizeof *w);
+    w->priority = INT_MIN;
+    w->shared = -1;
+    struct response *refusal = NULL;
+    w->body = body_object(r, &refusal);
+    if (!w->body)
+        return refusal;
+    for (const cJSON *member = w->body->child; member; member = member->next) {
+        const char *name = member->string;
+        if (strcmp(name, "name") == 0)
+            w->name = check_string(member, API_NAME_MAX_BYTES, params) ? member->valuestring : NULL;
+        else if (strcmp(name, "labels") == 0)
+            read_labels(w, member, params);
+        else if (strcmp(name, "priority") == 0)
+            read_priority(w, member, params);
+        else if (strcmp(name, "shared") == 0 && cJSON_IsBool(member))
+            w->shared = cJSON_IsTrue(member);
+        else if (strcmp(name, "shared") == 0)
+            problem_param(params, name, NULL, "must be true or false");
+        else if (!is_new && strcmp(name, "order") == 0)
+            read_order(w, member, params);
+        else if (!is_new && keeping_read(&w->keeping, member, params))
+            continue;
+        else if (is_new && strcmp(name, "scene") == 0)
+            w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
+        else if (is_new && strcmp(name, "webhook") == 0)
+            read_webhook(w, member, params);
+        else if (is_new && strcmp(name, "settings") == 0)
+            w->settings = member;
+        else
+            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, webhook, shared"
+                                               : "there are name, priority, labels, shared, order, pinned, "
+                                                 "expires_at",
+                          "is not known here");
+    }
+    if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
+        problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");
+    return NULL;
+}
+
+void wish_settings(const struct wish *w, struct settings *settings, cJSON *params) {
+    cJSON *problems = cJSON_CreateArray();
+    if (w->settings && settings_apply(settings, w->settings, problems, NULL) != STATUS_OK) {
+        const cJSON *problem;
+        cJSON_ArrayForEach(problem, problems) {
+            const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "name"));
+            const char *reason = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "reason"));
+            const char *hint = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, "hint"));
+            char *full = strcmp(name, "settings") == 0 ? mem_strdup(name) : mem_printf("settings.%s", name);
+            problem_param(params, full, hint, "%s", reason);
+            mem_free(full);
+        }
+    }
+    cJSON_Delete(problems);
+}

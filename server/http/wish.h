@@ -1,0 +1,36 @@
+/* wish.h -- what the body of POST /v1/jobs or of PATCH /v1/jobs/ID asks for. */
+#ifndef UNBAKE_HTTP_WISH_H
+#define UNBAKE_HTTP_WISH_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "common/json.h"
+#include "common/settings.h"
+#include "server/http/message.h"
+#include "server/store/store.h"
+
+/* Pointers lie in `body`. */
+struct wish {
+    cJSON *body; /* owned */
+    const char *scene, *name;
+    const cJSON *settings;
+    char *labels; /* JSON text; owned; NULL: not given */
+    const char *webhook_url, *webhook_secret; /* NULL: none */
+    int priority; /* INT_MIN: not given */
+    int shared;   /* -1: not given */
+    enum job_place place;
+    int64_t before; /* with JOB_PLACE_BEFORE */
+    struct keeping keeping;
+};
+
+/* Reads and checks the request's body; all faults go into the array `params`, as problem_param puts them.
+ * NULL, or a reply where the body is no JSON object at all. *w needs wish_release in any case. */
+struct response *wish_read(const struct request *r, struct wish *w, bool is_new, cJSON *params);
+void wish_release(struct wish *w);
+
+/* Applies the settings that it asks for, if any, over *settings; faults as above, their names with
+ * "settings." before them. */
+void wish_settings(const struct wish *w, struct settings *settings, cJSON *params);
+
+#endif
