@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "client/commands.h"
-#include "common/nearest.h"
 #include "client/table.h"
 #include "common/mem.h"
+#include "common/nearest.h"
 #include "common/protocol.h"
 #include "common/settings.h"
 

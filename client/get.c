@@ -1,10 +1,12 @@
 /* get.c -- `get`: a job's outputs become files.
  *
- * 1. A file has its name only when its content has the SHA-256 that the server lists; before, it
- *    is NAME.part. 2. What NAME.part holds is hashed, not trusted: if the whole is wrong in the
- * end, it is fetched from its beginning once more. 3. A running job may replace an output at any
- * time: If-Range names the version, and after a mismatch the list is asked for again. 4. No name
- * from the server leads out of the folder asked for. */
+ * 1. A file has its name only when its content has the SHA-256 that the server lists; before, it is
+ *    NAME.part.
+ * 2. What NAME.part holds is hashed, not trusted: if the whole is wrong in the end, it is fetched
+ *    from its beginning once more.
+ * 3. A running job may replace an output at any time: If-Range names the version, and after a
+ *    mismatch the list is asked for again.
+ * 4. No name from the server leads out of the folder asked for. */
 #include <errno.h>
 #include <fcntl.h>
 #include <fnmatch.h>
@@ -15,11 +17,11 @@
 
 #include "client/commands.h"
 #include "client/meter.h"
-#include "common/clock.h"
-#include "common/nearest.h"
 #include "client/view.h"
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/nearest.h"
 #include "common/sha256.h"
 
 #define PATIENCE_SEC 60.0

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "common/nearest.h"
 #include "common/mem.h"
+#include "common/nearest.h"
 
 static const struct option *find(const struct option *table, const char *name, size_t length) {
     for (; table && table->name; table++)

@@ -3,10 +3,13 @@
 #ifndef UNBAKE_HTTP_COLLECTOR_H
 #define UNBAKE_HTTP_COLLECTOR_H
 
+#include "common/error.h"
+#include "common/json.h"
 #include "server/http/api.h"
 
 struct collector; /* its thread; opaque */
 
+/* Starts the thread, which collects at once and then every interval_sec; *c is to be stopped. */
 enum status collector_start(struct collector **c, struct api *api, double interval_sec,
                             struct error *err);
 void collector_stop(struct collector *c); /* NULL is fine */

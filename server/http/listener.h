@@ -25,6 +25,8 @@ struct listener_config {
     struct guard_limits limits;
 };
 
+/* Listens and serves; *l is to be stopped, and is api->listener from then on. Nothing of `config` is
+ * kept, `api` is borrowed. STATUS_INPUT: the address or the certificate is no good. */
 enum status listener_start(struct listener **l, const struct listener_config *config, struct api *api,
                            struct error *err);
 uint16_t listener_port(const struct listener *l);

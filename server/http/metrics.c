@@ -6,8 +6,8 @@
 
 #include "common/file.h"
 #include "common/protocol.h"
-#include "server/http/hub.h"
 #include "server/http/handlers.h"
+#include "server/http/hub.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
 #include "server/http/tally.h"

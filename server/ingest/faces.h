@@ -34,7 +34,8 @@ struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_lim
 /* Makes room for so many triangles in all. */
 void faces_reserve(struct faces *f, size_t triangle_count);
 
-/* Adds the polygon as the face number mesh->face_count of the input, which is counted up. */
+/* Adds the polygon as the face number mesh->face_count of the input, which is counted up. STATUS_LIMIT
+ * where that makes too many triangles. */
 enum status faces_add(struct faces *f, int64_t object_id, struct error *err);
 
 #endif

@@ -17,6 +17,7 @@ struct intern {
 
 void intern_init(struct intern *in);
 void intern_release(struct intern *in);
+/* The number of the string, which is copied where it is new. */
 uint32_t intern_number(struct intern *in, const void *bytes, size_t length);
 
 #endif

@@ -15,6 +15,8 @@
 
 struct scheduler; /* opaque */
 
+/* Nothing runs yet. What `config` points to and the store are borrowed; fails where the system has no
+ * descriptor left. */
 enum status scheduler_new(struct scheduler **s, const struct scheduler_config *config,
                           struct store *store, struct error *err);
 void scheduler_free(struct scheduler *s);

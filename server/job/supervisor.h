@@ -29,6 +29,8 @@ struct worker {
     off_t log_start; /* where this process's part of the log begins */
 };
 
+/* Starts the process in the folder `dir`; *w is to be buried and released. Where it fails *w is as
+ * released. Nothing of the arguments is kept. */
 enum status supervisor_start(struct worker *w, const char *binary, const char *dir,
                              struct error *err);
 

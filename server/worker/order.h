@@ -37,6 +37,8 @@ struct order {
     bool allow_private;
 };
 
+/* Reads DIR/job.json; `dir` is borrowed. STATUS_INTERNAL where it is not as above: the daemon wrote it.
+ * *order needs order_release in any case. */
 enum status order_read(struct order *order, const char *dir, struct error *err);
 void order_release(struct order *order);
 

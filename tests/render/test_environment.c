@@ -6,8 +6,8 @@
 #include "server/export/outputs.h"
 #include "server/reconstruct/environment.h"
 #include "server/reconstruct/reconstruct.h"
-#include "tests/render/small_room.h"
 #include "tests/render/shell.h"
+#include "tests/render/small_room.h"
 
 #define SKY_WIDTH 256
 

@@ -1,11 +1,11 @@
 /* The client's pieces that turn text into text: events, options, corrections, figures, bars. */
 #include "client/commands.h"
 #include "client/meter.h"
-#include "common/nearest.h"
 #include "client/sse.h"
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
+#include "common/nearest.h"
 #include "tests/check.h"
 
 /* --- sse.c --------------------------------------------------------------------------------- */
