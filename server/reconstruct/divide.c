@@ -73,6 +73,13 @@ static rgb divide_channels(rgb over, rgb under, float least) {
                     over.b / fmaxf(under.b, least));
 }
 
+/* Reads a photograph more sharply where all that this takes is of one surface; else `shown` stays. Tells
+ * whether it did. */
+static bool sharpen(const struct divide *d, const struct view *view, uint32_t triangle, rgb *shown) {
+    return views_edge(d->views, view, triangle) < VIEWS_EDGE - 1 &&
+           photograph_sample_cubic(&d->r->scene->photograph[d->views->train[view->train]], view->x, view->y, shown);
+}
+
 static void add_look(const struct divide *d, uint32_t texel, const struct surface_point *at,
                      const struct irradiance *light, const struct view *view, rgb shown,
                      struct incident *scratch, struct texel_looks *looks) {
@@ -81,6 +88,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     float median = d->views->median_radiance;
     float weight = view->weight * views_trust(d->views, view, at->triangle);
     float mixing = views_mixing(d->views, view, at->triangle, shown);
+    bool sharp = sharpen(d, view, at->triangle, &shown);
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
     rgb typical = rgb_scale(white, TYPICAL_BASE_COLOR);
@@ -101,7 +109,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     looks->look[looks->count++] = (struct robust_sample){
         base, logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
         weight * noise_weight(d->noise, d->views, view, typical, mixing),
-        sqrtf(rgb_dot(noise, noise)) * noise_draw(view), mixing * rgb_dot(base, base)};
+        sqrtf(rgb_dot(noise, noise)) * noise_draw(view, sharp), mixing * rgb_dot(base, base)};
 }
 
 static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,

@@ -22,6 +22,8 @@
 #define EMITTER_SHARE 0.4f
 /* A base colour below this tells too little of the light that fell on it. */
 #define DARKEST_BASE_COLOR 0.02f
+/* Segments this many times brighter than the median of the room outshine it. */
+#define BRIGHT 4.0f
 /* Iteration number that keeps the decision's random numbers apart from the optimiser's. */
 #define DECISION_ITERATION UINT64_C(0x7fff0000)
 
@@ -138,6 +140,16 @@ void emitters_observe(const struct reconstruction *r, const struct views *views,
     by_segment_sort(&job.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, observe_segment, &job);
     by_segment_release(&job.texels);
+}
+
+void emitters_light_bright(struct reconstruction *r, const struct views *views,
+                           const struct emitter_evidence *evidence) {
+    for (size_t i = 0; i < r->segments.count; i++) {
+        rgb shown = evidence[i].shown;
+        bool shines = rgb_mean(shown) > BRIGHT * views->median_radiance;
+        r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
+    }
+    world_update_lights(&r->world);
 }
 
 /* Base colours of a segment that were looked at and the radiance reflected there, added up: their

@@ -25,6 +25,11 @@ struct emitter_evidence {
 void emitters_observe(const struct reconstruction *r, const struct views *views,
                       struct emitter_evidence *evidence);
 
+/* Makes lights of what outshines the room, before it is known what emits: its emission is what is shown of it,
+ * own and reflected light together; that of all else is 0. */
+void emitters_light_bright(struct reconstruction *r, const struct views *views,
+                           const struct emitter_evidence *evidence);
+
 /* Fills `arrived` by looks at the present state of the materials, decides, and gives every emitter
  * in r->materials its radiance: what is shown less what a neutral base colour would reflect.
  * batch[threads] is scratch for EMITTERS_TEXELS texels. */

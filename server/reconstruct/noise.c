@@ -198,13 +198,19 @@ static float sign_of(uint32_t train, long x, long y) {
     return rng_key(train, (uint64_t)x, (uint64_t)y) & 1 ? 1.0f : -1.0f;
 }
 
-float noise_draw(const struct view *view) {
-    float x = view->x - 0.5f, y = view->y - 0.5f;
+float noise_draw(const struct view *view, bool cubic) {
+    float x = view->x - 0.5f, y = view->y - 0.5f, sum = 0.0f;
     long column = (long)floorf(x), row = (long)floorf(y);
-    float wx = x - (float)column, wy = y - (float)row;
-    float sum = 0.0f;
-    for (int k = 0; k < 4; k++)
-        sum += (k & 1 ? wx : 1.0f - wx) * (k & 2 ? wy : 1.0f - wy) *
-               sign_of(view->train, column + (k & 1), row + (k >> 1));
+    float fx = x - (float)column, fy = y - (float)row;
+    float wx[4] = {0.0f, 1.0f - fx, fx, 0.0f}, wy[4] = {0.0f, 1.0f - fy, fy, 0.0f};
+    if (cubic) {
+        photograph_cubic(fx, wx);
+        photograph_cubic(fy, wy);
+    }
+    for (int k = 0; k < 16; k++) {
+        float weight = wx[k % 4] * wy[k / 4];
+        if (weight != 0.0f)
+            sum += weight * sign_of(view->train, column - 1 + k % 4, row - 1 + k / 4);
+    }
     return sum;
 }

@@ -37,8 +37,8 @@ rgb noise_deviation(const struct noise *noise, const struct views *views, const 
 float noise_weight(const struct noise *noise, const struct views *views, const struct view *view, rgb radiance,
                    float mixing);
 
-/* What a look-up in a picture of independent noise of deviation 1 reads at the view's place: the
- * same for the same pixels, so that texels which share pixels share their noise. */
-float noise_draw(const struct view *view);
+/* What a bilinear or cubic look-up in a picture of independent noise of deviation 1 reads at the view's
+ * place: the same for the same pixels, so that texels which share pixels share their noise. */
+float noise_draw(const struct view *view, bool cubic);
 
 #endif

@@ -134,7 +134,7 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     make_environment(run);
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
-    unseen_light_estimate(run->r);
+    unseen_light_estimate(run->r, &run->views);
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     return STATUS_OK;

@@ -16,9 +16,6 @@
 #define LEAST_SPACING 4
 /* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
 #define FIRST_PASS_PART 0.25
-/* Segments this many times brighter than the median of the room are sampled as lights before it is
- * known whether they emit. */
-#define BRIGHT 4.0f
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -96,13 +93,10 @@ static bool divide_all(struct solve *s) {
 
 /* Lights are sampled by what is shown of them, own and reflected light together: that is what they
  * send out. */
-static void set_lights(struct solve *s, bool decided) {
+static void set_lights(struct solve *s) {
     struct reconstruction *r = s->r;
-    for (size_t i = 0; i < r->segments.count; i++) {
-        rgb shown = r->evidence[i].shown;
-        bool shines = decided ? r->is_emitter[i] : rgb_mean(shown) > BRIGHT * s->views->median_radiance;
-        r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
-    }
+    for (size_t i = 0; i < r->segments.count; i++)
+        r->materials.emission[i] = r->is_emitter[i] ? r->evidence[i].shown : rgb_gray(0.0f);
     world_update_lights(&r->world);
 }
 
@@ -204,7 +198,10 @@ static void solve_release(struct solve *s) {
 }
 
 static bool solve_pass(struct solve *s, int pass) {
-    set_lights(s, pass > 0);
+    if (pass == 0)
+        emitters_light_bright(s->r, s->views, s->r->evidence);
+    else
+        set_lights(s);
     if (!gather(s, pass))
         return false;
     decide_emitters(s);

@@ -7,21 +7,26 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/reconstruct/conjugate.h"
+#include "server/reconstruct/emitters.h"
 #include "server/reconstruct/incident.h"
 #include "server/render/sampler.h"
 
-#define POINTS 4096
-#define WAYS 512 /* rays a point */
+#define POINTS 2048
+#define WAYS 512 /* directions a point */
 #define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
 /* The coarse map, in columns of longitude and rows of latitude. */
 #define COLUMNS 12
 #define ROWS 6
 #define CELLS (COLUMNS * ROWS)
-/* Share of the rays that must go where nothing is known before it is worth estimating. */
-#define SHARE_LEAST 0.01
+/* A point speaks of the unseen directions where they have this share of its rays; so many must. */
+#define SHARE_LEAST 0.1f
+#define LEAST_POINTS 64
 /* White paint, and the part of the points that is no whiter. In scans that is not near 1: in creases of a
  * fused mesh too little light is found. */
 #define WHITE_BASE_COLOR 0.85
+/* Nothing is so white. Light is missing, and not only known badly, if a good part of the points are. */
+#define IMPOSSIBLE_BASE_COLOR 1.5
+#define NOT_IMPOSSIBLE 0.8
 #define NO_WHITER 0.9
 /* Standard deviations of the logarithm of base colour within a segment and above white. */
 #define SPREAD_WITHIN 0.3
@@ -42,11 +47,12 @@
  * channels. */
 struct point {
     uint32_t segment;
-    float shown, known, filled, share[CELLS];
+    float shown, known, filled, unseen, share[CELLS]; /* unseen: the shares' sum */
 };
 
 struct unseen {
     struct reconstruction *r;
+    uint16_t (*radiance)[3];  /* [height][width] */
     struct light_field field;
     size_t count;
     uint32_t *texel;          /* [count] */
@@ -78,17 +84,54 @@ static struct corner corners_at(vec3 d) {
 
 /* --- looking around ------------------------------------------------------------------------------- */
 
-/* Texels that photographs show, evenly spread. */
+static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
+    return r->segments.of_triangle[r->inverse.triangle[texel]];
+}
+
+/* What texels send out: of those that no photograph shows the mean of their segment, or of the room. */
+static void fill_radiance(struct unseen *u) {
+    const struct reconstruction *r = u->r;
+    size_t segments = r->segments.count;
+    double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
+    u->radiance = mem_calloc_large((size_t)r->fused.width * r->fused.height, sizeof *u->radiance);
+    memcpy(u->radiance, r->fused.radiance, (size_t)r->fused.width * r->fused.height * sizeof *u->radiance);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        rgb shown = fused_radiance(&r->fused, texel);
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        for (size_t s = segment_of(r, texel), k = 0; k < 2; s = segments, k++) {
+            sum[s][0] += (double)shown.r;
+            sum[s][1] += (double)shown.g;
+            sum[s][2] += (double)shown.b;
+            sum[s][3] += 1.0;
+        }
+    }
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = segment_of(r, texel);
+        const double *from = sum[segment][3] > 0.0 ? sum[segment] : sum[segments];
+        for (int c = 0; c < 3 && !(r->fused.count[texel] > 0.0f) && from[3] > 0.0; c++)
+            u->radiance[texel][c] = image_half_from_float((float)(from[c] / from[3]));
+    }
+    mem_free(sum);
+}
+
+/* A surface that photographs show and that is no lamp. */
+static bool tells(const struct reconstruction *r, uint32_t texel) {
+    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[segment_of(r, texel)]);
+}
+
+/* Such texels, evenly spread. */
 static void choose_points(struct unseen *u) {
     const struct reconstruction *r = u->r;
     size_t seen = 0, met = 0;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
-        seen += r->fused.count[r->inverse.valid[i]] > 0.0f;
+        seen += tells(r, r->inverse.valid[i]);
     size_t wanted = seen < POINTS ? seen : POINTS;
     u->texel = mem_array(wanted + 1, sizeof *u->texel);
     for (size_t i = 0; i < r->inverse.valid_count && u->count < wanted; i++) {
         uint32_t texel = r->inverse.valid[i];
-        if (r->fused.count[texel] > 0.0f && met++ == u->count * seen / wanted)
+        if (tells(r, texel) && met++ == u->count * seen / wanted)
             u->texel[u->count++] = texel;
     }
 }
@@ -100,7 +143,7 @@ static void look_around(void *user, size_t index, int thread) {
     struct incident *in = &u->scratch[thread];
     uint32_t texel = u->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
     struct surface_point at;
-    *p = (struct point){.segment = r->segments.of_triangle[r->inverse.triangle[texel]]};
+    *p = (struct point){.segment = segment_of(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
     vec3 frame[3] = {[2] = at.shading};
@@ -109,26 +152,36 @@ static void look_around(void *user, size_t index, int thread) {
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
     incident_trace(in, &u->field, &at, WAYS);
     for (size_t i = 0; i < WAYS; i++) {
-        bool escapes = in->hit[i].triangle == ACCEL_NONE;
-        float light = rgb_mean(in->radiance[i]) / WAYS;
-        if (!escapes || (r->environment.map.pixel && environment_is_seen(&r->environment, in->direction[i]))) {
-            p->known += light;
+        bool has_map = r->environment.map.pixel != NULL;
+        if (in->hit[i].triangle != ACCEL_NONE || (has_map && environment_is_seen(&r->environment, in->direction[i])))
             continue;
-        }
-        p->filled += light;
+        p->filled += rgb_mean(in->radiance[i]) / WAYS;
+        p->unseen += 1.0f / WAYS;
         struct corner c = corners_at(in->direction[i]);
         for (int k = 0; k < 4; k++)
             p->share[c.cell[k]] += c.weight[k] / WAYS;
     }
+    struct irradiance light;
+    irradiance_gather(&light, in, &u->field, &at, key, WAYS);
+    p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
 }
 
 static double unseen_share(const struct unseen *u) {
     double sum = 0.0;
     for (size_t i = 0; i < u->count; i++)
-        for (size_t k = 0; k < CELLS; k++)
-            sum += (double)u->point[i].share[k];
+        sum += (double)u->point[i].unseen;
     return sum / fmax((double)u->count, 1.0);
+}
+
+/* Keeps the points that speak of the unseen directions. */
+static void keep_telling_points(struct unseen *u) {
+    size_t kept = 0;
+    for (size_t i = 0; i < u->count; i++) {
+        if (u->point[i].unseen >= SHARE_LEAST)
+            u->point[kept++] = u->point[i];
+    }
+    u->count = kept;
 }
 
 /* --- what it takes -------------------------------------------------------------------------------- */
@@ -140,28 +193,28 @@ static double arrived(const struct point *p, const double log_radiance[CELLS]) {
     return fmax(sum, 1e-12);
 }
 
-/* Base colour that hardly a point exceeds if the unseen directions are filled in as they are, or have one
- * radiance everywhere. */
-static double whitest(const struct unseen *u, const double *log_radiance) {
+/* Base colour that part `below` of the points do not exceed under such a map, or, without one, under what was
+ * filled in. */
+static double base_color_at(const struct unseen *u, double below, const double *log_radiance) {
     float *base = mem_array(u->count + 1, sizeof *base);
     for (size_t i = 0; i < u->count; i++) {
         const struct point *p = &u->point[i];
         double light = log_radiance ? arrived(p, log_radiance) : (double)(p->known + p->filled);
         base[i] = (float)((double)p->shown / fmax(light, 1e-12));
     }
-    double found = (double)quantile(base, u->count, NO_WHITER);
+    double found = (double)quantile(base, u->count, below);
     mem_free(base);
     return found;
 }
 
-/* Makes it white by a common factor. */
+/* Multiplies the map so that nearly all is no whiter than white. */
 static void make_white(struct unseen *u) {
     double low = -20.0, high = 20.0, cell[CELLS];
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         for (size_t k = 0; k < CELLS; k++)
             cell[k] = u->log_radiance[k] + middle;
-        *(whitest(u, cell) > WHITE_BASE_COLOR ? &low : &high) = middle;
+        *(base_color_at(u, NO_WHITER, cell) > WHITE_BASE_COLOR ? &low : &high) = middle;
     }
     for (size_t k = 0; k < CELLS; k++)
         u->log_radiance[k] += high;
@@ -289,27 +342,48 @@ static void fill_in(const struct unseen *u) {
     }
 }
 
-void unseen_light_estimate(struct reconstruction *r) {
-    struct unseen u = {.r = r, .field = {&r->world, (const uint16_t(*)[3])r->fused.radiance}};
+/* Fills the points: what they show, and what is around them. Small lamps must be looked for. */
+static void gather_points(struct unseen *u, const struct views *views) {
+    struct reconstruction *r = u->r;
+    struct emitter_evidence *evidence = mem_calloc(r->segments.count, sizeof *evidence);
+    emitters_observe(r, views, evidence);
+    emitters_light_bright(r, views, evidence);
+    choose_points(u);
+    u->point = mem_array(u->count + 1, sizeof *u->point);
+    u->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *u->scratch);
+    parallel_for(r->pool, u->count, look_around, u);
+    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
+    world_update_lights(&r->world);
+    mem_free(evidence);
+}
+
+static void relight(struct unseen *u) {
+    struct reconstruction *r = u->r;
+    fit(u);
+    if (!r->environment.map.pixel)
+        environment_make_unseen(&r->environment);
+    fill_in(u);
+    environment_update_figures(&r->environment);
+    world_set_environment(&r->world, &r->environment.map, r->pool);
+}
+
+void unseen_light_estimate(struct reconstruction *r, const struct views *views) {
+    struct unseen u = {.r = r};
+    fill_radiance(&u);
+    u.field = (struct light_field){&r->world, (const uint16_t(*)[3])u.radiance};
     cJSON *figures = cJSON_AddObjectToObject(r->report, "unseen_light");
-    choose_points(&u);
-    u.point = mem_array(u.count + 1, sizeof *u.point);
-    u.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *u.scratch);
-    parallel_for(r->pool, u.count, look_around, &u);
+    gather_points(&u, views);
     r->unseen_share = unseen_share(&u);
-    bool matters = r->unseen_share > SHARE_LEAST && whitest(&u, NULL) > WHITE_BASE_COLOR;
+    keep_telling_points(&u);
+    double base_color = base_color_at(&u, NOT_IMPOSSIBLE, NULL);
+    bool matters = u.count >= LEAST_POINTS && base_color > IMPOSSIBLE_BASE_COLOR;
+    if (matters)
+        relight(&u);
     json_add_number(figures, "share_of_rays", r->unseen_share);
+    json_add_number(figures, "base_color_without", base_color);
     json_add_bool(figures, "estimated", matters);
-    if (matters) {
-        fit(&u);
-        if (!r->environment.map.pixel)
-            environment_make_unseen(&r->environment);
-        fill_in(&u);
-        environment_update_figures(&r->environment);
-        json_add_number(figures, "mean_luminance", r->environment.luminance);
-        world_set_environment(&r->world, &r->environment.map, r->pool);
-    }
     mem_free(u.scratch);
     mem_free(u.point);
     mem_free(u.texel);
+    mem_free(u.radiance);
 }

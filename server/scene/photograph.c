@@ -79,6 +79,33 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     return true;
 }
 
+bool photograph_sample_cubic(const struct photograph *photo, float x, float y, rgb *radiance) {
+    long width = (long)photo->camera.width, height = (long)photo->camera.height;
+    long column = (long)floorf(x - 0.5f) - 1, row = (long)floorf(y - 0.5f) - 1;
+    if (column < 0 || row < 0 || column + 4 > width || row + 4 > height)
+        return false;
+    float wx[4], wy[4], value[3] = {0.0f, 0.0f, 0.0f};
+    photograph_cubic(x - 0.5f - (float)(column + 1), wx);
+    photograph_cubic(y - 0.5f - (float)(row + 1), wy);
+    for (long k = 0; k < 16; k++) {
+        size_t at = (size_t)((row + k / 4) * width + column + k % 4);
+        if (photo->mask && photo->mask[at] == 0)
+            return false;
+        for (int c = 0; c < 3; c++) {
+            float tap = half_to_float(photo->pixel[at][c]);
+            if (!(tap < photo->clip))
+                return false;
+            value[c] += wx[k % 4] * wy[k / 4] * tap;
+        }
+    }
+    if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
+        return false;
+    float scale = 1.0f / (photo->exposure * photograph_falloff(photo, x, y));
+    *radiance = rgb_make(value[0] * scale / photo->gain.r, value[1] * scale / photo->gain.g,
+                         value[2] * scale / photo->gain.b);
+    return true;
+}
+
 struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px) {
     static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
     struct photograph_ring ring = {0.0f, 0.0f, 0.0f};

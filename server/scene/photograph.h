@@ -57,6 +57,19 @@ static inline float photograph_trust(const struct photograph *photo) {
 bool photograph_sample(const struct photograph *photo, float x, float y,
                        struct photograph_sample *sample);
 
+/* Cubic look-up (Keys 1981, a = -1/2), which does not blur by another pixel's width as a bilinear one
+ * does and passes on twice its noise. False when one of the 4 x 4 taps is outside, masked, saturated or
+ * not finite. */
+bool photograph_sample_cubic(const struct photograph *photo, float x, float y, rgb *radiance);
+
+/* Its four weights along a row or column, for a place `t` in [0, 1) from the second tap to the third. */
+static inline void photograph_cubic(float t, float weight[4]) {
+    weight[0] = -0.5f * t * (1.0f - t) * (1.0f - t);
+    weight[1] = 1.0f + t * t * (1.5f * t - 2.5f);
+    weight[2] = t * (0.5f + t * (2.0f - 1.5f * t));
+    weight[3] = -0.5f * t * t * (1.0f - t);
+}
+
 /* How bright (mean of the channels) the picture is at eight places around one; those outside of it or masked
  * do not count. */
 struct photograph_ring {

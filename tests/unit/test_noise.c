@@ -86,21 +86,23 @@ static void test_places_and_texture(void) {
     noise_release(&noise);
 }
 
-/* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter between four, and texels that read
+/* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter (cubic: 0.41) between four, and texels that read
  * the same pixels have the same. */
 static void test_draw(void) {
-    double middle = 0.0, between = 0.0;
+    double middle = 0.0, between = 0.0, cubic = 0.0;
     for (uint32_t i = 0; i < 10000; i++) {
         struct view view = {.train = i / 100, .x = (float)(i % 100) + 0.5f, .y = 7.5f};
-        double at = (double)noise_draw(&view);
+        double at = (double)noise_draw(&view, false);
         middle += at * at / 10000.0;
-        CHECK(noise_draw(&view) == (float)at);
+        CHECK(noise_draw(&view, false) == (float)at);
         view.x += 0.5f;
         view.y += 0.5f;
-        between += (double)noise_draw(&view) * (double)noise_draw(&view) / 10000.0;
+        between += (double)noise_draw(&view, false) * (double)noise_draw(&view, false) / 10000.0;
+        cubic += (double)noise_draw(&view, true) * (double)noise_draw(&view, true) / 10000.0;
     }
     CHECK_NEAR(middle, 1.0, 1e-6);
     CHECK_NEAR(between, 0.25, 0.02);
+    CHECK_NEAR(cubic, 0.41, 0.03); /* (2 x 9^2 + 2)^2 / 16^4 */
 }
 
 int main(void) {

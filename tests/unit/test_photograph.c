@@ -1,6 +1,7 @@
 /* Bilinear look-ups in a photograph: places, borders, saturation, masks, damaged pixels. */
 #include "server/scene/photograph.h"
 
+#include "common/image.h"
 #include "common/mem.h"
 #include "tests/check.h"
 
@@ -27,7 +28,37 @@ static struct photograph make(void) {
     return p;
 }
 
+/* A cubic look-up reads pixels as they are and straight lines between them, parabolas too away from the
+ * border, and keeps more of a fine pattern than a bilinear one; it wants all its taps. */
+static void test_cubic(void) {
+    struct photograph p = {.exposure = 2.0f, .gain = {1.0f, 1.0f, 0.5f}, .clip = INFINITY,
+                           .camera = {.width = 12, .height = 8}};
+    p.pixel = mem_calloc(96, sizeof *p.pixel);
+    for (int i = 0; i < 96; i++) {
+        float x = (float)(i % 12) + 0.5f, y = (float)(i / 12) + 0.5f;
+        p.pixel[i][0] = image_half_from_float(x + 2.0f * y);
+        p.pixel[i][1] = image_half_from_float(x * x);
+        p.pixel[i][2] = image_half_from_float(i % 4 < 2 ? 0.0f : 1.0f);
+    }
+    rgb sharp;
+    struct photograph_sample soft;
+    CHECK(photograph_sample_cubic(&p, 4.25f, 3.75f, &sharp));
+    CHECK_NEAR(sharp.r, 0.5 * (4.25 + 2.0 * 3.75), 1e-5);
+    CHECK_NEAR(sharp.g, 0.5 * 4.25 * 4.25, 1e-4);
+    CHECK(photograph_sample_cubic(&p, 4.5f, 3.5f, &sharp) && sharp.b == 0.0f);
+    CHECK(photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp) && photograph_sample(&p, 7.0f, 3.5f, &soft));
+    CHECK(soft.radiance.b == 1.0f && sharp.b > 1.1f); /* between two that are bright */
+    CHECK(!photograph_sample_cubic(&p, 1.4f, 3.5f, &sharp) && !photograph_sample_cubic(&p, 4.5f, 6.6f, &sharp));
+    CHECK(photograph_sample_cubic(&p, 1.5f, 1.5f, &sharp) && photograph_sample_cubic(&p, 9.9f, 5.9f, &sharp));
+    p.clip = 100.0f;
+    CHECK(photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp) && !photograph_sample_cubic(&p, 8.6f, 3.5f, &sharp));
+    p.mask = mem_calloc(96, 1);
+    CHECK(!photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp));
+    photograph_release(&p);
+}
+
 int main(void) {
+    test_cubic();
     struct photograph p = make();
     struct photograph_sample s;
     CHECK(photograph_sample(&p, 1.5f, 0.5f, &s));
