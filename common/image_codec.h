@@ -1,5 +1,5 @@
-/* image_codec.h -- what the codecs (exr.c, hdr.c, jpeg.c, png.c) and what chooses among them
- * share; private to them.
+/* image_codec.h -- what the codecs (exr.c, hdr.c, jpeg.c, png.c) share with image_read.c, which
+ * chooses among them; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
  * whole, so probing a large file costs as little as reading its header. A codec fills *image

@@ -1,0 +1,85 @@
+/* image_read.c -- the readers of image.h: where a picture's bytes come from, and which codec takes them. */
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/image_codec.h"
+
+static enum status read_source(struct image_source *source, bool probe, struct image *image,
+                               struct image_info *info, struct error *err) {
+    static const struct {
+        const char *magic;
+        size_t length;
+        enum status (*read)(struct image_source *, bool, struct image *, struct image_info *,
+                            struct error *);
+    } codecs[] = {
+        {"\x76\x2f\x31\x01", 4, image_read_exr},
+        {"\x89PNG", 4, image_read_png}, /* libpng explains what is wrong with the other four */
+        {"\xff\xd8\xff", 3, image_read_jpeg},
+        {"#?", 2, image_read_hdr},
+    };
+    struct image_info unwanted;
+    if (!info)
+        info = &unwanted;
+    *image = (struct image){0};
+    *info = (struct image_info){.orientation = 1};
+    char start[8];
+    size_t length = image_source_read(source, 0, start, sizeof start);
+    enum status status = STATUS_INPUT;
+    size_t i = 0, codec_count = sizeof codecs / sizeof codecs[0];
+    while (i < codec_count && (length < codecs[i].length ||
+                               memcmp(start, codecs[i].magic, codecs[i].length) != 0))
+        i++;
+    if (i < codec_count)
+        status = codecs[i].read(source, probe, image, info, err);
+    else if (source->size == 0)
+        error_set(err, status, "%s: the file is empty", source->name);
+    else
+        error_set(err, status, "%s: not a picture in EXR, PNG, JPEG or Radiance HDR format",
+                  source->name);
+    /* What a decoder takes for a short file may be a failing disk. */
+    if (source->io_error)
+        status = error_set_errno(err, source->io_error, "cannot read %s", source->name);
+    if (status != STATUS_OK)
+        image_release(image);
+    return status;
+}
+
+static enum status read_path(const char *path, bool probe, struct image *image,
+                             struct image_info *info, struct error *err) {
+    *image = (struct image){0};
+    /* Without O_NONBLOCK a FIFO under a picture's name would block for ever. */
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    if (fd < 0)
+        return error_set_errno(err, errno, "cannot open %s", path);
+    struct stat facts;
+    enum status status;
+    if (fstat(fd, &facts) != 0)
+        status = error_set_errno(err, errno, "cannot read %s", path);
+    else if (!S_ISREG(facts.st_mode))
+        status = error_set(err, STATUS_INPUT, "%s: not a regular file", path);
+    else {
+        struct image_source source = {.name = path, .fd = fd, .size = (uint64_t)facts.st_size};
+        status = read_source(&source, probe, image, info, err);
+    }
+    close(fd);
+    return status;
+}
+
+enum status image_read(const char *path, struct image *image, struct image_info *info,
+                       struct error *err) {
+    return read_path(path, false, image, info, err);
+}
+
+enum status image_probe(const char *path, struct image *image, struct image_info *info,
+                        struct error *err) {
+    return read_path(path, true, image, info, err);
+}
+
+enum status image_read_memory(const char *name, const void *data, size_t size,
+                              struct image *image, struct image_info *info, struct error *err) {
+    struct image_source source = {.name = name, .memory = data, .fd = -1, .size = size};
+    return read_source(&source, false, image, info, err);
+}
