@@ -2,6 +2,7 @@
 #include "server/ingest/transforms.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -22,7 +23,13 @@ struct context {
     size_t unlisted_count;
 };
 
-static void problem(struct context *c, const char *what) {
+__attribute__((format(printf, 2, 3)))
+static void problem(struct context *c, const char *format, ...) {
+    char what[1024]; /* of a longer one this much is told */
+    va_list args;
+    va_start(args, format);
+    vsnprintf(what, sizeof what, format, args);
+    va_end(args);
     findings_problem(c->findings, c->name, "%s: %s", c->place, what);
     c->ok = false;
 }
@@ -70,13 +77,9 @@ static char *path(struct context *c, const cJSON *object, const char *key) {
             *p = '/';
     struct error err;
     if (path_clean(copy, &clean, &err) != STATUS_OK) {
-        char text[1400];
-        snprintf(text, sizeof text, "%s %s", key, err.message);
-        problem(c, text);
+        problem(c, "%s %s", key, err.message);
     } else if (clean[0] == '\0') {
-        char text[64];
-        snprintf(text, sizeof text, "%s is empty", key);
-        problem(c, text);
+        problem(c, "%s is empty", key);
         mem_free(clean);
         clean = NULL;
     }
@@ -110,11 +113,8 @@ static enum camera_model read_model(struct context *c) {
     for (size_t i = 0; i < sizeof models / sizeof *models; i++)
         if (strcmp(name, models[i].name) == 0)
             return models[i].model;
-    char text[320];
-    snprintf(text, sizeof text,
-             "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
-             "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE", name);
-    problem(c, text);
+    problem(c, "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
+               "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE", name);
     return CAMERA_OPENCV;
 }
 
@@ -122,9 +122,7 @@ static enum camera_model read_model(struct context *c) {
 static double positive(struct context *c, const char *key) {
     double value = number(c, key, NAN);
     if (value <= 0.0) {
-        char text[128];
-        snprintf(text, sizeof text, "%s is %.9g, it must be positive", key, value);
-        problem(c, text);
+        problem(c, "%s is %.9g, it must be positive", key, value);
         return NAN;
     }
     return value;
@@ -133,9 +131,7 @@ static double positive(struct context *c, const char *key) {
 static double side(struct context *c, const char *key) {
     double value = number(c, key, NAN);
     if (!isnan(value) && (value < 1.0 || value > IMAGE_MAX_SIDE || value != floor(value))) {
-        char text[128];
-        snprintf(text, sizeof text, "%s is %.9g, it must be a number of pixels", key, value);
-        problem(c, text);
+        problem(c, "%s is %.9g, it must be a number of pixels", key, value);
         return NAN;
     }
     return value;
@@ -144,10 +140,7 @@ static double side(struct context *c, const char *key) {
 static double angle(struct context *c, const char *key) {
     double value = number(c, key, NAN);
     if (!isnan(value) && !(value > 0.0 && value < 3.14)) {
-        char text[128];
-        snprintf(text, sizeof text, "%s is %.9g, it must be an angle in radians below pi", key,
-                 value);
-        problem(c, text);
+        problem(c, "%s is %.9g, it must be an angle in radians below pi", key, value);
         return NAN;
     }
     return value;
@@ -239,7 +232,7 @@ static void read_pose(struct context *c, struct transforms_frame *frame) {
     bool scaled = false;
     if (pose_from_matrix((const double(*)[4])m, "transform_matrix", POSE_RIGHT_UP_BACK,
                          &frame->world_from_camera, &frame->camera_from_world, &scaled, &err) != STATUS_OK)
-        problem(c, err.message);
+        problem(c, "%s", err.message);
     c->scaled_count += scaled;
 }
 

@@ -20,8 +20,8 @@
 
 struct probe {
     uint32_t texel, chart;
-    bool seen; /* a photograph sees the texel */
-    vec3 shading;
+    bool seen;    /* a photograph sees the texel */
+    vec3 shading; /* unit, interpolated normal there */
     struct irradiance light;
 };
 
@@ -51,8 +51,10 @@ void probes_gather(struct probes *p, const struct light_field *field, const stru
                    const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed,
                    size_t samples, size_t first, size_t count, struct parallel *pool);
 
+/* The mix for a valid texel, whose piece of surface `at` is. */
 void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,
                 uint32_t texel, const struct surface_point *at, struct probe_mix *mix);
+/* *out: what arrives there, the sum of the probes' light by their weights. */
 void probes_irradiance(const struct probes *p, const struct probe_mix *mix, struct irradiance *out);
 
 #endif
