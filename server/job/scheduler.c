@@ -358,6 +358,9 @@ static void deliver(struct scheduler *s) {
     bool is_free = false;
     for (size_t i = 0; i < DELIVERIES; i++)
         is_free = delivery_listen(&s->delivery[i], s->store) || is_free;
+    /* Asked before what is due is taken, so that no message's time comes in between. */
+    if (store_outbox_wait(s->store, &wait, &err) != STATUS_OK)
+        wait = RETRY_SEC;
     for (size_t i = 0; i < DELIVERIES && is_free; i++) {
         struct outbox_row row;
         enum status status = STATUS_OK;
@@ -376,12 +379,7 @@ static void deliver(struct scheduler *s) {
         if (status != STATUS_OK && status != STATUS_NOT_FOUND)
             retry_later(s, "cannot call a webhook", &err);
     }
-    /* While all are busy, or a message is under way, the end of one wakes us. */
-    is_free = true;
-    for (size_t i = 0; i < DELIVERIES; i++)
-        is_free = is_free && s->delivery[i].id == 0;
-    if (is_free && !s->must_retry && store_outbox_wait(s->store, &wait, &err) != STATUS_OK)
-        wait = RETRY_SEC;
+    /* Messages that are due, while all hands are busy, go on when one of these ends, which wakes us. */
     s->outbox_at = clock_sec() + wait;
 }
 

@@ -243,7 +243,8 @@ struct outbox_row {
 void outbox_row_release(struct outbox_row *row);
 /* The first message with id > after whose time has come; STATUS_NOT_FOUND when there is none. */
 enum status store_outbox_next(struct store *store, int64_t after, struct outbox_row *row, struct error *err);
-/* How long until a message's time comes; infinite when there is none. */
+/* How long until the next message's time comes, of those whose time has not come yet; infinite when
+ * there is none. */
 enum status store_outbox_wait(struct store *store, double *seconds, struct error *err);
 /* Removes a message that was delivered, or puts it off: longer each time, and in the end for ever. */
 enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,

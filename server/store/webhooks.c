@@ -84,12 +84,12 @@ enum status store_outbox_next(struct store *store, int64_t after, struct outbox_
 }
 
 enum status store_outbox_wait(struct store *store, double *seconds, struct error *err) {
-    int64_t next;
+    int64_t next, now = store_now_ms();
     store_lock(store);
     enum status status = sql_int(&store->sql, -1, &next, err,
-                                 "SELECT next_ms FROM outbox ORDER BY next_ms LIMIT 1", "");
+                                 "SELECT next_ms FROM outbox WHERE next_ms > ? ORDER BY next_ms LIMIT 1", "i", now);
     store_unlock(store);
-    double wait = (double)(next - store_now_ms()) * 1e-3;
+    double wait = (double)(next - now) * 1e-3;
     *seconds = next < 0 ? (double)INFINITY : fmin(fmax(wait, 0.05), RETRY_MOST_MS * 1e-3);
     return status;
 }

@@ -1,4 +1,6 @@
 /* test_store_content.c -- what state.db holds besides jobs: scenes, events, outputs. */
+#include <math.h>
+
 #include "common/protocol.h"
 #include "tests/unit/store_rig.h"
 
@@ -151,8 +153,45 @@ static void test_events(void) {
     drop_dir(dir);
 }
 
+/* --- messages ------------------------------------------------------------------------------------ */
+
+/* A message that is put off has its time, whatever else is due: the one who is called may hang. */
+static void test_outbox(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    struct outbox_row first, second;
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 2,
+                          .webhook_url = "http://x/", .webhook_secret = "0123456789abcdef"};
+    int64_t id;
+    int attempt;
+    bool replayed, gave_up;
+    double wait;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    OK(store_outbox_wait(store, &wait, &err));
+    CHECK(isinf(wait));
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    OK(store_job_start(store, id, &attempt, &err));
+    OK(store_job_succeed(store, id, attempt, &err));
+    OK(store_outbox_next(store, 0, &first, &err));
+    OK(store_outbox_next(store, first.id, &second, &err));
+    CHECK(strstr(first.body, "running") && strstr(second.body, "succeeded"));
+    OK(store_outbox_settle(store, first.id, false, &gave_up, &err));
+    CHECK(!gave_up);
+    OK(store_outbox_wait(store, &wait, &err));
+    CHECK_THAT(wait > 0.1 && wait <= 2.0, "%g s until the next time", wait);
+    OK(store_outbox_settle(store, first.id, true, &gave_up, &err));
+    OK(store_outbox_wait(store, &wait, &err));
+    CHECK(isinf(wait));
+    outbox_row_release(&first);
+    outbox_row_release(&second);
+    store_close(store);
+    drop_dir(dir);
+}
+
 int main(void) {
     test_scenes();
     test_events();
+    test_outbox();
     return check_result();
 }
