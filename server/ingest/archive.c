@@ -29,6 +29,7 @@
 
 struct unpacking {
     struct archive *archive;
+    struct archive_entry *entry; /* ours: libarchive 3.6.2 forgets to look whether it could make its own */
     const char *name; /* the archive's, for messages */
     const struct archive_limits *limits;
     uint64_t packed_bytes, written_bytes, entry_count, file_count;
@@ -39,10 +40,11 @@ struct unpacking {
     struct error *err;
 };
 
-/* What libarchive says went wrong: a fault of the file, unless reading it failed. */
+/* What libarchive says went wrong: a fault of the file, unless reading it failed. For want of memory it
+ * often says nothing, or words of its own, and then errno tells: callers set it to 0 before. */
 static enum status library_error(struct unpacking *u, const char *entry) {
     int number = archive_errno(u->archive);
-    if (number == ENOMEM)
+    if (number == ENOMEM || errno == ENOMEM)
         mem_exhausted("libarchive");
     const char *text = archive_error_string(u->archive);
     enum status status = number == EIO || number == EACCES ? STATUS_IO : STATUS_INPUT;
@@ -61,6 +63,8 @@ static la_ssize_t read_gzip(struct archive *a, void *user, const void **block) {
     struct unpacking *u = user;
     int got = gzread(u->gzip, u->gzip_block, (unsigned)BLOCK_BYTES), fault = Z_OK;
     const char *text = gzerror(u->gzip, &fault);
+    if (fault == Z_MEM_ERROR)
+        mem_exhausted("zlib");
     if (got < 0 || (got == 0 && fault != Z_OK && fault != Z_STREAM_END)) {
         const char *fact = strstr(text, ">: "); /* after "<fd:6>", which is zlib's name for it */
         archive_set_error(a, fault == Z_ERRNO ? errno : EINVAL, "gzip: %s", fact ? fact + 3 : text);
@@ -88,13 +92,24 @@ static bool open_gzip(struct unpacking *u, const char *path) {
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     if (fd < 0)
         return false;
-    if (pread(fd, magic, 2, 0) == 2 && magic[0] == 0x1f && magic[1] == 0x8b)
-        u->gzip = gzdopen(fd, "rb");
-    if (!u->gzip)
+    if (pread(fd, magic, 2, 0) != 2 || magic[0] != 0x1f || magic[1] != 0x8b) {
         close(fd);
-    else
-        u->gzip_block = mem_alloc(BLOCK_BYTES);
-    return u->gzip != NULL;
+        return false;
+    }
+    u->gzip = gzdopen(fd, "rb");
+    if (!u->gzip)
+        mem_exhausted("zlib");
+    u->gzip_block = mem_alloc(BLOCK_BYTES);
+    return true;
+}
+
+/* As archive_read_open, which in libarchive 3.6.2 does not look whether there was memory for the first
+ * of these. */
+static int open_stream(struct unpacking *u) {
+    int result = archive_read_set_callback_data(u->archive, u);
+    if (result == ARCHIVE_OK)
+        result = archive_read_set_read_callback(u->archive, read_gzip);
+    return result == ARCHIVE_OK ? archive_read_open1(u->archive) : result;
 }
 
 /* The formats and filters that are promised and no others: each is a parser of hostile bytes. */
@@ -109,7 +124,8 @@ static enum status open_archive(struct unpacking *u, const char *path) {
         archive_read_support_filter_zstd(a) != ARCHIVE_OK)
         return error_set(u->err, STATUS_INTERNAL, "libarchive lacks zip, tar or zstd: %s",
                          archive_error_string(a));
-    int result = open_gzip(u, path) ? archive_read_open(a, u, NULL, read_gzip, NULL)
+    errno = 0;
+    int result = open_gzip(u, path) ? open_stream(u)
                                     : archive_read_open_filename(a, path, BLOCK_BYTES);
     if (result != ARCHIVE_OK)
         return library_error(u, NULL);
@@ -190,6 +206,7 @@ static enum status count_bytes(struct unpacking *u, size_t bytes) {
 
 static enum status write_content(struct unpacking *u, int fd, const char *path) {
     for (;;) {
+        errno = 0;
         la_ssize_t got = archive_read_data(u->archive, u->block, BLOCK_BYTES);
         if (got == 0)
             return STATUS_OK;
@@ -259,8 +276,8 @@ out:
 
 static enum status unpack_all(struct unpacking *u) {
     for (;;) {
-        struct archive_entry *entry;
-        int result = archive_read_next_header(u->archive, &entry);
+        errno = 0;
+        int result = archive_read_next_header2(u->archive, u->entry);
         if (result == ARCHIVE_EOF)
             break;
         /* Warnings are about attributes and names; names that matter are checked next. */
@@ -269,7 +286,7 @@ static enum status unpack_all(struct unpacking *u) {
         if (++u->entry_count > u->limits->file_count)
             return error_set(u->err, STATUS_LIMIT, "%s holds more than %" PRIu64 " files, the limit",
                              u->name, u->limits->file_count);
-        enum status status = unpack_entry(u, entry);
+        enum status status = unpack_entry(u, u->entry);
         if (status != STATUS_OK)
             return status;
     }
@@ -282,24 +299,27 @@ enum status archive_unpack(const char *path, const char *name, const char *dir,
                            const struct archive_limits *limits, struct error *err) {
     if (mkdir(dir, 0750) != 0)
         return error_set_errno(err, errno, "cannot create folder %s", dir);
-    struct unpacking u = {.archive = archive_read_new(), .name = name, .limits = limits, .err = err,
+    struct unpacking u = {.archive = archive_read_new(), .entry = archive_entry_new(), .name = name, .limits = limits, .err = err,
                           .dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC),
                           .block = mem_alloc(BLOCK_BYTES)};
     /* libarchive turns names into the locale's characters and loses those it cannot; the "C"
      * locale of a daemon has none but ASCII. For this thread, for this call. */
+    if (!u.archive || !u.entry)
+        mem_exhausted("libarchive");
     locale_t utf8 = newlocale(LC_CTYPE_MASK, "C.UTF-8", (locale_t)0), previous = (locale_t)0;
     if (utf8)
         previous = uselocale(utf8);
+    else if (errno == ENOMEM)
+        mem_exhausted("libc");
     enum status status;
     if (u.dir_fd < 0)
         status = error_set_errno(err, errno, "cannot open folder %s", dir);
-    else if (!u.archive)
-        mem_exhausted("libarchive");
     else
         status = open_archive(&u, path);
     if (status == STATUS_OK)
         status = unpack_all(&u);
     archive_read_free(u.archive);
+    archive_entry_free(u.entry);
     if (utf8) {
         uselocale(previous);
         freelocale(utf8);

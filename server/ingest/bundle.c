@@ -184,23 +184,21 @@ static void find_candidates(struct candidates *c, const char *root, bool ply) {
 
 /* The only PLY with faces at the top; where there is none, the only mesh of another format. NULL with
  * a problem when there is none or more. */
-static char *search_mesh(const char *root, struct findings *f) {
+static enum status search_mesh(const char *root, char **found, struct findings *f, struct error *err) {
     struct candidates c = {0};
-    struct error err;
-    char *found = NULL;
-    if (list_folder(root, &c.name, &c.count, &err) != STATUS_OK) {
-        findings_error(f, "mesh", &err);
-        return NULL;
-    }
+    struct error two;
+    enum status status = list_folder(root, &c.name, &c.count, err);
+    if (status != STATUS_OK)
+        return status;
     find_candidates(&c, root, true);
     if (!c.first)
         find_candidates(&c, root, false);
     if (c.second) {
-        error_set(&err, STATUS_INPUT, "two meshes: %s and %s", c.first, c.second);
-        error_hint(&err, "leave one, or name it in transforms.json as \"mesh\"");
-        findings_error(f, c.second, &err);
+        error_set(&two, STATUS_INPUT, "two meshes: %s and %s", c.first, c.second);
+        error_hint(&two, "leave one, or name it in transforms.json as \"mesh\"");
+        findings_error(f, c.second, &two);
     } else if (c.first) {
-        found = mem_strdup(c.first);
+        *found = mem_strdup(c.first);
     } else if (c.unknown) {
         findings_problem(f, c.unknown, "no mesh: the format of %s is not read; a mesh must be "
                          MESH_FILE_FORMATS, c.unknown);
@@ -210,21 +208,25 @@ static char *search_mesh(const char *root, struct findings *f) {
                              : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
     }
     free_names(c.name, c.count);
-    return found;
+    return STATUS_OK;
 }
 
-static char *find_mesh(const char *root, const char *transforms_name, const struct transforms *t,
-                       struct findings *f) {
+/* The mesh's name, the caller's; NULL with a problem. */
+static enum status find_mesh(const char *root, const char *transforms_name, const struct transforms *t,
+                             char **found, struct findings *f, struct error *err) {
+    *found = NULL;
     if (t->mesh || t->point_cloud) {
         const char *name = t->mesh ? t->mesh : t->point_cloud;
-        if (file_is_in(root, name) && (t->mesh || has_faces(root, name)))
-            return mem_strdup(name);
+        if (file_is_in(root, name) && (t->mesh || has_faces(root, name))) {
+            *found = mem_strdup(name);
+            return STATUS_OK;
+        }
         if (t->mesh) {
             findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
-            return NULL;
+            return STATUS_OK;
         }
     }
-    return search_mesh(root, f);
+    return search_mesh(root, found, f, err);
 }
 
 static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit,
@@ -329,7 +331,7 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
     bool has_frames = f.problem_count == 0 || t.frame_count > 0;
     if (status != STATUS_OK)
         goto out;
-    mesh = find_mesh(root, name, &t, &f);
+    status = find_mesh(root, name, &t, &mesh, &f, err);
     if (mesh)
         status = load_mesh(root, mesh, limits->triangles, scene, &f, err);
     if (status == STATUS_OK && has_frames)

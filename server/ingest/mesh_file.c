@@ -45,5 +45,5 @@ bool mesh_file_has_faces(const char *path, const char *name) {
     mesh_reader *read = reader_of(name);
     if (read && read != ply_read)
         return true;
-    return ply_count_faces(path, name, &count, NULL) == STATUS_INPUT || count > 0;
+    return ply_count_faces(path, name, &count, NULL) != STATUS_OK || count > 0;
 }

@@ -4,6 +4,8 @@
  * compares with and a load reads by. */
 #include "server/worker/checkpoint.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -218,6 +220,24 @@ static enum status remove_file(const char *path, struct error *err) {
     return status;
 }
 
+/* Where SQLite cannot make a file it tries whether it can at least read it, and then tells why that
+ * failed. Both files are made here, so that a full disk is told as one; empty, they are an empty database
+ * and no journal. */
+static enum status open_file(struct checkpoint *c, const char *path, struct error *err) {
+    static const char *const suffixes[] = {"", "-journal"};
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0] && status == STATUS_OK; i++) {
+        char *name = mem_printf("%s%s", path, suffixes[i]);
+        int fd = open(name, O_WRONLY | O_CREAT | O_CLOEXEC, 0640);
+        if (fd < 0)
+            status = error_set_errno(err, errno, "cannot open %s", name);
+        else
+            close(fd);
+        mem_free(name);
+    }
+    return status == STATUS_OK ? sql_open(&c->sql, path, SQL_ROLLBACK, PAGE_SIZE, err) : status;
+}
+
 enum status checkpoint_open(struct checkpoint **out, const char *path, const char *fingerprint,
                             char note[512], struct error *err) {
     *out = NULL;
@@ -226,7 +246,7 @@ enum status checkpoint_open(struct checkpoint **out, const char *path, const cha
     c->fingerprint = mem_strdup(fingerprint);
     c->next_row = 1;
     struct error first;
-    enum status status = sql_open(&c->sql, path, SQL_ROLLBACK, PAGE_SIZE, &first);
+    enum status status = open_file(c, path, &first);
     if (status == STATUS_OK)
         status = read_commit(c, note, &first);
     /* Damage in the schema's text makes our statements wrong: STATUS_INTERNAL. */
@@ -240,7 +260,7 @@ enum status checkpoint_open(struct checkpoint **out, const char *path, const cha
             sql_close(&c->sql);
         status = remove_file(path, err);
         if (status == STATUS_OK)
-            status = sql_open(&c->sql, path, SQL_ROLLBACK, PAGE_SIZE, err);
+            status = open_file(c, path, err);
         if (status == STATUS_OK)
             status = create_tables(c, err);
     }

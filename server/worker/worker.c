@@ -6,11 +6,13 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <unistd.h>
 
 #include "common/log.h"
+#include "common/mem.h"
 #include "server/worker/order.h"
 #include "server/worker/progress.h"
 #include "server/worker/sandbox.h"
@@ -79,6 +81,14 @@ static int exit_status(enum status status) {
     }
 }
 
+/* A library that ends the process, as libarchive does, does so for want of memory: it is said as we say
+ * it (mem.h). */
+static void on_exit_of_library(int status, void *is_over) {
+    (void)status;
+    if (!*(const bool *)is_over)
+        _exit(PROGRESS_EXIT_MEMORY);
+}
+
 int worker_main(int argc, char **argv) {
     if (argc != 2) {
         fprintf(stderr, "usage: unbaked worker DIR\nThe daemon runs this; see job.json in DIR.\n");
@@ -87,6 +97,8 @@ int worker_main(int argc, char **argv) {
     struct progress progress = {.fd = fcntl(PROGRESS_FD, F_GETFD) >= 0 ? PROGRESS_FD : -1};
     struct order order;
     struct error err = {0};
+    bool *is_over = mem_calloc(1, sizeof *is_over); /* outlives this function */
+    on_exit(on_exit_of_library, is_over);
     signal(SIGPIPE, SIG_IGN); /* a daemon that is gone is noticed elsewhere */
     enum status status = order_read(&order, argv[1], &err);
     if (status == STATUS_OK)
@@ -99,5 +111,6 @@ int worker_main(int argc, char **argv) {
         log_error("%s", err.message);
     progress_end(&progress, status, err.message, err.hint);
     order_release(&order);
+    *is_over = true;
     return exit_status(status);
 }

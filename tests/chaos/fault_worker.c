@@ -1,9 +1,10 @@
-/* fault_worker BUILD ROOM disk|memory STEP ALL -- a worker's n-th operation on a file or n-th allocation
+/* fault_worker BUILD ROOM ARCHIVE disk|memory STEP ALL -- a worker's n-th operation on a file or n-th allocation
  * fails, for every STEP-th n: a disk by ENOSPC or EIO, once or from then on, memory once or from then on
  * (ALL: 1 for all of these at each n, 0 for one in turn). The worker ends with the status that says so
  * (server/worker/progress.h), by which the daemon pauses the job or tries again with less, never by a
  * signal, and without a leak; a full disk leaves no half-written file. The next attempt, when all is
- * well again, ends with the textures of one that nobody disturbed. */
+ * well again, ends with the textures of one that nobody disturbed. The same of the check of a scene, which
+ * never finds fault with the scene for it. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -77,9 +78,51 @@ static bool strike(const char *root, const char *room, long n, int error, bool f
     return has_struck;
 }
 
+/* One check; its wait status. No problem is told. */
+static int check(const char *dir) {
+    int fd, status;
+    worker_order_check(dir, !is_memory);
+    pid_t pid = worker_start(binary, dir, library, log_path, &fd);
+    CHECK_THAT(!worker_hear(fd, "\"type\":\"problem\"", 120.0), "%s: a problem is told", dir);
+    waitpid(pid, &status, 0);
+    close(fd);
+    return status;
+}
+
+/* As strike, of the check of the archive. */
+static bool strike_check(const char *root, const char *archive, long n, int error, bool for_good) {
+    struct buf bytes;
+    const char *word = strerrorname_np(error), *how = for_good ? "for good" : "once";
+    char *dir = file_join(root, "scene"), *copy = file_join(dir, "archive"), *files = file_join(dir, "files");
+    int wanted = is_memory ? PROGRESS_EXIT_MEMORY : error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
+    file_make_dirs(dir, NULL);
+    buf_init(&bytes, (size_t)64 << 20);
+    CHECK(file_read(archive, &bytes, NULL) == STATUS_OK && file_replace(copy, bytes.data, bytes.length, NULL) == STATUS_OK);
+    buf_release(&bytes);
+    worker_order_check(dir, !is_memory);
+    faults_arm(faults, FAULTS_WORKER, n, error, for_good);
+    int status = check(dir);
+    bool has_struck = atomic_load(&faults->failed) > 0, is_good = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    faults_lift(faults);
+    CHECK_THAT(WIFEXITED(status), "check, operation %ld fails %s with %s: signal %d", n, how, word, WTERMSIG(status));
+    bool is_vague = is_memory && WEXITSTATUS(status) == PROGRESS_EXIT_FAILED;
+    vague += is_vague;
+    CHECK_THAT(WEXITSTATUS(status) == wanted || is_vague || (is_good && (!for_good || !has_struck)),
+               "check, operation %ld fails %s with %s: exit status %d", n, how, word, WEXITSTATUS(status));
+    CHECK_THAT(is_good || error != ENOSPC || access(files, F_OK) != 0, "check, operation %ld fails %s with %s: files are left",
+               n, how, word);
+    CHECK_THAT(check(dir) == 0, "after the check's operation %ld failed %s with %s", n, how, word);
+    if (check_failed_count == 0)
+        file_remove_tree(dir, NULL);
+    mem_free(files);
+    mem_free(copy);
+    mem_free(dir);
+    return has_struck;
+}
+
 int main(int argc, char **argv) {
-    long step = argc == 6 ? strtol(argv[4], NULL, 10) : 0, strikes = 0, n = 1;
-    bool all = step > 0 && argv[5][0] == '1', more = true;
+    long step = argc == 7 ? strtol(argv[5], NULL, 10) : 0, strikes = 0, n = 1;
+    bool all = step > 0 && argv[6][0] == '1', more = true;
     char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE], top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
     if (step <= 0 || !mkdtemp(top))
         return 2;
@@ -87,7 +130,7 @@ int main(int argc, char **argv) {
     snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
     snprintf(log_path, sizeof log_path, "%s/log", top);
     snprintf(page, sizeof page, "%s/faults", top);
-    is_memory = strcmp(argv[3], "memory") == 0;
+    is_memory = strcmp(argv[4], "memory") == 0;
     preload_find(argv[1], is_memory ? "memory" : "files", library);
     faults = faults_new(page, root, NULL);
     if (!faults)
@@ -104,6 +147,14 @@ int main(int argc, char **argv) {
                           peace);
     printf("workers: %ld %s, %ld of them made to fail\n", n - step, is_memory ? "allocations" : "operations on files",
            strikes - 1);
+    more = true;
+    long m = 1, checks = 0;
+    for (long turn = 0; more && check_failed_count == 0; m += step, turn++)
+        for (long way = all ? 0 : turn % ways; more && way < (all ? ways : turn % ways + 1); way++, checks++)
+            more = strike_check(root, argv[3], m, is_memory ? ENOMEM : way % 2 ? EIO : ENOSPC, is_memory ? way % 2 : way / 2);
+    printf("checks of scenes: %ld %s, %ld of them made to fail\n", m - step,
+           is_memory ? "allocations" : "operations on files", checks - 1);
+    strikes += checks - 1;
     if (is_memory) {
         figure("no memory, workers: allocations made to fail", (double)strikes - 1, 500, "higher");
         figure("no memory, workers: attempts that cannot say so", (double)vague, 0.02 * (double)strikes, "lower");

@@ -8,5 +8,5 @@ make_room "$work/room"
 tar -C "$work/room" -cf "$work/room.tar" .
 if [ -n "${UNBAKE_LONG:-}" ]; then step=1 all=1 worker=1; else step=7 all=0 worker=28; fi
 "$build/tests/chaos/fault_daemon" "$build" "$work/room.tar" disk "${UNBAKE_STEP:-$step}" $all || fail "the daemon"
-"$build/tests/chaos/fault_worker" "$build" "$work/room" disk "${UNBAKE_STEP:-$worker}" $all || fail "a worker"
+"$build/tests/chaos/fault_worker" "$build" "$work/room" "$work/room.tar" disk "${UNBAKE_STEP:-$worker}" $all || fail "a worker"
 finish

@@ -13,5 +13,5 @@ make_room "$work/room"
 tar -C "$work/room" -cf "$work/room.tar" .
 if [ -n "${UNBAKE_LONG:-}" ]; then step=1 all=1 worker=13; else step=97 all=0 worker=997; fi
 "$build/tests/chaos/fault_daemon" "$build" "$work/room.tar" memory "${UNBAKE_STEP:-$step}" $all || fail "the daemon"
-"$build/tests/chaos/fault_worker" "$build" "$work/room" memory "${UNBAKE_STEP:-$worker}" 0 || fail "a worker"
+"$build/tests/chaos/fault_worker" "$build" "$work/room" "$work/room.tar" memory "${UNBAKE_STEP:-$worker}" 0 || fail "a worker"
 finish

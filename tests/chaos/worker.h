@@ -13,19 +13,29 @@ static const char *const worker_outputs[] = {"base_color.exr", "roughness.exr", 
                                              "confidence.exr", "scene.ply"};
 #define WORKER_OUTPUTS (sizeof worker_outputs / sizeof *worker_outputs)
 
-/* Writes the order; `settings` are JSON members. */
-static inline void worker_order(const char *dir, const char *room, int attempt, int threads, double checkpoint_sec,
-                                bool sandbox, const char *settings) {
+static inline void worker_write_order(const char *dir, char *text) {
     char *path = file_join(dir, "job.json");
-    char *text = mem_printf(
-        "{\"kind\":\"reconstruct\",\"scene\":\"%s\",\"scene_id\":\"x\",\"name\":\"x\",\"job_id\":1,\"attempt\":%d,"
-        "\"thread_count\":%d,\"memory_bytes\":0,\"sandbox\":%s,\"checkpoint_interval_sec\":%g,\"settings\":{%s}}",
-        room, attempt, threads, sandbox ? "true" : "false", checkpoint_sec, settings);
     struct error err;
     if (file_replace(path, text, strlen(text), &err) != STATUS_OK)
         exit(1);
     mem_free(text);
     mem_free(path);
+}
+
+/* The check of the scene that is in the folder as `archive`. */
+static inline void worker_order_check(const char *dir, bool sandbox) {
+    worker_write_order(dir, mem_printf("{\"kind\":\"check\",\"scene_id\":\"x\",\"thread_count\":1,\"memory_bytes\":0,"
+                                       "\"sandbox\":%s}", sandbox ? "true" : "false"));
+}
+
+/* Writes the order; `settings` are JSON members. */
+static inline void worker_order(const char *dir, const char *room, int attempt, int threads, double checkpoint_sec,
+                                bool sandbox, const char *settings) {
+    char *text = mem_printf(
+        "{\"kind\":\"reconstruct\",\"scene\":\"%s\",\"scene_id\":\"x\",\"name\":\"x\",\"job_id\":1,\"attempt\":%d,"
+        "\"thread_count\":%d,\"memory_bytes\":0,\"sandbox\":%s,\"checkpoint_interval_sec\":%g,\"settings\":{%s}}",
+        room, attempt, threads, sandbox ? "true" : "false", checkpoint_sec, settings);
+    worker_write_order(dir, text);
 }
 
 /* `preload`: a library, or NULL. What the worker has to complain about goes to the file `log`. */
