@@ -18,6 +18,9 @@
 static const rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f},
                                         {0.2f, 0.6f, 0.3f}, {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f},
                                         {0.4f, 0.4f, 0.4f}};
+/* A test may make walls glossy before they are photographed. */
+static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
+static float wall_specular[OBJECTS];
 static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
 
 static inline void add_quad(struct mesh *m, int64_t object, vec3 corner, vec3 u, vec3 v) {
@@ -124,6 +127,8 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
         rgb color = wall_color[truth.segments.of_triangle[truth.inverse.triangle[texel]]];
         memcpy(truth.materials.base_color.texel[texel], &color, sizeof color);
     }
+    memcpy(truth.materials.roughness, wall_roughness, sizeof wall_roughness);
+    memcpy(truth.materials.specular, wall_specular, sizeof wall_specular);
     model_light(&truth, &scene->mesh, lamp, environment, pool);
     struct path_settings path = {.max_depth = 8, .roulette_depth = 5, .seed = 99};
     scene->photograph = mem_calloc(FRAMES, sizeof *scene->photograph);

@@ -396,6 +396,7 @@ static void test_reconstruction(struct scene *scene, struct scene *masked, struc
     printf("base colour off by %.4f, %d emitters\n", with, emitters);
     CHECK_THAT(with < 0.1, "base colour off by %g", with);
     CHECK(emitters == 0 && cJSON_GetObjectItem(r.report, "environment") != NULL);
+    CHECK(cJSON_IsFalse(cJSON_GetObjectItem(cJSON_GetObjectItem(r.report, "unseen_light"), "estimated")));
     test_relight(&r, pool);
     reconstruct_release(&r);
     shell_release(&shell);
