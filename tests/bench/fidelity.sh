@@ -49,7 +49,7 @@ measure() { # ROOM KIND
     echo "== $label" >&2
     reconstruct "$room" "$dir/out" texture_size=2048 "time_limit_sec=$seconds" \
         "transforms=$transforms" report_samples=1 &&
-        evaluate "$room" "$dir/out" --pictures "$dir" &&
+        evaluate "$room" "$dir/out" --spp 256 --pictures "$dir" &&
         jq -r '[.stages[] | "\(.name) \(.seconds | round) s"] | join(", ")' "$dir/out/report.json" >&2
     # Where that failed the figures are null, and no goal is met.
     value() { figure "$dir/out" "$1"; }
