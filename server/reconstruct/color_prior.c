@@ -10,7 +10,6 @@
 /* Variance by light of others (struct measured, mixing) at which a texel counts half. */
 #define MIXING_FLOOR 0.01
 #define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
-#define NEUTRAL_BASE_COLOR 0.5f
 /* Share of a segment's texels that must be measured cleanly for its own mean to count as much as its
  * surroundings; it counts with the square of that share. */
 #define SHARE_KNOWN 0.003

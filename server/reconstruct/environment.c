@@ -325,9 +325,8 @@ void environment_update_figures(struct environment *e) {
 
 /* Empty map and confidence. */
 static void make_images(struct environment *e, uint32_t width) {
-    static const char *const map_channels[] = {"R", "G", "B"};
     static const char *const confidence_channels[] = {"count", "spread"};
-    image_init(&e->map, width, width / 2, 3, map_channels);
+    image_init_rgb(&e->map, width, width / 2);
     image_init(&e->confidence, width, width / 2, 2, confidence_channels);
 }
 

@@ -13,7 +13,6 @@
  * q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) is its own light, q being how many times brighter it is than
  * the median of the room; the rest is reflected. A segment that no photograph shows does not emit. */
 #define NEUTRAL_BRIGHTNESS 3.0f
-#define NEUTRAL_BASE_COLOR 0.5f
 
 _Static_assert(PASS_CHUNK_TEXELS >= EMITTERS_TEXELS, "the decision works in a pass's batches");
 

@@ -25,7 +25,6 @@
 #define EMITTER_SHARE_UNSEEN 0.25f
 /* Share of what a segment was observed to show from which a texel is one of those observed. */
 #define AS_BRIGHT 0.7f
-#define NEUTRAL_BASE_COLOR 0.5f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
 #define SLICE_PROBES 1024 /* work between two questions whether to stop */
 #define SLICE_TEXELS 65536

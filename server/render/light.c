@@ -7,7 +7,6 @@
 
 #include "common/mem.h"
 
-#define PI 3.14159265358979323846
 #define GUIDE_DENSITY 4 /* entries of a table's guide per entry */
 #define MAX_BLOCK_COLUMNS 512
 /* The least that a direction's reach is taken for, as a part of the mean over the light. */

@@ -7,7 +7,6 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define PI 3.14159265358979323846
 #define POINTS 256 /* surface points a bin */
 #define SEED UINT64_C(0x7265616368)
 
