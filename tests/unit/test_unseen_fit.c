@@ -1,0 +1,103 @@
+/* unseen_fit.h: points under a sky that is bright above, with light from below that is known. The map is
+ * found again from what they show, emitters among them or not; and the corners of directions. */
+#include "server/reconstruct/unseen_fit.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+#include "tests/check.h"
+
+#define POINTS 600
+#define SEGMENTS 12
+#define WAYS 256
+#define KNOWN 0.1f
+
+static float number(uint64_t a, uint64_t b) {
+    return rng_to_float((uint32_t)rng_key(7, a, b));
+}
+
+static vec3 direction_of(uint64_t a, uint64_t b) {
+    float z = 2.0f * number(a, b) - 1.0f, turn = 6.2831853f * number(a, b + 1), r = sqrtf(1.0f - z * z);
+    return (vec3){r * cosf(turn), z, r * sinf(turn)};
+}
+
+static float sky(vec3 d) {
+    return d.y < 0.0f ? 0.2f : 0.2f + 3.0f * d.y;
+}
+
+static void test_corners(void) {
+    for (uint64_t i = 0; i < 1000; i++) {
+        vec3 d = direction_of(i, 100);
+        struct unseen_corners c = unseen_corners(d);
+        float sum = 0.0f;
+        for (int k = 0; k < 4; k++) {
+            CHECK(c.cell[k] < UNSEEN_CELLS && c.weight[k] >= 0.0f);
+            sum += c.weight[k];
+        }
+        CHECK_NEAR(sum, 1.0, 1e-5);
+    }
+    CHECK(unseen_corners((vec3){0, 1, 0}).cell[0] / UNSEEN_COLUMNS == 0);
+    CHECK(unseen_corners((vec3){0, -1, 0}).cell[0] / UNSEEN_COLUMNS == UNSEEN_ROWS - 1);
+    /* Around the seam, which is at -z: half the first column, half the last. */
+    struct unseen_corners seam = unseen_corners((vec3){0, 0, -1});
+    CHECK(seam.cell[0] % UNSEEN_COLUMNS == UNSEEN_COLUMNS - 1 && seam.cell[1] % UNSEEN_COLUMNS == 0);
+    CHECK_NEAR(seam.weight[0], seam.weight[1], 1e-6);
+}
+
+/* Fills point[POINTS]; returns the mean of the light that the sky sends to them. */
+static double make_points(struct unseen_point *point, float white[POINTS]) {
+    double mean = 0.0;
+    for (uint64_t i = 0; i < POINTS; i++) {
+        struct unseen_point *p = &point[i];
+        vec3 normal = direction_of(i, 0);
+        float light = 0.0f;
+        *p = (struct unseen_point){.segment = (uint32_t)(i % SEGMENTS), .known = KNOWN, .unseen = 1.0f};
+        for (uint64_t k = 0; k < WAYS; k++) {
+            vec3 d = vec3_normalize(vec3_add(normal, vec3_scale(direction_of(i, 10 + 2 * k), 0.999f)));
+            struct unseen_corners c = unseen_corners(d);
+            for (int m = 0; m < 4; m++)
+                p->share[c.cell[m]] += c.weight[m] / WAYS;
+            light += sky(d) / WAYS;
+        }
+        /* Base colours from .2 to .85, the last two segments white, with a texture of a tenth. */
+        float base = p->segment + 2 < SEGMENTS ? 0.2f + 0.05f * (float)p->segment : 0.85f;
+        white[i] = light + KNOWN;
+        p->shown = base * white[i] * (p->segment + 2 < SEGMENTS ? 0.9f + 0.2f * number(i, 1) : 1.0f);
+        mean += (double)light / POINTS;
+    }
+    return mean;
+}
+
+/* Relative error of the light that arrives, root of the mean square. */
+static double fit_error(const struct unseen_point *point, const float *white) {
+    double map[UNSEEN_CELLS], error = 0.0;
+    unseen_fit(point, POINTS, SEGMENTS, map);
+    for (size_t i = 0; i < POINTS; i++) {
+        double light = (double)point[i].known;
+        for (size_t k = 0; k < UNSEEN_CELLS; k++)
+            light += (double)point[i].share[k] * exp(map[k]);
+        error += pow(light / (double)white[i] - 1.0, 2.0) / POINTS;
+    }
+    return sqrt(error);
+}
+
+int main(void) {
+    static struct unseen_point point[POINTS];
+    static float white[POINTS];
+    test_corners();
+    double mean = make_points(point, white);
+    CHECK(mean > 0.5);
+    CHECK(unseen_base_color(point, POINTS, 0.8, NULL) > 3.0);
+    double plain = fit_error(point, white);
+    for (size_t i = 0; i < POINTS; i += 25)
+        point[i].shown *= 20.0f; /* they emit */
+    double with = fit_error(point, white);
+    printf("light off by %.3f, with emitters by %.3f\n", plain, with);
+    CHECK_THAT(plain < 0.12, "light off by %g", plain);
+    CHECK_THAT(with < 0.2, "with emitters light off by %g", with);
+    for (size_t i = 0; i < POINTS; i++)
+        point[i].filled = white[i] - KNOWN;
+    CHECK_NEAR(unseen_base_color(point, POINTS, 0.8, NULL), 0.75, 0.1);
+    return 0;
+}
