@@ -15,7 +15,7 @@ void look_batch_init(struct look_batch *b, const struct reconstruction *r, const
     *b = (struct look_batch){.r = r, .views = views, .path = *path, .cameras = cameras,
                              .samples = samples, .look_capacity = looks};
     b->look = mem_array(looks, sizeof *b->look);
-    b->paths = path_batch_new(paths, path->max_depth);
+    b->paths = path->derivatives ? path_batch_new(paths, path->max_depth) : path_batch_new_forward(paths);
     b->ray = mem_array(paths, sizeof *b->ray);
     b->key = mem_array(paths, sizeof *b->key);
     b->reference = mem_array(paths, sizeof *b->reference);

@@ -89,7 +89,7 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
     int thread_count = parallel_thread_count(pool);
     struct slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
     for (int i = 0; i < thread_count; i++) {
-        slot[i].batch = path_batch_new(BATCH, settings->max_depth);
+        slot[i].batch = path_batch_new_forward(BATCH);
         slot[i].ray = mem_array(BATCH, sizeof *slot[i].ray);
         slot[i].key = mem_array(BATCH, sizeof *slot[i].key);
         slot[i].pixel = mem_array(BATCH, sizeof *slot[i].pixel);

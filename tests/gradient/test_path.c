@@ -141,6 +141,18 @@ static void check_dark_emission(struct box *b) {
     path_batch_free(batch);
 }
 
+/* A batch that keeps no vertices traces the same paths. */
+static void check_forward(const struct box *b) {
+    struct path_settings settings = {.max_depth = 7, .roulette_depth = 3, .seed = 23};
+    struct path_batch *keeps = path_batch_new(BATCH, 7), *forward = path_batch_new_forward(BATCH);
+    rgb kept[BATCH], found[BATCH];
+    CHECK(trace(keeps, b, &settings, 0, kept) > 0.0);
+    trace(forward, b, &settings, 0, found);
+    CHECK(memcmp(kept, found, sizeof kept) == 0);
+    path_batch_free(keeps);
+    path_batch_free(forward);
+}
+
 static void check_parameters(void) {
     struct box b;
     box_init(&b);
@@ -173,6 +185,7 @@ static void check_parameters(void) {
     for (size_t i = 0; i < sizeof glossy / sizeof *glossy; i++)
         check_parameter(&b, &glossy[i]);
     check_dark_emission(&b);
+    check_forward(&b);
     box_release(&b);
 }
 
@@ -200,6 +213,7 @@ static void check_under_sky(void) {
     };
     for (size_t i = 0; i < sizeof parameters / sizeof *parameters; i++)
         check_parameter(&b, &parameters[i]);
+    check_forward(&b);
     box_release(&b);
 }
 
