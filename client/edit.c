@@ -76,6 +76,8 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
         json_add_string(body, "name", options_text(o, "name", NULL));
     if (options_text(o, "priority", NULL))
         json_add_int(body, "priority", options_whole(o, "priority", 0));
+    if (options_flag(o, "share") && options_flag(o, "unshare"))
+        return error_set(err, STATUS_INPUT, "only one of --share and --unshare can be so");
     if (options_flag(o, "share") || options_flag(o, "unshare"))
         json_add_bool(body, "shared", options_flag(o, "share"));
     for (size_t i = 0; i < o->given_count && status == STATUS_OK; i++) {

@@ -29,8 +29,8 @@ static const struct command table[] = {
      "Ends with 1 when something keeps the daemon from working.\n",
      "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
     {"backup", "FILE", "write a consistent copy of the database, also while the daemon works",
-     "FILE is a whole state.db: users, scenes, jobs, events. The files of scenes and jobs never change\n"
-     "once they are there: copy those folders after it, with rsync, say.\n",
+     "FILE is a whole state.db: users, scenes, jobs, events. The files of scenes never change once they\n"
+     "are there, those of a job only while it runs: copy those folders after it, with rsync, say.\n",
      "  unbaked backup /backup/state.db && rsync -a /var/lib/unbaked/scenes /var/lib/unbaked/jobs /backup/\n",
      backup_flags, backup_command},
     {"demo-room", "DIR", "make a room whose materials and lights are known", "",
@@ -73,7 +73,8 @@ static void print_commands_and_options(FILE *out) {
     const struct option *options = config_table(&count);
     fputs("\ncommands:\n", out);
     for (size_t i = 1; i < COMMAND_COUNT; i++)
-        fprintf(out, "  unbaked %s %s: %s\n", table[i].name, table[i].arguments, table[i].summary);
+        fprintf(out, "  unbaked %s%s%s: %s\n", table[i].name, *table[i].arguments ? " " : "", table[i].arguments,
+                table[i].summary);
     fputs("\noptions for --set and the file:\n", out);
     for (size_t i = 0; i < count; i++)
         fprintf(out, "  %-24s %s [%s%s%s]\n", options[i].name, options[i].help, options[i].default_text,

@@ -18,7 +18,7 @@ static struct response *read_request(struct api *api, const struct request *r, s
     const char *accept = request_field(r, "Accept"), *follow = target_query(&r->target, "follow");
     const char *query = target_query(&r->target, "after"), *wait = target_query(&r->target, "wait");
     const char *place = query ? query : request_field(r, "Last-Event-ID");
-    int64_t follows = 1, wait_sec = 0;
+    int64_t follows = 1, wait_sec = 0, newest = 0;
     struct error err;
     if (follow && !field_number(follow, 0, 1, &follows))
         return problem(r, 400, "follow must be 0 or 1");
@@ -28,6 +28,11 @@ static struct response *read_request(struct api *api, const struct request *r, s
         return problem(r, 400, "%s is not the id of an event", query ? "after" : "Last-Event-ID");
     if (!place && store_event_last(api->store, what->job_id, &what->after, &err) != STATUS_OK)
         return problem_from(r, &err);
+    if (place && store_event_newest(api->store, &newest, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    what->is_ahead = place && what->after > newest;
+    if (what->is_ahead)
+        what->after = newest;
     what->is_ndjson = accept && field_accepts(accept, MIME_NDJSON);
     what->is_past = !follows;
     what->wait_sec = (double)wait_sec;

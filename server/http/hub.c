@@ -141,26 +141,29 @@ static int64_t now_ms(void) {
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
+/* The client does not know all up to this event: it must look for itself, and goes on from there. */
+static void render_resync(struct subscriber *s, int64_t id, const char *reason) {
+    cJSON *data = cJSON_CreateObject();
+    json_add_string(data, "reason", reason);
+    struct event_row row = {.id = id, .at_ms = now_ms(), .type = EVENT_RESYNC};
+    render(s, &row, data);
+    s->what.after = id;
+}
+
 /* Before anything else, with the id that the client has: keeping the last id it neither misses nor
  * repeats an event. */
 static void render_start(struct subscriber *s) {
     if (!s->what.is_ndjson && s->what.revision == 0)
         buf_puts(&s->text, s->what.snapshot ? "retry: 3000\n" : "retry: 3000\n\n");
-    if (!s->what.snapshot)
-        return;
-    struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE};
-    json_add_bool(s->what.snapshot, "snapshot", true);
-    render(s, &row, s->what.snapshot);
-    s->what.snapshot = NULL;
-}
-
-/* Events after the client's last one are gone: it must look for itself, and goes on from there. */
-static void render_resync(struct subscriber *s, int64_t pruned_id) {
-    cJSON *data = cJSON_CreateObject();
-    json_add_string(data, "reason", "events up to this one are no longer kept: GET tells what is so");
-    struct event_row row = {.id = pruned_id, .at_ms = now_ms(), .type = EVENT_RESYNC};
-    render(s, &row, data);
-    s->what.after = pruned_id;
+    if (s->what.snapshot) {
+        struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE};
+        json_add_bool(s->what.snapshot, "snapshot", true);
+        render(s, &row, s->what.snapshot);
+        s->what.snapshot = NULL;
+    }
+    if (s->what.is_ahead)
+        render_resync(s, s->what.after, "this is the newest event, there is none with the id that was named: "
+                                        "GET tells what is so");
 }
 
 static void mark_dirty(struct subscriber *s) {
@@ -235,7 +238,7 @@ static void fetch(struct subscriber *s) {
     }
     if (page.pruned_id > what->after) {
         buf_clear(&s->text); /* the same events come again, after the news that some are missing */
-        render_resync(s, page.pruned_id);
+        render_resync(s, page.pruned_id, "events up to this one are no longer kept: GET tells what is so");
         mark_dirty(s);
         return;
     }

@@ -31,6 +31,7 @@ size_t hub_count(struct hub *hub);
 struct subscription {
     int64_t job_id;      /* 0: all that the caller may read */
     int64_t after;       /* the newest event that the client has */
+    bool is_ahead;       /* it has seen later ones, which this database does not know: it was put back */
     bool is_ndjson;
     bool is_past;        /* ends with what is stored by now */
     double wait_sec;     /* above 0: ends with the first events, or when so much time has passed */

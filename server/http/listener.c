@@ -556,7 +556,7 @@ void listener_quiesce(struct listener *l) {
 /* Ends the streams and the clerks' work, and waits for both: nothing is suspended after. */
 static void settle(struct listener *l) {
     struct timespec until;
-    clock_gettime(CLOCK_REALTIME, &until);
+    clock_gettime(CLOCK_MONOTONIC, &until);
     until.tv_sec += 3; /* for streams whose clients do not read, too long; for others, plenty */
     pthread_mutex_lock(&l->mutex);
     l->is_closing = true;
@@ -567,7 +567,7 @@ static void settle(struct listener *l) {
         unlink_waiting(l, x);
         MHD_resume_connection(x->connection);
     }
-    while (l->stream_count > 0 && pthread_cond_timedwait(&l->changed, &l->mutex, &until) == 0)
+    while (l->stream_count > 0 && pthread_cond_clockwait(&l->changed, &l->mutex, CLOCK_MONOTONIC, &until) == 0)
         ;
     pthread_mutex_unlock(&l->mutex);
     for (size_t i = 0; i < l->clerk_count; i++)

@@ -243,3 +243,11 @@ enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, s
     store_unlock(store);
     return status;
 }
+
+enum status store_event_newest(struct store *store, int64_t *id, struct error *err) {
+    store_lock(store);
+    enum status status =
+        sql_int(&store->sql, 0, id, err, "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
+    store_unlock(store);
+    return status;
+}

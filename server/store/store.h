@@ -233,6 +233,8 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
 /* The id of the newest event of the job, or (0) of all; 0 when there is none: where a stream without
  * history begins. */
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err);
+/* The largest id that an event of this database ever had, also of one that is gone. */
+enum status store_event_newest(struct store *store, int64_t *id, struct error *err);
 
 /* A message for a webhook, made by every change of its job's state. */
 struct outbox_row {

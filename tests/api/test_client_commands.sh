@@ -77,6 +77,7 @@ run 0 edit last --priority 7 --label a=b --name 'new name' --first --json
 so '.priority == 7 and .labels == {"a": "b"} and .name == "new name"'
 run 2 edit last
 run 2 edit last --first --last
+run 2 edit last --share --unshare
 run 4 edit last --before last
 run 0 rm last --dry-run
 has "$out" "files"

@@ -160,6 +160,24 @@ static void check_resync(void) {
     CHECK(count_of(&reply, "event: resync") == 1);
     buf_release(&reply);
 
+    /* Whoever has seen more than there ever was, before a backup was put back, is told so, too. */
+    int64_t newest;
+    rig_must(store_event_newest(rig.store, &newest, &err), &err, "newest");
+    char *line = mem_printf("id: %lld\nevent: resync", (long long)newest);
+    path = mem_printf("/v1/jobs/%lld/events?after=%lld&follow=0", (long long)job, (long long)newest + 1);
+    CHECK(rig_get(&rig, path, "", &reply) == 200);
+    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
+    buf_release(&reply);
+    CHECK(rig_get(&rig, "/v1/events?follow=0", "Last-Event-ID: 123456789012\r\n", &reply) == 200);
+    CHECK_THAT(strstr(buf_text(&reply), line), "%s", buf_text(&reply));
+    buf_release(&reply);
+    mem_free(path);
+    path = mem_printf("/v1/events?after=%lld&follow=0", (long long)newest);
+    CHECK(rig_get(&rig, path, "", &reply) == 200 && count_of(&reply, "resync") == 0);
+    buf_release(&reply);
+    mem_free(path);
+    mem_free(line);
+
     /* Age: the last event of a job that has ended stays. */
     bool more = true;
     rig_must(store_job_succeed(rig.store, job, attempt, &err), &err, "succeed");
