@@ -29,10 +29,6 @@ struct grids {
     struct evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
 };
 
-static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
-    return r->segments.of_triangle[r->inverse.triangle[texel]];
-}
-
 static void evidence_add(struct evidence *e, const struct measured *m) {
     rgb v = measured_value(m);
     double weight = MIXING_FLOOR / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
@@ -82,7 +78,7 @@ static struct evidence *grids_cell(const struct grids *g, int level, vec3 point)
 }
 
 static bool is_known(const struct reconstruction *r, const struct measured *measured, uint32_t texel) {
-    return measured[texel].weight > 0.0f && !r->is_emitter[segment_of(r, texel)];
+    return measured[texel].weight > 0.0f && !r->is_emitter[reconstruction_segment(r, texel)];
 }
 
 static void grids_fill(struct grids *g, const struct reconstruction *r, const struct measured *measured) {
@@ -128,9 +124,9 @@ static struct evidence *of_segments(const struct reconstruction *r, const struct
     struct evidence *own = mem_calloc(r->segments.count, sizeof *own);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
-        texels[segment_of(r, texel)]++;
+        texels[reconstruction_segment(r, texel)]++;
         if (is_known(r, measured, texel))
-            evidence_add(&own[segment_of(r, texel)], &measured[texel]);
+            evidence_add(&own[reconstruction_segment(r, texel)], &measured[texel]);
     }
     return own;
 }

@@ -44,10 +44,6 @@ struct texel_looks {
     struct robust_sample look[MAX_LOOKS];
 };
 
-static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
-    return r->segments.of_triangle[r->inverse.triangle[texel]];
-}
-
 static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
                      struct irradiance *light) {
     const struct reconstruction *r = d->r;
@@ -84,7 +80,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
                      const struct irradiance *light, const struct view *view, rgb shown,
                      struct incident *scratch, struct texel_looks *looks) {
     const struct materials *m = &d->r->materials;
-    uint32_t segment = segment_of(d->r, texel);
+    uint32_t segment = reconstruction_segment(d->r, texel);
     float median = d->views->median_radiance;
     float weight = view->weight * views_trust(d->views, view, at->triangle);
     float mixing = views_mixing(d->views, view, at->triangle, shown);
@@ -188,7 +184,7 @@ static void divide_texel(struct divide *d, uint32_t texel, struct incident *scra
     struct irradiance light;
     look_all(d, texel, scratch, &light, &looks);
     d->measured[texel] = (struct measured){0};
-    if (looks.count > 0 && !d->r->is_emitter[segment_of(d->r, texel)])
+    if (looks.count > 0 && !d->r->is_emitter[reconstruction_segment(d->r, texel)])
         d->measured[texel] = mean_of(&looks, &light);
 }
 
@@ -231,7 +227,7 @@ static void send_out(const struct divide *d, uint32_t texel, uint16_t radiance[3
     const struct measured *m = &d->measured[texel];
     float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
     rgb white;
-    if (known > MOSTLY_KNOWN || d->r->is_emitter[segment_of(d->r, texel)] || !divide_white(d, texel, &white))
+    if (known > MOSTLY_KNOWN || d->r->is_emitter[reconstruction_segment(d->r, texel)] || !divide_white(d, texel, &white))
         return;
     rgb reflected = rgb_mul(texel_color(d->r, texel), white);
     set_half(radiance, rgb_mad(rgb_scale(reflected, 1.0f - known), known, fused_radiance(&d->r->fused, texel)));

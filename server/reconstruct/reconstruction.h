@@ -73,4 +73,9 @@ struct reconstruction {
     cJSON *report;                   /* object: figures of each stage, filled as they are known; owned */
 };
 
+/* The segment of a valid texel. */
+static inline uint32_t reconstruction_segment(const struct reconstruction *r, uint32_t texel) {
+    return r->segments.of_triangle[r->inverse.triangle[texel]];
+}
+
 #endif

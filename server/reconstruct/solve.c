@@ -118,7 +118,7 @@ static void average_arrived(const struct solve *s) {
     struct arrived *sum = mem_calloc(r->segments.count, sizeof *sum);
     for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
         uint32_t texel = r->inverse.valid[i];
-        size_t segment = r->segments.of_triangle[r->inverse.triangle[texel]];
+        size_t segment = reconstruction_segment(r, texel);
         rgb white;
         if (!(r->fused.count[texel] > 0.0f) || !divide_white(&s->divide, texel, &white))
             continue;

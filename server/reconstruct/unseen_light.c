@@ -22,20 +22,16 @@
 
 struct unseen {
     struct reconstruction *r;
-    uint16_t (*radiance)[3];  /* [height][width] */
+    uint16_t (*radiance)[3];    /* [height][width] half precision: what texels send out; owned, as all below */
     struct light_field field;
     size_t count;
-    uint32_t *texel;          /* [count] */
+    uint32_t *texel;            /* [count] */
     struct unseen_point *point; /* [count] */
-    struct incident *scratch; /* [threads] */
+    struct incident *scratch;   /* [threads] */
     double log_radiance[UNSEEN_CELLS];
 };
 
 /* --- looking around ------------------------------------------------------------------------------- */
-
-static uint32_t segment_of(const struct reconstruction *r, uint32_t texel) {
-    return r->segments.of_triangle[r->inverse.triangle[texel]];
-}
 
 /* What texels send out: of those that no photograph shows the mean of their segment, or of the room. */
 static void fill_radiance(struct unseen *u) {
@@ -49,7 +45,7 @@ static void fill_radiance(struct unseen *u) {
         rgb shown = fused_radiance(&r->fused, texel);
         if (!(r->fused.count[texel] > 0.0f))
             continue;
-        for (size_t s = segment_of(r, texel), k = 0; k < 2; s = segments, k++) {
+        for (size_t s = reconstruction_segment(r, texel), k = 0; k < 2; s = segments, k++) {
             sum[s][0] += (double)shown.r;
             sum[s][1] += (double)shown.g;
             sum[s][2] += (double)shown.b;
@@ -57,7 +53,7 @@ static void fill_radiance(struct unseen *u) {
         }
     }
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i], segment = segment_of(r, texel);
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
         const double *from = sum[segment][3] > 0.0 ? sum[segment] : sum[segments];
         for (int c = 0; c < 3 && !(r->fused.count[texel] > 0.0f) && from[3] > 0.0; c++)
             u->radiance[texel][c] = image_half_from_float((float)(from[c] / from[3]));
@@ -67,7 +63,7 @@ static void fill_radiance(struct unseen *u) {
 
 /* A surface that photographs show and that is no lamp. */
 static bool tells(const struct reconstruction *r, uint32_t texel) {
-    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[segment_of(r, texel)]);
+    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[reconstruction_segment(r, texel)]);
 }
 
 /* Such texels, evenly spread. */
@@ -92,7 +88,7 @@ static void look_around(void *user, size_t index, int thread) {
     struct incident *in = &u->scratch[thread];
     uint32_t texel = u->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
     struct surface_point at;
-    *p = (struct unseen_point){.segment = segment_of(r, texel)};
+    *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
     vec3 frame[3] = {[2] = at.shading};
