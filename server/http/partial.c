@@ -1,8 +1,11 @@
 /* partial.c -- see partial.h.
  *
  * An entry stands for one upload while a request uses it or it holds bytes that are not counted
- * yet. Lock order: partials.finishing, partials.mutex, entry.mutex. An entry's mutex may be held
- * for long while it is loaded, so it is taken under partials.mutex only when nobody uses it. */
+ * yet. Lock order: partials.finishing, partials.mutex, entry.syncing, entry.mutex. An entry's mutex may
+ * be held for long while it is loaded, so it is taken under partials.mutex only when nobody uses it.
+ *
+ * One commit of an upload at a time: of two syncs at once the kernel tells one of a page that it could
+ * not write, and the other that all is well. */
 #include "server/http/partial.h"
 
 #include <errno.h>
@@ -32,10 +35,11 @@ struct entry {
     unsigned users; /* under partials->mutex, and so are: */
     unsigned long tended; /* the round of partials_tend that last saw to it */
     struct entry *next;
+    pthread_mutex_t syncing; /* held by a commit */
     pthread_mutex_t mutex; /* guards what follows */
     bool is_loaded, is_gone;
     bool is_spoiled; /* what the file has beyond `counted` must be cut off and could not be yet */
-    int fd; /* -1 before it is loaded */
+    int fd; /* -1 before it is loaded; then the same until the entry is dropped */
     uint64_t length;
     uint64_t received, counted; /* in the file; in the store */
     uint64_t hinted;
@@ -113,7 +117,7 @@ static enum status load(struct entry *e, struct error *err) {
     e->is_believed = *row.boot != '\0';
     if (*row.scene_id)
         status = error_set(err, STATUS_CONFLICT, "upload %s is finished", e->id);
-    else if ((e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW)) < 0 &&
+    else if (e->fd < 0 && (e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW)) < 0 &&
              (errno != ENOENT || e->received < e->length)) /* whole, it may be on its way: see place */
         status = error_set_errno(err, errno, "cannot open %s", path);
     else if (e->fd >= 0 && e->is_believed && !e->is_spoiled && strcmp(row.boot, p->boot) == 0)
@@ -134,6 +138,7 @@ static void drop(struct entry *e) {
     if (e->fd >= 0)
         close(e->fd);
     pthread_mutex_destroy(&e->mutex);
+    pthread_mutex_destroy(&e->syncing);
     mem_free(e);
 }
 
@@ -168,6 +173,7 @@ static enum status get(struct partials *p, const char *id, struct entry **out, s
         snprintf(e->id, sizeof e->id, "%s", id);
         e->partials = p;
         e->fd = -1;
+        pthread_mutex_init(&e->syncing, NULL);
         pthread_mutex_init(&e->mutex, NULL);
         e->next = p->first;
         p->first = e;
@@ -179,9 +185,6 @@ static enum status get(struct partials *p, const char *id, struct entry **out, s
     if (e->is_gone) {
         status = error_set(err, STATUS_NOT_FOUND, "there is no upload %s", id);
     } else if (!e->is_loaded) {
-        if (e->fd >= 0)
-            close(e->fd);
-        e->fd = -1;
         status = load(e, err);
         e->is_loaded = status == STATUS_OK;
     }
@@ -193,7 +196,7 @@ static enum status get(struct partials *p, const char *id, struct entry **out, s
 }
 
 /* What was received since the last commit may be lost: where a sync has failed, the kernel can have
- * dropped it, and the next sync would say that all is well. It is to be sent again. */
+ * dropped it, and the next sync would say that all is well. It is to be sent again. e->syncing is held. */
 static void forget_tail(struct entry *e) {
     struct error err;
     pthread_mutex_lock(&e->mutex);
@@ -207,7 +210,13 @@ static void forget_tail(struct entry *e) {
     pthread_mutex_unlock(&e->mutex);
 }
 
-static enum status commit(struct entry *e, struct error *err) {
+static enum status lost(struct error *err) {
+    error_set(err, STATUS_CONFLICT, "the disk failed: the upload stands at an earlier offset");
+    return error_hint(err, "HEAD tells where; go on from there");
+}
+
+/* e->syncing is held, so nothing else counts or forgets. */
+static enum status commit_alone(struct entry *e, struct error *err) {
     pthread_mutex_lock(&e->mutex);
     uint64_t received = e->received;
     struct sha256 hash = e->hash;
@@ -221,12 +230,17 @@ static enum status commit(struct entry *e, struct error *err) {
         return failed;
     }
     pthread_mutex_lock(&e->mutex);
-    enum status status = /* another thread's sync may have failed meanwhile */
-        e->is_loaded ? store_upload_advance(e->partials->api->store, e->id, received, &hash, sizeof hash, err)
-                     : error_set(err, STATUS_CONFLICT, "upload %s stands at an earlier offset", e->id);
-    if (status == STATUS_OK && e->counted < received)
+    enum status status = store_upload_advance(e->partials->api->store, e->id, received, &hash, sizeof hash, err);
+    if (status == STATUS_OK)
         e->counted = received;
     pthread_mutex_unlock(&e->mutex);
+    return status;
+}
+
+static enum status commit(struct entry *e, struct error *err) {
+    pthread_mutex_lock(&e->syncing);
+    enum status status = commit_alone(e, err);
+    pthread_mutex_unlock(&e->syncing);
     return status;
 }
 
@@ -277,12 +291,14 @@ static enum status finish(struct partials *p, const char *id, struct error *err)
 
 /* Commits; finishes what is whole. */
 static enum status settle(struct entry *e, struct error *err) {
+    pthread_mutex_lock(&e->syncing);
     pthread_mutex_lock(&e->mutex);
     bool is_spoiled = e->is_spoiled && !e->is_gone;
     pthread_mutex_unlock(&e->mutex);
     if (is_spoiled)
         forget_tail(e);
-    enum status status = commit(e, err);
+    enum status status = commit_alone(e, err);
+    pthread_mutex_unlock(&e->syncing);
     pthread_mutex_lock(&e->mutex);
     bool is_whole = !e->is_gone && e->counted == e->length;
     pthread_mutex_unlock(&e->mutex);
@@ -448,6 +464,8 @@ enum status partial_claim(struct partials *p, const char *id, uint64_t offset, b
         status = disbelieve(e, err);
     struct claim *claim = mem_calloc(1, sizeof *claim);
     pthread_mutex_lock(&e->mutex);
+    if (status == STATUS_OK && !e->is_loaded) /* e->hash is still that of what was forgotten */
+        status = lost(err);
     if (status == STATUS_OK && e->received != offset)
         status = error_set(err, STATUS_CONFLICT, "the upload stands at %llu, not at %llu",
                            (unsigned long long)e->received, (unsigned long long)offset);
@@ -549,6 +567,15 @@ enum status partial_accept(struct claim *claim, struct error *err) {
 
 enum status partial_commit(struct claim *claim, struct error *err) {
     return commit(claim->entry, err);
+}
+
+enum status partial_finish(struct claim *claim, struct upload_row *row, struct error *err) {
+    struct entry *e = claim->entry;
+    enum status status = partial_look(e->partials, e->id, row, err);
+    if (status != STATUS_OK || row->received >= claim->at)
+        return status;
+    upload_row_release(row); /* another thread's sync has failed */
+    return lost(err);
 }
 
 void partial_release(struct claim *claim) {

@@ -54,6 +54,8 @@ bool partial_is_due(struct claim *claim);           /* much was written since th
 enum status partial_accept(struct claim *claim, struct error *err);
 /* What was written is on disk and counted. */
 enum status partial_commit(struct claim *claim, struct error *err);
+/* The same, and the row as partial_look gives it. STATUS_CONFLICT: some of it was lost, and is to be sent again. */
+enum status partial_finish(struct claim *claim, struct upload_row *row, struct error *err);
 void partial_release(struct claim *claim); /* NULL is fine; frees it */
 
 /* Removes the upload with what it holds, also while somebody writes to it. */

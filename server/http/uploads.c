@@ -381,7 +381,7 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     if (p->checksum != CHECKSUM_NONE)
         status = partial_accept(p->claim, &err);
     if (status == STATUS_OK)
-        status = partial_look(api->partials, r->target.segments[2], &row, &err);
+        status = partial_finish(p->claim, &row, &err);
     if (status != STATUS_OK)
         return refuse(r, &err);
     struct response *reply = tagged(response_new(204));

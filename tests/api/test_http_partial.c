@@ -1,0 +1,139 @@
+/* test_http_partial.c -- two that count what one upload has received, at once, while the disk fails one
+ * of them: what the kernel may have dropped is counted by neither, and is sent again. */
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <time.h>
+
+#include "common/sha256.h"
+#include "server/http/partial.h"
+#include "tests/api/rig.h"
+
+#define BYTES 1000
+
+/* --- a disk ---------------------------------------------------------------------------------- */
+
+static atomic_bool is_armed;
+static atomic_int begun, ended; /* syncs of uploads since */
+
+static bool is_upload(int fd) {
+    char name[64], path[256];
+    snprintf(name, sizeof name, "/proc/self/fd/%d", fd);
+    ssize_t length = readlink(name, path, sizeof path - 1);
+    path[length > 0 ? length : 0] = '\0';
+    return strstr(path, "/uploads/") != NULL;
+}
+
+static void nap(void) {
+    nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+}
+
+/* The first of an upload fails, after a second one, if it comes meanwhile, has ended well: the kernel
+ * tells a lost page once, and the file has lost its last byte. */
+int fdatasync(int fd) {
+    if (!atomic_load(&is_armed) || !is_upload(fd))
+        return 0;
+    int number = atomic_fetch_add(&begun, 1) + 1;
+    if (number == 1) {
+        for (int i = 0; i < 50 && atomic_load(&ended) == 0; i++)
+            nap();
+        CHECK(pwrite(fd, "", 1, BYTES - 1) == 1);
+        errno = EIO;
+        return -1;
+    }
+    atomic_fetch_add(&ended, 1);
+    return 0;
+}
+
+/* --- two at once ------------------------------------------------------------------------------ */
+
+struct look {
+    struct partials *partials;
+    const char *id;
+    enum status status;
+};
+
+static void *look(void *user) {
+    struct look *l = user;
+    struct upload_row row = {0};
+    struct error err;
+    l->status = partial_look(l->partials, l->id, &row, &err);
+    upload_row_release(&row);
+    return NULL;
+}
+
+static struct claim *send_all(struct partials *p, const char *id, const char *bytes) {
+    struct claim *claim;
+    struct error err;
+    rig_must(partial_claim(p, id, 0, false, &claim, &err), &err, "partial_claim");
+    rig_must(partial_write(claim, bytes, BYTES, &err), &err, "partial_write");
+    return claim;
+}
+
+static void check_received(struct rig *rig, const char *id, uint64_t wanted) {
+    struct upload_row row = {0};
+    struct error err;
+    rig_must(store_upload_get(rig->store, id, &row, NULL, 0, &err), &err, "store_upload_get");
+    CHECK_THAT(row.received == wanted && !*row.scene_id, "%llu bytes, scene \"%s\"",
+               (unsigned long long)row.received, row.scene_id);
+    upload_row_release(&row);
+}
+
+/* What comes while the first sync, that will fail, is under way. */
+enum rival { RIVAL_LOOK, RIVAL_FINISH, RIVAL_CLAIM };
+
+static void test_two(struct rig *rig, enum rival rival) {
+    struct partials *p = rig->api->partials;
+    struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES}, found = {0};
+    struct error err;
+    struct claim *late = NULL;
+    char bytes[BYTES], wanted[SHA256_HEX_SIZE];
+    struct sha256 hash;
+    pthread_t thread;
+    memset(bytes, 'x' + (int)rival, sizeof bytes);
+    sha256_init(&hash);
+    sha256_update(&hash, bytes, sizeof bytes);
+    sha256_hex(&hash, wanted);
+    rig_must(partial_create(p, &row, &err), &err, "partial_create");
+
+    struct claim *claim = send_all(p, row.id, bytes);
+    struct look first = {.partials = p, .id = row.id};
+    atomic_store(&begun, 0);
+    atomic_store(&ended, 0);
+    atomic_store(&is_armed, true);
+    CHECK(pthread_create(&thread, NULL, look, &first) == 0);
+    while (atomic_load(&begun) == 0)
+        nap();
+    enum status status = rival == RIVAL_LOOK     ? partial_look(p, row.id, &found, &err)
+                         : rival == RIVAL_FINISH ? partial_finish(claim, &found, &err)
+                                                 : partial_claim(p, row.id, 0, true, &late, &err);
+    pthread_join(thread, NULL);
+    atomic_store(&is_armed, false);
+    CHECK(first.status == STATUS_IO);
+    check_received(rig, row.id, 0);
+    if (rival == RIVAL_LOOK) /* it may look again, and finds nothing */
+        CHECK(status == STATUS_OK && found.received == 0);
+    else
+        CHECK_THAT(status == STATUS_CONFLICT, "%s", status_name(status));
+    upload_row_release(&found);
+    partial_release(late);
+    partial_release(claim);
+
+    claim = send_all(p, row.id, bytes);
+    rig_must(partial_finish(claim, &found, &err), &err, "partial_finish");
+    CHECK_STRING(found.scene_id, wanted);
+    partial_release(claim);
+    upload_row_release(&found);
+    upload_row_release(&row);
+}
+
+int main(void) {
+    struct rig rig;
+    rig_start(&rig, &rig_patient, 15);
+    log_set_level(LOG_ERROR);
+    test_two(&rig, RIVAL_LOOK);
+    test_two(&rig, RIVAL_FINISH);
+    test_two(&rig, RIVAL_CLAIM);
+    rig_stop(&rig);
+    return check_failed_count > 0;
+}
