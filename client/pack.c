@@ -7,7 +7,6 @@
 
 #include <archive.h>
 #include <archive_entry.h>
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -63,16 +62,14 @@ static enum status list_folder(struct pack *p, const char *folder, const char *p
     if (depth > DEEPEST)
         return error_set(err, STATUS_INPUT, "%s: folders are more than %d deep: do links lead back?",
                          folder, DEEPEST);
-    DIR *dir = opendir(folder);
-    if (!dir)
-        return error_set_errno(err, errno, "cannot open folder %s", folder);
-    enum status status = STATUS_OK;
-    struct dirent *found;
-    while (status == STATUS_OK && (found = readdir(dir)) != NULL) {
-        if (found->d_name[0] == '.' || strcmp(found->d_name, "__MACOSX") == 0)
+    char **names;
+    size_t count;
+    enum status status = file_list(folder, &names, &count, err);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        if (names[i][0] == '.' || strcmp(names[i], "__MACOSX") == 0)
             continue;
-        char *path = file_join(folder, found->d_name);
-        char *name = mem_printf("%s%s", prefix, found->d_name);
+        char *path = file_join(folder, names[i]);
+        char *name = mem_printf("%s%s", prefix, names[i]);
         struct stat info;
         if (stat(path, &info) != 0)
             status = error_set_errno(err, errno, "cannot look at %s", path);
@@ -87,7 +84,7 @@ static enum status list_folder(struct pack *p, const char *folder, const char *p
         mem_free(name);
         mem_free(path);
     }
-    closedir(dir);
+    file_free_names(names, count);
     return status;
 }
 

@@ -4,7 +4,6 @@
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <fts.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -133,30 +132,89 @@ enum status file_make_dirs(const char *path, struct error *err) {
     return status;
 }
 
+void file_free_names(char **names, size_t count) {
+    for (size_t i = 0; i < count; i++)
+        mem_free(names[i]);
+    mem_free(names);
+}
+
+static int by_name(const void *a, const void *b) {
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* As file_list, of an open folder. */
+static enum status list(DIR *dir, const char *path, char ***names, size_t *count, struct error *err) {
+    size_t capacity = 0;
+    struct dirent *entry;
+    *names = NULL;
+    *count = 0;
+    while ((void)(errno = 0), (entry = readdir(dir)) != NULL) {
+        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
+            continue;
+        if (*count == capacity) {
+            capacity = capacity ? 2 * capacity : 64;
+            *names = mem_realloc_array(*names, capacity, sizeof **names);
+        }
+        (*names)[(*count)++] = mem_strdup(entry->d_name);
+    }
+    if (errno != 0) {
+        enum status status = error_set_errno(err, errno, "cannot list all of folder %s", path);
+        file_free_names(*names, *count);
+        *names = NULL;
+        *count = 0;
+        return status;
+    }
+    if (*count > 1)
+        qsort(*names, *count, sizeof **names, by_name);
+    return STATUS_OK;
+}
+
+/* Opens the folder `name` of the folder `dir_fd` and lists it. */
+static enum status open_folder(int dir_fd, const char *name, const char *path, DIR **dir, char ***names,
+                               size_t *count, struct error *err) {
+    int fd = openat(dir_fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    *dir = fd >= 0 ? fdopendir(fd) : NULL;
+    if (!*dir) {
+        enum status status = error_set_errno(err, errno, "cannot open folder %s", path);
+        if (fd >= 0)
+            close(fd);
+        return status;
+    }
+    enum status status = list(*dir, path, names, count, err);
+    if (status != STATUS_OK)
+        closedir(*dir);
+    return status;
+}
+
+enum status file_list(const char *path, char ***names, size_t *count, struct error *err) {
+    DIR *dir = opendir(path);
+    *names = NULL;
+    *count = 0;
+    if (!dir)
+        return error_set_errno(err, errno, "cannot open folder %s", path);
+    enum status status = list(dir, path, names, count, err);
+    closedir(dir);
+    return status;
+}
+
 /* Removes what `name` is inside the folder `dir_fd`. `path` is for messages. */
 static enum status remove_at(int dir_fd, const char *name, const char *path, struct error *err) {
+    char **names;
+    size_t count;
+    DIR *dir;
     if (unlinkat(dir_fd, name, 0) == 0 || errno == ENOENT)
         return STATUS_OK;
     if (errno != EISDIR && errno != EPERM)
         return error_set_errno(err, errno, "cannot remove %s", path);
-    int fd = openat(dir_fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (fd < 0)
-        return error_set_errno(err, errno, "cannot open folder %s", path);
-    DIR *dir = fdopendir(fd);
-    if (!dir) {
-        enum status status = error_set_errno(err, errno, "cannot list folder %s", path);
-        close(fd);
+    enum status status = open_folder(dir_fd, name, path, &dir, &names, &count, err);
+    if (status != STATUS_OK)
         return status;
-    }
-    enum status status = STATUS_OK;
-    struct dirent *entry;
-    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
-            continue;
-        char *inner = file_join(path, entry->d_name);
-        status = remove_at(dirfd(dir), entry->d_name, inner, err);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        char *inner = file_join(path, names[i]);
+        status = remove_at(dirfd(dir), names[i], inner, err);
         mem_free(inner);
     }
+    file_free_names(names, count);
     closedir(dir);
     if (status == STATUS_OK && unlinkat(dir_fd, name, AT_REMOVEDIR) != 0 && errno != ENOENT)
         status = error_set_errno(err, errno, "cannot remove folder %s", path);
@@ -167,23 +225,37 @@ enum status file_remove_tree(const char *path, struct error *err) {
     return remove_at(AT_FDCWD, path, path, err);
 }
 
-enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, struct error *err) {
-    char *roots[] = {mem_strdup(path), NULL};
-    enum status status = STATUS_OK;
-    *files = *bytes = 0;
-    FTS *tree = fts_open(roots, FTS_PHYSICAL | FTS_NOCHDIR, NULL);
-    if (!tree)
-        status = error_set_errno(err, errno, "cannot list folder %s", path);
-    for (FTSENT *entry; tree && (entry = fts_read(tree)) != NULL;) {
-        if (entry->fts_info != FTS_F)
-            continue;
+/* Adds what `name` is inside the folder `dir_fd`. `path` is for messages. */
+static enum status add_size(int dir_fd, const char *name, const char *path, uint64_t *files, uint64_t *bytes,
+                            struct error *err) {
+    struct stat info;
+    char **names;
+    size_t count;
+    DIR *dir;
+    if (fstatat(dir_fd, name, &info, AT_SYMLINK_NOFOLLOW) != 0)
+        return errno == ENOENT ? STATUS_OK : error_set_errno(err, errno, "cannot look at %s", path);
+    if (S_ISREG(info.st_mode)) {
         ++*files;
-        *bytes += (uint64_t)entry->fts_statp->st_blocks * 512;
+        *bytes += (uint64_t)info.st_blocks * 512;
     }
-    if (tree)
-        fts_close(tree);
-    mem_free(roots[0]);
+    if (!S_ISDIR(info.st_mode))
+        return STATUS_OK;
+    enum status status = open_folder(dir_fd, name, path, &dir, &names, &count, err);
+    if (status != STATUS_OK)
+        return status == STATUS_NOT_FOUND ? STATUS_OK : status;
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        char *inner = file_join(path, names[i]);
+        status = add_size(dirfd(dir), names[i], inner, files, bytes, err);
+        mem_free(inner);
+    }
+    file_free_names(names, count);
+    closedir(dir);
     return status;
+}
+
+enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, struct error *err) {
+    *files = *bytes = 0;
+    return add_size(AT_FDCWD, path, path, files, bytes, err);
 }
 
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err) {

@@ -31,6 +31,11 @@ enum status file_sync_parent(const char *path, struct error *err);
  * error. */
 enum status file_make_dirs(const char *path, struct error *err);
 
+/* The names in a folder, sorted, without "." and ".."; the caller's (file_free_names). Where the disk gives
+ * only some of them that is an error, and there are none. */
+enum status file_list(const char *dir, char ***names, size_t *count, struct error *err);
+void file_free_names(char **names, size_t count);
+
 /* Removes a file or a whole tree, never following a symbolic link; absent is no error. */
 enum status file_remove_tree(const char *path, struct error *err);
 

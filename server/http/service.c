@@ -1,8 +1,6 @@
 /* service.c -- see service.h. */
 #include "server/http/service.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <string.h>
 
 #include "common/file.h"
@@ -22,21 +20,19 @@ static enum status sweep(const struct api *api, const char *folder, const enum s
                          struct error *err) {
     char *path = file_join(api->config.data_dir, folder);
     enum status status = file_make_dirs(path, err);
-    DIR *dir = status == STATUS_OK ? opendir(path) : NULL;
-    if (status == STATUS_OK && !dir)
-        status = error_set_errno(err, errno, "cannot list folder %s", path);
-    struct dirent *entry;
-    while (status == STATUS_OK && (entry = readdir(dir)) != NULL) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0 ||
-            (kind && store_has_files(api->store, *kind, entry->d_name)))
+    char **names = NULL;
+    size_t count = 0;
+    if (status == STATUS_OK)
+        status = file_list(path, &names, &count, err);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        if (kind && store_has_files(api->store, *kind, names[i]))
             continue;
-        char *inner = file_join(path, entry->d_name);
+        char *inner = file_join(path, names[i]);
         log_info("removing %s, left over from an earlier run", inner);
         status = file_remove_tree(inner, err);
         mem_free(inner);
     }
-    if (dir)
-        closedir(dir);
+    file_free_names(names, count);
     mem_free(path);
     return status;
 }

@@ -1,8 +1,6 @@
 /* bundle.c -- see bundle.h. */
 #include "server/ingest/bundle.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -36,38 +34,19 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
 
 /* --- the folder -------------------------------------------------------------------------- */
 
-static int by_name(const void *a, const void *b) {
-    return strcmp(*(char *const *)a, *(char *const *)b);
-}
-
-static void free_names(char **names, size_t count) {
-    for (size_t i = 0; i < count; i++)
-        mem_free(names[i]);
-    mem_free(names);
-}
-
-/* Names in a folder, sorted, litter and hidden files left out; the caller's (free_names). */
+/* Names in a folder, sorted, litter and hidden files left out; the caller's (file_free_names). */
 static enum status list_folder(const char *dir, char ***names, size_t *count, struct error *err) {
-    *names = NULL;
-    *count = 0;
-    DIR *folder = opendir(dir);
-    if (!folder)
-        return error_set_errno(err, errno, "cannot list folder %s", dir);
-    size_t capacity = 0;
-    struct dirent *entry;
-    while ((entry = readdir(folder)) != NULL) {
-        if (entry->d_name[0] == '.' || path_is_litter(entry->d_name))
-            continue;
-        if (*count == capacity) {
-            capacity = capacity ? 2 * capacity : 64;
-            *names = mem_realloc_array(*names, capacity, sizeof **names);
-        }
-        (*names)[(*count)++] = mem_strdup(entry->d_name);
+    enum status status = file_list(dir, names, count, err);
+    size_t kept = 0;
+    for (size_t i = 0; i < *count; i++) {
+        char *name = (*names)[i];
+        if (name[0] == '.' || path_is_litter(name))
+            mem_free(name);
+        else
+            (*names)[kept++] = name;
     }
-    closedir(folder);
-    if (*count > 1)
-        qsort(*names, *count, sizeof **names, by_name);
-    return STATUS_OK;
+    *count = kept;
+    return status;
 }
 
 static bool is_folder(const char *path) {
@@ -92,7 +71,7 @@ static enum status find_root(const char *dir, char **root, struct error *err) {
     }
     if (!*root)
         *root = mem_strdup(dir);
-    free_names(names, count);
+    file_free_names(names, count);
     return STATUS_OK;
 }
 
@@ -207,7 +186,7 @@ static enum status search_mesh(const char *root, char **found, struct findings *
                              ? "no mesh: the PLY files at the bundle's top are point clouds"
                              : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
     }
-    free_names(c.name, c.count);
+    file_free_names(c.name, c.count);
     return STATUS_OK;
 }
 

@@ -1,8 +1,6 @@
 /* trajectory.c -- see trajectory.h. */
 #include "server/ingest/trajectory.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -178,26 +176,21 @@ static int by_value(const void *a, const void *b) {
 
 /* The numbers N of the files N.txt in the folder, ascending; the caller's. */
 static enum status list_poses(const char *root, long **number, size_t *count, struct error *err) {
-    char *path = file_join(root, POSES), *end;
-    DIR *folder = opendir(path);
-    struct dirent *entry;
-    size_t capacity = 0;
+    char *path = file_join(root, POSES), **names, *end;
+    size_t name_count;
     *number = NULL;
     *count = 0;
+    enum status status = file_list(path, &names, &name_count, err);
     mem_free(path);
-    if (!folder)
-        return error_set_errno(err, errno, "cannot list " POSES);
-    while ((entry = readdir(folder)) != NULL) {
-        long value = strtol(entry->d_name, &end, 10);
-        if (end == entry->d_name || strcmp(end, ".txt") != 0 || value < 0 || *count == TRANSFORMS_MAX_FRAMES + 1)
-            continue;
-        if (*count == capacity) {
-            capacity = capacity ? 2 * capacity : 64;
-            *number = mem_realloc_array(*number, capacity, sizeof **number);
-        }
-        (*number)[(*count)++] = value;
+    if (status != STATUS_OK)
+        return status;
+    *number = mem_calloc(name_count + 1, sizeof **number);
+    for (size_t i = 0; i < name_count; i++) {
+        long value = strtol(names[i], &end, 10);
+        if (end != names[i] && strcmp(end, ".txt") == 0 && value >= 0)
+            (*number)[(*count)++] = value;
     }
-    closedir(folder);
+    file_free_names(names, name_count);
     if (*count > 1)
         qsort(*number, *count, sizeof **number, by_value);
     if (*count > TRANSFORMS_MAX_FRAMES)
