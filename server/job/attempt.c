@@ -193,6 +193,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);
     enum status status = file_make_dirs(a->dir, &why);
+    housekeeping_drop_scraps(a->dir); /* the daemon may have been killed in the middle of an earlier check */
     if (status == STATUS_OK)
         status = write_order(a->dir, order, &why);
     if (status == STATUS_OK)
@@ -574,6 +575,7 @@ enum status attempt_settle(struct attempt *a, struct store *store, struct figure
                            struct error *err) {
     struct verdict verdict;
     attempt_charge(a, store, figures);
+    housekeeping_drop_scraps(a->dir);
     judge(a, &verdict);
     enum status status = a->job_id ? settle_job(a, store, &verdict, err)
                                    : settle_check(a, store, &verdict, err);

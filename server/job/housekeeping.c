@@ -1,8 +1,10 @@
 /* housekeeping.c -- see housekeeping.h. */
 #include "server/job/housekeeping.h"
 
-#include <dirent.h>
+#include <errno.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -21,6 +23,60 @@ enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
     return status;
 }
 
+/* As file_replace calls a file until it is whole, and whoever uses file_put_in_place. */
+static bool is_scrap(const char *name) {
+    static const char part[] = ".part", temporary[] = ".tmp-";
+    size_t length = strlen(name), random = 6;
+    return (length > sizeof part - 1 && strcmp(name + length - (sizeof part - 1), part) == 0) ||
+           (length > sizeof temporary - 1 + random &&
+            memcmp(name + length - random - (sizeof temporary - 1), temporary, sizeof temporary - 1) == 0);
+}
+
+static void drop_scraps(const char *dir, bool and_below) {
+    struct error err;
+    char **names;
+    size_t count;
+    if (file_list(dir, &names, &count, &err) != STATUS_OK && err.status != STATUS_NOT_FOUND)
+        log_warning("%s", err.message);
+    for (size_t i = 0; i < count; i++) {
+        char *path = file_join(dir, names[i]);
+        struct stat info;
+        bool is_there = lstat(path, &info) == 0;
+        if (is_there && S_ISDIR(info.st_mode) && and_below)
+            drop_scraps(path, true);
+        else if (is_there && S_ISREG(info.st_mode) && is_scrap(names[i]) && unlink(path) != 0)
+            log_warning("cannot remove %s: %s", path, strerror(errno));
+        mem_free(path);
+    }
+    file_free_names(names, count);
+}
+
+void housekeeping_drop_scraps(const char *dir) {
+    char *out = file_join(dir, "out");
+    drop_scraps(dir, false);
+    drop_scraps(out, true);
+    mem_free(out);
+}
+
+void housekeeping_after_kill(const struct scheduler_config *config, struct store *store) {
+    struct job jobs[16];
+    struct error err;
+    size_t count = sizeof jobs / sizeof *jobs;
+    for (int64_t before = 0; count == sizeof jobs / sizeof *jobs;) {
+        if (store_job_list(store, NULL, JOB_RUNNING, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) != STATUS_OK) {
+            log_warning("what killed jobs left cannot be removed: %s", err.message);
+            return;
+        }
+        for (size_t i = 0; i < count; i++) {
+            char *dir = mem_printf("%s/jobs/%lld", config->data_dir, (long long)jobs[i].id);
+            housekeeping_drop_scraps(dir);
+            before = jobs[i].id;
+            mem_free(dir);
+            job_release(&jobs[i]);
+        }
+    }
+}
+
 /* A job in doubt keeps what it has. */
 static bool is_old(struct store *store, int64_t id, int64_t before_ms) {
     struct job job;
@@ -34,20 +90,21 @@ static bool is_old(struct store *store, int64_t id, int64_t before_ms) {
 static void drop_old_checkpoints(const struct scheduler_config *config, struct store *store) {
     int64_t before_ms = (int64_t)(((double)time(NULL) - config->checkpoint_keep_sec) * 1e3);
     char *jobs = file_join(config->data_dir, "jobs");
-    DIR *dir = opendir(jobs);
-    struct dirent *entry;
-    while (dir && (entry = readdir(dir)) != NULL) {
-        struct error err;
-        int64_t id = strtoll(entry->d_name, NULL, 10);
-        char *folder = file_join(jobs, entry->d_name), *file = file_join(folder, "checkpoint.db");
+    struct error err;
+    char **names;
+    size_t count;
+    if (file_list(jobs, &names, &count, &err) != STATUS_OK && err.status != STATUS_NOT_FOUND)
+        log_warning("old checkpoints cannot be found: %s", err.message);
+    for (size_t i = 0; i < count; i++) {
+        int64_t id = strtoll(names[i], NULL, 10);
+        char *folder = file_join(jobs, names[i]), *file = file_join(folder, "checkpoint.db");
         if (id > 0 && access(file, F_OK) == 0 && is_old(store, id, before_ms) &&
             housekeeping_drop_checkpoint(folder, &err) != STATUS_OK)
             log_warning("job %lld: %s", (long long)id, err.message);
         mem_free(file);
         mem_free(folder);
     }
-    if (dir)
-        closedir(dir);
+    file_free_names(names, count);
     mem_free(jobs);
 }
 

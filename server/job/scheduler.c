@@ -392,6 +392,7 @@ static void keep_house(struct scheduler *s) {
 
 enum status scheduler_run(struct scheduler *s, struct error *err) {
     size_t requeued;
+    housekeeping_after_kill(&s->config, s->store);
     enum status status = store_reconcile(s->store, &requeued, err);
     if (status == STATUS_OK)
         status = store_scene_check_again(s->store, err);

@@ -50,6 +50,33 @@ static void announce(struct progress *p, const char *dir, const char *name, cons
     progress_file(p, "output", claimed, bytes, SCENE_A, "text/plain");
 }
 
+/* What is left of files that were being written, and files that have their names. */
+static const char *const scraps[] = {"job.json.tmp-a1B2c3", "out/a.exr.part", "out/compare/000.png.tmp-XYZxyz"};
+static const char *const kept[] = {"checkpoint.db", "out/a.exr", "out/compare/000.png", "out/tmp-a1B2c3"};
+
+static void litter(const char *dir) {
+    char *inner = file_join(dir, "out/compare");
+    OK(file_make_dirs(inner, &err));
+    mem_free(inner);
+    for (size_t i = 0; i < sizeof scraps / sizeof *scraps + sizeof kept / sizeof *kept; i++) {
+        bool is_scrap = i < sizeof scraps / sizeof *scraps;
+        char *path = file_join(dir, is_scrap ? scraps[i] : kept[i - sizeof scraps / sizeof *scraps]);
+        int fd = open(path, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+        CHECK(fd >= 0);
+        close(fd);
+        mem_free(path);
+    }
+}
+
+static bool is_tidy(const char *dir) {
+    bool tidy = true;
+    for (size_t i = 0; i < sizeof scraps / sizeof *scraps; i++)
+        tidy = tidy && !file_is_in(dir, scraps[i]);
+    for (size_t i = 0; i < sizeof kept / sizeof *kept; i++)
+        CHECK_THAT(file_is_in(dir, kept[i]), "%s is gone", kept[i]);
+    return tidy;
+}
+
 /* 0 when this process has only what a worker should have. */
 static int check_surroundings(const char *dir) {
     int bad = 0;
@@ -135,8 +162,10 @@ static int play(const char *role, const char *dir, int attempt) {
         fprintf(stderr, "out of memory: could not allocate 12345 bytes\n");
         return PROGRESS_EXIT_MEMORY;
     }
-    if (strcmp(role, "killed") == 0)
+    if (strcmp(role, "killed") == 0) {
+        litter(dir);
         kill(getpid(), SIGKILL);
+    }
     if (strcmp(role, "silent") == 0)
         return 0;
     if (strcmp(role, "deserter") == 0)
@@ -427,6 +456,9 @@ static void test_outcomes(struct daemon *d) {
     expect(d, full, JOB_PAUSED, 1, "disk full: checkpoint.db", "resume");
     expect(d, memory, JOB_FAILED, 2, "could not allocate 12345", "smaller texture_size");
     expect(d, killed, JOB_FAILED, 2, "killed from outside", "smaller texture_size");
+    char *killed_dir = mem_printf("%s/jobs/%lld", d->dir, (long long)killed);
+    CHECK(is_tidy(killed_dir));
+    mem_free(killed_dir);
     expect(d, silent, JOB_FAILED, 2, "without a result", "");
     expect(d, deserter, JOB_FAILED, 2, "told to stop from outside", "");
     expect(d, around, JOB_SUCCEEDED, 1, "", "");
@@ -557,6 +589,7 @@ static void test_daemon_killed(struct daemon *d) {
     for (int i = 0; i < WAIT_TRIES && worker_pid(job_dir); i++)
         usleep(WAIT_US);
     CHECK_THAT(worker_pid(job_dir) == 0, "worker %d outlived its daemon", (int)pid);
+    litter(job_dir);
 
     daemon_start(d, 1, "/proc/self/exe");
     struct job job = {0};
@@ -566,6 +599,7 @@ static void test_daemon_killed(struct daemon *d) {
         OK(store_job_get(d->store, id, &job, &err));
     }
     CHECK(job.attempt == 2 && job.attempts_left == 2);
+    CHECK(is_tidy(job_dir));
     job_release(&job);
     OK(store_job_cancel(d->store, id, &err));
     scheduler_wake(d->scheduler);
