@@ -3,16 +3,16 @@
  * Gathered, not scattered: each direction of the map asks every photograph that may look there,
  * at several places over its cell where the photograph is finer than the map. What the photographs
  * say is combined channel by channel: the median that a saturated value, a lower bound, moves only
- * upwards (the least absolute deviation with censored values, Powell 1984), then the mean of what
- * agrees with it. A photograph weighs by its exposure, as the precision of a count of photons does;
- * by the value itself it would favour the noise that is too bright. */
+ * upwards (censored.h), then the mean of what agrees with it. A photograph weighs by its exposure, as
+ * the precision of a count of photons does; by the value itself it would favour the noise that is too
+ * bright. */
 #include "server/reconstruct/environment.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/reconstruct/censored.h"
 #include "server/reconstruct/fill.h"
 
 /* A point so far away that every camera of a room sees it in the same direction, in metres. */
@@ -37,12 +37,6 @@ struct window {
     int grid;           /* places over a cell, along each side */
 };
 
-/* What one photograph shows in a direction, in one channel. */
-struct value {
-    float radiance, weight;
-    bool is_bound;
-};
-
 /* Solid angles, in units of a cell at the equator. */
 struct seen {
     double angle, saturated;
@@ -53,7 +47,7 @@ struct gather {
     struct environment *e;
     size_t window_count;
     struct window *window; /* [window_count] */
-    struct value *scratch; /* [threads][3][window_count] */
+    struct censored *scratch; /* [threads][3][window_count] what photographs show in a direction */
     struct seen *seen;     /* [height] by row */
 };
 
@@ -120,33 +114,9 @@ static uint32_t find_windows(struct gather *g, struct parallel *pool) {
 
 /* --- what they say ---------------------------------------------------------------------------- */
 
-static int compare_values(const void *a, const void *b) {
-    const struct value *x = a, *y = b;
-    return x->radiance != y->radiance ? (x->radiance > y->radiance) - (x->radiance < y->radiance)
-                                      : x->is_bound - y->is_bound;
-}
-
-/* Where the sum of weighted absolute deviations, that of a bound counted only from below, is least.
- * Sorts the values; there must be one. *is_bound: it is a bound. */
-static float censored_median(struct value *value, size_t count, bool *is_bound) {
-    qsort(value, count, sizeof *value, compare_values);
-    float above = 0.0f, below = 0.0f; /* what pulls upwards and downwards */
-    for (size_t i = 0; i < count; i++)
-        above += value[i].weight;
-    size_t i = 0;
-    for (; i + 1 < count; i++) {
-        above -= value[i].weight;
-        below += value[i].is_bound ? 0.0f : value[i].weight;
-        if (below >= above)
-            break;
-    }
-    *is_bound = value[i].is_bound;
-    return value[i].radiance;
-}
-
 /* The mean of what agrees with the median. Sorts the values. */
-static float combine(struct value *value, size_t count, bool *is_bound) {
-    float middle = censored_median(value, count, is_bound);
+static float combine(struct censored *value, size_t count, bool *is_bound) {
+    float middle = censored_quantile(value, count, 0.5f, is_bound);
     if (*is_bound || count < 3)
         return middle;
     /* The median absolute deviation is the farthest when the farther half is gone. */
@@ -155,17 +125,17 @@ static float combine(struct value *value, size_t count, bool *is_bound) {
     for (size_t i = 0; i < count; i++)
         half += value[i].is_bound ? 0.0f : 0.5f * value[i].weight;
     while (first < end && gone < half) {
-        bool is_low = middle - value[first].radiance > value[end - 1].radiance - middle;
-        const struct value *far = &value[is_low ? first++ : --end];
+        bool is_low = middle - value[first].value > value[end - 1].value - middle;
+        const struct censored *far = &value[is_low ? first++ : --end];
         gone += far->is_bound ? 0.0f : far->weight;
-        deviation = fabsf(far->radiance - middle);
+        deviation = fabsf(far->value - middle);
     }
     float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, LEAST_DEVIATION * middle);
     for (size_t i = 0; i < count; i++) {
-        if (value[i].is_bound || fabsf(value[i].radiance - middle) > limit)
+        if (value[i].is_bound || fabsf(value[i].value - middle) > limit)
             continue;
         weight += value[i].weight;
-        sum += value[i].weight * value[i].radiance;
+        sum += value[i].weight * value[i].value;
     }
     return weight > 0.0f ? sum / weight : middle;
 }
@@ -193,7 +163,7 @@ static struct cell cell_at(const struct image *map, size_t column, size_t row) {
 
 /* What a photograph shows of a cell, by channel; false: nothing. */
 static bool look_out(const struct gather *g, const struct window *w, const struct cell *cell,
-                     struct value value[3]) {
+                     struct censored value[3]) {
     const struct views *v = g->views;
     const struct photograph *photo = &v->scene->photograph[v->train[w->train]];
     vec3 origin = camera_origin(&photo->camera);
@@ -219,7 +189,7 @@ static bool look_out(const struct gather *g, const struct window *w, const struc
     }
     float weight = photo->exposure * trust_sum / (float)(w->grid * w->grid);
     for (int c = 0; c < 3 && trust_sum > 0.0f; c++)
-        value[c] = (struct value){sum[c] / trust_sum, weight, saturated[c]};
+        value[c] = (struct censored){sum[c] / trust_sum, weight, saturated[c]};
     return trust_sum > 0.0f;
 }
 
@@ -228,8 +198,8 @@ struct spread {
     double count, sum, square;
 };
 
-static void spread_add(struct spread *s, const struct value value[3]) {
-    float mean = (value[0].radiance + value[1].radiance + value[2].radiance) / 3.0f;
+static void spread_add(struct spread *s, const struct censored value[3]) {
+    float mean = (value[0].value + value[1].value + value[2].value) / 3.0f;
     if (value[0].is_bound || value[1].is_bound || value[2].is_bound || !(mean > 0.0f))
         return;
     double x = log((double)mean);
@@ -243,14 +213,14 @@ static float spread_of(const struct spread *s) {
     return squares > 0.0 ? (float)sqrt(squares / (s->count - 1.0)) : 0.0f;
 }
 
-static void gather_cell(struct gather *g, size_t column, size_t row, struct value *scratch) {
+static void gather_cell(struct gather *g, size_t column, size_t row, struct censored *scratch) {
     struct environment *e = g->e;
     size_t count = 0, at = row * e->map.width + column;
     struct cell cell = cell_at(&e->map, column, row);
     struct spread spread = {0};
     for (size_t i = 0; i < g->window_count; i++) {
         const struct window *w = &g->window[i];
-        struct value value[3];
+        struct censored value[3];
         if (vec3_dot(cell.centre, w->axis) < w->cosine || !look_out(g, w, &cell, value))
             continue;
         for (size_t c = 0; c < 3; c++)

@@ -14,6 +14,7 @@
 #include "server/reconstruct/refine.h"
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
+#include "server/reconstruct/split.h"
 #include "server/reconstruct/unseen_light.h"
 #include "server/reconstruct/views.h"
 
@@ -92,6 +93,72 @@ static void add_prepare_figures(const struct run *run) {
     json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
 }
 
+/* All that follows from the segments. */
+static enum status map_surface(struct reconstruction *r, struct error *err) {
+    const struct mesh *mesh = &r->scene->mesh;
+    enum status status = atlas_make(&r->atlas, mesh, &r->segments,
+                                    (uint32_t)settings_number(r->settings, "texture_size"),
+                                    (float)settings_number(r->settings, "texels_per_metre"), err);
+    if (status != STATUS_OK)
+        return status;
+    inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
+    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR),
+                   NEUTRAL_ROUGHNESS, NEUTRAL_SPECULAR);
+    r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
+    r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
+    return world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
+}
+
+static void forget_surface(struct reconstruction *r) {
+    world_release(&r->world);
+    mem_free(r->evidence);
+    mem_free(r->is_emitter);
+    r->evidence = NULL;
+    r->is_emitter = NULL;
+    materials_release(&r->materials);
+    inverse_uv_release(&r->inverse);
+    atlas_release(&r->atlas);
+}
+
+static void light_by_environment(struct reconstruction *r) {
+    if (r->environment.map.pixel)
+        world_set_environment(&r->world, &r->environment.map, r->pool);
+}
+
+static void report_split(const struct run *run, const struct split *split) {
+    cJSON *list = cJSON_AddArrayToObject(run->r->report, "parts_that_shine");
+    for (size_t i = 0; i < split->part_count; i++) {
+        cJSON *entry = cJSON_CreateObject();
+        json_add_int(entry, "segment", (int64_t)(split->old_count + i));
+        json_add_int(entry, "of_segment", (int64_t)split->whole[i]);
+        cJSON_AddItemToArray(list, entry);
+    }
+    char line[128];
+    snprintf(line, sizeof line, "segments: %zu parts that shine were split off, as segments of their own",
+             split->part_count);
+    if (split->part_count > 0)
+        run->hooks->log(run->hooks->user, line);
+}
+
+/* Splits off what shines, and makes anew what followed from the segments. */
+static enum status split_shining(struct run *run, struct error *err) {
+    struct reconstruction *r = run->r;
+    struct split split;
+    split_segments(&split, r, &run->views);
+    report_split(run, &split);
+    bool any = split.part_count > 0;
+    split_release(&split);
+    if (!any)
+        return STATUS_OK;
+    forget_surface(r);
+    enum status status = map_surface(r, err);
+    if (status != STATUS_OK)
+        return status;
+    views_update_segments(&run->views, r->world.accel, r->pool);
+    light_by_environment(r);
+    return STATUS_OK;
+}
+
 static enum status prepare(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -103,35 +170,20 @@ static enum status prepare(struct run *run, struct error *err) {
     if (status != STATUS_OK)
         return status;
     make_segments(r);
-    status = atlas_make(&r->atlas, mesh, &r->segments, (uint32_t)settings_number(r->settings, "texture_size"),
-                        (float)settings_number(r->settings, "texels_per_metre"), err);
-    if (status != STATUS_OK)
-        return status;
-    inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
-    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR),
-                   NEUTRAL_ROUGHNESS, NEUTRAL_SPECULAR);
-    r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
-    r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
-    status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
+    status = map_surface(r, err);
     if (status != STATUS_OK)
         return status;
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
     calibrate(r, &run->views, run->hooks);
+    environment_make(&r->environment, &run->views, r->pool);
+    light_by_environment(r);
+    status = split_shining(run, err);
     add_prepare_figures(run);
-    return STATUS_OK;
-}
-
-/* Needs exposures; lights the room from here on. */
-static void make_environment(struct run *run) {
-    struct reconstruction *r = run->r;
-    if (!environment_make(&r->environment, &run->views, r->pool))
-        return;
-    world_set_environment(&r->world, &r->environment.map, r->pool);
+    return status;
 }
 
 static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
-    make_environment(run);
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     unseen_light_estimate(run->r, &run->views);

@@ -168,6 +168,12 @@ void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) 
     make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
 }
 
+void views_update_segments(struct views *v, const struct accel *accel, struct parallel *pool) {
+    v->accel = accel;
+    for (uint32_t t = 0; t < v->train_count; t++)
+        views_update_edges(v, t, pool);
+}
+
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
                 const struct accel *accel, struct parallel *pool) {
     *v = (struct views){.scene = scene, .segments = segments, .accel = accel};

@@ -50,6 +50,8 @@ void views_init(struct views *v, const struct scene *scene, const struct segment
 void views_release(struct views *v);
 /* Marks the pixels that mix surfaces anew, of training photograph `train`, after its camera moved. */
 void views_update_edges(struct views *v, uint32_t train, struct parallel *pool);
+/* Marks all of them anew, after the segments changed. */
+void views_update_segments(struct views *v, const struct accel *accel, struct parallel *pool);
 /* Takes the median anew, after exposures changed. */
 void views_update_median(struct views *v);
 

@@ -13,7 +13,8 @@
 struct segments {
     size_t count;
     uint32_t *of_triangle; /* [triangle_count], in [0, count); owned */
-    int64_t *id;           /* [count] the input's object_id, or the segment's own number; owned */
+    int64_t *id;           /* [count] the input's object_id, or the segment's own number; of a part that was split
+                            * off: that of the whole; owned */
 };
 
 void segments_from_object_id(struct segments *s, const struct mesh *mesh); /* needs object_id */

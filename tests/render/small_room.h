@@ -15,9 +15,10 @@
 #define WIDTH 48
 #define HEIGHT 36
 
-static const rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f},
-                                        {0.2f, 0.6f, 0.3f}, {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f},
-                                        {0.4f, 0.4f, 0.4f}};
+/* A test may change these before walls are photographed. */
+static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f},
+                                  {0.2f, 0.6f, 0.3f}, {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f},
+                                  {0.4f, 0.4f, 0.4f}};
 /* A test may make walls glossy before they are photographed. */
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
