@@ -87,7 +87,10 @@ static int one(struct client *c, const struct collection *what, const char *id, 
         what->print_one(c, reply.json);
     else if (!c->quiet) {
         keeping_sentence(kept, reply.json);
-        printf("%s %.12s is %s\n", what->one, id, *kept ? kept : "kept until it is removed");
+        bool is_used = cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
+        printf("%s %.12s is %s\n", what->one, id, *kept      ? kept
+                                                  : is_used ? "in use, and kept at least as long"
+                                                            : "kept until it is removed");
     }
     buf_release(&path);
     reply_release(&reply);

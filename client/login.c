@@ -84,7 +84,15 @@ int login_run(struct client *c, const struct options *o) {
 
 int logout_run(struct client *c, const struct options *o) {
     struct error err;
+    char *kept;
     (void)o;
+    if (credentials_find(request_server(c->request), &kept, &err) != STATUS_OK)
+        return client_fail(c, NULL, &err);
+    if (!kept) {
+        client_note(c, "no token is kept for %s", request_server(c->request));
+        return CLIENT_OK;
+    }
+    mem_free(kept);
     if (credentials_keep(request_server(c->request), NULL, &err) != STATUS_OK)
         return client_fail(c, NULL, &err);
     client_note(c, "the token for %s is forgotten here; it stays valid until it is revoked there",

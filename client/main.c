@@ -36,12 +36,25 @@ static int unknown_command(struct client *c, const char *name) {
     nearest_init(&nearest, name);
     for (size_t i = 0; i < count; i++)
         nearest_offer(&nearest, table[i].name);
-    error_set(&err, STATUS_INPUT, "there is no command \"%.100s\"", name);
+    error_set(&err, STATUS_INPUT, *name == '-' ? "\"%.100s\" is no command" : "there is no command \"%.100s\"", name);
     if (nearest.best)
         error_hint(&err, "did you mean \"%s\"?", nearest.best);
     else
         error_hint(&err, "`unbake --help` lists the commands");
     return client_fail(c, NULL, &err);
+}
+
+/* Options that all commands share may come first, too (`unbake --json list`): they are put behind the
+ * command's name. */
+static void put_command_first(int argc, char **argv) {
+    int at = 1;
+    while (at < argc && options_length(argv[at], command_shared_options) > 0)
+        at += options_length(argv[at], command_shared_options);
+    if (at == 1 || at >= argc)
+        return;
+    char *name = argv[at];
+    memmove(argv + 2, argv + 1, (size_t)(at - 1) * sizeof *argv);
+    argv[1] = name;
 }
 
 static int check_words(struct client *c, const struct command *command, size_t count) {
@@ -60,6 +73,11 @@ static int present_token(struct client *c, const struct options *o) {
     struct error err;
     const char *given = getenv("UNBAKE_TOKEN"), *ca = getenv("UNBAKE_CA");
     char *kept = NULL;
+    for (const char *at = given; at && *at; at++)
+        if (*at <= ' ' || *at > '~') {
+            error_set(&err, STATUS_INPUT, "UNBAKE_TOKEN is no token: it has blanks or other signs in it");
+            return client_fail(c, NULL, &err);
+        }
     ca = options_text(o, "ca", ca && *ca ? ca : NULL);
     if (ca)
         request_set_ca(c->request, ca);
@@ -92,6 +110,7 @@ int main(int argc, char **argv) {
     struct error err;
     terminal_init(&c.out, stdout);
     terminal_init(&c.err, stderr);
+    put_command_first(argc, argv);
     const char *name = argc > 1 ? argv[1] : "";
     bool help = strcmp(name, "help") == 0;
     if (help && argc > 2) {

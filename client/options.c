@@ -61,6 +61,30 @@ static enum status check_value(const struct option *option, const char *text, st
     return STATUS_OK;
 }
 
+/* The option that begins with `argument`; *text is the value in the same word, if there is one. */
+static const struct option *read_option(const char *argument, const struct option *own, const struct option *shared,
+                                        const char **text) {
+    const struct option *option;
+    *text = NULL;
+    if (argument[1] == '-') {
+        size_t length = strcspn(argument + 2, "=");
+        option = find(own, argument + 2, length);
+        if (argument[2 + length] == '=')
+            *text = argument + 3 + length;
+        return option ? option : find(shared, argument + 2, length);
+    }
+    option = find_letter(own, argument[1]);
+    if (argument[2])
+        *text = argument + 2;
+    return option ? option : find_letter(shared, argument[1]);
+}
+
+int options_length(const char *word, const struct option *table) {
+    const char *text;
+    const struct option *option = word[0] == '-' && word[1] ? read_option(word, NULL, table, &text) : NULL;
+    return !option ? 0 : option->kind == OPTION_FLAG || text ? 1 : 2;
+}
+
 enum status options_parse(struct options *o, int count, char *const *argv,
                           const struct option *own, const struct option *shared,
                           struct error *err) {
@@ -80,22 +104,8 @@ enum status options_parse(struct options *o, int count, char *const *argv,
             options_ended = true;
             continue;
         }
-        const struct option *option;
-        const char *text = NULL;
-        if (argument[1] == '-') {
-            size_t length = strcspn(argument + 2, "=");
-            option = find(own, argument + 2, length);
-            if (!option)
-                option = find(shared, argument + 2, length);
-            if (argument[2 + length] == '=')
-                text = argument + 3 + length;
-        } else {
-            option = find_letter(own, argument[1]);
-            if (!option)
-                option = find_letter(shared, argument[1]);
-            if (argument[2])
-                text = argument + 2;
-        }
+        const char *text;
+        const struct option *option = read_option(argument, own, shared, &text);
         if (!option)
             return unknown(argument, own, shared, err);
         if (option->kind == OPTION_FLAG && text)

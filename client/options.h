@@ -44,6 +44,9 @@ enum status options_parse(struct options *o, int count, char *const *argv,
                           const struct option *own, const struct option *shared,
                           struct error *err);
 void options_release(struct options *o);
+/* How many words the option that begins with `word` takes of a command line, by that table; 0 where it is
+ * none of them. */
+int options_length(const char *word, const struct option *table);
 
 bool options_flag(const struct options *o, const char *name);
 /* The last value given, or `fallback`. */

@@ -289,6 +289,8 @@ static enum status transport_failed(struct attempt *a, CURLcode code, const char
         return error_hint(err, "--ca FILE names the certificates to trust");
     if (code == CURLE_SSL_CONNECT_ERROR)
         return error_hint(err, "does it speak https, or should the URL begin with http://?");
+    if (code == CURLE_GOT_NOTHING && strncmp(a->request->server, "http://", 7) == 0)
+        return error_hint(err, "does it want https? Then the URL begins with https://");
     return error_hint(err, "is unbaked running there? --server URL or UNBAKE_SERVER names another");
 }
 

@@ -58,7 +58,8 @@ cJSON *view_job(const struct job *job) {
     json_add_bool(v, "pinned", job->is_pinned);
     add_time(v, "expires_at", job->expires_ms);
     json_add_string(v, "stage", or_null(job->stage));
-    json_add_number(v, "progress", job->progress);
+    /* The last that was reported is of its last stage. */
+    json_add_number(v, "progress", job->state == JOB_SUCCEEDED ? 1.0 : job->progress);
     if (job->eta_sec >= 0)
         json_add_number(v, "eta_sec", job->eta_sec);
     else

@@ -13,6 +13,16 @@ so() {
 make_room "$work/room"
 daemon_start
 
+# Options that all commands have may come first.
+run 0 --json --retry=1 list
+so '. == []'
+run 0 --server "$UNBAKE_SERVER" -q list
+run 2 --jsn list
+has "$err" '"--jsn" is no command'
+run 0 --help list
+has "$out" "usage: unbake list"
+run 2 --server
+
 # --- a whole job ---------------------------------------------------------------------------------
 
 run 0 submit "$work/room" $quick --dry-run
@@ -66,6 +76,8 @@ run 0 get 1 report.json -o "$work/longer"
 equal "$(jq '.refine.iterations, .settings.iterations' "$work/longer/report.json" | tr '\n' ' ')" "7 7 "
 run 4 extend 1 --time 5
 has "$err" "iterations is"
+so_job() { "$build/unbake" show "$1" --json | jq -e "$2" >/dev/null || fail "job $1: not so: $2"; }
+so_job 1 '.state == "succeeded" and .progress == 1'
 run 2 extend 1
 run 0 retry 1 --from report
 run 0 watch 1
@@ -75,6 +87,9 @@ run 4 retry 1 --from lunch
 run 0 pause "$("$build/unbake" submit --scene "${scene:0:10}" $long -q)" -q
 run 0 edit last --priority 7 --label a=b --name 'new name' --first --json
 so '.priority == 7 and .labels == {"a": "b"} and .name == "new name"'
+run 0 scenes keep "${scene:0:10}" --keep-days 1
+has "$out" "in use, and kept at least as long"
+run 0 scenes keep "${scene:0:10}" --keep-days 0
 run 2 edit last
 run 2 edit last --first --last
 run 2 edit last --share --unshare

@@ -52,10 +52,14 @@ wait "$background"; equal $? 4 "exit status of a watch whose token was revoked: 
 background=
 run 4 list
 has "$err" "no longer, valid"
+UNBAKE_TOKEN=$'unbake_1\nx' run 2 list
+has "$err" "UNBAKE_TOKEN is no token"
 
 # --- the file ---
 run 0 logout
 equal "$(cat "$tokens")" "" "the file after logout"
+run 0 logout
+has "$err" "no token is kept"
 printf 'http://other.example:1 unbake_9_x\n%s bad\n' "$UNBAKE_SERVER" >"$tokens"
 ada=$("$build/unbaked" token add ada --role admin --data "$data" 2>/dev/null)
 run 0 login -q <<<"$ada"
