@@ -26,7 +26,7 @@ static const struct option table[] = {
     TEXT(listen, "127.0.0.1:7117",
          "Address and port for HTTP. Port 0 takes a free one."),
     TEXT(access, "auto",
-         "Who may use the daemon: auto (anybody on loopback until there is a token), tokens or open."),
+         "Who may use the daemon: auto (anybody on loopback until there is a token), tokens, or open (loopback only)."),
     TEXT(tls_certificate, "", "PEM file of the certificate chain for HTTPS. Empty: plain HTTP."),
     TEXT(tls_key, "", "PEM file of the certificate's key. SIGHUP reads both files again."),
     TEXT(server_names, "",

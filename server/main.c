@@ -5,8 +5,6 @@
  * and back in the same order when SIGTERM or SIGINT comes: nothing new is accepted, running jobs
  * write checkpoints and go back to the queue, streams end, the database is closed. SIGHUP reads
  * the TLS certificate again; options change by a restart, never by surprise. */
-#include <archive.h>
-#include <cjson/cJSON.h>
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
@@ -29,25 +27,13 @@
 #include "server/http/listener.h"
 #include "server/http/service.h"
 #include "server/job/scheduler.h"
+#include "server/libraries.h"
 #include "server/notify.h"
-#include "server/render/accel.h"
 #include "server/store/store.h"
 
-#define LIBRARY_COUNT 5
-
-static void libraries(struct api_library list[LIBRARY_COUNT]) {
-    const char *embree = accel_library_version();
-    const char *archive = archive_version_string();
-    list[0] = (struct api_library){"libmicrohttpd", listener_library_version()};
-    list[1] = (struct api_library){"sqlite", store_library_version()};
-    list[2] = (struct api_library){"embree", strncmp(embree, "Embree ", 7) == 0 ? embree + 7 : embree};
-    list[3] = (struct api_library){"libarchive", strncmp(archive, "libarchive ", 11) == 0 ? archive + 11 : archive};
-    list[4] = (struct api_library){"cjson", cJSON_Version()};
-}
-
 static void print_version(void) {
-    struct api_library list[LIBRARY_COUNT];
-    libraries(list);
+    struct library list[LIBRARY_COUNT];
+    libraries_list(list);
     printf("unbaked %s\n", UNBAKE_VERSION);
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         printf("%s %s\n", list[i].name, list[i].version);
@@ -78,18 +64,23 @@ struct daemon {
     struct api_library libraries[LIBRARY_COUNT];
 };
 
-/* An address that others can reach needs tokens, or the plain wish for none. */
+/* An address that others can reach needs tokens. */
 static enum status check_access(const struct daemon *d, bool is_loopback, struct error *err) {
     const struct config *c = d->config;
-    if (strcmp(c->access, "auto") == 0 && !is_loopback && !store_has_users(d->store)) {
+    if (is_loopback)
+        return STATUS_OK;
+    if (strcmp(c->access, "open") == 0) {
+        error_set(err, STATUS_INPUT, "access = open is for loopback addresses, and listen is \"%s\": anybody who "
+                  "reaches the daemon could use it", c->listen);
+        return error_hint(err, "access = auto, with a token for each user (`unbaked token add NAME`)");
+    }
+    if (strcmp(c->access, "auto") == 0 && !store_has_users(d->store)) {
         error_set(err, STATUS_INPUT, "listen is \"%s\", which is not a loopback address, and there are no "
                   "tokens: anybody who reaches the daemon could use it", c->listen);
-        return error_hint(err, "`unbaked token add NAME --role admin` makes one; access = open lets anybody in");
+        return error_hint(err, "`unbaked token add NAME --role admin` makes one");
     }
-    if (!is_loopback && !*c->tls_certificate)
+    if (!*c->tls_certificate)
         log_warning("without tls_certificate, tokens and scenes cross the network unencrypted");
-    if (!is_loopback && strcmp(c->access, "open") == 0)
-        log_warning("access = open: anybody who reaches %s may do everything", c->listen);
     return STATUS_OK;
 }
 
@@ -163,7 +154,10 @@ static enum status build(struct daemon *d, struct error *err) {
     char address[CONFIG_ADDRESS_SIZE];
     bool is_loopback;
     struct listener_config network;
-    libraries(d->libraries);
+    struct library list[LIBRARY_COUNT];
+    libraries_list(list);
+    for (size_t i = 0; i < LIBRARY_COUNT; i++)
+        d->libraries[i] = (struct api_library){list[i].name, list[i].version};
     const struct scheduler_config work = scheduler_options(c);
     const struct api_config limits = api_options(c, d->libraries);
     enum status status = listener_options(c, &network, address, &is_loopback, err);
@@ -258,15 +252,10 @@ static void prepare_signals(void) {
 }
 
 static void log_start(const struct daemon *d) {
-    struct api_library list[LIBRARY_COUNT];
-    struct buf text;
-    libraries(list);
-    buf_init(&text, 4096);
-    for (size_t i = 0; i < LIBRARY_COUNT; i++)
-        buf_printf(&text, "%s%s %s", i ? ", " : "", list[i].name, list[i].version);
-    log_info("unbaked %s (%s)", UNBAKE_VERSION, buf_text(&text));
+    char *text = libraries_text();
+    log_info("unbaked %s (%s)", UNBAKE_VERSION, text);
     log_info("data folder %s", d->config->data_dir);
-    buf_release(&text);
+    mem_free(text);
 }
 
 /* Says where it listens: in the log, on stdout and, where asked for, in a file. */

@@ -24,6 +24,7 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/http/tls.h"
+#include "server/libraries.h"
 #include "server/worker/sandbox.h"
 
 const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print this help"}, {0}};
@@ -46,6 +47,15 @@ static void tell(struct doctor *d, enum verdict verdict, const char *what, const
     va_end(args);
     printf("%-5s %-12s %s\n", words[verdict], what, text);
     d->bad_count += verdict == BAD;
+}
+
+/* --- the program ----------------------------------------------------------------------------- */
+
+static void check_libraries(struct doctor *d) {
+    const char *lack = libraries_lack();
+    char *text = libraries_text();
+    tell(d, lack ? WARN : GOOD, "libraries", "%s%s%s", lack ? lack : "", lack ? "; " : "", text);
+    mem_free(text);
 }
 
 /* --- the machine ----------------------------------------------------------------------------- */
@@ -194,10 +204,11 @@ static void check_tokens(struct doctor *d, bool runs) {
         cJSON_Delete(reply);
     }
     mem_free(path);
-    if (count > 0)
+    if (strcmp(c->access, "open") == 0)
+        tell(d, is_loopback ? GOOD : BAD, "tokens", "access = open%s",
+             is_loopback ? ": whoever has an account on this machine may do everything" : " is for loopback addresses only");
+    else if (count > 0)
         tell(d, GOOD, "tokens", "%d", count);
-    else if (strcmp(c->access, "open") == 0)
-        tell(d, is_loopback ? GOOD : WARN, "tokens", "access = open: whoever reaches %s may do everything", c->listen);
     else if (is_loopback)
         tell(d, GOOD, "tokens", "none: whoever has an account on this machine may do everything");
     else
@@ -243,6 +254,7 @@ int doctor_command(int argc, char **argv) {
         config_address(in.config.listen, address, &port, &d->is_loopback, &err); /* was checked with the rest */
         tell(d, GOOD, "program", "unbaked " UNBAKE_VERSION "; a daemon %s on %s", runs ? "runs" : "does not run",
              in.config.data_dir);
+        check_libraries(d);
         check_processors(d);
         check_limits(d);
         check_sandbox(d);

@@ -74,6 +74,7 @@ refused 1 'there are no tokens' "$build/unbaked" --data "$work/fresh" --listen 0
 refused 1 'there are no tokens' "$build/unbaked" --data "$work/fresh" --listen '[::]:0'
 refused 2 'access must be' "$build/unbaked" --data "$work/fresh" --set access=nobody
 refused 2 'go together' "$build/unbaked" --data "$work/fresh" --set tls_key=x
+refused 1 'access = open is for loopback' "$build/unbaked" --data "$work/fresh" --set access=open --listen 0.0.0.0:0
 unbaked doctor --data "$work/fresh" --set listen=0.0.0.0:1 >"$work/out"; equal $? 1 "doctor's exit status"
 grep -q '^FAIL *tokens' "$work/out" || fail "doctor: $(cat "$work/out")"
 data=$work/open start_daemon --set access=tokens
@@ -100,8 +101,10 @@ doctor 0 'warn +machine .*more memory than there is' --data "$work/none" --set w
 doctor 0 'warn +data .*chmod o=' --data "$work/others" --set min_free_mib=1
 doctor 1 'FAIL +disk' --data "$work/others" --set min_free_mib=16777216
 doctor 1 'FAIL +database .*damaged' --data "$work/damaged" --set min_free_mib=1
-doctor 0 'warn +tokens .*may do everything' --data "$work/none" --set access=open --set listen=0.0.0.0:1
-doctor 0 'warn +tls .*unencrypted' --data "$work/none" --set access=open --set listen=0.0.0.0:1
+doctor 0 'ok +libraries .*sqlite [0-9]' --data "$work/none"
+doctor 0 'ok +tokens .*open: .*may do everything' --data "$work/none" --set access=open
+doctor 1 'FAIL +tokens .*loopback addresses only' --data "$work/none" --set access=open --set listen=0.0.0.0:1
+doctor 1 'warn +tls .*unencrypted' --data "$work/none" --set listen=0.0.0.0:1
 doctor 1 'FAIL +tls' --data "$work/none" --set tls_certificate="$work/none" --set tls_key="$work/none"
 doctor 0 'usage: unbaked doctor' --help
 (ulimit -n 500; exec "$build/unbaked" doctor --data "$work/none") >"$work/out"

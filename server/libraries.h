@@ -1,0 +1,17 @@
+/* libraries.h -- the libraries that this program runs with, as they say themselves. */
+#ifndef UNBAKE_SERVER_LIBRARIES_H
+#define UNBAKE_SERVER_LIBRARIES_H
+
+#define LIBRARY_COUNT 5
+
+struct library {
+    const char *name, *version; /* static storage */
+};
+
+void libraries_list(struct library list[LIBRARY_COUNT]);
+/* "libmicrohttpd 0.9.75, sqlite ..."; the caller's (mem_free). */
+char *libraries_text(void);
+/* What one of them was built without, though some rooms need it, as a sentence; NULL: nothing. */
+const char *libraries_lack(void);
+
+#endif
