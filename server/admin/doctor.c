@@ -229,7 +229,7 @@ static void check_tls(struct doctor *d) {
     }
     if (tls_new(&tls, c->tls_certificate, c->tls_key, &err) != STATUS_OK ||
         tls_days_left(c->tls_certificate, &days, &err) != STATUS_OK) {
-        tell(d, BAD, "tls", "%s", err.message);
+        tell(d, BAD, "tls", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
         return;
     }
     tls_free(tls);

@@ -51,9 +51,11 @@ static enum status check_match(const struct tls *tls, const gnutls_datum_t *chai
         return failed(code, tls->certificate_file, err);
     code = gnutls_certificate_set_x509_key_mem(credentials, chain, key, GNUTLS_X509_FMT_PEM);
     gnutls_certificate_free_credentials(credentials);
-    return code >= 0 ? STATUS_OK
-                     : error_set(err, STATUS_INPUT, "%s and %s: %s", tls->certificate_file, tls->key_file,
-                                 gnutls_strerror(code));
+    if (code >= 0)
+        return STATUS_OK;
+    error_set(err, STATUS_INPUT, "%s and %s: %s", tls->certificate_file, tls->key_file, gnutls_strerror(code));
+    return error_hint(err, "both are PEM: a certificate, then its chain; and the private key that belongs to it, without "
+                      "a passphrase");
 }
 
 static void free_pair(struct pair *pair) {

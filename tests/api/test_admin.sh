@@ -105,6 +105,8 @@ doctor 0 'ok +libraries .*sqlite [0-9]' --data "$work/none"
 doctor 0 'ok +tokens .*open: .*may do everything' --data "$work/none" --set access=open
 doctor 1 'FAIL +tokens .*loopback addresses only' --data "$work/none" --set access=open --set listen=0.0.0.0:1
 doctor 1 'warn +tls .*unencrypted' --data "$work/none" --set listen=0.0.0.0:1
+cp /etc/hostname "$work/nokey"
+doctor 1 'FAIL +tls .*private key' --data "$work/none" --set tls_certificate="$work/nokey" --set tls_key="$work/nokey"
 doctor 1 'FAIL +tls' --data "$work/none" --set tls_certificate="$work/none" --set tls_key="$work/none"
 doctor 0 'usage: unbaked doctor' --help
 (ulimit -n 500; exec "$build/unbaked" doctor --data "$work/none") >"$work/out"
