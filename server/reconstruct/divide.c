@@ -179,6 +179,17 @@ static struct measured mean_of(struct texel_looks *looks, const struct irradianc
     return m;
 }
 
+/* The texel that is measured in place of this one. */
+static uint32_t stand_in(const struct divide *d, uint32_t texel) {
+    const struct reconstruction *r = d->r;
+    uint32_t width = r->atlas.width, x = texel % width, y = texel / width;
+    uint32_t other = (y - y % d->stride) * width + x - x % d->stride;
+    uint32_t triangle = r->inverse.triangle[other];
+    bool same = triangle != INVERSE_UV_NONE && r->atlas.chart_of_triangle[triangle] ==
+                                                   r->atlas.chart_of_triangle[r->inverse.triangle[texel]];
+    return same ? other : texel;
+}
+
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
     struct texel_looks looks;
     struct irradiance light;
@@ -197,8 +208,11 @@ static void divide_chunk(void *user, size_t chunk, int thread) {
     const struct divide_range *range = user;
     struct divide *d = range->divide;
     size_t begin = chunk * CHUNK, end = begin + CHUNK < range->count ? begin + CHUNK : range->count;
-    for (size_t i = begin; i < end; i++)
-        divide_texel(d, d->r->inverse.valid[range->first + i], &d->scratch[thread]);
+    for (size_t i = begin; i < end; i++) {
+        uint32_t texel = d->r->inverse.valid[range->first + i];
+        if (stand_in(d, texel) == texel)
+            divide_texel(d, texel, &d->scratch[thread]);
+    }
 }
 
 void divide_texels(struct divide *d, size_t first, size_t count) {
@@ -235,6 +249,8 @@ static void send_out(const struct divide *d, uint32_t texel, uint16_t radiance[3
 
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     struct reconstruction *r = d->r;
+    for (size_t i = 0; i < r->inverse.valid_count; i++)
+        d->measured[r->inverse.valid[i]] = d->measured[stand_in(d, r->inverse.valid[i])];
     struct color_prior *prior = color_priors(r, d->measured);
     if (d->denoises)
         denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,

@@ -24,6 +24,7 @@ struct divide {
     const struct light_field *field;
     const struct noise *noise;
     bool denoises;                    /* else base colour is as measured */
+    uint32_t stride;                  /* one texel is measured for its chart in every stride x stride */
     struct incident *scratch;         /* [threads] */
     struct measured *measured;        /* [height][width] what the photographs tell of each texel */
 };

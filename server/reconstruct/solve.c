@@ -16,6 +16,8 @@
 #define LEAST_SPACING 4
 /* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
 #define FIRST_PASS_PART 0.25
+/* It measures one texel in so many squared: only what no photograph sees is taken from it. */
+#define FIRST_PASS_STRIDE 2
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -204,7 +206,9 @@ static bool solve_pass(struct solve *s, int pass) {
     if (!gather(s, pass))
         return false;
     decide_emitters(s);
-    gloss_fit(s->r, s->views, &s->probes, &s->field);
+    if (pass > 0)
+        gloss_fit(s->r, s->views, &s->probes, &s->field);
+    s->divide.stride = pass > 0 ? 1 : FIRST_PASS_STRIDE;
     if (!divide_all(s))
         return false;
     divide_finish(&s->divide, s->radiance);
