@@ -34,7 +34,7 @@ static const struct setting table[] = {
      "which segments emit: decided from the evidence; or, of listing1, any may to the end"},
     {"estimates", SETTING_CHOICE, "", 0, 0, "two|one", "two", NULL,
      "of a look's radiance in the loss: two independent ones, or one, whose squared error is biased"},
-    {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "1024", "solve",
+    {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",
      "solve: directions from which light is gathered at each point where it is"},
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},

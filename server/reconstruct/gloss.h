@@ -2,9 +2,10 @@
  *
  * At a few hundred texels of a segment, each seen by several photographs, the highlight of every
  * candidate material is gathered (highlight.h); what remains must be base colour times what the
- * diffuse lobe sends, with one base colour for all views of a texel. The candidate with the least
- * robust misfit wins, and is then placed between its neighbours by a parabola. A segment is glossy, or
- * matt, only where that is significant; of others too little is known. */
+ * diffuse lobe sends, with one base colour for all views of a texel. How much worse than the best one a
+ * candidate does, in standard errors over the texels, is how likely it is: a segment that is sure to be
+ * glossy is as the best candidate, placed between its neighbours by a parabola; one that is sure to be matt is
+ * matt; any other gets the mean of all candidates. */
 #ifndef UNBAKE_RECONSTRUCT_GLOSS_H
 #define UNBAKE_RECONSTRUCT_GLOSS_H
 

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/clock.h"
 #include "common/mem.h"
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emitters.h"
@@ -16,8 +17,11 @@
 #define LEAST_SPACING 4
 /* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
 #define FIRST_PASS_PART 0.25
-/* It measures one texel in so many squared: only what no photograph sees is taken from it. */
-#define FIRST_PASS_STRIDE 2
+/* It measures one texel in so many squared: only what no photograph sees is taken from it. So does the last
+ * where the time limit is short: where all texels would take longer than what is left of it, at so many times
+ * what the first pass took (highlights are looked at as well). */
+#define COARSE_STRIDE 2
+#define LAST_OVER_FIRST 6.0
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -39,6 +43,8 @@ struct solve {
     struct probes probes;
     struct divide divide;
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
+    double begin_sec;
+    bool hurries;            /* the time limit is too short to measure every texel */
     double work_done, work_total;
 };
 
@@ -174,7 +180,7 @@ static uint32_t spacing_for(const struct atlas *atlas) {
 static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views,
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    *s = (struct solve){.r = r, .views = views, .hooks = hooks};
+    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
     s->radiance = mem_calloc_large(texels, sizeof *s->radiance);
     memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
@@ -198,6 +204,13 @@ static void solve_release(struct solve *s) {
     mem_free(s->radiance);
 }
 
+/* Whether the time limit, where there is one, leaves less than so long. */
+static bool is_short(const struct solve *s, double seconds) {
+    const struct settings *set = s->r->settings;
+    return settings_number(set, "iterations") == 0.0 &&
+           clock_sec() - s->begin_sec + seconds > settings_number(set, "time_limit_sec");
+}
+
 static bool solve_pass(struct solve *s, int pass) {
     if (pass == 0)
         emitters_light_bright(s->r, s->views, s->r->evidence);
@@ -208,9 +221,12 @@ static bool solve_pass(struct solve *s, int pass) {
     decide_emitters(s);
     if (pass > 0)
         gloss_fit(s->r, s->views, &s->probes, &s->field);
-    s->divide.stride = pass > 0 ? 1 : FIRST_PASS_STRIDE;
+    s->divide.stride = pass == 0 || s->hurries ? COARSE_STRIDE : 1;
+    double divide_sec = clock_sec();
     if (!divide_all(s))
         return false;
+    if (pass == 0)
+        s->hurries = is_short(s, LAST_OVER_FIRST * (clock_sec() - divide_sec));
     divide_finish(&s->divide, s->radiance);
     return true;
 }
@@ -237,6 +253,7 @@ static void report(const struct solve *s) {
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
     json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASSES - 1));
     json_add(figures, "segments", segment_list(s->r));
+    json_add_int(figures, "measured_one_texel_in", (int64_t)s->divide.stride * (int64_t)s->divide.stride);
     json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);
 }
 
