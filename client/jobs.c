@@ -46,10 +46,10 @@ static double percent_done(const cJSON *job) {
 
 static void print_jobs(struct client *c, const cJSON *items) {
     static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", ">expires",
-                                           "name"};
+                                           "?owner", "name"};
     struct table t;
     const cJSON *job;
-    table_init(&t, 8, headings);
+    table_init(&t, 9, headings);
     cJSON_ArrayForEach(job, items) {
         char age[16], expires[16];
         const char *state = member_text(job, "state");
@@ -69,7 +69,8 @@ static void print_jobs(struct client *c, const cJSON *items) {
         table_set(&t, 5, COLOUR_NONE, "%s", age);
         keeping_text(expires, job);
         table_set(&t, 6, COLOUR_NONE, "%s", expires);
-        table_set(&t, 7, COLOUR_NONE, "%s", member_text(job, "name"));
+        table_set(&t, 7, COLOUR_NONE, "%s", member_text(job, "owner"));
+        table_set(&t, 8, COLOUR_NONE, "%s", member_text(job, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);

@@ -10,10 +10,10 @@
 #include "common/protocol.h"
 
 static void print_scenes(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"scene", "state", ">size", ">age", ">expires", "name"};
+    static const char *const headings[] = {"scene", "state", ">size", ">age", ">expires", "?owner", "name"};
     struct table t;
     const cJSON *scene;
-    table_init(&t, 6, headings);
+    table_init(&t, 7, headings);
     cJSON_ArrayForEach(scene, items) {
         char size[16], age[16], expires[16];
         const char *state = member_text(scene, "state");
@@ -26,7 +26,8 @@ static void print_scenes(struct client *c, const cJSON *items) {
         table_set(&t, 3, COLOUR_NONE, "%s", age);
         keeping_text(expires, scene);
         table_set(&t, 4, COLOUR_NONE, "%s", expires);
-        table_set(&t, 5, COLOUR_NONE, "%s", member_text(scene, "name"));
+        table_set(&t, 5, COLOUR_NONE, "%s", member_text(scene, "owner"));
+        table_set(&t, 6, COLOUR_NONE, "%s", member_text(scene, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);

@@ -13,7 +13,8 @@ void table_init(struct table *t, size_t columns, const char *const *headings) {
     table_row(t);
     for (size_t i = 0; i < columns; i++) {
         t->right[i] = headings[i][0] == '>';
-        table_set(t, i, COLOUR_DIM, "%s", headings[i] + t->right[i]);
+        t->optional[i] = headings[i][0] == '?';
+        table_set(t, i, COLOUR_DIM, "%s", headings[i] + (t->right[i] || t->optional[i]));
     }
 }
 
@@ -61,6 +62,8 @@ static void print_row(const struct table *t, size_t row, const size_t *width,
                       struct terminal *terminal) {
     size_t used = 0, edge = terminal->live ? terminal_width(terminal) : 0;
     for (size_t i = 0; i < t->columns; i++) {
+        if (width[i] == 0)
+            continue;
         struct buf cell;
         buf_init(&cell, CELL_MAX);
         buf_puts(&cell, t->cell[row * t->columns + i]);
@@ -85,10 +88,15 @@ static void print_row(const struct table *t, size_t row, const size_t *width,
 
 void table_print(const struct table *t, struct terminal *terminal) {
     size_t width[TABLE_COLUMNS] = {0};
-    for (size_t i = 0; i < t->rows * t->columns; i++) {
+    for (size_t i = t->columns; i < t->rows * t->columns; i++) {
         size_t columns = text_columns(t->cell[i]);
         if (columns > width[i % t->columns])
             width[i % t->columns] = columns;
+    }
+    for (size_t i = 0; i < t->columns; i++) {
+        size_t columns = text_columns(t->cell[i]);
+        if (columns > width[i] && !(t->optional[i] && width[i] == 0))
+            width[i] = columns;
     }
     for (size_t row = 0; row < t->rows; row++)
         print_row(t, row, width, terminal);

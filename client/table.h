@@ -6,17 +6,19 @@
 
 #include "client/terminal.h"
 
-#define TABLE_COLUMNS 8
+#define TABLE_COLUMNS 9
 
 struct table {
     size_t columns;
-    bool right[TABLE_COLUMNS]; /* align to the right */
+    bool right[TABLE_COLUMNS];    /* align to the right */
+    bool optional[TABLE_COLUMNS]; /* left out where no row has anything in it */
     char **cell;               /* [rows][columns]; owned */
     enum colour *colour;       /* [rows][columns] */
     size_t rows, capacity;
 };
 
-/* `headings` are the first row; one that begins with '>' is a column aligned to the right. */
+/* `headings` are the first row; one that begins with '>' is a column aligned to the right,
+ * with '?' one that is left out where it stays empty; not the last. */
 void table_init(struct table *t, size_t columns, const char *const *headings);
 void table_release(struct table *t);
 /* Starts a row of empty cells. */

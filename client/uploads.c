@@ -10,10 +10,10 @@ const struct option collect_options[] = {
 };
 
 static void print_uploads(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {"upload", ">done", ">size", ">age", ">expires", "scene", "name"};
+    static const char *const headings[] = {"upload", ">done", ">size", ">age", ">expires", "scene", "?owner", "name"};
     struct table t;
     const cJSON *item;
-    table_init(&t, 7, headings);
+    table_init(&t, 8, headings);
     cJSON_ArrayForEach(item, items) {
         char size[16], age[16], expires[16];
         double length = member_number(item, "length", 1.0);
@@ -27,7 +27,8 @@ static void print_uploads(struct client *c, const cJSON *items) {
         table_set(&t, 3, COLOUR_NONE, "%s", age);
         table_set(&t, 4, COLOUR_NONE, "%s", expires);
         table_set(&t, 5, COLOUR_NONE, "%.12s", member_text(item, "scene"));
-        table_set(&t, 6, COLOUR_NONE, "%s", member_text(item, "name"));
+        table_set(&t, 6, COLOUR_NONE, "%s", member_text(item, "owner"));
+        table_set(&t, 7, COLOUR_NONE, "%s", member_text(item, "name"));
     }
     table_print(&t, &c->out);
     table_release(&t);

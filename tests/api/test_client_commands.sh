@@ -37,6 +37,8 @@ run 0 show last --json
 so '.id == 1 and .state == "succeeded" and .name == "my room" and .labels.who == "me" and .priority == 3'
 so '.settings.texture_size == 64 and (.outputs | length) > 5'
 scene=$(jq -r .scene <<<"$out")
+run 0 list
+equal "$(head -n 1 <<<"$out" | tr -s ' ')" "job state done stage left age expires name" "the headings of a list"
 run 0 show 1
 has "$out" "who=me"
 has "$out" "base_color.exr"

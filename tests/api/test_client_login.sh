@@ -37,6 +37,8 @@ equal "$out" "[]" "what a viewer sees"
 run 0 edit 1 --share
 UNBAKE_TOKEN=$vic run 0 show 1
 has "$out" alice
+UNBAKE_TOKEN=$vic run 0 list
+equal "$(head -n 1 <<<"$out" | tr -s " ")" "job state done stage left age expires owner name" "the headings of a list"
 UNBAKE_TOKEN=$vic run 0 logs 1
 UNBAKE_TOKEN=$vic run 4 cancel 1
 has "$err" "may only look"
