@@ -58,8 +58,8 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
                        struct photograph_sample *sample);
 
 /* Cubic look-up (Keys 1981, a = -1/2), which does not blur by another pixel's width as a bilinear one
- * does and passes on twice its noise. False when one of the 4 x 4 taps is outside, masked, saturated or
- * not finite. */
+ * does and passes on twice its noise. False when one of the 4 x 4 taps is outside, masked, saturated, not
+ * finite, or far brighter than all others. */
 bool photograph_sample_cubic(const struct photograph *photo, float x, float y, rgb *radiance);
 
 /* Its four weights along a row or column, for a place `t` in [0, 1) from the second tap to the third. */
