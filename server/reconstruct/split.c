@@ -26,7 +26,7 @@
 /* A part and what is left are that large in photographs, at least, and differ by so much. */
 #define LEAST_PIXELS 100.0f
 #define LEAST_SHARE 0.05f
-#define LEAST_CONTRAST 4.0f
+#define LEAST_CONTRAST 2.0f
 /* What shows less than this share of its part is mixed with what is beside it. */
 #define PURE 0.3f
 /* What is cut off from the rest of the segment by a part and smaller than this share of it belongs to it. */

@@ -1,16 +1,17 @@
 /* split.h -- parts of segments that shine become segments of their own.
  *
  * A segment emits as a whole or not at all, and a screen in its bezel, or a bulb in its fixture, often is one
- * segment with it, given or made from the shape. Here a connected part of a segment is split off that all over
- * shows more than a white surface could reflect of what arrives there, while what is left of the
- * segment is much darker and of some size as well. It says nothing yet of what emits: that is decided later, for
- * all segments alike (emitters.h).
+ * segment with it, given or made from the shape. Here a connected part of a segment is split off that all
+ * over shows more than a white surface could reflect of what arrives there, while what is left of the
+ * segment is at most half as bright and of some size as well. It says nothing yet of what emits: that is
+ * decided later, for all segments alike (emitters.h).
  *
  * What is only painted white, a highlight (shining from some places only) and a patch of sun are left
  * where they are (shining.h).
  *
- * Limits. Triangles are not cut: a lit part of one is not found. Light of a sun that no photograph shows, through an
- * opening that the mesh does not have, makes what it falls on look like something that shines. */
+ * Limits. Triangles are not cut: a lit part of one is not found. Nor is a screen that shows less than white
+ * paper in its place would. Light of a sun that no photograph shows, through an opening that the mesh does
+ * not have, makes what it falls on look like something that shines. */
 #ifndef UNBAKE_RECONSTRUCT_SPLIT_H
 #define UNBAKE_RECONSTRUCT_SPLIT_H
 
