@@ -75,6 +75,9 @@ change /v1/jobs/1 '{"pinned":false}'
 run 0 collect; has "$out" job
 gone /v1/jobs/1 || fail "the expired job is there"
 [ ! -e "$data/jobs/1" ] || fail "its files are there"
+call POST /v1/uploads -H "$tus" -H 'Upload-Length: 1000000'; upload=$(header location)
+run 0 uploads --json; so '.[0].expires_at != null and .[0].offset == 0'
+run 0 uploads rm "${upload##*/}" --dry-run --json; so '.bytes >= 1000000'
 daemon_end TERM || fail "the daemon did not end with 0"
 
 # --- by the configuration: jobs after their end, scenes after their last use, uploads after their last byte ---
@@ -83,9 +86,6 @@ daemon_start --set collect_interval_sec=0.2 --set job_keep_days=0.00001 --set sc
 run 0 submit "$work/room" $long -q
 job=$out
 wait_for 60 job_is "$job" running
-call POST /v1/uploads -H "$tus" -H 'Upload-Length: 1000000'; upload=$(header location)
-run 0 uploads --json; so '.[0].expires_at != null and .[0].offset == 0'
-run 0 uploads rm "${upload##*/}" --dry-run --json; so '.bytes >= 1000000'
 wait_for 60 gone "$upload"
 [ -z "$(ls -A "$data/uploads")" ] || fail "the expired upload's file is there"
 # By now the job and its scene would have expired, had they not been in use.
