@@ -24,7 +24,7 @@ for source in tests/fuzz/test_*.c; do
     rm -rf "$seeds"
     mkdir -p "$seeds" "$corpus"
     "$build/tests/fuzz/test_$name" --seeds "$seeds" || continue
-    options=(-max_total_time="$seconds" -runs="$runs" -max_len=32768 -timeout=60 -rss_limit_mb=3072 -malloc_limit_mb=0
+    options=(-max_total_time="$seconds" -runs="$runs" -max_len=32768 -timeout=60 -rss_limit_mb=3072 -malloc_limit_mb=200000
         -artifact_prefix="$work/found-$name-" -print_final_stats=1)
     [ ! -e "$dictionary" ] || options+=(-dict="$dictionary")
     crashes=0
