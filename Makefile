@@ -47,7 +47,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests benches bench fidelity paper chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests benches bench fidelity rooms paper chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -129,6 +129,10 @@ bench: ## print the speed ratios and write build/bench.json; LONG=1: also what t
 fidelity: deps ## compare with the truth of known rooms, 10 minutes each; FIDELITY_SEC, FIDELITY_ROOMS
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
 	@tests/bench/fidelity.sh $(B)
+
+rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS; ROOM_SPP
+	@deploy/install-deps.sh rooms
+	@tests/bench/rooms.sh $(B)
 
 paper: ## repeat the paper's experiments (hours; PAPER=short: minutes, to see that they run), write build/paper.json
 	@deploy/install-deps.sh bench

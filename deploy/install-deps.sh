@@ -11,6 +11,7 @@ libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev libcurl4-openssl-de
 zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
 fuzz_packages="clang libclang-rt-14-dev"
 coverage_packages="gcovr"
+room_packages="libllvm19 python3-venv sweethome3d-furniture"
 bench_packages="libllvm19 python3-venv libmeshoptimizer-dev"
 
 # install PACKAGE...: those that are missing
@@ -43,6 +44,7 @@ install $packages
 case ${1:-} in
 fuzz) install $fuzz_packages ;;
 coverage) install $coverage_packages ;;
+rooms) install $room_packages ;;
 esac
 if [ "${1:-}" = bench ]; then
     # shellcheck disable=SC2086

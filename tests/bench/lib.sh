@@ -41,3 +41,20 @@ at_least() {
 quotient() {
     awk -v a="$1" -v b="$2" 'BEGIN { if (a == "null" || b == "null" || b + 0 == 0) print "null"; else print a / b }'
 }
+
+# Takes Mitsuba 3 from PyPI into $build/mitsuba, unless it is there; false where it is not to be had.
+mitsuba_ready() {
+    local llvm
+    llvm=$(ls /usr/lib/*/libLLVM.so.19* /usr/lib/*/libLLVM-19.so* 2>/dev/null | head -n 1)
+    if [ -z "$llvm" ]; then
+        echo "no libllvm19" >&2
+        return 1
+    fi
+    export DRJIT_LIBLLVM_PATH=$llvm
+    [ -x "$build/mitsuba/bin/python" ] || python3 -m venv "$build/mitsuba" >&2 || return 1
+    "$build/mitsuba/bin/python" -c 'import mitsuba, numpy' 2>/dev/null ||
+        "$build/mitsuba/bin/pip" install -q mitsuba numpy >&2 || {
+        echo "Mitsuba 3 cannot be installed" >&2
+        return 1
+    }
+}

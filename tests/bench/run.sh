@@ -9,6 +9,7 @@ set -u
 build=$1
 export UNBAKE_BUILD=$build
 rows=$build/bench.tsv
+. tests/bench/lib.sh
 : >"$rows"
 
 collect() {
@@ -20,24 +21,8 @@ collect() {
     done
 }
 
-mitsuba_ready() {
-    local llvm
-    llvm=$(ls /usr/lib/*/libLLVM.so.19* /usr/lib/*/libLLVM-19.so* 2>/dev/null | head -n 1)
-    if [ -z "$llvm" ]; then
-        echo "no libllvm19: the lines against Mitsuba 3 are left out" >&2
-        return 1
-    fi
-    export DRJIT_LIBLLVM_PATH=$llvm
-    [ -x "$build/mitsuba/bin/python" ] || python3 -m venv "$build/mitsuba" >&2 || return 1
-    "$build/mitsuba/bin/python" -c 'import mitsuba, numpy' 2>/dev/null ||
-        "$build/mitsuba/bin/pip" install -q mitsuba numpy >&2 || {
-        echo "Mitsuba 3 cannot be installed: its lines are left out" >&2
-        return 1
-    }
-}
-
 has_mitsuba=
-mitsuba_ready && has_mitsuba=1
+mitsuba_ready && has_mitsuba=1 || echo "the lines against Mitsuba 3 are left out" >&2
 for bench in "$build"/tests/bench/bench_*; do
     [ -x "$bench" ] && [ -f "$bench" ] || continue
     echo "== ${bench##*/}" >&2

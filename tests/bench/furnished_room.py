@@ -1,0 +1,309 @@
+"""Makes a furnished room with its truth, to measure fidelity on rooms that nothing was tuned on.
+
+usage: furnished_room.py kitchen|parlour OUT [SPP]
+
+OUT becomes a bundle like those of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: 72
+training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb; SPP samples a pixel, 256), HDR and
+8-bit at cycling exposures, and the truth of the held-out ones. Needs Debian's sweethome3d-furniture, whose
+models it uses; nothing of them is kept here.
+
+  kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel
+  parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books
+"""
+import json
+import os
+import sys
+
+import mitsuba as mi
+import numpy as np
+
+mi.set_variant("llvm_ad_rgb")
+
+from furniture import (METAL, SATIN, Catalogue, box, join, material, picture, planks, quad, sphere, stripes,  # noqa: E402
+                       tiles)
+
+WIDTH, HEIGHT, FOCAL = 320, 240, 208.5160596545929
+TRAIN, TEST = 72, 8
+DEPTH = 16
+EXPOSURES = (1.0, 1 / 16.66, 1 / 166.66)
+CLEARANCE = 0.25  # of cameras from furniture
+
+
+class Room:
+    """Parts, and the boxes where no camera can stand."""
+
+    def __init__(self, size, rng):
+        self.size, self.rng, self.catalogue = np.array(size), rng, Catalogue()
+        self.parts, self.boxes, self.sky = [], [], None
+
+    def add(self, *parts, blocks=False):
+        self.parts.extend(parts)
+        if blocks:
+            points = np.concatenate([p.positions for p in parts])
+            self.boxes.append((points.min(0) - CLEARANCE, points.max(0) + CLEARANCE))
+
+    def model(self, name, at, blocks=True, **how):
+        self.add(*self.catalogue.model(name, at, **how), blocks=blocks)
+
+    def walls(self, floor, wall, ceiling, windows=()):
+        """Windows are holes in the wall of greatest x: (z0, z1, y0, y1)."""
+        w, h, d = self.size
+        self.add(quad("floor", (0, 0, 0), (0, 0, d), (w, 0, 0), floor, (d / 1.6, w / 1.6)),
+                 quad("ceiling", (0, h, 0), (w, 0, 0), (0, 0, d), ceiling),
+                 quad("wall-x0", (0, 0, d), (0, 0, -d), (0, h, 0), wall, (d, h)),
+                 quad("wall-z0", (0, 0, 0), (w, 0, 0), (0, h, 0), wall, (w, h)),
+                 quad("wall-z1", (w, 0, d), (-w, 0, 0), (0, h, 0), wall, (w, h)))
+        z_cuts = sorted({0, d, *(z for win in windows for z in win[:2])})
+        y_cuts = sorted({0, h, *(y for win in windows for y in win[2:])})
+        panes = [quad("wall-x1", (w, y0, z0), (0, 0, z1 - z0), (0, y1 - y0, 0), wall, (z1 - z0, y1 - y0))
+                 for z0, z1 in zip(z_cuts, z_cuts[1:]) for y0, y1 in zip(y_cuts, y_cuts[1:])
+                 if not any(a <= z0 and z1 <= b and low <= y0 and y1 <= high for a, b, low, high in windows)]
+        self.add(join("wall-x1", panes, wall))
+        for z0, z1, y0, y1 in windows:
+            self.window(w, z0, z1, y0, y1)
+
+    def window(self, x, z0, z1, y0, y1, deep=0.2, thick=0.04):
+        white = material(SATIN, color=(0.8, 0.8, 0.78))
+        sides = ((y0 - thick, y0, z0 - thick, z1 + thick), (y1, y1 + thick, z0 - thick, z1 + thick),
+                 (y0, y1, z0 - thick, z0), (y0, y1, z1, z1 + thick))
+        self.add(*(box("reveal", (x, low, a), (x + deep, high, b), white) for low, high, a, b in sides))
+        middle = (z0 + z1) / 2
+        self.add(box("mullion", (x + 0.08, y0, middle - 0.03), (x + 0.13, y1, middle + 0.03),
+                     material(color=(0.8, 0.8, 0.78))))
+
+
+def kitchen(rng):
+    room = Room((4.5, 2.6, 4.0), rng)
+    room.walls(floor=material(roughness=0.15, specular=0.5,
+                              texture=tiles(rng, ((0.7, 0.68, 0.62), (0.08, 0.08, 0.09)))),
+               wall=material(color=(0.62, 0.68, 0.6)), ceiling=material(color=(0.82, 0.82, 0.82)))
+    backsplash = tiles(rng, ((0.75, 0.78, 0.8),), count=2, joint=(0.25, 0.25, 0.25), joint_width=8)
+    room.add(quad("backsplash", (0.6, 0.9, 0.01), (3.3, 0, 0), (0, 0.6, 0),
+                  material(roughness=0.2236, specular=0.5, texture=backsplash), (8, 1.5)))
+    for k, name in enumerate(("kitchenLowerCabinet", "largeStove", "kitchenDrawersCabinet", "kitchenLowerCabinet")):
+        room.model("blendswap-cc-by/" + name, (0.9 + 0.85 * k, 0, 0.33), height=0.9)
+        if k != 1:
+            room.model("blendswap-cc-by/kitchenUpperCabinet", (0.9 + 0.85 * k, 1.5, 0.2), height=0.75)
+    white = material(color=(0.8, 0.8, 0.8))
+    room.add(box("strip-body", (2.3, 1.47, 0.1), (3.8, 1.5, 0.16), white),
+             quad("strip", (2.32, 1.468, 0.11), (1.46, 0, 0), (0, 0, 0.04), material(emission=(16, 17, 18))))
+    for x in (1.2, 3.2):
+        for z in (1.4, 3.0):
+            room.add(box("spot-ring", (x - 0.09, 2.56, z - 0.09), (x + 0.09, 2.598, z + 0.09),
+                         material(METAL, color=(0.7, 0.7, 0.7))),
+                     quad("spot", (x - 0.06, 2.557, z - 0.06), (0.12, 0, 0), (0, 0, 0.12),
+                          material(emission=(40, 34, 26))))
+    for name, at, how in (
+            ("blendswap-cc-0/largeFridge", (4.1, 0, 2.2), dict(height=1.85, turned=-90)),
+            ("blendswap-cc-by/microwave", (3.4, 0.91, 0.33), dict(height=0.3)),
+            ("blendswap-cc-0/kitchenaid", (2.4, 0.91, 0.33), dict(height=0.38, turned=20)),
+            ("blendswap-cc-by/espressokettle", (1.7, 0.93, 0.35), dict(height=0.22)),
+            ("blendswap-cc-0/oakTable", (1.5, 0, 2.6), dict(height=0.75)),
+            ("blendswap-cc-0/oakChair", (1.5, 0, 1.8), dict(height=0.95)),
+            ("blendswap-cc-0/oakChair", (1.4, 0, 3.4), dict(height=0.95, turned=180)),
+            ("blendswap-cc-by/chair3", (2.6, 0, 2.6), dict(height=0.9, turned=-90)),
+            ("scopia/teapot", (1.6, 0.76, 2.6), dict(height=0.2)),
+            ("katorlegaz/bowl", (1.2, 0.76, 2.7), dict(height=0.1)),
+            ("scopia/apples", (1.2, 0.8, 2.7), dict(height=0.1)),
+            ("katorlegaz/coffee-mug", (1.9, 0.76, 2.5), dict(height=0.1)),
+            ("blendswap-cc-by/yuccaPlant", (0.4, 0, 3.6), dict(height=1.3)),
+            ("blendswap-cc-0/radiator", (4.42, 0.1, 3.3), dict(height=0.6, turned=-90)),
+            ("blendswap-cc-0/whiteBoard", (0.08, 1.2, 2.0), dict(height=0.8, turned=90, blocks=False))):
+        room.model(name, at, **how)
+    room.add(quad("calendar", (0.02, 1.3, 3.5), (0, 0, -0.5), (0, 0.7, 0), material(texture=picture(rng))))
+    return room
+
+
+def parlour(rng):
+    room = Room((6.0, 2.8, 5.0), rng)
+    room.walls(floor=material(SATIN, texture=planks(rng)),
+               wall=material(texture=stripes(rng, (0.55, 0.5, 0.38), (0.7, 0.66, 0.55))),
+               ceiling=material(color=(0.8, 0.8, 0.78)), windows=((0.8, 2.2, 0.9, 2.3), (3.0, 4.4, 0.9, 2.3)))
+    leather = material(roughness=0.4472, specular=0.5, color=(0.35, 0.12, 0.1))
+    for name, at, how in (
+            ("blendswap-cc-0/L_shaped_sofa", (1.3, 0, 1.3), dict(width=2.2, kind=leather)),
+            ("katorlegaz/oriental-rug", (2.6, 0.002, 2.4), dict(width=2.4, blocks=False)),
+            ("blendswap-cc-by/coffeeTable", (2.7, 0.01, 2.5), dict(height=0.45)),
+            ("katorlegaz/full-bookcase", (0.25, 0, 3.2), dict(height=2.1, turned=90)),
+            ("katorlegaz/full-bookcase", (0.25, 0, 4.3), dict(height=2.1, turned=90)),
+            ("blendswap-cc-0/televisionCabinet", (3.2, 0, 4.65), dict(width=2.0, turned=180)),
+            ("blendswap-cc-0/modernArmchair", (4.6, 0, 1.0),
+             dict(height=0.8, turned=-40, kind=material(color=(0.15, 0.25, 0.4)))),
+            ("blendswap-cc-0/teddyBear", (4.6, 0.42, 1.0), dict(height=0.35, turned=-40)),
+            ("blendswap-cc-by/mediumIndoorPlant", (5.5, 0, 4.5), dict(height=1.3)),
+            ("katorlegaz/coffee-mug", (2.6, 0.46, 2.4), dict(height=0.12)),
+            ("blendswap-cc-by/clock", (0.1, 2.2, 1.5), dict(height=0.4, turned=90, blocks=False))):
+        room.model(name, at, **how)
+    room.add(box("screen-body", (2.5, 0.9, 4.8), (3.9, 1.7, 4.9),
+                 material(roughness=0.2, specular=0.5, color=(0.03, 0.03, 0.03))), blocks=True)
+    room.add(quad("screen", (2.55, 0.95, 4.79), (0, 0.7, 0), (1.3, 0, 0), material(emission=(0.9, 1.3, 2.0))),
+             box("lamp-rod", (2.98, 2.3, 2.48), (3.02, 2.8, 2.52), material(METAL, color=(0.6, 0.6, 0.6))),
+             sphere("lamp", (3.0, 2.2, 2.5), 0.12, material(emission=(9, 7.5, 5.5))))
+    for x in (1.2, 2.7, 4.2):
+        room.add(box("frame", (x - 0.05, 1.35, 0.001), (x + 0.95, 2.1, 0.028),
+                     material(roughness=0.3162, specular=1.0, color=(0.5, 0.35, 0.12))),
+                 quad("picture", (x, 1.4, 0.03), (0.9, 0, 0), (0, 0.65, 0),
+                      material(roughness=0.2, specular=0.5, texture=picture(rng))))
+    # From the horizon up bluer and darker, brighter towards +x, brown below.
+    up = np.cos(np.pi * (np.arange(128) + 0.5) / 128)[:, None, None]
+    along = 1 + 0.5 * np.cos(2 * np.pi * (np.arange(256) + 0.5) / 256 - np.pi / 2)[None, :, None]
+    room.sky = np.where(up > 0, (8, 9, 11) - up * np.array((5, 4, 3)), (2.2, 1.9, 1.5)) * along
+    return room
+
+
+# --- rendering -----------------------------------------------------------------------------------
+
+
+def texture_of(of):
+    if of.texture is None:
+        return {"type": "rgb", "value": [float(c) for c in of.color]}
+    return {"type": "bitmap", "bitmap": mi.Bitmap(of.texture.astype(np.float32)), "raw": True}
+
+
+def scene_of(room, shines):
+    """The room as it is; or, where shines(number, part) gives a texture, black and shining by that."""
+    scene = {"type": "scene"}
+    if shines is None and room.sky is not None:
+        scene["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(room.sky.astype(np.float32))}
+    for number, part in enumerate(room.parts):
+        of, props = part.material, mi.Properties()
+        radiance = {"type": "rgb", "value": [float(c) for c in of.emission]}
+        bsdf = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+        if shines:
+            radiance = shines(number, part)
+        else:
+            bsdf = {"type": "twosided", "bsdf": {"type": "principled", "base_color": texture_of(of),
+                                                 "roughness": of.roughness, "specular": of.specular}}
+        props["bsdf"] = mi.load_dict(bsdf)
+        if shines or max(of.emission) > 0:
+            props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
+        mesh = mi.Mesh(f"part{number}", len(part.positions), len(part.faces), has_vertex_normals=True,
+                       has_vertex_texcoords=True, props=props)
+        params = mi.traverse(mesh)
+        params["vertex_positions"] = part.positions.astype(np.float32).ravel()
+        params["vertex_normals"] = part.normals.astype(np.float32).ravel()
+        params["vertex_texcoords"] = part.uv.astype(np.float32).ravel()
+        params["faces"] = part.faces.astype(np.uint32).ravel()
+        params.update()
+        scene[f"part{number}"] = mesh
+    return mi.load_dict(scene)
+
+
+def render(scene, pose, spp, integrator, seed):
+    to_world = pose.copy()
+    to_world[:3, [0, 2]] *= -1  # theirs: x left, y up, z forward
+    sensor = mi.load_dict({
+        "type": "perspective", "fov": 2 * np.degrees(np.arctan(0.5 * WIDTH / FOCAL)), "fov_axis": "x",
+        "to_world": mi.ScalarTransform4f(to_world), "near_clip": 1e-3, "far_clip": 1e4,
+        "film": {"type": "hdrfilm", "width": WIDTH, "height": HEIGHT, "rfilter": {"type": "box"},
+                 "pixel_format": "rgb", "component_format": "float32"},
+        "sampler": {"type": "independent", "sample_count": spp}})
+    return np.array(mi.render(scene, sensor=sensor, integrator=mi.load_dict(integrator), spp=spp, seed=seed))
+
+
+def choose_poses(room, scene, count):
+    """Cameras anywhere at the height of hands and eyes, that look anywhere but at what is near."""
+    poses = []
+    while len(poses) < count:
+        at = room.rng.uniform((0.4, 0.9, 0.4), (room.size[0] - 0.4, 1.9, room.size[2] - 0.4))
+        back = at - room.rng.uniform((0, 0, 0), room.size)
+        distance = np.linalg.norm(back)
+        if distance < 1.5 or abs(back[1]) > 0.75 * distance or any(
+                np.all((at > low) & (at < high)) for low, high in room.boxes):
+            continue
+        back /= distance
+        ray = mi.Ray3f(mi.Point3f(*map(float, at)), mi.Vector3f(*map(float, -back)))
+        if float(scene.ray_intersect(ray).t[0]) < 0.7:
+            continue
+        pose = np.eye(4)
+        right = np.cross((0, 1, 0), back)
+        pose[:3, 0] = right / np.linalg.norm(right)
+        pose[:3, 1] = np.cross(back, pose[:3, 0])
+        pose[:3, 2], pose[:3, 3] = back, at
+        poses.append(pose)
+    return poses
+
+
+# --- the bundle ----------------------------------------------------------------------------------
+
+
+def write_mesh(room, path):
+    joined = join("room", room.parts, None)
+    faces = np.zeros(len(joined.faces), [("count", "u1"), ("v", "<i4", 3), ("object", "<i4")])
+    faces["count"], faces["v"] = 3, joined.faces
+    faces["object"] = np.repeat(np.arange(len(room.parts)), [len(p.faces) for p in room.parts])
+    vertices = np.hstack([joined.positions, joined.normals]).astype("<f4")
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}",
+              *(f"property float {c}" for c in ("x", "y", "z", "nx", "ny", "nz")), f"element face {len(faces)}",
+              "property list uchar int vertex_indices", "property int object_id", "end_header", ""]
+    with open(path, "wb") as out:
+        out.write("\n".join(header).encode() + vertices.tobytes() + faces.tobytes())
+
+
+def write_transforms(path, poses, folder, kind, **more):
+    frames = [{"file_path": f"{folder}/{k:03d}.{kind}", "transform_matrix": pose.tolist(),
+               "split": "train" if k < TRAIN else "test"} for k, pose in enumerate(poses)]
+    for key, values in more.pop("of_frames", {}).items():
+        for frame, value in zip(frames, values):
+            frame[key] = value
+    json.dump({"camera_model": "PINHOLE", "w": WIDTH, "h": HEIGHT, "fl_x": FOCAL, "fl_y": FOCAL, "cx": WIDTH / 2,
+               "cy": HEIGHT / 2, **more, "frames": frames}, open(path, "w"))
+
+
+def write_photographs(room, scene, poses, out, spp):
+    path = {"type": "path", "max_depth": DEPTH, "rr_depth": 8}
+    images = [render(scene, pose, spp, path, k) for k, pose in enumerate(poses)]
+    base = 0.7 / float(np.median(images[:TRAIN]))
+    exposures = [base * EXPOSURES[k % 3] for k in range(len(images))]
+    for k, (image, exposure) in enumerate(zip(images, exposures)):
+        mi.Bitmap(image.astype(np.float16)).write(f"{out}/images/{k:03d}.exr")
+        shown = image * exposure
+        shown = np.clip(shown + 0.01 * np.sqrt(shown) * room.rng.normal(size=shown.shape), 0, 1)
+        mi.Bitmap(shown.astype(np.float32)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8,
+                                                    srgb_gamma=True).write(f"{out}/sdr/{k:03d}.png")
+    write_transforms(out + "/transforms.json", poses, "images", "exr")
+    write_transforms(out + "/transforms_sdr.json", poses, "sdr", "png", response="srgb",
+                     of_frames={"exposure": exposures})
+
+
+def write_truth(room, poses, out):
+    """Base colour averaged over the pixel; all else at one random place of it, the same for all."""
+    def constant(*values):
+        return {"type": "rgb", "value": [float(v) for v in values]}
+
+    emitted = {"type": "path", "max_depth": 1}
+    colors = scene_of(room, lambda number, part: texture_of(part.material))
+    # A shape whose light is black would be no emitter: numbers from 1, all else a little more than 0.
+    others = scene_of(room, lambda number, part: constant(part.material.roughness, part.material.specular + 1e-9,
+                                                          number + 1))
+    lights = scene_of(room, lambda number, part: constant(*(e + 1e-9 for e in part.material.emission)))
+    for k in range(TRAIN, TRAIN + TEST):
+        color = render(colors, poses[k], 64, emitted, 1)
+        other, light = render(others, poses[k], 1, emitted, 2), render(lights, poses[k], 1, emitted, 2)
+        light[light < 1e-6] = 0.0
+        depth = render(others, poses[k], 1, {"type": "depth"}, 2)[..., :1]
+        channels = np.dstack([color, light, other[..., :2], np.round(other[..., 2:]) - 1, depth]).astype(np.float32)
+        names = [f"{what}.{c}" for what in ("base_color", "emission") for c in "RGB"]
+        mi.Bitmap(channels, pixel_format=mi.Bitmap.PixelFormat.MultiChannel,
+                  channel_names=names + ["roughness", "specular", "object_id", "depth"]).write(f"{out}/truth/{k:03d}.exr")
+    json.dump([{"id": k, "name": p.name, "roughness": p.material.roughness, "specular": p.material.specular,
+                "emission": list(map(float, p.material.emission)), "base_color": list(map(float, p.material.color)),
+                "base_color_texture": None if p.material.texture is None else p.name, "triangles": len(p.faces)}
+               for k, p in enumerate(room.parts)], open(out + "/truth/objects.json", "w"), indent=1)
+
+
+def main():
+    kind, out, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 256
+    room = {"kitchen": kitchen, "parlour": parlour}[kind](np.random.default_rng(1))
+    for folder in ("images", "sdr", "truth"):
+        os.makedirs(f"{out}/{folder}", exist_ok=True)
+    print(f"{kind}: {len(room.parts)} objects, {sum(len(p.faces) for p in room.parts)} triangles", flush=True)
+    scene = scene_of(room, None)
+    poses = choose_poses(room, scene, TRAIN + TEST)
+    write_mesh(room, out + "/mesh.ply")
+    write_photographs(room, scene, poses, out, spp)
+    write_truth(room, poses, out)
+
+
+if __name__ == "__main__":
+    main()
