@@ -162,10 +162,11 @@ soak: deps ## many clients for a long time; writes build/soak.json; T=name runs 
 	@tests/long.sh soak $(B) "$(T)"
 
 FUZZ_SECONDS ?= 60
-fuzz: deps ## search for crashes with libFuzzer, FUZZ_SECONDS (60) a target; writes build/fuzz.json; T=name runs one
+FUZZ_RUNS ?= -1
+fuzz: deps ## search for crashes with libFuzzer, FUZZ_SECONDS (60) or FUZZ_RUNS a target; writes build/fuzz.json; T=name runs one
 	@deploy/install-deps.sh fuzz
 	@+$(BUILD) fuzzers fuzz-build
-	@FUZZ_SECONDS=$(FUZZ_SECONDS) tests/fuzz/fuzz.sh $(B) "$(T)"
+	@FUZZ_SECONDS=$(FUZZ_SECONDS) FUZZ_RUNS=$(FUZZ_RUNS) tests/fuzz/fuzz.sh $(B) "$(T)"
 
 fuzzers: $(FUZZ_BIN)
 # clang has another way to say that a sanitizer is there.

@@ -1,4 +1,4 @@
-/* partial.h -- uploads in parts, on disk: who may write, what is safe, what becomes of it.
+/* partial.h -- uploads in parts, on disk: what is safe, what becomes of them. Who may write: claim.h.
  *
  *      created ──claim, write ...──> whole ──finish──> a scene        (or removed, or expired)
  *                  ^         │
@@ -6,9 +6,7 @@
  *
  * 1. `received` in the store counts bytes that are on disk (fdatasync before the row): what is
  *    acknowledged is never lost. It only grows.
- * 2. One request at a time holds the claim. A newer one that names the right offset takes it away:
- *    the older is dead or about to find out. Bytes go to disk under the entry's mutex, so the two
- *    never mix.
+ * 2. One request at a time writes (claim.h).
  * 3. A daemon that was killed leaves bytes in the file that no row counts. They are hashed and
  *    counted when the upload is next looked at, provided that the machine has run on since (its
  *    boot id says so): then the kernel has kept them. After a power cut they are cut off.
@@ -26,7 +24,6 @@
 #include "server/http/api.h"
 
 struct partials; /* the uploads that are being written or looked at; opaque */
-struct claim;    /* one request's right to write to one of them; opaque */
 
 struct partials *partials_new(struct api *api);
 void partials_free(struct partials *p); /* what is in files but not yet counted is counted */
@@ -41,22 +38,6 @@ enum status partial_create(struct partials *p, struct upload_row *row, struct er
 
 /* The row as it is now, everything received on disk and counted, and finished if it is whole. */
 enum status partial_look(struct partials *p, const char *id, struct upload_row *row, struct error *err);
-
-/* The right to write from `offset` on. STATUS_CONFLICT when that is not where the upload stands.
- * is_checked: what is written does not count before partial_accept. */
-enum status partial_claim(struct partials *p, const char *id, uint64_t offset, bool is_checked,
-                          struct claim **claim, struct error *err);
-/* STATUS_CONFLICT: another request has taken over; STATUS_LIMIT: more than the whole. */
-enum status partial_write(struct claim *claim, const void *data, uint64_t length, struct error *err);
-uint64_t partial_room(const struct claim *claim);   /* what may still be written */
-uint64_t partial_unreserved(struct claim *claim);   /* of that, what the disk has not set aside */
-bool partial_is_due(struct claim *claim);           /* much was written since the last commit */
-enum status partial_accept(struct claim *claim, struct error *err);
-/* What was written is on disk and counted. */
-enum status partial_commit(struct claim *claim, struct error *err);
-/* The same, and the row as partial_look gives it. STATUS_CONFLICT: some of it was lost, and is to be sent again. */
-enum status partial_finish(struct claim *claim, struct upload_row *row, struct error *err);
-void partial_release(struct claim *claim); /* NULL is fine; frees it */
 
 /* Removes the upload with what it holds, also while somebody writes to it. */
 enum status partial_remove(struct partials *p, const char *id, struct error *err);

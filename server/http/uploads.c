@@ -15,6 +15,7 @@
 #include "common/sha256.h"
 #include "common/utf8.h"
 #include "server/http/body.h"
+#include "server/http/claim.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
@@ -287,13 +288,13 @@ struct response *uploads_begin(struct api *api, struct request *r) {
     refusal = read_checksum(r, p);
     if (refusal)
         return tagged(refusal);
-    if (partial_claim(api->partials, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->claim, &err) !=
+    if (claim_take(api->partials, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->claim, &err) !=
         STATUS_OK)
         return refuse(r, &err);
-    if (r->content_length > 0 && (uint64_t)r->content_length > partial_room(p->claim))
+    if (r->content_length > 0 && (uint64_t)r->content_length > claim_room(p->claim))
         return tagged(problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld",
-                              partial_room(p->claim), (long long)r->content_length));
-    uint64_t unreserved = partial_unreserved(p->claim);
+                              claim_room(p->claim), (long long)r->content_length));
+    uint64_t unreserved = claim_unreserved(p->claim);
     refusal = unreserved ? space_check_room(api, r, unreserved) : NULL;
     return refusal ? tagged(refusal) : NULL;
 }
@@ -301,7 +302,7 @@ struct response *uploads_begin(struct api *api, struct request *r) {
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
     struct patch *p = r->patch;
     struct error err;
-    if (partial_write(p->claim, data, length, &err) != STATUS_OK)
+    if (claim_write(p->claim, data, length, &err) != STATUS_OK)
         return refuse(r, &err);
     atomic_fetch_add(&api->uploaded_bytes, length);
     if (p->checksum == CHECKSUM_SHA1)
@@ -309,19 +310,19 @@ struct response *uploads_data(struct api *api, struct request *r, const void *da
     else if (p->checksum == CHECKSUM_SHA256)
         sha256_update(&p->sha256, data, length);
     /* The library does not bear a pause between the chunks of one piece that it has read. */
-    r->wants_rest = r->content_length > 0 && partial_is_due(p->claim);
+    r->wants_rest = r->content_length > 0 && claim_is_due(p->claim);
     return NULL;
 }
 
 struct response *uploads_rest(struct request *r) {
     struct error err;
-    return partial_commit(r->patch->claim, &err) == STATUS_OK ? NULL : refuse(r, &err);
+    return claim_commit(r->patch->claim, &err) == STATUS_OK ? NULL : refuse(r, &err);
 }
 
 void uploads_drop(struct patch *p) {
     if (!p)
         return;
-    partial_release(p->claim);
+    claim_release(p->claim);
     mem_free(p);
 }
 
@@ -379,9 +380,9 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     if (!is_as_sent(p))
         return tagged(problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten"));
     if (p->checksum != CHECKSUM_NONE)
-        status = partial_accept(p->claim, &err);
+        status = claim_accept(p->claim, &err);
     if (status == STATUS_OK)
-        status = partial_finish(p->claim, &row, &err);
+        status = claim_finish(p->claim, &row, &err);
     if (status != STATUS_OK)
         return refuse(r, &err);
     struct response *reply = tagged(response_new(204));

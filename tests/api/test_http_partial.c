@@ -6,7 +6,7 @@
 #include <time.h>
 
 #include "common/sha256.h"
-#include "server/http/partial.h"
+#include "server/http/claim.h"
 #include "tests/api/rig.h"
 
 #define BYTES 1000
@@ -65,8 +65,8 @@ static void *look(void *user) {
 static struct claim *send_all(struct partials *p, const char *id, const char *bytes) {
     struct claim *claim;
     struct error err;
-    rig_must(partial_claim(p, id, 0, false, &claim, &err), &err, "partial_claim");
-    rig_must(partial_write(claim, bytes, BYTES, &err), &err, "partial_write");
+    rig_must(claim_take(p, id, 0, false, &claim, &err), &err, "claim_take");
+    rig_must(claim_write(claim, bytes, BYTES, &err), &err, "claim_write");
     return claim;
 }
 
@@ -105,8 +105,8 @@ static void test_two(struct rig *rig, enum rival rival) {
     while (atomic_load(&begun) == 0)
         nap();
     enum status status = rival == RIVAL_LOOK     ? partial_look(p, row.id, &found, &err)
-                         : rival == RIVAL_FINISH ? partial_finish(claim, &found, &err)
-                                                 : partial_claim(p, row.id, 0, true, &late, &err);
+                         : rival == RIVAL_FINISH ? claim_finish(claim, &found, &err)
+                                                 : claim_take(p, row.id, 0, true, &late, &err);
     pthread_join(thread, NULL);
     atomic_store(&is_armed, false);
     CHECK(first.status == STATUS_IO);
@@ -116,13 +116,13 @@ static void test_two(struct rig *rig, enum rival rival) {
     else
         CHECK_THAT(status == STATUS_CONFLICT, "%s", status_name(status));
     upload_row_release(&found);
-    partial_release(late);
-    partial_release(claim);
+    claim_release(late);
+    claim_release(claim);
 
     claim = send_all(p, row.id, bytes);
-    rig_must(partial_finish(claim, &found, &err), &err, "partial_finish");
+    rig_must(claim_finish(claim, &found, &err), &err, "claim_finish");
     CHECK_STRING(found.scene_id, wanted);
-    partial_release(claim);
+    claim_release(claim);
     upload_row_release(&found);
     upload_row_release(&row);
 }

@@ -1,10 +1,10 @@
-/* fault_worker BUILD ROOM ARCHIVE disk|memory STEP ALL -- a worker's n-th operation on a file or n-th allocation
- * fails, for every STEP-th n: a disk by ENOSPC or EIO, once or from then on, memory once or from then on
- * (ALL: 1 for all of these at each n, 0 for one in turn). The worker ends with the status that says so
- * (server/worker/progress.h), by which the daemon pauses the job or tries again with less, never by a
- * signal, and without a leak; a full disk leaves no half-written file. The next attempt, when all is
- * well again, ends with the textures of one that nobody disturbed. The same of the check of a scene, which
- * never finds fault with the scene for it. */
+/* fault_worker BUILD ROOM ARCHIVE disk|memory STEP ALL [FROM] -- a worker's n-th operation on a file or n-th
+ * allocation fails, for every STEP-th n from FROM (1) on: a disk by ENOSPC or EIO, once or from then on,
+ * memory once or from then on (ALL: 1 for all of these at each n, 0 for one in turn). The worker ends with
+ * the status that says so (server/worker/progress.h), by which the daemon pauses the job or tries again with
+ * less, never by a signal, and without a leak; a full disk leaves no half-written file. The next attempt,
+ * when all is well again, ends with the textures of one that nobody disturbed. The same of the check of a
+ * scene, which never finds fault with the scene for it. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -121,7 +121,7 @@ static bool strike_check(const char *root, const char *archive, long n, int erro
 }
 
 int main(int argc, char **argv) {
-    long step = argc == 7 ? strtol(argv[5], NULL, 10) : 0, strikes = 0, n = 1;
+    long step = argc >= 7 ? strtol(argv[5], NULL, 10) : 0, n = argc > 7 ? strtol(argv[7], NULL, 10) : 1, strikes = 0;
     bool all = step > 0 && argv[6][0] == '1', more = true;
     char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE], top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
     if (step <= 0 || !mkdtemp(top))

@@ -1,0 +1,179 @@
+/* claim.c -- see claim.h. */
+#include "server/http/claim.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/mem.h"
+#include "server/http/intake.h"
+
+#define COMMIT_BYTES ((uint64_t)64 << 20) /* counted at least so often; a kill costs hashing them again */
+#define HINT_BYTES ((uint64_t)8 << 20)    /* writing out begins so often, so that a commit is short */
+
+struct claim {
+    struct intake *intake;
+    bool is_checked;
+    uint64_t at;        /* where it writes next */
+    struct sha256 hash; /* where is_checked: up to `at` */
+};
+
+static enum status lost(struct error *err) {
+    error_set(err, STATUS_CONFLICT, "the disk failed: the upload stands at an earlier offset");
+    return error_hint(err, "HEAD tells where; go on from there");
+}
+
+/* --- who writes ---------------------------------------------------------------------------- */
+
+/* The intake's mutex is held. */
+static enum status check_offset(const struct intake *e, uint64_t offset, struct error *err) {
+    if (!e->is_loaded) /* e->hash is still that of what was forgotten */
+        return lost(err);
+    if (e->received != offset)
+        return error_set(err, STATUS_CONFLICT, "the upload stands at %llu, not at %llu",
+                         (unsigned long long)e->received, (unsigned long long)offset);
+    return STATUS_OK;
+}
+
+enum status claim_take(struct partials *p, const char *id, uint64_t offset, bool is_checked, struct claim **out,
+                       struct error *err) {
+    struct intake *e;
+    *out = NULL;
+    enum status status = intake_get(p, id, &e, err);
+    if (status != STATUS_OK)
+        return status;
+    pthread_mutex_lock(&e->mutex);
+    bool must_disbelieve = is_checked && e->is_believed;
+    pthread_mutex_unlock(&e->mutex);
+    if (must_disbelieve)
+        status = intake_disbelieve(e, err);
+    pthread_mutex_lock(&e->mutex);
+    if (status == STATUS_OK)
+        status = check_offset(e, offset, err);
+    if (status == STATUS_OK) {
+        struct claim *c = *out = mem_calloc(1, sizeof *c);
+        *c = (struct claim){e, is_checked, offset, e->hash};
+        e->holder = c;
+    }
+    pthread_mutex_unlock(&e->mutex);
+    if (status != STATUS_OK)
+        intake_put(e);
+    return status;
+}
+
+/* The intake's mutex is held. */
+static enum status check_holder(const struct claim *c, struct error *err) {
+    if (c->intake->is_gone)
+        return error_set(err, STATUS_NOT_FOUND, "the upload was removed");
+    if (c->intake->holder != c)
+        return error_set(err, STATUS_CONFLICT, "another request goes on with this upload");
+    return STATUS_OK;
+}
+
+void claim_release(struct claim *c) {
+    if (!c)
+        return;
+    struct intake *e = c->intake;
+    pthread_mutex_lock(&e->mutex);
+    if (e->holder == c)
+        e->holder = NULL;
+    pthread_mutex_unlock(&e->mutex);
+    intake_put(e);
+    mem_free(c);
+}
+
+/* --- writing ------------------------------------------------------------------------------- */
+
+static enum status write_at(int fd, const char *data, uint64_t length, uint64_t at, struct error *err) {
+    while (length > 0) {
+        ssize_t wrote = pwrite(fd, data, length, (off_t)at);
+        if (wrote < 0 && errno == EINTR)
+            continue;
+        if (wrote < 0)
+            return error_set_errno(err, errno, "cannot write the upload");
+        data += wrote;
+        at += (uint64_t)wrote;
+        length -= (uint64_t)wrote;
+    }
+    return STATUS_OK;
+}
+
+/* Now and then: the kernel begins to write out what has come up to `at`. Only a hint to it. */
+static void hint(struct intake *e, uint64_t at) {
+    if (at >= e->hinted && at - e->hinted < HINT_BYTES)
+        return;
+    if (at > e->hinted)
+        (void)sync_file_range(e->fd, (off_t)e->hinted, (off_t)(at - e->hinted), SYNC_FILE_RANGE_WRITE);
+    e->hinted = at;
+}
+
+enum status claim_write(struct claim *c, const void *data, uint64_t length, struct error *err) {
+    struct intake *e = c->intake;
+    pthread_mutex_lock(&e->mutex);
+    enum status status = check_holder(c, err);
+    if (status == STATUS_OK && length > e->length - c->at)
+        status = error_set(err, STATUS_LIMIT, "the upload has %llu bytes, and more were sent",
+                           (unsigned long long)e->length);
+    if (status == STATUS_OK)
+        status = write_at(e->fd, data, length, c->at, err);
+    if (status == STATUS_OK) {
+        sha256_update(&c->hash, data, length);
+        c->at += length;
+        if (!c->is_checked) {
+            e->hash = c->hash;
+            e->received = c->at;
+        }
+        hint(e, c->at);
+    }
+    pthread_mutex_unlock(&e->mutex);
+    return status;
+}
+
+uint64_t claim_room(const struct claim *c) {
+    return c->intake->length - c->at; /* the length never changes */
+}
+
+uint64_t claim_unreserved(const struct claim *c) {
+    struct stat info;
+    uint64_t length = c->intake->length;
+    if (fstat(c->intake->fd, &info) != 0)
+        return claim_room(c);
+    uint64_t has = (uint64_t)info.st_blocks * 512;
+    return has < length ? length - has : 0;
+}
+
+/* --- counting ------------------------------------------------------------------------------ */
+
+bool claim_is_due(const struct claim *c) {
+    struct intake *e = c->intake;
+    pthread_mutex_lock(&e->mutex);
+    bool due = e->received - e->counted >= COMMIT_BYTES;
+    pthread_mutex_unlock(&e->mutex);
+    return due;
+}
+
+enum status claim_accept(struct claim *c, struct error *err) {
+    struct intake *e = c->intake;
+    pthread_mutex_lock(&e->mutex);
+    enum status status = check_holder(c, err);
+    if (status == STATUS_OK) {
+        e->hash = c->hash;
+        e->received = c->at;
+    }
+    pthread_mutex_unlock(&e->mutex);
+    return status;
+}
+
+enum status claim_commit(struct claim *c, struct error *err) {
+    return intake_commit(c->intake, err);
+}
+
+enum status claim_finish(struct claim *c, struct upload_row *row, struct error *err) {
+    struct intake *e = c->intake;
+    enum status status = partial_look(e->partials, e->id, row, err);
+    if (status != STATUS_OK || row->received >= c->at)
+        return status;
+    upload_row_release(row); /* another thread's sync has failed */
+    return lost(err);
+}

@@ -1,0 +1,260 @@
+/* intake.c -- see intake.h.
+ *
+ * One commit of an upload at a time: of two syncs at once the kernel tells one of a page that it could
+ * not write, and the other that all is well. */
+#include "server/http/intake.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/log.h"
+#include "common/mem.h"
+
+#define CHUNK_BYTES ((size_t)256 << 10)
+
+char *intake_path(const struct partials *p, const char *id) {
+    return mem_printf("%s/uploads/%s", p->api->config.data_dir, id);
+}
+
+/* --- loading ------------------------------------------------------------------------------- */
+
+static enum status open_file(struct intake *e, struct error *err) {
+    if (e->fd >= 0)
+        return STATUS_OK;
+    enum status status = STATUS_OK;
+    char *path = intake_path(e->partials, e->id);
+    e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+    /* Whole, it may be on its way to be a scene: see place in partial.c. */
+    if (e->fd < 0 && (errno != ENOENT || e->received < e->length))
+        status = error_set_errno(err, errno, "cannot open %s", path);
+    mem_free(path);
+    return status;
+}
+
+/* Hashes what lies in the file from e->received to its end: written, but never counted. */
+static enum status believe_tail(struct intake *e, struct error *err) {
+    struct stat info;
+    if (fstat(e->fd, &info) != 0)
+        return error_set_errno(err, errno, "cannot look at upload %s", e->id);
+    uint64_t end = (uint64_t)info.st_size < e->length ? (uint64_t)info.st_size : e->length;
+    char *chunk = mem_alloc(CHUNK_BYTES);
+    enum status status = STATUS_OK;
+    while (status == STATUS_OK && e->received < end) {
+        uint64_t left = end - e->received;
+        ssize_t got = pread(e->fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)e->received);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got <= 0) {
+            status = error_set_errno(err, got < 0 ? errno : EIO, "cannot read upload %s", e->id);
+            break;
+        }
+        sha256_update(&e->hash, chunk, (size_t)got);
+        e->received += (uint64_t)got;
+    }
+    mem_free(chunk);
+    return status;
+}
+
+/* What lies beyond the counted bytes may be anything: the machine was started anew since, or its disk
+ * has failed. */
+static enum status cut_tail(struct intake *e, struct error *err) {
+    if (ftruncate(e->fd, (off_t)e->received) != 0)
+        return error_set_errno(err, errno, "cannot cut upload %s", e->id);
+    if (fallocate(e->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)e->length) != 0 && errno != EOPNOTSUPP)
+        return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s",
+                               (unsigned long long)e->length, e->id);
+    return store_upload_begin(e->partials->api->store, e->id, e->partials->boot, err);
+}
+
+static enum status load(struct intake *e, struct error *err) {
+    struct partials *p = e->partials;
+    struct upload_row row;
+    enum status status = store_upload_get(p->api->store, e->id, &row, &e->hash, sizeof e->hash, err);
+    if (status != STATUS_OK)
+        return status;
+    bool is_same_boot = strcmp(row.boot, p->boot) == 0;
+    e->length = row.length;
+    e->received = e->counted = e->hinted = row.received;
+    e->is_believed = *row.boot != '\0';
+    status = *row.scene_id ? error_set(err, STATUS_CONFLICT, "upload %s is finished", e->id) : open_file(e, err);
+    if (status == STATUS_OK && e->fd >= 0 && e->is_believed)
+        status = is_same_boot && !e->is_spoiled ? believe_tail(e, err) : cut_tail(e, err);
+    if (status == STATUS_OK) {
+        e->is_spoiled = false;
+        e->is_loaded = true;
+    }
+    upload_row_release(&row);
+    return status;
+}
+
+/* --- while it is in use -------------------------------------------------------------------- */
+
+void intake_drop(struct intake *e) {
+    struct intake **link = &e->partials->first;
+    while (*link != e)
+        link = &(*link)->next;
+    *link = e->next;
+    if (e->fd >= 0)
+        close(e->fd);
+    pthread_mutex_destroy(&e->mutex);
+    pthread_mutex_destroy(&e->syncing);
+    mem_free(e);
+}
+
+static bool is_clean(struct intake *e) {
+    pthread_mutex_lock(&e->mutex);
+    bool clean = e->is_gone || (!e->is_spoiled && (!e->is_loaded || e->received == e->counted));
+    pthread_mutex_unlock(&e->mutex);
+    return clean;
+}
+
+void intake_put(struct intake *e) {
+    struct partials *p = e->partials;
+    pthread_mutex_lock(&p->mutex);
+    if (--e->users == 0 && is_clean(e))
+        intake_drop(e);
+    pthread_mutex_unlock(&p->mutex);
+}
+
+static struct intake *find(struct partials *p, const char *id) {
+    struct intake *e = p->first;
+    while (e && strcmp(e->id, id) != 0)
+        e = e->next;
+    return e;
+}
+
+static struct intake *add(struct partials *p, const char *id) {
+    struct intake *e = mem_calloc(1, sizeof *e);
+    snprintf(e->id, sizeof e->id, "%s", id);
+    e->partials = p;
+    e->fd = -1;
+    pthread_mutex_init(&e->syncing, NULL);
+    pthread_mutex_init(&e->mutex, NULL);
+    e->next = p->first;
+    p->first = e;
+    return e;
+}
+
+enum status intake_get(struct partials *p, const char *id, struct intake **out, struct error *err) {
+    pthread_mutex_lock(&p->mutex);
+    struct intake *e = find(p, id);
+    if (!e)
+        e = add(p, id);
+    e->users++;
+    pthread_mutex_unlock(&p->mutex);
+    enum status status = STATUS_OK;
+    pthread_mutex_lock(&e->mutex);
+    if (e->is_gone)
+        status = error_set(err, STATUS_NOT_FOUND, "there is no upload %s", id);
+    else if (!e->is_loaded)
+        status = load(e, err);
+    pthread_mutex_unlock(&e->mutex);
+    if (status != STATUS_OK)
+        intake_put(e);
+    *out = status == STATUS_OK ? e : NULL;
+    return status;
+}
+
+struct intake *intake_next(struct partials *p, unsigned long round) {
+    pthread_mutex_lock(&p->mutex);
+    struct intake *e = p->first;
+    while (e && (e->users > 0 || e->tended == round))
+        e = e->next;
+    if (e) {
+        e->users++;
+        e->tended = round;
+    }
+    pthread_mutex_unlock(&p->mutex);
+    return e;
+}
+
+void intake_mark_gone(struct partials *p, const char *id) {
+    pthread_mutex_lock(&p->mutex);
+    struct intake *e = find(p, id);
+    if (e)
+        e->users++;
+    pthread_mutex_unlock(&p->mutex);
+    if (!e)
+        return;
+    pthread_mutex_lock(&e->mutex);
+    e->is_gone = true;
+    pthread_mutex_unlock(&e->mutex);
+    intake_put(e);
+}
+
+bool intake_is_whole(struct intake *e) {
+    pthread_mutex_lock(&e->mutex);
+    bool is_whole = !e->is_gone && e->counted == e->length;
+    pthread_mutex_unlock(&e->mutex);
+    return is_whole;
+}
+
+void intake_close(struct intake *e) {
+    pthread_mutex_lock(&e->mutex);
+    e->is_loaded = false; /* the next to come reads its row */
+    e->holder = NULL;
+    pthread_mutex_unlock(&e->mutex);
+}
+
+/* --- counting ------------------------------------------------------------------------------ */
+
+/* What was received since the last commit may be lost: where a sync has failed, the kernel can have
+ * dropped it, and the next sync would say that all is well. It is to be sent again. e->syncing is held. */
+static void forget_tail(struct intake *e) {
+    struct error err;
+    pthread_mutex_lock(&e->mutex);
+    e->received = e->counted;
+    e->is_loaded = false; /* the next to come reads row and hash again */
+    e->holder = NULL;
+    e->is_spoiled = ftruncate(e->fd, (off_t)e->counted) != 0 &&
+                    store_upload_begin(e->partials->api->store, e->id, "", &err) != STATUS_OK;
+    if (e->is_spoiled)
+        log_warning("upload %s: %s", e->id, err.message);
+    pthread_mutex_unlock(&e->mutex);
+}
+
+/* e->syncing is held, so nothing else counts or forgets. */
+static enum status commit_alone(struct intake *e, struct error *err) {
+    pthread_mutex_lock(&e->mutex);
+    uint64_t received = e->received;
+    struct sha256 hash = e->hash;
+    bool is_spoiled = e->is_spoiled && !e->is_gone, has_news = !e->is_gone && received > e->counted;
+    pthread_mutex_unlock(&e->mutex);
+    if (is_spoiled)
+        forget_tail(e);
+    if (is_spoiled || !has_news)
+        return STATUS_OK;
+    if (fdatasync(e->fd) != 0) {
+        enum status failed = error_set_errno(err, errno, "cannot sync upload %s", e->id);
+        forget_tail(e);
+        return failed;
+    }
+    pthread_mutex_lock(&e->mutex);
+    enum status status = store_upload_advance(e->partials->api->store, e->id, received, &hash, sizeof hash, err);
+    if (status == STATUS_OK)
+        e->counted = received;
+    pthread_mutex_unlock(&e->mutex);
+    return status;
+}
+
+enum status intake_commit(struct intake *e, struct error *err) {
+    pthread_mutex_lock(&e->syncing);
+    enum status status = commit_alone(e, err);
+    pthread_mutex_unlock(&e->syncing);
+    return status;
+}
+
+enum status intake_disbelieve(struct intake *e, struct error *err) {
+    enum status status = intake_commit(e, err);
+    if (status == STATUS_OK)
+        status = store_upload_begin(e->partials->api->store, e->id, "", err);
+    pthread_mutex_lock(&e->mutex);
+    if (status == STATUS_OK)
+        e->is_believed = false;
+    pthread_mutex_unlock(&e->mutex);
+    return status;
+}
