@@ -194,7 +194,7 @@ struct response *jobs_add(struct api *api, struct request *r) {
     if (!reply && !dry_run)
         reply = space_check_room(api, r, 0);
     if (!reply && !dry_run)
-        reply = space_check_share(api, r, 0);
+        reply = space_check_share(api, r, NULL, 0);
     if (!reply)
         reply = dry_run ? dry_run_reply(&scene, &settings) : add_job(api, r, &w, &scene);
     if (has_scene)

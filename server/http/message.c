@@ -51,14 +51,19 @@ void response_free(struct response *r) {
 }
 
 void response_field(struct response *r, const char *name, const char *format, ...) {
-    assert(r->field_count < RESPONSE_FIELDS_MAX);
     char value[1024];
+    size_t i = 0;
     va_list args;
     va_start(args, format);
     vsnprintf(value, sizeof value, format, args);
     va_end(args);
-    r->fields[r->field_count].name = mem_strdup(name);
-    r->fields[r->field_count++].value = mem_strdup(value);
+    while (i < r->field_count && strcmp(r->fields[i].name, name) != 0)
+        i++;
+    assert(i < RESPONSE_FIELDS_MAX);
+    if (i == r->field_count)
+        r->fields[r->field_count++].name = mem_strdup(name);
+    mem_free(r->fields[i].value);
+    r->fields[i].value = mem_strdup(value);
 }
 
 struct response *response_text(int status, const char *content_type, char *text, size_t length) {

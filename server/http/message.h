@@ -79,6 +79,7 @@ struct response {
 
 struct response *response_new(int status);
 void response_free(struct response *r);
+/* Sets a field; one of that name is replaced. */
 void response_field(struct response *r, const char *name, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 struct response *response_json(int status, cJSON *value); /* takes value */

@@ -78,11 +78,23 @@ static bool matches(const char *pattern, const struct target *t) {
     return i == t->segment_count;
 }
 
+static bool is_tus(const struct request *r) {
+    return r->target.segment_count >= 2 && strcmp(r->target.segments[0], "v1") == 0 &&
+           strcmp(r->target.segments[1], "uploads") == 0;
+}
+
+/* Each reply about uploads says the protocol's version, also one that was made before uploads.c was asked.
+ * NULL stays NULL. */
+static struct response *answer(const struct request *r, struct response *reply) {
+    if (reply && is_tus(r))
+        response_field(reply, "Tus-Resumable", TUS_VERSION);
+    return reply;
+}
+
 /* For clients that can send no other methods than GET and POST, as the tus protocol has it. */
 static void override_method(struct request *r) {
     const char *other = request_field(r, "X-HTTP-Method-Override");
-    if (!other || r->method != METHOD_POST || r->target.segment_count != 3 ||
-        strcmp(r->target.segments[1], "uploads") != 0)
+    if (!other || r->method != METHOD_POST || r->target.segment_count != 3 || !is_tus(r))
         return;
     if (strcmp(other, "PATCH") == 0)
         r->method = METHOD_PATCH;
@@ -167,7 +179,7 @@ static struct response *too_large(const struct request *r, uint64_t limit) {
     return problem_full(r, 413, detail, "", members);
 }
 
-struct response *routes_begin(struct api *api, struct request *r) {
+static struct response *begin(struct api *api, struct request *r) {
     override_method(r);
     for (size_t i = 0; i < sizeof table / sizeof *table && !r->route; i++)
         if ((int)table[i].method == r->method && matches(table[i].pattern, &r->target))
@@ -191,6 +203,10 @@ struct response *routes_begin(struct api *api, struct request *r) {
     return body == ROUTE_BODY_UPLOAD ? upload_begin(api, r) : NULL;
 }
 
+struct response *routes_begin(struct api *api, struct request *r) {
+    return answer(r, begin(api, r));
+}
+
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length) {
     if (r->upload) {
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
@@ -198,18 +214,18 @@ struct response *routes_data(struct api *api, struct request *r, const void *dat
         return upload_data(api, r, data, length);
     }
     if (r->patch)
-        return uploads_data(api, r, data, length);
-    return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
+        return answer(r, uploads_data(api, r, data, length));
+    return buf_append(&r->body, data, length) ? NULL : answer(r, too_large(r, ROUTES_BODY_MAX));
 }
 
 struct response *routes_rest(struct api *api, struct request *r) {
     (void)api;
     r->wants_rest = false;
-    return uploads_rest(r);
+    return answer(r, uploads_rest(r));
 }
 
 struct response *routes_finish(struct api *api, struct request *r) {
-    return r->route->handle(api, r);
+    return answer(r, r->route->handle(api, r));
 }
 
 void routes_drop_body(struct request *r) {

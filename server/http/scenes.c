@@ -72,12 +72,18 @@ struct response *scenes_add(struct api *api, struct request *r) {
     struct error err;
     struct scene_row row;
     bool existed = false;
+    enum status status = STATUS_OK;
     pthread_mutex_lock(&api->scene_mutex);
-    enum status status = upload_publish(api, r->upload, id, &err);
-    if (status == STATUS_OK)
+    /* Not only when the body began: its length may have been unknown, and others have come meanwhile. */
+    refusal = space_check_share(api, r, id, upload_bytes(r->upload));
+    if (!refusal)
+        status = upload_publish(api, r->upload, id, &err);
+    if (!refusal && status == STATUS_OK)
         status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload),
                                  r->caller.user_id, &existed, &err);
     pthread_mutex_unlock(&api->scene_mutex);
+    if (refusal)
+        return refusal;
     if (status == STATUS_OK)
         status = store_scene_get(api->store, id, &row, &err);
     if (status != STATUS_OK)

@@ -66,7 +66,7 @@ struct response *upload_begin(struct api *api, struct request *r) {
     if (!refusal)
         refusal = space_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (!refusal)
-        refusal = space_check_share(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
+        refusal = space_check_share(api, r, NULL, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (refusal)
         return refusal;
     struct error err;
@@ -110,7 +110,7 @@ struct response *upload_data(struct api *api, struct request *r, const void *dat
     if (u->is_reserved)
         return NULL;
     struct response *refusal = space_check_room(api, r, 0);
-    return refusal ? refusal : space_check_share(api, r, u->bytes);
+    return refusal ? refusal : space_check_share(api, r, NULL, u->bytes);
 }
 
 struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]) {

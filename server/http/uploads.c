@@ -38,11 +38,6 @@ struct patch {
 
 /* --- what all of them have ------------------------------------------------------------------ */
 
-static struct response *tagged(struct response *reply) {
-    response_field(reply, "Tus-Resumable", TUS_VERSION);
-    return reply;
-}
-
 /* The protocol's version: must be said where `is_needed`. NULL when it is ours. */
 static struct response *check_version(const struct request *r, bool is_needed) {
     const char *version = request_field(r, "Tus-Resumable");
@@ -52,13 +47,13 @@ static struct response *check_version(const struct request *r, bool is_needed) {
                                                           : "the field Tus-Resumable is missing",
                                           "send Tus-Resumable: " TUS_VERSION, NULL);
     response_field(reply, "Tus-Version", TUS_VERSION);
-    return tagged(reply);
+    return reply;
 }
 
 static struct response *refuse(const struct request *r, const struct error *err) {
     if (err->status == STATUS_LIMIT) /* longer than was said; a full queue is told otherwise */
-        return tagged(problem_full(r, 413, err->message, err->hint, NULL));
-    return tagged(problem_from(r, err));
+        return problem_full(r, 413, err->message, err->hint, NULL);
+    return problem_from(r, err);
 }
 
 /* The id in the path, where there is such an upload and it is the caller's; or *refusal. Others'
@@ -101,7 +96,7 @@ static void add_place(struct response *reply, const struct upload_row *row) {
 
 struct response *uploads_options(struct api *api, struct request *r) {
     (void)r;
-    struct response *reply = tagged(response_new(204));
+    struct response *reply = response_new(204);
     response_field(reply, "Tus-Version", TUS_VERSION);
     response_field(reply, "Tus-Extension", "creation,termination,expiration,checksum");
     response_field(reply, "Tus-Checksum-Algorithm", "sha1,sha256");
@@ -176,29 +171,33 @@ static struct response *read_creation(struct api *api, const struct request *r, 
         return problem_full(r, 413, detail, "", members);
     }
     row->length = (uint64_t)length;
-    refusal = read_metadata(r, row);
+    return read_metadata(r, row);
+}
+
+/* Where there is room for it; or why it is not made. */
+static struct response *create(struct api *api, const struct request *r, struct upload_row *row) {
+    struct error err;
+    pthread_mutex_lock(&api->scene_mutex); /* two at once would both find room */
+    struct response *refusal = space_check_room(api, r, row->length);
     if (!refusal)
-        refusal = space_check_room(api, r, row->length);
-    return refusal ? refusal : space_check_share(api, r, row->length);
+        refusal = space_check_share(api, r, NULL, row->length);
+    if (!refusal && partial_create(api->partials, row, &err) != STATUS_OK)
+        refusal = problem_from(r, &err);
+    pthread_mutex_unlock(&api->scene_mutex);
+    return refusal;
 }
 
 struct response *uploads_add(struct api *api, struct request *r) {
     struct upload_row row = {.owner_id = r->caller.user_id};
-    struct error err;
     struct response *reply = read_creation(api, r, &row);
-    if (reply) {
-        upload_row_release(&row);
-        return request_field(r, "Tus-Resumable") ? tagged(reply) : reply;
-    }
     if (!row.name)
         row.name = mem_strndup(*row.sha256 ? row.sha256 : "upload", 12);
-    enum status status = partial_create(api->partials, &row, &err);
-    if (status != STATUS_OK) {
-        reply = tagged(problem_from(r, &err));
-    } else {
+    if (!reply)
+        reply = create(api, r, &row);
+    if (!reply) {
         struct timespec now;
         clock_gettime(CLOCK_REALTIME, &now);
-        reply = tagged(response_new(201));
+        reply = response_new(201);
         response_field(reply, "Location", "/v1/uploads/%s", row.id);
         add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.upload_keep_ms);
     }
@@ -218,14 +217,13 @@ struct response *uploads_get(struct api *api, struct request *r) {
     if (partial_look(api->partials, id, &row, &err) != STATUS_OK)
         return refuse(r, &err);
     reply = response_json(200, view_upload(&row));
-    mem_free(reply->fields[1].value); /* of Cache-Control */
-    reply->fields[1].value = mem_strdup("no-store");
+    response_field(reply, "Cache-Control", "no-store");
     response_field(reply, "Upload-Length", "%" PRIu64, row.length);
     if (*row.metadata)
         response_field(reply, "Upload-Metadata", "%s", row.metadata);
     add_place(reply, &row);
     upload_row_release(&row);
-    return tagged(reply);
+    return reply;
 }
 
 struct response *uploads_list(struct api *api, struct request *r) {
@@ -281,22 +279,21 @@ struct response *uploads_begin(struct api *api, struct request *r) {
     int64_t offset = 0;
     struct error err;
     if (!refusal && (!text || !field_number(text, 0, INT64_MAX, &offset)))
-        refusal = tagged(problem(r, 400, "Upload-Offset must be a number of bytes"));
+        refusal = problem(r, 400, "Upload-Offset must be a number of bytes");
     if (refusal)
         return refusal;
     struct patch *p = r->patch = mem_calloc(1, sizeof *p);
     refusal = read_checksum(r, p);
     if (refusal)
-        return tagged(refusal);
+        return refusal;
     if (claim_take(api->partials, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->claim, &err) !=
         STATUS_OK)
         return refuse(r, &err);
     if (r->content_length > 0 && (uint64_t)r->content_length > claim_room(p->claim))
-        return tagged(problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld",
-                              claim_room(p->claim), (long long)r->content_length));
+        return problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld", claim_room(p->claim),
+                       (long long)r->content_length);
     uint64_t unreserved = claim_unreserved(p->claim);
-    refusal = unreserved ? space_check_room(api, r, unreserved) : NULL;
-    return refusal ? tagged(refusal) : NULL;
+    return unreserved ? space_check_room(api, r, unreserved) : NULL;
 }
 
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
@@ -378,14 +375,14 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     struct upload_row row = {0};
     enum status status = STATUS_OK;
     if (!is_as_sent(p))
-        return tagged(problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten"));
+        return problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten");
     if (p->checksum != CHECKSUM_NONE)
         status = claim_accept(p->claim, &err);
     if (status == STATUS_OK)
         status = claim_finish(p->claim, &row, &err);
     if (status != STATUS_OK)
         return refuse(r, &err);
-    struct response *reply = tagged(response_new(204));
+    struct response *reply = response_new(204);
     add_place(reply, &row);
     upload_row_release(&row);
     return reply;
@@ -404,9 +401,9 @@ struct response *uploads_delete(struct api *api, struct request *r) {
         char *path = mem_printf("uploads/%s", id);
         reply = keeping_would_free(api, r, path);
         mem_free(path);
-        return tagged(reply);
+        return reply;
     }
     if (partial_remove(api->partials, id, &err) != STATUS_OK)
         return refuse(r, &err);
-    return tagged(response_new(204));
+    return response_new(204);
 }

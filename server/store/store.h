@@ -145,8 +145,9 @@ enum status store_job_next(struct store *store, int user_max_running, int64_t *i
 /* Charges CPU time to a user; thread-safe, as all is. */
 enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec,
                             struct error *err);
-/* What a user keeps: scenes, outputs, and uploads that are under way with their whole length. */
-enum status store_user_bytes(struct store *store, int64_t user_id, uint64_t *bytes,
+/* What a user keeps: scenes but for `but_scene` (NULL: all), outputs, and uploads that are under way with
+ * their whole length. */
+enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, uint64_t *bytes,
                              struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,

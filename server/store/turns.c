@@ -57,19 +57,19 @@ enum status store_job_next(struct store *store, int user_max_running, int64_t *i
                : status;
 }
 
-enum status store_user_bytes(struct store *store, int64_t user_id, uint64_t *bytes,
+enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, uint64_t *bytes,
                              struct error *err) {
     int64_t sum = 0;
     store_lock(store);
     enum status status =
         sql_int(&store->sql, 0, &sum, err,
                 "SELECT (SELECT ifnull(sum(bytes), 0) FROM scenes"
-                "         JOIN scene_owners ON scene_id = id WHERE user_id = ?1)"
+                "         JOIN scene_owners ON scene_id = id WHERE user_id = ?1 AND id <> ?2)"
                 "     + (SELECT ifnull(sum(outputs.bytes), 0) FROM outputs"
                 "         JOIN jobs ON jobs.id = job_id WHERE owner_id = ?1)"
                 "     + (SELECT ifnull(sum(length), 0) FROM uploads"
                 "         WHERE owner_id = ?1 AND scene_id = '')",
-                "i", user_id);
+                "it", user_id, but_scene ? but_scene : "");
     store_unlock(store);
     *bytes = (uint64_t)sum;
     return status;

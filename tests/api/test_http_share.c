@@ -14,11 +14,52 @@ static int send_as(const struct rig *rig, const char *token, const char *request
     return status;
 }
 
+/* In chunks, so that nobody knows how many bytes come: those of send_as. */
+static int send_chunked(const struct rig *rig, const char *token, size_t length, char filling, struct buf *reply) {
+    char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+                            "Authorization: Bearer %s\r\nTransfer-Encoding: chunked\r\n\r\n%zx\r\n", token, length);
+    size_t head = strlen(text);
+    text = mem_realloc_array(text, head + length + 7, 1);
+    memset(text + head, filling, length);
+    memcpy(text + head, "{\"scene\":\"" RIG_SCENE "\"}", 76);
+    memcpy(text + head + length, "\r\n0\r\n\r\n", 7);
+    int status = rig_ask(rig, text, head + length + 7, reply);
+    mem_free(text);
+    return status;
+}
+
+/* Two bodies that began when there was room for either: one gets it. */
+static void test_two_at_once(const struct rig *rig, const char *token) {
+    int fd[2];
+    struct buf reply;
+    char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+                            "Authorization: Bearer %s\r\nContent-Length: 600000\r\nExpect: 100-continue\r\n\r\n", token);
+    char *body = mem_calloc(1, 600000);
+    for (int i = 0; i < 2; i++) {
+        fd[i] = rig_connect(rig);
+        rig_send(fd[i], text, strlen(text));
+        buf_init(&reply, 1 << 20);
+        rig_receive(fd[i], &reply, "100 Continue"); /* it has been let in */
+        buf_release(&reply);
+    }
+    for (int i = 0; i < 2; i++) {
+        body[0] = (char)i;
+        rig_send(fd[i], body, 600000);
+        buf_init(&reply, 1 << 20);
+        rig_receive(fd[i], &reply, NULL);
+        CHECK(strstr(buf_text(&reply), i == 0 ? "HTTP/1.1 201" : "HTTP/1.1 507"));
+        buf_release(&reply);
+        close(fd[i]);
+    }
+    mem_free(body);
+    mem_free(text);
+}
+
 int main(void) {
     struct rig rig;
     struct error err;
     struct buf reply;
-    char alice[TOKEN_SIZE], bob[TOKEN_SIZE];
+    char alice[TOKEN_SIZE], bob[TOKEN_SIZE], carol[TOKEN_SIZE];
     int64_t id;
     int status = 0;
     rig_start(&rig, &rig_patient, 60);
@@ -33,13 +74,21 @@ int main(void) {
     CHECK(send_as(&rig, alice, upload, 600 << 10, &reply) == 201);
     buf_release(&reply);
     CHECK(send_as(&rig, alice, upload, 600 << 10, &reply) == 507); /* the same again: nobody knows yet */
-    CHECK(strstr(buf_text(&reply), "1 MiB are what a user may keep"));
+    CHECK(strstr(buf_text(&reply), "of the 1.0 MiB that a user may keep, and 0.6 MiB more are wanted"));
     buf_release(&reply);
     CHECK(send_as(&rig, bob, upload, 600 << 10, &reply) != 507);
     buf_release(&reply);
     CHECK(send_as(&rig, alice, "POST /v1/uploads HTTP/1.1\r\nTus-Resumable: 1.0.0\r\nUpload-Length: 500000", 0,
                   &reply) == 507);
     buf_release(&reply);
+
+    /* Bytes that nobody announced; what is there already takes no more room. */
+    CHECK(send_chunked(&rig, alice, 600 << 10, 'x', &reply) == 507);
+    buf_release(&reply);
+    CHECK(send_chunked(&rig, alice, 600 << 10, ' ', &reply) == 200);
+    buf_release(&reply);
+    rig_must(store_token_add(rig.store, "carol", ROLE_USER, carol, &id, &err), &err, "token");
+    test_two_at_once(&rig, carol);
 
     /* Jobs. */
     const char *submit = "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json";
