@@ -310,8 +310,13 @@ static enum status do_pause(struct api *api, int64_t id, struct error *err) {
     return store_job_pause(api->store, id, err);
 }
 
+static struct queue_limits limits_of(const struct api *api) {
+    return (struct queue_limits){api->config.queue_limit, api->config.user_queue_limit};
+}
+
 static enum status do_resume(struct api *api, int64_t id, struct error *err) {
-    return store_job_resume(api->store, id, err);
+    struct queue_limits limits = limits_of(api);
+    return store_job_resume(api->store, id, &limits, err);
 }
 
 struct response *jobs_cancel(struct api *api, struct request *r) {
@@ -337,7 +342,8 @@ struct response *jobs_retry(struct api *api, struct request *r) {
     if (refusal)
         return refusal;
     struct error err;
-    if (store_job_retry(api->store, id, api->config.max_attempts, from, &err) != STATUS_OK)
+    struct queue_limits limits = limits_of(api);
+    if (store_job_retry(api->store, id, api->config.max_attempts, from, &limits, &err) != STATUS_OK)
         return problem_from(r, &err);
     scheduler_wake(api->scheduler);
     return show(api, r, id, 202);
@@ -390,6 +396,7 @@ struct response *jobs_extend(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     struct job job;
     struct error err;
+    struct queue_limits limits = limits_of(api);
     int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;
@@ -400,7 +407,7 @@ struct response *jobs_extend(struct api *api, struct request *r) {
     if (!refusal && job_is_terminal(job.state) && access(checkpoint, F_OK) != 0)
         refusal = problem_full(r, 409, "the job's checkpoint is no longer there: there is nothing to go on from",
                                "submit the room again, with more iterations or time", NULL);
-    if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &err) != STATUS_OK)
+    if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &limits, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
     mem_free(checkpoint);
     mem_free(settings);

@@ -82,7 +82,7 @@ static enum status find_replay(struct store *store, const struct job_new *job, c
 /* Whether one more job may join the queue for this scene. */
 static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit,
                              struct error *err) {
-    int64_t state, queued;
+    int64_t state;
     enum status status = sql_int(&store->sql, -1, &state, err,
                                  "SELECT state FROM scenes WHERE id = ?", "t", job->scene_id);
     if (status != STATUS_OK)
@@ -94,20 +94,7 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
         return error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
                           job->scene_id, job->scene_id);
     }
-    status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?",
-                     "n", (int)JOB_QUEUED);
-    if (status == STATUS_OK && (uint64_t)queued >= queue_limit)
-        return error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu",
-                         (long long)queued, queue_limit);
-    if (status != STATUS_OK || job->user_queue_limit == 0 || job->owner_id == 0)
-        return status;
-    status = sql_int(&store->sql, 0, &queued, err,
-                     "SELECT count(*) FROM jobs WHERE owner_id = ? AND state = ?", "in",
-                     job->owner_id, (int)JOB_QUEUED);
-    if (status == STATUS_OK && (uint64_t)queued >= job->user_queue_limit)
-        status = error_set(err, STATUS_LIMIT, "%lld of your jobs are queued already, the limit is %zu",
-                           (long long)queued, job->user_queue_limit);
-    return status;
+    return store_queue_check(store, job->owner_id, &(struct queue_limits){queue_limit, job->user_queue_limit}, err);
 }
 
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,

@@ -101,6 +101,11 @@ enum status store_scene_check_again(struct store *store, struct error *err);
 
 /* --- jobs -------------------------------------------------------------------------------- */
 
+/* How many jobs may be queued; one_user 0: no limit. Where a user asks for one more: STATUS_LIMIT. */
+struct queue_limits {
+    size_t all, one_user;
+};
+
 struct job_new {
     const char *scene_id, *name, *labels, *settings;
     int64_t owner_id; /* 0: nobody */
@@ -156,14 +161,15 @@ enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
 /* What users ask. A running job only gets its wish recorded; the scheduler fulfils it (wake it).
  * Asking again for what is so already is STATUS_OK and changes nothing. Resume takes back a wish
  * to pause. Retry is for failed and cancelled jobs; with `from`, a stage that job_stage_parse
- * knows (else NULL), also for succeeded ones. Extend gives a job that has ended new settings. */
+ * knows (else NULL), also for succeeded ones. Extend gives a job that has ended new settings.
+ * Those that put a job into the queue keep `limits` (NULL: none). */
 enum status store_job_cancel(struct store *store, int64_t id, struct error *err);
 enum status store_job_pause(struct store *store, int64_t id, struct error *err);
-enum status store_job_resume(struct store *store, int64_t id, struct error *err);
+enum status store_job_resume(struct store *store, int64_t id, const struct queue_limits *limits, struct error *err);
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
-                            struct error *err);
-enum status store_job_extend(struct store *store, int64_t id, int max_attempts,
-                             const char *settings, struct error *err);
+                            const struct queue_limits *limits, struct error *err);
+enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
+                             const struct queue_limits *limits, struct error *err);
 
 /* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A wish
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */

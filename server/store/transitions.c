@@ -167,7 +167,17 @@ enum status store_job_pause(struct store *store, int64_t id, struct error *err) 
     return store_end(store, status, id, err);
 }
 
-enum status store_job_resume(struct store *store, int64_t id, struct error *err) {
+/* Into the queue by its user's wish, where there is room for one more. */
+static enum status enqueue(struct store *store, struct present *now, const struct queue_limits *limits,
+                           struct error *err) {
+    int64_t owner = 0;
+    enum status status = sql_int(&store->sql, 0, &owner, err, "SELECT owner_id FROM jobs WHERE id = ?", "i", now->id);
+    if (status == STATUS_OK && limits)
+        status = store_queue_check(store, owner, limits, err);
+    return status == STATUS_OK ? move(store, now, JOB_QUEUED, "", "", err) : status;
+}
+
+enum status store_job_resume(struct store *store, int64_t id, const struct queue_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
@@ -177,7 +187,7 @@ enum status store_job_resume(struct store *store, int64_t id, struct error *err)
     else if (now.wanted == JOB_WANT_PAUSE)
         status = wish(store, &now, JOB_WANT_RUN, err);
     else if (now.state == JOB_PAUSED)
-        status = move(store, &now, JOB_QUEUED, "", "", err);
+        status = enqueue(store, &now, limits, err);
     else if (job_is_terminal(now.state))
         status = forbidden(&now, "resumed", err);
     else /* queued or running: so it is already */
@@ -187,7 +197,7 @@ enum status store_job_resume(struct store *store, int64_t id, struct error *err)
 
 /* A new life for a job that has ended; in the transaction that job_begin began. */
 static enum status revive(struct store *store, struct present *now, int max_attempts,
-                          struct error *err) {
+                          const struct queue_limits *limits, struct error *err) {
     int64_t scene = 0;
     enum status status =
         sql_int(&store->sql, 0, &scene, err,
@@ -199,11 +209,15 @@ static enum status revive(struct store *store, struct present *now, int max_atte
     if (status != STATUS_OK)
         return status;
     now->attempts_left = max_attempts;
-    return move(store, now, JOB_QUEUED, "", "", err);
+    status = enqueue(store, now, limits, err);
+    /* Where it ended is not where it will be. */
+    return status == STATUS_OK ? sql_run(&store->sql, err, "UPDATE jobs SET stage = '', progress = 0 WHERE id = ?", "i",
+                                         now->id)
+                               : status;
 }
 
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
-                            struct error *err) {
+                            const struct queue_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
@@ -213,7 +227,7 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
     if (status == STATUS_CONFLICT && now.state == JOB_SUCCEEDED)
         error_hint(err, "name the stage to do anew (retry --from STAGE), or extend it");
     if (status == STATUS_OK)
-        status = revive(store, &now, max_attempts, err);
+        status = revive(store, &now, max_attempts, limits, err);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "UPDATE jobs SET restart_from = ?, memory_step = 0 WHERE id = ?", "ti",
@@ -221,8 +235,8 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
     return store_end(store, status, id, err);
 }
 
-enum status store_job_extend(struct store *store, int64_t id, int max_attempts,
-                             const char *settings, struct error *err) {
+enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
+                             const struct queue_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
@@ -230,7 +244,7 @@ enum status store_job_extend(struct store *store, int64_t id, int max_attempts,
     if (!job_is_terminal(now.state))
         status = forbidden(&now, "extended", err);
     if (status == STATUS_OK)
-        status = revive(store, &now, max_attempts, err);
+        status = revive(store, &now, max_attempts, limits, err);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "UPDATE jobs SET settings = ? WHERE id = ?", "ti",
                          settings, id);

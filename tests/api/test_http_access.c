@@ -267,7 +267,7 @@ static void test_streams_end(void) {
     add_token(STRANGER, "eve", ROLE_USER);
     fd = open_stream(STRANGER, job, &out);
     rig_must(store_job_patch(rig.store, job, -1, &(struct job_patch){.shared = 0}, &err), &err, "unshare");
-    rig_must(store_job_resume(rig.store, job, &err), &err, "resume");
+    rig_must(store_job_resume(rig.store, job, NULL, &err), &err, "resume");
     rig_receive(fd, &out, NULL);
     CHECK(!strstr(buf_text(&out), "\"state\":\"queued\",\"at\""));
     close(fd);

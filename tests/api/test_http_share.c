@@ -55,6 +55,34 @@ static void test_two_at_once(const struct rig *rig, const char *token) {
     mem_free(text);
 }
 
+static int ask(const struct rig *rig, const char *token, const char *what, int64_t job, const char *action) {
+    struct buf reply;
+    char *request = mem_printf("%s/%lld%s HTTP/1.1", what, (long long)job, action);
+    int status = send_as(rig, token, request, 0, &reply);
+    buf_release(&reply);
+    mem_free(request);
+    return status;
+}
+
+/* Two of the owner's jobs, 1 and 2, are queued, which is all that may be: no other way leads past that. */
+static void test_back_into_the_queue(const struct rig *rig, const char *token) {
+    const char *submit = "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json", *post = "POST /v1/jobs";
+    struct buf reply;
+    struct error err;
+    int attempt;
+    CHECK(ask(rig, token, post, 1, "/pause") == 202 && ask(rig, token, post, 2, "/cancel") == 202);
+    for (int i = 0; i < 2; i++) { /* jobs 3 and 4 */
+        CHECK(send_as(rig, token, submit, 76, &reply) == 201);
+        buf_release(&reply);
+    }
+    CHECK(ask(rig, token, post, 1, "/resume") == 429);
+    CHECK(ask(rig, token, post, 2, "/retry") == 429);
+    CHECK(ask(rig, token, post, 2, "/retry?from=load") == 429);
+    rig_must(store_job_start(rig->store, 3, &attempt, &err), &err, "start");
+    CHECK(ask(rig, token, post, 1, "/resume") == 202); /* one is no longer queued */
+    CHECK(ask(rig, token, post, 2, "/retry") == 429);
+}
+
 int main(void) {
     struct rig rig;
     struct error err;
@@ -99,6 +127,7 @@ int main(void) {
             CHECK(strstr(buf_text(&reply), "Retry-After: "));
         buf_release(&reply);
     }
+    test_back_into_the_queue(&rig, bob);
     rig.api->config.user_max_bytes = 1000;
     CHECK(send_as(&rig, bob, submit, 76, &reply) == 507);
     buf_release(&reply);

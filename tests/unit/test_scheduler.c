@@ -474,7 +474,7 @@ static void test_wishes(struct daemon *d) {
     scheduler_wake(d->scheduler);
     expect(d, first, JOB_PAUSED, 1, "", "");
     expect(d, second, JOB_SUCCEEDED, 1, "", "");
-    OK(store_job_resume(d->store, first, &err));
+    OK(store_job_resume(d->store, first, NULL, &err));
     scheduler_wake(d->scheduler);
     CHECK(wait_for(d, first, JOB_RUNNING, "refine"));
     OK(store_job_cancel(d->store, first, &err));

@@ -85,10 +85,10 @@ static void test_transitions(void) {
             switch ((enum action)action) {
             case CANCEL: status = store_job_cancel(store, id, &err); break;
             case PAUSE: status = store_job_pause(store, id, &err); break;
-            case RESUME: status = store_job_resume(store, id, &err); break;
-            case RETRY: status = store_job_retry(store, id, 3, NULL, &err); break;
-            case AGAIN: status = store_job_retry(store, id, 3, "report", &err); break;
-            case EXTEND: status = store_job_extend(store, id, 3, "{\"seed\":2}", &err); break;
+            case RESUME: status = store_job_resume(store, id, NULL, &err); break;
+            case RETRY: status = store_job_retry(store, id, 3, NULL, NULL, &err); break;
+            case AGAIN: status = store_job_retry(store, id, 3, "report", NULL, &err); break;
+            case EXTEND: status = store_job_extend(store, id, 3, "{\"seed\":2}", NULL, &err); break;
             case START: status = store_job_start(store, id, &started, &err); break;
             case SUCCEED: status = store_job_succeed(store, id, attempt, &err); break;
             case FAIL: status = store_job_fail(store, id, attempt, "r", "h", &err); break;
@@ -152,7 +152,7 @@ static void test_attempts(void) {
     CHECK(strstr((events_of(store, id), last_event), "\"reason\":\"signal 6\"") != NULL);
 
     /* A retry is a new life, but numbers of attempts are not used again. */
-    OK(store_job_retry(store, id, 2, NULL, &err));
+    OK(store_job_retry(store, id, 2, NULL, NULL, &err));
     OK(store_job_start(store, id, &first, &err));
     CHECK(first == third + 1);
     OK(store_job_get(store, id, &job, &err));
@@ -437,7 +437,7 @@ static void check_turns(struct store *store, const int64_t *wanted, size_t count
         OK(store_job_pause(store, id, &err));
     }
     for (size_t i = 0; i < count; i++)
-        OK(store_job_resume(store, wanted[i], &err));
+        OK(store_job_resume(store, wanted[i], NULL, &err));
 }
 
 static void test_order(void) {

@@ -65,7 +65,7 @@ static void test_scenes(void) {
     OK(store_job_cancel(store, job, &err));
     OK(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err));
     IS(store_scene_get(store, SCENE_A, &row, &err), STATUS_NOT_FOUND);
-    IS(store_job_retry(store, job, 3, NULL, &err), STATUS_CONFLICT); /* nothing to work on */
+    IS(store_job_retry(store, job, 3, NULL, NULL, &err), STATUS_CONFLICT); /* nothing to work on */
     store_close(store);
     drop_dir(dir);
 }
