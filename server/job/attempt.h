@@ -1,4 +1,5 @@
-/* attempt.h -- one worker's work, from its folder to the entry of its outcome in the store.
+/* attempt.h -- one worker's work, from its folder to the entry of its outcome in the store: what is known of
+ * it, and its start. What it says is heard by hearing.h, how it ends is judged by outcome.h.
  *
  *      empty ──start──> alive ──(process ends)──> ended ──settle──> empty
  *
@@ -54,18 +55,10 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
                                 const char *scene_id, int thread_count, struct error *err);
 
-/* Reads what the worker says and notices its end. */
-void attempt_listen(struct attempt *a, struct store *store, struct figures *figures);
-
 /* Enters the CPU time since the last call for the job's owner. A failure is no harm: the next call
  * makes up for it. */
 void attempt_charge(struct attempt *a, struct store *store, struct figures *figures);
 
-/* Whether an ended attempt was too large for the disk. */
-bool attempt_lacks_room(const struct attempt *a);
-
-/* Enters the outcome of an ended attempt and empties it. */
-enum status attempt_settle(struct attempt *a, struct store *store, struct figures *figures,
-                           struct error *err);
+void attempt_empty(struct attempt *a); /* forgets all of it */
 
 #endif

@@ -24,7 +24,9 @@
 #include "server/job/attempt.h"
 #include "server/job/delivery.h"
 #include "server/job/disk.h"
+#include "server/job/hearing.h"
 #include "server/job/housekeeping.h"
+#include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
 #define DELIVERIES 4      /* webhooks that are called at the same time */
@@ -339,9 +341,9 @@ static void listen_and_settle(struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         struct error err;
-        attempt_listen(a, s->store, &s->figures);
-        bool is_postponed = i + 1 == s->slot_count && attempt_lacks_room(a);
-        if (a->phase == ATTEMPT_ENDED && attempt_settle(a, s->store, &s->figures, &err) != STATUS_OK)
+        hearing_listen(a, s->store, &s->figures);
+        bool is_postponed = i + 1 == s->slot_count && outcome_lacks_room(a);
+        if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, &s->figures, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)
             postpone_check(s);

@@ -8,7 +8,8 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/views.h"
-#include "server/job/attempt.h"
+#include "server/job/hearing.h"
+#include "server/job/outcome.h"
 #include "server/job/figures.h"
 #include "server/worker/progress.h"
 #include "tests/fuzz/fuzz.h"
@@ -121,11 +122,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     buf_init(&a.worker.line, PROGRESS_LINE_MAX);
     a.worker.log_path = mem_strdup("/dev/null");
     a.worker.pipe_fd = pipe_of(data + 1, size - 1);
-    attempt_listen(&a, store, &figures);
+    hearing_listen(&a, store, &figures);
     a.phase = ATTEMPT_ENDED;
     a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
     struct error err;
-    enum status status = attempt_settle(&a, store, &figures, &err);
+    enum status status = outcome_settle(&a, store, &figures, &err);
     if (status != STATUS_OK)
         fprintf(stderr, "%s\n", err.message);
     MUST(status == STATUS_OK && a.phase == ATTEMPT_EMPTY);

@@ -1,0 +1,12 @@
+/* hearing.h -- what a worker says while it lives: its lines become events, outputs and figures, and what it
+ * says of its own end is noted in the attempt. It has read a stranger's files: nothing that can be checked is
+ * believed. */
+#ifndef UNBAKE_JOB_HEARING_H
+#define UNBAKE_JOB_HEARING_H
+
+#include "server/job/attempt.h"
+
+/* Reads what there is, and notices the worker's end. */
+void hearing_listen(struct attempt *a, struct store *store, struct figures *figures);
+
+#endif

@@ -1,0 +1,225 @@
+/* outcome.c -- see outcome.h. */
+#include "server/job/outcome.h"
+
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/wait.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/job/housekeeping.h"
+#include "server/job/memory.h"
+#include "server/worker/progress.h"
+
+#define LAST_WORDS_MAX 400 /* bytes */
+
+enum outcome {
+    OUTCOME_OK,
+    OUTCOME_INPUT,
+    OUTCOME_CRASH,
+    OUTCOME_MEMORY, /* a crash that a smaller working set may mend */
+    OUTCOME_STOPPED,
+    OUTCOME_BLOCKED
+};
+
+struct verdict {
+    enum outcome outcome;
+    char reason[1024], hint[256];
+};
+
+#define HINT_MEMORY "Use a smaller texture_size, or give workers more memory."
+
+static void say(struct verdict *v, enum outcome outcome, const char *reason, const char *hint) {
+    v->outcome = outcome;
+    snprintf(v->reason, sizeof v->reason, "%s", reason);
+    snprintf(v->hint, sizeof v->hint, "%s", hint ? hint : "");
+}
+
+static void judge_signal(const struct attempt *a, struct verdict *v) {
+    int number = WTERMSIG(a->wait_status);
+    char text[256];
+    if (number == SIGKILL) {
+        bool by_kernel = memory_oom_kills() > a->oom_kills;
+        say(v, by_kernel ? OUTCOME_MEMORY : OUTCOME_CRASH,
+            by_kernel ? "killed because the machine ran out of memory"
+                      : "killed from outside, or by a limit of memory that does not say so",
+            HINT_MEMORY);
+        return;
+    }
+    snprintf(text, sizeof text, "the worker crashed (%s)", strsignal(number));
+    say(v, OUTCOME_CRASH, text, "");
+}
+
+static void judge_exit(const struct attempt *a, struct verdict *v) {
+    int code = WEXITSTATUS(a->wait_status);
+    const char *message = a->end_message ? a->end_message : "", *hint = a->end_hint;
+    char text[1024];
+    switch (code) {
+    case PROGRESS_EXIT_OK:
+        if (a->has_end && a->end_status == STATUS_OK)
+            say(v, OUTCOME_OK, "", "");
+        else
+            say(v, OUTCOME_CRASH, "the worker ended without a result", "");
+        return;
+    case PROGRESS_EXIT_INPUT:
+        say(v, OUTCOME_INPUT, message[0] ? message : "the input is at fault", hint);
+        return;
+    case PROGRESS_EXIT_MEMORY:
+        say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY);
+        return;
+    case PROGRESS_EXIT_NO_SPACE:
+        snprintf(text, sizeof text, "disk full: %.900s", message);
+        say(v, OUTCOME_BLOCKED, text, "Free some space, then resume the job.");
+        return;
+    case PROGRESS_EXIT_STOPPED:
+        if (a->stopping)
+            say(v, OUTCOME_STOPPED, "", "");
+        else
+            say(v, OUTCOME_CRASH, "the worker was told to stop from outside", "");
+        return;
+    case PROGRESS_EXIT_FAILED:
+        if (message[0]) {
+            say(v, OUTCOME_CRASH, message, hint);
+            return;
+        }
+        break;
+    default:
+        break;
+    }
+    snprintf(text, sizeof text, "the worker ended with status %d", code);
+    say(v, OUTCOME_CRASH, text, "");
+}
+
+static void judge(const struct attempt *a, struct verdict *v) {
+    *v = (struct verdict){0};
+    if (WIFEXITED(a->wait_status))
+        judge_exit(a, v);
+    else
+        judge_signal(a, v);
+    /* We wanted it to end: how it did is of no interest. */
+    if ((v->outcome == OUTCOME_CRASH || v->outcome == OUTCOME_MEMORY) && a->stopping)
+        say(v, OUTCOME_STOPPED, "", "");
+    if (v->outcome != OUTCOME_CRASH && v->outcome != OUTCOME_MEMORY)
+        return;
+    if (a->has_end && a->end_status != STATUS_OK) /* it could speak for itself */
+        return;
+    char *words = supervisor_last_words(&a->worker, LAST_WORDS_MAX);
+    size_t used = strlen(v->reason);
+    if (words[0])
+        snprintf(v->reason + used, sizeof v->reason - used, "; its last words: %s", words);
+    mem_free(words);
+}
+
+/* Enters an attempt that ran out of memory: the next one gets by with less, where it can. */
+static enum status settle_memory(const struct attempt *a, struct store *store,
+                                 const struct verdict *v, struct error *err) {
+    struct buf reason, what;
+    cJSON *settings = NULL;
+    int step = a->memory_step;
+    buf_init(&what, 4096);
+    buf_init(&reason, 4096);
+    buf_puts(&reason, v->reason);
+    if (json_parse(a->settings, strlen(a->settings), "settings", &settings, NULL) == STATUS_OK &&
+        memory_can_reduce(settings, step, a->thread_count, &what)) {
+        step++;
+        buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
+    }
+    enum status status = store_job_crash(store, a->job_id, a->number, buf_text(&reason), v->hint,
+                                         step, err);
+    cJSON_Delete(settings);
+    buf_release(&reason);
+    buf_release(&what);
+    return status;
+}
+
+static enum status settle_job(const struct attempt *a, struct store *store, const struct verdict *v,
+                              struct error *err) {
+    switch (v->outcome) {
+    case OUTCOME_OK: return store_job_succeed(store, a->job_id, a->number, err);
+    case OUTCOME_INPUT:
+        return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
+    case OUTCOME_BLOCKED:
+        return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
+    case OUTCOME_STOPPED: return store_job_stop(store, a->job_id, a->number, "", err);
+    case OUTCOME_MEMORY: return settle_memory(a, store, v, err);
+    case OUTCOME_CRASH: break;
+    }
+    return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, a->memory_step, err);
+}
+
+/* What the archive was unpacked to: a check that was killed could not tidy up. A ready scene needs it,
+ * of another only the archive is kept. */
+static void remove_unpacked(const struct attempt *a) {
+    struct error err;
+    char *files = file_join(a->dir, "files");
+    if (file_remove_tree(files, &err) != STATUS_OK)
+        log_warning("scene %.12s: %s", a->scene_id, err.message);
+    mem_free(files);
+}
+
+static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v,
+                                struct error *err) {
+    if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
+        return STATUS_OK;
+    char *text;
+    enum status status;
+    if (v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts) {
+        text = json_text(a->facts);
+        status = store_scene_ready(store, a->scene_id, text, err);
+    } else {
+        bool waits = v->outcome == OUTCOME_BLOCKED; /* the content is not at fault */
+        remove_unpacked(a);
+        if (waits || cJSON_GetArraySize(a->problems) == 0) {
+            cJSON *problem = cJSON_CreateObject();
+            json_add_string(problem, "file", "");
+            json_add_string(problem, "reason",
+                            a->killed           ? "its check took too long"
+                            : v->reason[0] != 0 ? v->reason
+                                                : "its check ended without a result");
+            if (waits)
+                json_add_string(problem, "hint", "It is checked again when there is more room.");
+            cJSON_AddItemToArray(a->problems, problem);
+        }
+        text = json_text(a->problems);
+        status = waits ? store_scene_postpone(store, a->scene_id, text, err)
+                       : store_scene_reject(store, a->scene_id, text, err);
+    }
+    mem_free(text);
+    return status;
+}
+
+bool outcome_lacks_room(const struct attempt *a) {
+    return a->phase == ATTEMPT_ENDED && WIFEXITED(a->wait_status) &&
+           WEXITSTATUS(a->wait_status) == PROGRESS_EXIT_NO_SPACE;
+}
+
+enum status outcome_settle(struct attempt *a, struct store *store, struct figures *figures, struct error *err) {
+    struct verdict verdict;
+    attempt_charge(a, store, figures);
+    housekeeping_drop_scraps(a->dir);
+    judge(a, &verdict);
+    enum status status = a->job_id ? settle_job(a, store, &verdict, err)
+                                   : settle_check(a, store, &verdict, err);
+    /* Fenced, or deleted meanwhile: there is nothing left to enter. */
+    if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
+        return status;
+    static const enum figures_end ends[] = {
+        [OUTCOME_OK] = END_SUCCEEDED,   [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
+        [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK};
+    if (a->job_id)
+        atomic_fetch_add(&figures->ends[ends[verdict.outcome]], 1);
+    static const char *const words[] = {
+        [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
+        [OUTCOME_MEMORY] = "broke off",
+        [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};
+    if (a->job_id)
+        log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number,
+                 words[verdict.outcome], verdict.reason[0] ? ": " : "", verdict.reason);
+    else
+        log_info("scene %.12s: its check %s%s%s", a->scene_id, words[verdict.outcome],
+                 verdict.reason[0] ? ": " : "", verdict.reason);
+    attempt_empty(a);
+    return STATUS_OK;
+}
