@@ -118,6 +118,11 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
         cJSON_Delete(params);
 }
 
+/* As whom a change is made: see store_scene_patch. */
+static int64_t owner_of(const struct request *r) {
+    return r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id;
+}
+
 struct response *scenes_patch(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
@@ -133,7 +138,7 @@ struct response *scenes_patch(struct api *api, struct request *r) {
         reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and look again", NULL);
     if (!reply)
         read_patch(r, &body, &name, &keeping, &reply);
-    if (!reply && store_scene_patch(api->store, row.id, name, &keeping, &err) != STATUS_OK)
+    if (!reply && store_scene_patch(api->store, row.id, owner_of(r), name, &keeping, &err) != STATUS_OK)
         reply = problem_from(r, &err);
     char id[SCENE_ID_SIZE];
     memcpy(id, row.id, sizeof id);
@@ -157,12 +162,11 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     struct response *reply = keeping_dry_run(r, &dry_run);
     if (reply || !auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
         return reply;
-    int64_t owner_id = r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id;
     char *path = mem_printf("scenes/%s", row.id);
     pthread_mutex_lock(&api->scene_mutex);
-    enum status status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
+    enum status status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (status == STATUS_NO_SPACE && space_spend_reserve(api))
-        status = store_scene_delete(api->store, row.id, owner_id, dry_run, &is_gone, &err);
+        status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
         status = space_discard(api, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);

@@ -223,14 +223,32 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
     return status;
 }
 
-enum status store_scene_patch(struct store *store, const char *id, const char *name,
+/* Whether the scene is somebody's besides owner_id's (-1: that does not matter). */
+static enum status is_others_too(struct store *store, const char *id, int64_t owner_id, int64_t *is_so,
+                                 struct error *err) {
+    *is_so = 0;
+    return owner_id < 0 ? STATUS_OK
+                        : sql_int(&store->sql, 0, is_so, err,
+                                  "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1", "ti", id,
+                                  owner_id);
+}
+
+enum status store_scene_patch(struct store *store, const char *id, int64_t owner_id, const char *name,
                               const struct keeping *keeping, struct error *err) {
+    int64_t others = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err,
-                     "UPDATE scenes SET " KEEPING_SET ", name = ifnull(?4, name) WHERE id = ?5",
-                     "nnitt", (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, name, id);
+    if (keeping->pin == KEEP_PIN_OFF || keeping->sets_expiry)
+        status = is_others_too(store, id, owner_id, &others, err);
+    if (others) {
+        error_set(err, STATUS_CONFLICT, "others keep scene %s, too: its end is not one user's to set", id);
+        status = error_hint(err, "It can be pinned; DELETE gives up your share of it alone.");
+    }
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err,
+                         "UPDATE scenes SET " KEEPING_SET ", name = ifnull(?4, name) WHERE id = ?5",
+                         "nnitt", (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, name, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
     return store_end(store, status, 0, err);
@@ -246,10 +264,8 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
     status = state_of(store, id, &state, err);
     if (status == STATUS_OK && state < 0)
         status = not_found(id, err);
-    if (status == STATUS_OK && owner_id >= 0)
-        status = sql_int(&store->sql, 0, &others, err,
-                         "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1",
-                         "ti", id, owner_id);
+    if (status == STATUS_OK)
+        status = is_others_too(store, id, owner_id, &others, err);
     if (status == STATUS_OK)
         status = is_in_check(store, id, &in_check, err);
     if (status == STATUS_OK && in_check && !others)

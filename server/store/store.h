@@ -81,8 +81,9 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
                              size_t limit, struct scene_row *rows, size_t *count,
                              char next_cursor[128], struct error *err);
-/* NULL leaves the name. */
-enum status store_scene_patch(struct store *store, const char *id, const char *name,
+/* NULL leaves the name. As user owner_id (-1: an admin): STATUS_CONFLICT when others own it, too, and could
+ * lose it by this. */
+enum status store_scene_patch(struct store *store, const char *id, int64_t owner_id, const char *name,
                               const struct keeping *keeping, struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a

@@ -171,10 +171,16 @@ static void test_lists(void) {
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
     CHECK(existed && scenes_seen(store, &bob) == 2);
+    const struct keeping past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
+    OK(store_scene_patch(store, SCENE_A, alice.user_id, "mine", &pin, &err));
+    IS(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &loose, &err), STATUS_CONFLICT);
+    IS(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &past, &err), STATUS_CONFLICT);
+    OK(store_scene_patch(store, SCENE_A, -1, NULL, &loose, &err));
     IS(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, first, &err));
     OK(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err));
     CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
+    OK(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &past, &err)); /* it is his alone now */
     IS(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, second, &err));
     OK(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err));
