@@ -310,12 +310,12 @@ static enum status do_pause(struct api *api, int64_t id, struct error *err) {
     return store_job_pause(api->store, id, err);
 }
 
-static struct queue_limits limits_of(const struct api *api) {
-    return (struct queue_limits){api->config.queue_limit, api->config.user_queue_limit};
+static struct count_limits limits_of(const struct api *api) {
+    return (struct count_limits){api->config.queue_limit, api->config.user_queue_limit};
 }
 
 static enum status do_resume(struct api *api, int64_t id, struct error *err) {
-    struct queue_limits limits = limits_of(api);
+    struct count_limits limits = limits_of(api);
     return store_job_resume(api->store, id, &limits, err);
 }
 
@@ -342,7 +342,7 @@ struct response *jobs_retry(struct api *api, struct request *r) {
     if (refusal)
         return refusal;
     struct error err;
-    struct queue_limits limits = limits_of(api);
+    struct count_limits limits = limits_of(api);
     if (store_job_retry(api->store, id, api->config.max_attempts, from, &limits, &err) != STATUS_OK)
         return problem_from(r, &err);
     scheduler_wake(api->scheduler);
@@ -396,7 +396,7 @@ struct response *jobs_extend(struct api *api, struct request *r) {
     struct response *refusal = NULL;
     struct job job;
     struct error err;
-    struct queue_limits limits = limits_of(api);
+    struct count_limits limits = limits_of(api);
     int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;

@@ -16,7 +16,7 @@
 #include "server/http/space.h"
 #include "server/http/upload.h"
 
-#define UNFINISHED_MAX 10000
+static const struct count_limits unfinished_max = {.all = 10000, .one_user = 1000};
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
@@ -168,7 +168,7 @@ enum status partial_create(struct partials *p, struct upload_row *row, struct er
     if (status == STATUS_OK)
         status = file_sync_parent(path, err);
     if (status == STATUS_OK)
-        status = store_upload_add(p->api->store, row, &hash, sizeof hash, UNFINISHED_MAX, err);
+        status = store_upload_add(p->api->store, row, &hash, sizeof hash, &unfinished_max, err);
     if (fd >= 0)
         close(fd);
     if (fd >= 0 && status != STATUS_OK)

@@ -63,9 +63,9 @@ enum status store_webhook_set(struct store *store, int64_t job_id, const char *u
                               struct error *err);
 enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state,
                                const char *reason, const char *hint, struct error *err);
-struct queue_limits; /* store.h */
+struct count_limits; /* store.h */
 /* Inside a transaction: STATUS_LIMIT unless one more job of this owner (0: nobody) may be queued. */
-enum status store_queue_check(struct store *store, int64_t owner_id, const struct queue_limits *limits,
+enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err);
 /* Inside a transaction: STATUS_CONFLICT unless the job runs its attempt `attempt`. */
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err);

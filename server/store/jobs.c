@@ -94,7 +94,7 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
         return error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
                           job->scene_id, job->scene_id);
     }
-    return store_queue_check(store, job->owner_id, &(struct queue_limits){queue_limit, job->user_queue_limit}, err);
+    return store_queue_check(store, job->owner_id, &(struct count_limits){queue_limit, job->user_queue_limit}, err);
 }
 
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,

@@ -45,6 +45,12 @@ enum status store_backup(struct store *store, const char *path, struct error *er
  * scene changed). One subscriber; set before threads start. */
 void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user);
 
+/* How many of a thing there may be, and of one user's (0: no limit; of nobody's there is none). Where a user
+ * asks for one more: STATUS_LIMIT. */
+struct count_limits {
+    size_t all, one_user;
+};
+
 /* --- scenes ------------------------------------------------------------------------------ */
 
 struct scene_row {
@@ -101,11 +107,6 @@ enum status store_scene_postpone(struct store *store, const char *id, const char
 enum status store_scene_check_again(struct store *store, struct error *err);
 
 /* --- jobs -------------------------------------------------------------------------------- */
-
-/* How many jobs may be queued; one_user 0: no limit. Where a user asks for one more: STATUS_LIMIT. */
-struct queue_limits {
-    size_t all, one_user;
-};
 
 struct job_new {
     const char *scene_id, *name, *labels, *settings;
@@ -166,11 +167,11 @@ enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
  * Those that put a job into the queue keep `limits` (NULL: none). */
 enum status store_job_cancel(struct store *store, int64_t id, struct error *err);
 enum status store_job_pause(struct store *store, int64_t id, struct error *err);
-enum status store_job_resume(struct store *store, int64_t id, const struct queue_limits *limits, struct error *err);
+enum status store_job_resume(struct store *store, int64_t id, const struct count_limits *limits, struct error *err);
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
-                            const struct queue_limits *limits, struct error *err);
+                            const struct count_limits *limits, struct error *err);
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
-                             const struct queue_limits *limits, struct error *err);
+                             const struct count_limits *limits, struct error *err);
 
 /* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A wish
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
@@ -301,9 +302,9 @@ struct upload_row {
 void upload_row_release(struct upload_row *row);
 
 /* A new row with nothing received; id, owner_id, name, metadata, sha256, length and boot are taken from *row.
- * `hash`: the state of an empty hash. STATUS_LIMIT when there are `limit` unfinished ones. */
+ * `hash`: the state of an empty hash. The limits are those of unfinished ones. */
 enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash,
-                             size_t hash_size, size_t limit, struct error *err);
+                             size_t hash_size, const struct count_limits *limits, struct error *err);
 /* hash (may be NULL) gets the kept state; STATUS_CORRUPT when it has another size. */
 enum status store_upload_get(struct store *store, const char *id, struct upload_row *row, void *hash,
                              size_t hash_size, struct error *err);

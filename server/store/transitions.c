@@ -168,7 +168,7 @@ enum status store_job_pause(struct store *store, int64_t id, struct error *err) 
 }
 
 /* Into the queue by its user's wish, where there is room for one more. */
-static enum status enqueue(struct store *store, struct present *now, const struct queue_limits *limits,
+static enum status enqueue(struct store *store, struct present *now, const struct count_limits *limits,
                            struct error *err) {
     int64_t owner = 0;
     enum status status = sql_int(&store->sql, 0, &owner, err, "SELECT owner_id FROM jobs WHERE id = ?", "i", now->id);
@@ -177,7 +177,7 @@ static enum status enqueue(struct store *store, struct present *now, const struc
     return status == STATUS_OK ? move(store, now, JOB_QUEUED, "", "", err) : status;
 }
 
-enum status store_job_resume(struct store *store, int64_t id, const struct queue_limits *limits, struct error *err) {
+enum status store_job_resume(struct store *store, int64_t id, const struct count_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
@@ -197,7 +197,7 @@ enum status store_job_resume(struct store *store, int64_t id, const struct queue
 
 /* A new life for a job that has ended; in the transaction that job_begin began. */
 static enum status revive(struct store *store, struct present *now, int max_attempts,
-                          const struct queue_limits *limits, struct error *err) {
+                          const struct count_limits *limits, struct error *err) {
     int64_t scene = 0;
     enum status status =
         sql_int(&store->sql, 0, &scene, err,
@@ -217,7 +217,7 @@ static enum status revive(struct store *store, struct present *now, int max_atte
 }
 
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
-                            const struct queue_limits *limits, struct error *err) {
+                            const struct count_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
@@ -236,7 +236,7 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
 }
 
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
-                             const struct queue_limits *limits, struct error *err) {
+                             const struct count_limits *limits, struct error *err) {
     struct present now;
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)

@@ -57,7 +57,7 @@ enum status store_job_next(struct store *store, int user_max_running, int64_t *i
                : status;
 }
 
-enum status store_queue_check(struct store *store, int64_t owner_id, const struct queue_limits *limits,
+enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err) {
     int64_t queued;
     enum status status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?", "n",

@@ -50,16 +50,22 @@ static enum status end_change(struct store *store, enum status status, const cha
 }
 
 enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash,
-                             size_t hash_size, size_t limit, struct error *err) {
-    int64_t count, now = store_now_ms();
+                             size_t hash_size, const struct count_limits *limits, struct error *err) {
+    int64_t count, mine = 0, now = store_now_ms();
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_int(&store->sql, 0, &count, err,
                      "SELECT count(*) FROM uploads WHERE scene_id = ''", "");
-    if (status == STATUS_OK && (uint64_t)count >= limit)
+    if (status == STATUS_OK && (uint64_t)count >= limits->all)
         status = error_set(err, STATUS_LIMIT, "%lld uploads are under way already, the limit is %zu",
-                           (long long)count, limit);
+                           (long long)count, limits->all);
+    if (status == STATUS_OK && limits->one_user > 0 && row->owner_id > 0)
+        status = sql_int(&store->sql, 0, &mine, err,
+                         "SELECT count(*) FROM uploads WHERE scene_id = '' AND owner_id = ?", "i", row->owner_id);
+    if (status == STATUS_OK && mine > 0 && (uint64_t)mine >= limits->one_user)
+        status = error_set(err, STATUS_LIMIT, "%lld of your uploads are under way already, the limit is %zu",
+                           (long long)mine, limits->one_user);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT INTO uploads (id, owner_id, name, metadata, sha256, length, hash, boot,"

@@ -80,7 +80,7 @@ static void add_upload(struct error *err) {
     struct sha256 hash;
     sha256_init(&hash);
     memcpy(row.id, UPLOAD, sizeof UPLOAD);
-    must(store_upload_add(lab.store, &row, &hash, sizeof hash, 100, err), err);
+    must(store_upload_add(lab.store, &row, &hash, sizeof hash, &(struct count_limits){.all = 100}, err), err);
     put_file("uploads/" UPLOAD, "");
 }
 

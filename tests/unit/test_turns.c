@@ -66,6 +66,28 @@ static void test_full_queue(void) {
     CHECK(owner_next(1) == 0); /* nobody has used nothing */
 }
 
+static enum status upload_of(int64_t user, int number) {
+    struct upload_row row = {.owner_id = user, .name = (char *)"room", .metadata = (char *)"", .length = 10};
+    const struct count_limits limits = {.all = 4, .one_user = 2};
+    snprintf(row.id, sizeof row.id, "%032d", number);
+    return store_upload_add(store, &row, "hash", 4, &limits, &err);
+}
+
+/* One user cannot take all the room for unfinished uploads. */
+static void test_uploads(void) {
+    OK(upload_of(1, 1));
+    OK(upload_of(1, 2));
+    IS(upload_of(1, 3), STATUS_LIMIT);
+    OK(upload_of(2, 4));
+    OK(upload_of(0, 5));
+    IS(upload_of(3, 6), STATUS_LIMIT);
+    for (int number = 1; number <= 5; number++) {
+        char id[UPLOAD_ID_SIZE];
+        snprintf(id, sizeof id, "%032d", number);
+        IS(store_upload_delete(store, id, &err), number == 3 ? STATUS_NOT_FOUND : STATUS_OK);
+    }
+}
+
 /* Ten users with a job after another: turns differ by one at most. */
 static void test_ten_users(void) {
     int started[10] = {0};
@@ -111,6 +133,7 @@ int main(void) {
     int64_t running = test_running();
     test_full_queue();
     test_ten_users();
+    test_uploads();
     test_bytes(running);
     store_close(store);
     drop_dir(dir);
