@@ -150,6 +150,26 @@ static void learn_row(const struct learn *l, size_t row) {
     }
 }
 
+/* The greatest power of two below count, or 0: from there, halved each time, steps reach any of `count`
+ * places. */
+static size_t first_step(size_t count) {
+    size_t step = 0;
+    for (size_t next = 1; next < count; next *= 2)
+        step = next;
+    return step;
+}
+
+static void plan_searches(struct guide *g) {
+    size_t most = 1, step = first_step(g->patch_count);
+    for (size_t p = 0; p < g->patch_count; p++) {
+        size_t own = g->first[p + 1] - g->first[p];
+        most = own > most ? own : most;
+    }
+    g->row_step = (int32_t)step;
+    g->patch_step = (int32_t)first_step(most);
+    g->stride = step > 0 ? 2 * step : 1;
+}
+
 struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel) {
     if (!(lights->triangles.total > 0.0))
         return NULL;
@@ -168,9 +188,8 @@ struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, co
     find_rows(&l, mesh);
     g->reach = mem_calloc(g->row_count * g->patch_count, sizeof *g->reach); /* row 0: nothing known */
     g->power = mem_array(g->patch_count, sizeof *g->power);
-    g->stride = g->patch_count + 1 + LIGHT_TABLE_PAD;
+    plan_searches(g);
     g->cumulative = mem_calloc_large(g->row_count * g->stride, sizeof *g->cumulative);
-    g->start = mem_calloc_large(g->row_count * GUIDE_STARTS, sizeof *g->start);
     for (size_t row = 1; row < g->row_count; row++)
         learn_row(&l, row);
     mem_free(l.point);
@@ -188,7 +207,6 @@ void guide_free(struct guide *g) {
     mem_free(g->reach);
     mem_free(g->power);
     mem_free(g->cumulative);
-    mem_free(g->start);
     mem_free(g);
 }
 
@@ -201,18 +219,12 @@ static void make_row(struct guide *g, size_t row, const float *luminance) {
     double by_power = total > 0.0 ? (double)POWER_SHARE : 1.0;
     double by_reach = total > 0.0 ? (1.0 - by_power) / total : 0.0;
     for (size_t p = 0; p < g->patch_count; p++) {
-        c[p] = (float)sum;
         sum += by_power * (double)g->power[p] + by_reach * (double)(reach[p] * luminance[p]);
+        c[p] = (float)sum;
     }
-    c[g->patch_count] = 1.0f;
-    for (size_t i = 1; i <= LIGHT_TABLE_PAD; i++)
-        c[g->patch_count + i] = INFINITY;
-    size_t patch = 0;
-    for (size_t i = 0; i < GUIDE_STARTS; i++) {
-        while (patch + 1 < g->patch_count && c[patch + 1] * GUIDE_STARTS <= (float)i)
-            patch++;
-        g->start[row * GUIDE_STARTS + i] = (uint16_t)patch;
-    }
+    c[g->patch_count - 1] = 1.0f;
+    for (size_t i = g->patch_count; i < g->stride; i++)
+        c[i] = INFINITY;
 }
 
 void guide_update(struct guide *g, const struct lights *lights) {

@@ -20,8 +20,6 @@
 #include "server/render/light.h"
 #include "server/scene/mesh.h"
 
-#define GUIDE_STARTS 32
-
 /* Cells are cubes; numbers count x fastest, and within a cell the six sides +x, -x, +y, ... */
 struct guide_grid {
     vec3 origin;
@@ -37,9 +35,10 @@ struct guide {
     uint16_t *patch_of;       /* [light triangles] */
     float *reach;             /* [row_count][patch_count] what arrives of radiance 1 */
     float *power;             /* [patch_count] share of all power */
-    size_t stride;            /* patch_count + 1 + LIGHT_TABLE_PAD */
-    float *cumulative;        /* [row_count][stride] as a light_table's; row 0 is by power */
-    uint16_t *start;          /* [row_count][GUIDE_STARTS] patch in whose range i / GUIDE_STARTS lies */
+    size_t stride;            /* patch_count rounded up to a power of two */
+    float *cumulative;        /* [row_count][stride] chance of a patch and those before it, so the last is
+                               * 1, then INFINITY; row 0 is by power */
+    int32_t row_step, patch_step; /* with which a search in a row, in a patch starts (shade_pick) */
 };
 
 /* NULL where lights have more patches than are worth while. */
@@ -69,29 +68,10 @@ static inline int32_t guide_cell(const struct guide_grid *grid, vec3 p, vec3 nor
 
 static inline float guide_chance(const struct guide *g, size_t row, size_t patch) {
     const float *c = g->cumulative + row * g->stride + patch;
-    return c[1] - c[0];
+    return patch > 0 ? c[0] - c[-1] : c[0];
 }
 
-/* The light triangle for a number in [0, 1); *density_factor: how many times denser than by power
- * its points are picked. */
-static inline uint32_t guide_pick(const struct guide *g, const struct lights *lights, size_t row, float pick,
-                                  float *density_factor) {
-    const float *c = g->cumulative + row * g->stride;
-    size_t patch = g->start[row * GUIDE_STARTS + (size_t)(pick * GUIDE_STARTS)];
-    patch += light_table_steps(c, patch, pick);
-    float width = c[patch + 1] - c[patch];
-    *density_factor = width / g->power[patch];
-    uint32_t first = g->first[patch], end = g->first[patch + 1];
-    if (end - first == 1)
-        return first;
-    const float *by_power = lights->triangles.cumulative;
-    float within = (pick - c[patch]) / width;
-    float at = by_power[first] + within * (by_power[end] - by_power[first]);
-    uint32_t entry = light_table_pick(&lights->triangles, at < 0x1.fffffep-1f ? at : 0x1.fffffep-1f);
-    return entry < first ? first : entry < end ? entry : end - 1;
-}
-
-/* The same factor for a point of light triangle `entry`. */
+/* How many times denser than by power points of light triangle `entry` are picked. */
 static inline float guide_density_factor(const struct guide *g, size_t row, uint32_t entry) {
     size_t patch = g->patch_of[entry];
     return guide_chance(g, row, patch) / g->power[patch];

@@ -210,14 +210,14 @@ static void add_emission(const struct vertex_block *v, int count, rgb *radiance)
     }
 }
 
-/* The rows of the guide, and their places that the picks will need fetched. */
-static void find_rows(struct shade_block *s, const struct guide *guide, int count) {
+/* The rows of the guide, of all lanes, and what the picks will need of them fetched. */
+static void find_rows(struct shade_block *s, const struct guide *guide) {
     shade_cells(s, &guide->grid);
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < LANES; i++) {
         s->guide_row[i] = guide->row[s->cell[i]];
-        __builtin_prefetch(guide->start + s->guide_row[i] * GUIDE_STARTS);
-        __builtin_prefetch(guide->cumulative +
-                           s->guide_row[i] * guide->stride + (size_t)(s->pick[i] * (float)guide->patch_count));
+        const float *chances = guide->cumulative + s->guide_row[i] * guide->stride;
+        for (size_t k = 0; k < guide->patch_count; k += 64 / sizeof *chances)
+            __builtin_prefetch(chances + k);
     }
 }
 
@@ -235,19 +235,16 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
     const struct lights *lights = world->lights;
     if (!(lights->triangles.total > 0.0))
         return lights_any(lights);
-    if (world->guide)
-        find_rows(s, world->guide, count);
+    if (world->guide) {
+        find_rows(s, world->guide);
+        shade_pick(s, world->guide, lights);
+    }
     for (int i = 0; i < count; i++) {
         if (s->pick[i] < lights->environment_chance)
             continue; /* see sample_environment */
-        if (!world->guide) {
-            load_light(s, v, i, lights_pick(lights, s->pick[i]));
-            continue;
-        }
-        float pick = lights_rescale(lights, s->pick[i]), factor;
-        uint32_t entry = guide_pick(world->guide, lights, s->guide_row[i], pick, &factor);
-        load_light(s, v, i, &lights->triangle[entry]);
-        s->light_density[i] *= factor;
+        load_light(s, v, i, world->guide ? &lights->triangle[s->light[i]] : lights_pick(lights, s->pick[i]));
+        if (world->guide)
+            s->light_density[i] *= s->density_factor[i];
     }
     return true;
 }

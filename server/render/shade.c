@@ -116,6 +116,44 @@ KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
     }
 }
 
+/* Two searches by steps of a fixed number, since how far the right entry lies is too random to branch
+ * on: for the patch in the row, then, by power, for the triangle in the patch. Every lane's row must be
+ * one of the guide's. */
+KERNEL void shade_pick(struct shade_block *restrict s, const struct guide *restrict guide,
+                       const struct lights *restrict lights) {
+    const float *restrict until = guide->cumulative, *restrict power = guide->power;
+    const float *restrict by_power = lights->triangles.cumulative;
+    const uint32_t *restrict first = guide->first;
+    int32_t stride = (int32_t)guide->stride, start[LANES], patch[LANES], last[LANES];
+    float at[LANES];
+    FOR_LANES {
+        at[i] = lights_rescale(lights, s->pick[i]);
+        start[i] = (int32_t)s->guide_row[i] * stride;
+        patch[i] = 0;
+    }
+    for (int32_t step = guide->row_step; step > 0; step /= 2) {
+        FOR_LANES {
+            patch[i] += until[start[i] + patch[i] + step - 1] <= at[i] ? step : 0;
+        }
+    }
+    FOR_LANES {
+        int32_t before = patch[i] > 0 ? start[i] + patch[i] - 1 : start[i];
+        float low = patch[i] > 0 ? until[before] : 0.0f;
+        float width = until[start[i] + patch[i]] - low, within = (at[i] - low) / width;
+        uint32_t from = first[patch[i]], end = first[patch[i] + 1];
+        s->density_factor[i] = width / power[patch[i]];
+        at[i] = by_power[from] + within * (by_power[end] - by_power[from]);
+        s->light[i] = (int32_t)from;
+        last[i] = (int32_t)end - 1;
+    }
+    for (int32_t step = guide->patch_step; step > 0; step /= 2) {
+        FOR_LANES {
+            int32_t next = s->light[i] + step < last[i] ? s->light[i] + step : last[i];
+            s->light[i] = by_power[next] <= at[i] ? next : s->light[i];
+        }
+    }
+}
+
 KERNEL void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict s) {
     FOR_LANES {
         float sum = s->filter_sum[i];

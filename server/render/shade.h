@@ -20,6 +20,10 @@ void shade_cells(struct shade_block *restrict s, const struct guide_grid *restri
 /* Random numbers of the vertex that ends segment number `depth` (0: the camera's). */
 void shade_numbers(struct shade_block *restrict s, int depth);
 
+/* The light triangles that the rows of a guide pick, for lanes whose choice is not the environment. */
+void shade_pick(struct shade_block *restrict s, const struct guide *restrict guide,
+                const struct lights *restrict lights);
+
 /* From the texel values gathered: base colour and weights. */
 void shade_texture(struct vertex_block *restrict v, struct shade_block *restrict s);
 

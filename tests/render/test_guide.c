@@ -1,9 +1,10 @@
 /* The guide of light samples: densities that agree with the picks, parts that cover their triangle,
  * the same radiance with and without it, less variance. */
+#include "server/render/shade.h"
 #include "tests/render/box.h"
 #include "tests/render/chi_square.h"
 
-#define SAMPLES 60000
+#define SAMPLES 64000 /* a multiple of LANES */
 
 static float number(uint64_t which, uint64_t i, uint64_t dimension) {
     return rng_to_float((uint32_t)(rng_key(which, i, dimension) >> 32));
@@ -50,12 +51,20 @@ static void check_density(const struct box *b, size_t row) {
     const struct lights *lights = b->world.lights;
     double *found = mem_calloc(lights->triangle_count, sizeof *found);
     double *expected = mem_calloc(lights->triangle_count, sizeof *expected), total = 0.0;
-    for (uint64_t i = 0; i < SAMPLES; i++) {
-        float factor;
-        uint32_t entry = guide_pick(b->world.guide, lights, row, number(2, i, row), &factor);
-        CHECK_NEAR(factor, guide_density_factor(b->world.guide, row, entry), 0.0);
-        found[entry] += 1.0;
+    struct shade_block *s = mem_calloc_large(1, sizeof *s);
+    for (uint64_t i = 0; i < SAMPLES; i += LANES) {
+        for (uint32_t lane = 0; lane < LANES; lane++) {
+            s->guide_row[lane] = (uint32_t)row;
+            s->pick[lane] = number(2, i + lane, row);
+        }
+        shade_pick(s, b->world.guide, lights);
+        for (int lane = 0; lane < LANES; lane++) {
+            uint32_t entry = (uint32_t)s->light[lane];
+            CHECK_NEAR(s->density_factor[lane], guide_density_factor(b->world.guide, row, entry), 0.0);
+            found[entry] += 1.0;
+        }
     }
+    mem_free(s);
     for (size_t i = 0; i < lights->triangle_count; i++) {
         const struct light_triangle *t = &lights->triangle[i];
         double area = 0.5 * (double)vec3_length(vec3_cross(t->edge1, t->edge2));
