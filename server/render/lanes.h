@@ -85,7 +85,7 @@ struct shade_block {
     float roulette[LANES], light_roulette[LANES];
     /* The light sample: a place on a triangle, or a direction already (distance INFINITY). */
     struct lanes3 light_corner, light_edge1, light_edge2, radiance;
-    int32_t light[LANES];            /* number of the triangle, where a guide picks it */
+    int32_t light[LANES];            /* number of the triangle */
     float density_factor[LANES];     /* how many times denser than by power */
     float light_density[LANES];      /* by area */
     struct lanes3 light_direction;   /* world */

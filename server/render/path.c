@@ -37,6 +37,7 @@
 #define DERIVATIVE_WORTH 2.0f /* from roulette_depth, where derivatives are wanted: as EARLY_WORTH */
 #define MIN_LIGHT_CHANCE 0.1f
 #define EARLY_WORTH 4.0f /* before roulette_depth a path worth less than 1 / this may end */
+#define BUCKETS 256 /* by which shadow rays are sorted */
 
 /* A path under way to its next surface. */
 struct flight {
@@ -66,10 +67,14 @@ struct path_batch {
     struct accel_ray *ray, *shadow_ray; /* [capacity] */
     struct accel_hit *hit;            /* [capacity] */
     struct shadow *shadow;            /* [capacity] */
+    uint8_t *bucket;                  /* [capacity] of each: rises with the number of its light */
+    struct accel_ray *sorted_ray;     /* [capacity] the shadow rays by bucket */
+    struct shadow *sorted;            /* [capacity] and what waits for them */
     uint8_t *occluded;                /* [capacity] */
     uint32_t *key, *sample;           /* [capacity] per path, of the sampler */
     bool *dropped;                    /* [capacity] the path's estimate was not finite */
     size_t flight_count, shadow_count;
+    unsigned bucket_shift;            /* a light's bucket is its number shifted down by so many bits */
     uint64_t ray_count, dropped_count;
     void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray);
     void *tap_user;
@@ -87,6 +92,9 @@ static struct path_batch *batch_new(size_t capacity, int max_depth) {
     b->shadow_ray = mem_array(capacity, sizeof *b->shadow_ray);
     b->hit = mem_array(capacity, sizeof *b->hit);
     b->shadow = mem_array(capacity, sizeof *b->shadow);
+    b->bucket = mem_array(capacity, sizeof *b->bucket);
+    b->sorted_ray = mem_array(capacity, sizeof *b->sorted_ray);
+    b->sorted = mem_array(capacity, sizeof *b->sorted);
     b->occluded = mem_array(capacity, sizeof *b->occluded);
     b->key = mem_array(capacity, sizeof *b->key);
     b->sample = mem_array(capacity, sizeof *b->sample);
@@ -121,6 +129,9 @@ void path_batch_free(struct path_batch *b) {
     mem_free(b->shadow_ray);
     mem_free(b->hit);
     mem_free(b->shadow);
+    mem_free(b->bucket);
+    mem_free(b->sorted_ray);
+    mem_free(b->sorted);
     mem_free(b->occluded);
     mem_free(b->key);
     mem_free(b->sample);
@@ -215,18 +226,19 @@ static void find_rows(struct shade_block *s, const struct guide *guide) {
     shade_cells(s, &guide->grid);
     for (int i = 0; i < LANES; i++) {
         s->guide_row[i] = guide->row[s->cell[i]];
-        const float *chances = guide->cumulative + s->guide_row[i] * guide->stride;
-        for (size_t k = 0; k < guide->patch_count; k += 64 / sizeof *chances)
-            __builtin_prefetch(chances + k);
+        const float *row = guide->cumulative + s->guide_row[i] * guide->stride;
+        for (size_t k = 0; k < guide->stride; k += 64 / sizeof *row)
+            __builtin_prefetch(row + k);
     }
 }
 
-static void load_light(struct shade_block *s, struct vertex_block *v, int lane, const struct light_triangle *t) {
+static void load_light(struct shade_block *s, struct vertex_block *v, int lane, const struct lights *lights) {
+    const struct light_triangle *t = &lights->triangle[s->light[lane]];
     lanes3_set(&s->light_corner, lane, t->corner);
     lanes3_set(&s->light_edge1, lane, t->edge1);
     lanes3_set(&s->light_edge2, lane, t->edge2);
     lanes3_set_rgb(&s->radiance, lane, t->radiance);
-    s->light_density[lane] = t->density;
+    s->light_density[lane] = t->density * s->density_factor[lane];
     v->light_segment[lane] = t->segment;
 }
 
@@ -242,9 +254,11 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
     for (int i = 0; i < count; i++) {
         if (s->pick[i] < lights->environment_chance)
             continue; /* see sample_environment */
-        load_light(s, v, i, world->guide ? &lights->triangle[s->light[i]] : lights_pick(lights, s->pick[i]));
-        if (world->guide)
-            s->light_density[i] *= s->density_factor[i];
+        if (!world->guide) {
+            s->light[i] = (int32_t)(lights_pick(lights, s->pick[i]) - lights->triangle);
+            s->density_factor[i] = 1.0f;
+        }
+        load_light(s, v, i, lights);
     }
     return true;
 }
@@ -259,6 +273,7 @@ static void sample_environment(struct shade_block *s, struct vertex_block *v, co
         vec3 point = lanes3_get(&s->point, i);
         lights_sample(lights, point, s->pick[i], s->light_u[i], s->light_v[i], &light);
         v->light_segment[i] = LIGHT_ENVIRONMENT;
+        s->light[i] = 0;
         s->light_pdf[i] = light.pdf;
         lanes3_set(&s->light_direction, i, light.direction);
         lanes3_set_rgb(&s->radiance, i, light.radiance);
@@ -313,6 +328,7 @@ static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32
         b->shadow_ray[shadows] = (struct accel_ray){lanes3_get(&s->shadow_origin, i), 0.0f,
                                                     lanes3_get(&s->shadow_direction, i), s->shadow_far[i]};
         b->shadow[shadows] = (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->gain, i)};
+        b->bucket[shadows] = (uint8_t)(s->light[i] >> b->bucket_shift);
         shadows += s->shadow_wanted[i];
     }
     for (int i = 0; i < count; i++) {
@@ -396,14 +412,30 @@ static void shade_hits(struct path_batch *b, const struct world *world,
         shade(b, world, settings, depth, block, lane, radiance);
 }
 
+/* Puts shadow rays that end near each other side by side, for the cache's sake: what is around a light
+ * is read once. In which order they are traced makes no other difference. */
+static void sort_shadows(struct path_batch *b) {
+    uint32_t place[BUCKETS + 1] = {0};
+    for (size_t i = 0; i < b->shadow_count; i++)
+        place[b->bucket[i] + 1]++;
+    for (size_t k = 0; k < BUCKETS; k++)
+        place[k + 1] += place[k];
+    for (size_t i = 0; i < b->shadow_count; i++) {
+        uint32_t to = place[b->bucket[i]]++;
+        b->sorted_ray[to] = b->shadow_ray[i];
+        b->sorted[to] = b->shadow[i];
+    }
+}
+
 /* Traces the shadow rays; light samples that are hidden lose their radiance. */
 static void gather_light(struct path_batch *b, const struct world *world, int depth, rgb *radiance) {
     if (b->tap)
         b->tap(b->tap_user, true, b->shadow_count, b->shadow_ray);
-    accel_occluded_many(world->accel, b->shadow_count, b->shadow_ray, b->occluded);
+    sort_shadows(b);
+    accel_occluded_many(world->accel, b->shadow_count, b->sorted_ray, b->occluded);
     b->ray_count += b->shadow_count;
     for (size_t i = 0; i < b->shadow_count; i++) {
-        const struct shadow *shadow = &b->shadow[i];
+        const struct shadow *shadow = &b->sorted[i];
         if (!b->occluded[i]) {
             add(&radiance[shadow->path], shadow->gain);
             continue;
@@ -428,6 +460,8 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
         b->ray[i] = (struct accel_ray){ray[i].origin, 0.0f, ray[i].direction, INFINITY};
         radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
     }
+    for (b->bucket_shift = 0; world->lights->triangle_count > (size_t)BUCKETS << b->bucket_shift;)
+        b->bucket_shift++;
     b->depth_count = 0;
     b->flight_count = count;
     for (int depth = 0; depth < settings->max_depth && b->flight_count > 0; depth++) {

@@ -63,8 +63,9 @@ void path_batch_trace(struct path_batch *batch, const struct world *world,
  * then. */
 void path_batch_backward(struct path_batch *batch, const rgb *d_radiance, struct gradient_log *log);
 
-/* Calls tap(user, shadow, count, ray) before each group of rays is traced; shadow tells rays that
- * only ask whether anything is in the way. For benches that measure the same rays elsewhere. */
+/* Calls tap(user, shadow, count, ray) before each group of rays is traced, in the order of their paths;
+ * shadow tells rays that only ask whether anything is in the way. For benches that measure the same rays
+ * elsewhere. */
 struct accel_ray;
 void path_batch_set_tap(struct path_batch *batch,
                         void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray),

@@ -5,7 +5,7 @@
 
 #define REPEATS 5
 
-/* All rays of the paths, in the order in which they were traced. */
+/* All rays of the paths, depth by depth, in the order of the paths. */
 struct record {
     size_t count[2], capacity[2]; /* nearest hit, shadow */
     struct accel_ray *ray[2];
