@@ -67,7 +67,7 @@ static const struct option table[] = {
          "Time after its last use for which a scene is kept. 0: for ever."),
     REAL(collect_interval_sec, "s", 0.1, 86400, "60", "Time between two looks for what has expired."),
     INT(max_connections, "connections", 8, 100000, "1000", "Open HTTP connections; more have to wait."),
-    INT(max_streams, "streams", 1, 100000, "500", "Open event streams; more are refused with 503."),
+    INT(max_streams, "streams", 1, 100000, "500", "Open event streams, of one user half as many; more are refused with 503."),
     REAL(head_timeout_sec, "s", 1, 600, "10", "Time for the whole head of a request to arrive."),
     REAL(idle_timeout_sec, "s", 1, 3600, "30", "Silence after which a connection is closed; time for a whole body that is no upload."),
     INT(body_min_bytes_per_sec, "bytes/s", 0, 1073741824, "1024",

@@ -41,9 +41,12 @@ static struct response *read_request(struct api *api, const struct request *r, s
 }
 
 static struct response *check_room_for_stream(struct api *api, const struct request *r) {
-    if (hub_count(api->hub) < api->config.max_streams)
-        return NULL;
-    return problem(r, 503, "there are %zu event streams already", api->config.max_streams);
+    size_t most = api->config.max_streams, of_one = (most + 1) / 2; /* so that nobody can have them all */
+    if (hub_count(api->hub) >= most)
+        return problem(r, 503, "there are %zu event streams already", most);
+    if (r->caller.user_id > 0 && hub_count_of(api->hub, r->caller.user_id) >= of_one)
+        return problem(r, 503, "%zu event streams are yours already", of_one);
+    return NULL;
 }
 
 static struct response *stream_reply(struct api *api, const struct request *r, const char *type,

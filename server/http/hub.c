@@ -74,6 +74,15 @@ size_t hub_count(struct hub *hub) {
     return count;
 }
 
+size_t hub_count_of(struct hub *hub, int64_t user_id) {
+    size_t count = 0;
+    pthread_mutex_lock(&hub->mutex);
+    for (const struct subscriber *s = hub->first; s; s = s->next)
+        count += s->caller.user_id == user_id;
+    pthread_mutex_unlock(&hub->mutex);
+    return count;
+}
+
 void hub_changed(void *user, int64_t job_id) {
     struct hub *hub = user;
     pthread_mutex_lock(&hub->mutex);

@@ -27,6 +27,7 @@ void hub_tick(struct hub *hub, double now_sec); /* about once a second: keep-ali
 /* A token was revoked: the streams that were opened with it end. */
 void hub_recheck(struct hub *hub);
 size_t hub_count(struct hub *hub);
+size_t hub_count_of(struct hub *hub, int64_t user_id); /* the streams of one user */
 
 struct subscription {
     int64_t job_id;      /* 0: all that the caller may read */

@@ -83,6 +83,26 @@ static void test_back_into_the_queue(const struct rig *rig, const char *token) {
     CHECK(ask(rig, token, post, 2, "/retry") == 429);
 }
 
+/* One user cannot have all event streams. */
+static void test_streams(struct rig *rig, const char *one, const char *other) {
+    const char *const token[] = {one, one, other};
+    struct buf reply;
+    int fd[3];
+    rig->api->config.max_streams = 2;
+    for (int i = 0; i < 3; i++) {
+        char *text = mem_printf("GET /v1/events HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n\r\n", token[i]);
+        fd[i] = rig_connect(rig);
+        rig_send(fd[i], text, strlen(text));
+        buf_init(&reply, 1 << 20);
+        rig_receive(fd[i], &reply, i == 1 ? "yours already" : "retry:");
+        CHECK_THAT(rig_status(&reply) == (i == 1 ? 503 : 200), "stream %d: %d", i, rig_status(&reply));
+        buf_release(&reply);
+        mem_free(text);
+    }
+    for (int i = 0; i < 3; i++)
+        close(fd[i]);
+}
+
 int main(void) {
     struct rig rig;
     struct error err;
@@ -117,6 +137,8 @@ int main(void) {
     buf_release(&reply);
     rig_must(store_token_add(rig.store, "carol", ROLE_USER, carol, &id, &err), &err, "token");
     test_two_at_once(&rig, carol);
+
+    test_streams(&rig, alice, bob);
 
     /* Jobs. */
     const char *submit = "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json";
