@@ -52,6 +52,7 @@ static bool light_at(const struct divide *d, uint32_t texel, struct surface_poin
         return false;
     probes_mix(d->probes, &r->atlas, &r->fused, texel, at, &mix);
     probes_irradiance(d->probes, &mix, light);
+    sun_add_light(&r->sun, r->world.accel, at, light);
     return true;
 }
 

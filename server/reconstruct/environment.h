@@ -8,7 +8,8 @@
  * not scanned, seen through a hole of the mesh), photographs from different places disagree about
  * a direction; the map then holds their median, and `spread` says by how much they disagree.
  * Light is known only in the directions in which some photograph looks out; the rest is filled
- * in smoothly from its surroundings and is a guess: a sun that no photograph shows is not there. */
+ * in smoothly from its surroundings and is a guess, but for a sun, which is looked for by what it lights
+ * (sun_find.h). */
 #ifndef UNBAKE_RECONSTRUCT_ENVIRONMENT_H
 #define UNBAKE_RECONSTRUCT_ENVIRONMENT_H
 

@@ -57,6 +57,7 @@ static void patch_around(const struct gloss_looker *l, uint32_t texel, struct pa
             continue;
         probes_mix(l->probes, &r->atlas, &r->fused, (uint32_t)y * r->atlas.width + (uint32_t)x, &p, &mix);
         probes_irradiance(l->probes, &mix, &patch->light[patch->count]);
+        sun_add_light(&r->sun, r->world.accel, &p, &patch->light[patch->count]);
         patch->at[patch->count++] = p;
     }
 }

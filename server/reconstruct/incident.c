@@ -147,6 +147,18 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
             irradiance->moment[m][c] = (float)sum[m][c];
 }
 
+void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux) {
+    float basis[IRRADIANCE_MOMENTS], c = vec3_dot(direction, shading);
+    if (!(c > 0.0f))
+        return;
+    moment_basis(direction, c, basis);
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+        irradiance->moment[m][0] += basis[m] * flux.r;
+        irradiance->moment[m][1] += basis[m] * flux.g;
+        irradiance->moment[m][2] += basis[m] * flux.b;
+    }
+}
+
 /* bsdf_diffuse written out by powers of F(wi) and m = wi . wo: with cos_d^2 = (1 + m) / 2, its
  * rr is roughness (1 + m). */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo) {

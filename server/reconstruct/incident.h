@@ -61,6 +61,9 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *scratch,
                        const struct light_field *field, const struct surface_point *at, uint32_t key,
                        size_t samples);
 
+/* Adds light from one unit direction, of which so much would arrive at a surface that faced it (irradiance). */
+void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux);
+
 /* Radiance that the diffuse lobe of a white surface sends towards unit `wo`. */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo);
 

@@ -15,6 +15,7 @@
 #include "server/reconstruct/report.h"
 #include "server/reconstruct/solve.h"
 #include "server/reconstruct/split.h"
+#include "server/reconstruct/sun_find.h"
 #include "server/reconstruct/unseen_light.h"
 #include "server/reconstruct/views.h"
 
@@ -187,6 +188,7 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     unseen_light_estimate(run->r, &run->views);
+    sun_find(run->r, &run->views);
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     return STATUS_OK;
@@ -212,6 +214,10 @@ static enum status run_resumable(struct run *run, struct error *err) {
     enum status status = optimiser_load(run->optimiser, &found, err);
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
+    if (run->r->sun.is_there) {
+        sun_draw(&run->r->sun, &run->r->environment);
+        light_by_environment(run->r);
+    }
     if (status == STATUS_OK)
         status = run_stage(run, "refine", optimise, err);
     optimiser_free(run->optimiser);

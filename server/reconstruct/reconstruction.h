@@ -13,6 +13,7 @@
 #include "server/reconstruct/environment.h"
 #include "server/reconstruct/fuse.h"
 #include "server/reconstruct/state.h"
+#include "server/reconstruct/sun.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
@@ -63,6 +64,7 @@ struct reconstruction {
     struct materials materials;
     struct world world;
     struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
+    struct sun sun;                  /* that no photograph shows */
     double unseen_share;             /* of rays from surfaces: those that go where nothing is known */
     struct noise noise;              /* of the photographs' pixels */
     struct fused fused;              /* what the photographs show of each texel */

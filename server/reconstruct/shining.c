@@ -215,7 +215,7 @@ void shining_release(struct shining *s) {
 
 /* --- the sun -------------------------------------------------------------------------------------- */
 
-struct sun {
+struct sunlight {
     const struct shining *shining;
     const struct accel *accel;
     struct shining_place lit[PLACES], beside[PLACES];
@@ -229,7 +229,7 @@ static bool is_open(const struct accel *accel, const struct shining_place *place
            !accel_occluded(accel, origin, direction, 0.0f, INFINITY);
 }
 
-static float share_open(const struct sun *sun, const struct shining_place *place, size_t count, vec3 direction) {
+static float share_open(const struct sunlight *sun, const struct shining_place *place, size_t count, vec3 direction) {
     size_t open = 0;
     for (size_t i = 0; i < count; i++)
         open += is_open(sun->accel, &place[i], direction);
@@ -237,13 +237,13 @@ static float share_open(const struct sun *sun, const struct shining_place *place
 }
 
 /* How much more of the part than of what is beside it sees out in a direction. */
-static float contrast(const struct sun *sun, vec3 direction) {
+static float contrast(const struct sunlight *sun, vec3 direction) {
     float lit = share_open(sun, sun->lit, sun->lit_count, direction);
     return lit > SUN_CONTRAST ? lit - share_open(sun, sun->beside, sun->beside_count, direction) : lit - 1.0f;
 }
 
 /* The places of `unlit` that are beside the part. */
-static size_t choose_beside(struct sun *sun, const struct mesh *mesh, const uint32_t *unlit, size_t count) {
+static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const uint32_t *unlit, size_t count) {
     vec3 middle = {0, 0, 0}, normal = {0, 0, 0};
     float reach_m = 0.0f;
     for (size_t i = 0; i < sun->lit_count; i++) {
@@ -272,7 +272,7 @@ struct candidate {
 };
 
 /* Climbs from a direction to better ones near it. */
-static void climb(const struct sun *sun, struct candidate *c, uint32_t key) {
+static void climb(const struct sunlight *sun, struct candidate *c, uint32_t key) {
     float step = SUN_STEP;
     for (uint32_t i = 0; i < SUN_STEPS && step > SUN_SMALLEST && c->contrast < SUN_CONTRAST; i++) {
         vec3 s, t;
@@ -289,7 +289,7 @@ static void climb(const struct sun *sun, struct candidate *c, uint32_t key) {
 }
 
 /* Whether what light from a direction would fall on, all over the room, is no brighter than the rest. */
-static bool is_contradicted(const struct sun *sun, vec3 direction) {
+static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
     const struct shining *s = sun->shining;
     float value[2][POINTS];
     size_t count[2] = {0, 0};
@@ -304,7 +304,7 @@ static bool is_contradicted(const struct sun *sun, vec3 direction) {
 bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_count, const uint32_t *unlit,
                        size_t unlit_count) {
     const struct mesh *mesh = &s->r->scene->mesh;
-    struct sun sun = {.shining = s, .accel = s->r->world.accel};
+    struct sunlight sun = {.shining = s, .accel = s->r->world.accel};
     struct candidate best[SUN_BEST];
     sun.lit_count = choose_places(mesh, lit, lit_count, PLACES, sun.lit);
     sun.beside_count = choose_beside(&sun, mesh, unlit, unlit_count);

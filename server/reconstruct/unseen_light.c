@@ -2,11 +2,9 @@
 #include "server/reconstruct/unseen_light.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "common/mem.h"
-#include "server/reconstruct/emitters.h"
-#include "server/reconstruct/incident.h"
+#include "server/reconstruct/survey.h"
 #include "server/reconstruct/unseen_fit.h"
 #include "server/render/sampler.h"
 
@@ -22,71 +20,21 @@
 
 struct unseen {
     struct reconstruction *r;
-    uint16_t (*radiance)[3];    /* [height][width] half precision: what texels send out; owned, as all below */
-    struct light_field field;
+    const struct survey *survey; /* while points are gathered */
     size_t count;
-    uint32_t *texel;            /* [count] */
-    struct unseen_point *point; /* [count] */
-    struct incident *scratch;   /* [threads] */
+    struct unseen_point *point;  /* [count] */
     double log_radiance[UNSEEN_CELLS];
 };
 
 /* --- looking around ------------------------------------------------------------------------------- */
 
-/* What texels send out: of those that no photograph shows the mean of their segment, or of the room. */
-static void fill_radiance(struct unseen *u) {
-    const struct reconstruction *r = u->r;
-    size_t segments = r->segments.count;
-    double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
-    u->radiance = mem_calloc_large((size_t)r->fused.width * r->fused.height, sizeof *u->radiance);
-    memcpy(u->radiance, r->fused.radiance, (size_t)r->fused.width * r->fused.height * sizeof *u->radiance);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        rgb shown = fused_radiance(&r->fused, texel);
-        if (!(r->fused.count[texel] > 0.0f))
-            continue;
-        for (size_t s = reconstruction_segment(r, texel), k = 0; k < 2; s = segments, k++) {
-            sum[s][0] += (double)shown.r;
-            sum[s][1] += (double)shown.g;
-            sum[s][2] += (double)shown.b;
-            sum[s][3] += 1.0;
-        }
-    }
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
-        const double *from = sum[segment][3] > 0.0 ? sum[segment] : sum[segments];
-        for (int c = 0; c < 3 && !(r->fused.count[texel] > 0.0f) && from[3] > 0.0; c++)
-            u->radiance[texel][c] = image_half_from_float((float)(from[c] / from[3]));
-    }
-    mem_free(sum);
-}
-
-/* A surface that photographs show and that is no lamp. */
-static bool tells(const struct reconstruction *r, uint32_t texel) {
-    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[reconstruction_segment(r, texel)]);
-}
-
-/* Such texels, evenly spread. */
-static void choose_points(struct unseen *u) {
-    const struct reconstruction *r = u->r;
-    size_t seen = 0, met = 0;
-    for (size_t i = 0; i < r->inverse.valid_count; i++)
-        seen += tells(r, r->inverse.valid[i]);
-    size_t wanted = seen < POINTS ? seen : POINTS;
-    u->texel = mem_array(wanted + 1, sizeof *u->texel);
-    for (size_t i = 0; i < r->inverse.valid_count && u->count < wanted; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        if (tells(r, texel) && met++ == u->count * seen / wanted)
-            u->texel[u->count++] = texel;
-    }
-}
-
 static void look_around(void *user, size_t index, int thread) {
     struct unseen *u = user;
     const struct reconstruction *r = u->r;
     struct unseen_point *p = &u->point[index];
-    struct incident *in = &u->scratch[thread];
-    uint32_t texel = u->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
+    const struct light_field *field = &u->survey->field;
+    struct incident *in = &u->survey->scratch[thread];
+    uint32_t texel = u->survey->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
     struct surface_point at;
     *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
@@ -95,7 +43,7 @@ static void look_around(void *user, size_t index, int thread) {
     vec3_frame(at.shading, &frame[0], &frame[1]);
     for (uint32_t i = 0; i < WAYS; i++)
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-    incident_trace(in, &u->field, &at, WAYS);
+    incident_trace(in, field, &at, WAYS);
     for (size_t i = 0; i < WAYS; i++) {
         bool has_map = r->environment.map.pixel != NULL;
         if (in->hit[i].triangle != ACCEL_NONE || (has_map && environment_is_seen(&r->environment, in->direction[i])))
@@ -107,7 +55,7 @@ static void look_around(void *user, size_t index, int thread) {
             p->share[c.cell[k]] += c.weight[k] / WAYS;
     }
     struct irradiance light;
-    irradiance_gather(&light, in, &u->field, &at, key, WAYS);
+    irradiance_gather(&light, in, field, &at, key, WAYS);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
 }
@@ -148,19 +96,15 @@ static void fill_in(const struct unseen *u) {
     }
 }
 
-/* Fills the points: what they show, and what is around them. Small lamps must be looked for. */
+/* Fills the points: what they show, and what is around them. */
 static void gather_points(struct unseen *u, const struct views *views) {
-    struct reconstruction *r = u->r;
-    struct emitter_evidence *evidence = mem_calloc(r->segments.count, sizeof *evidence);
-    emitters_observe(r, views, evidence);
-    emitters_light_bright(r, views, evidence);
-    choose_points(u);
+    struct survey survey;
+    survey_init(&survey, u->r, views, POINTS);
+    u->survey = &survey;
+    u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);
-    u->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *u->scratch);
-    parallel_for(r->pool, u->count, look_around, u);
-    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
-    world_update_lights(&r->world);
-    mem_free(evidence);
+    parallel_for(u->r->pool, u->count, look_around, u);
+    survey_release(&survey);
 }
 
 static void relight(struct unseen *u) {
@@ -175,8 +119,6 @@ static void relight(struct unseen *u) {
 
 void unseen_light_estimate(struct reconstruction *r, const struct views *views) {
     struct unseen u = {.r = r};
-    fill_radiance(&u);
-    u.field = (struct light_field){&r->world, (const uint16_t(*)[3])u.radiance};
     cJSON *figures = cJSON_AddObjectToObject(r->report, "unseen_light");
     gather_points(&u, views);
     r->unseen_share = unseen_share(&u);
@@ -188,8 +130,5 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     json_add_number(figures, "share_of_rays", r->unseen_share);
     json_add_number(figures, "base_color_without", base_color);
     json_add_bool(figures, "estimated", matters);
-    mem_free(u.scratch);
     mem_free(u.point);
-    mem_free(u.texel);
-    mem_free(u.radiance);
 }

@@ -2,7 +2,7 @@
 
 Not unseen any more: constants of gloss.c were chosen on a draft of these rooms, too.
 
-usage: furnished_room.py kitchen|parlour OUT [SPP]
+usage: furnished_room.py kitchen|parlour|bedroom|lounge OUT [SPP]
 
 OUT becomes a bundle like those of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: 72
 training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb; SPP samples a pixel, 256), HDR and
@@ -11,6 +11,8 @@ models it uses; nothing of them is kept here.
 
   kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel
   parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books
+  bedroom   sun through one window, a red wall, two lamps with shades that shine, a patterned bed
+  lounge    a window whose panes shine as one emitter, twelve small bulbs, a warm and a blue lamp, black polish
 """
 import json
 import os
@@ -21,7 +23,7 @@ import numpy as np
 
 mi.set_variant("llvm_ad_rgb")
 
-from furniture import (METAL, SATIN, Catalogue, box, join, material, picture, planks, quad, sphere, stripes,  # noqa: E402
+from furniture import (METAL, POLISHED, SATIN, Catalogue, box, join, material, picture, planks, quad, sphere, stripes,  # noqa: E402
                        tiles)
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 208.5160596545929
@@ -147,10 +149,90 @@ def parlour(rng):
                  quad("picture", (x, 1.4, 0.03), (0.9, 0, 0), (0, 0.65, 0),
                       material(roughness=0.2, specular=0.5, texture=picture(rng))))
     # From the horizon up bluer and darker, brighter towards +x, brown below.
-    up = np.cos(np.pi * (np.arange(128) + 0.5) / 128)[:, None, None]
-    along = 1 + 0.5 * np.cos(2 * np.pi * (np.arange(256) + 0.5) / 256 - np.pi / 2)[None, :, None]
+    up, around = directions()
+    along = 1 + 0.5 * np.cos(around - np.pi / 2)
     room.sky = np.where(up > 0, (8, 9, 11) - up * np.array((5, 4, 3)), (2.2, 1.9, 1.5)) * along
     return room
+
+
+def bedroom(rng):
+    room = Room((4.8, 2.7, 4.2), rng)
+    room.walls(floor=material(roughness=0.2, specular=0.5, texture=planks(rng, count=6, color=(0.5, 0.32, 0.18))),
+               wall=material(color=(0.75, 0.73, 0.68)), ceiling=material(color=(0.85, 0.85, 0.84)),
+               windows=((1.2, 2.8, 0.8, 2.2),))
+    room.add(quad("red-wall", (0.01, 0, 4.2), (0, 0, -4.2), (0, 2.7, 0), material(color=(0.6, 0.09, 0.07))))
+    for name, at, how in (
+            ("blendswap-cc-0/bedWithTexture", (1.3, 0, 2.1), dict(width=2.1, turned=90)),
+            ("blendswap-cc-by/bedsideTable", (0.35, 0, 0.7), dict(height=0.5, turned=90)),
+            ("blendswap-cc-by/bedsideTable", (0.35, 0, 3.5), dict(height=0.5, turned=90)),
+            ("blendswap-cc-by/wardrobe", (3.2, 0, 0.35), dict(height=2.0)),
+            ("blendswap-cc-by/dresserWithDrawers", (3.0, 0, 3.85), dict(height=0.9, turned=180)),
+            ("blendswap-cc-0/antiqueChair", (4.2, 0, 3.5), dict(height=1.0, turned=-120)),
+            ("blendswap-cc-0/pianoBench", (3.9, 0, 1.9), dict(height=0.45, turned=90)),
+            ("scopia/round-carpet", (3.2, 0.003, 2.2), dict(width=1.6, blocks=False)),
+            ("blendswap-cc-by/tulips", (2.7, 0.91, 3.85), dict(height=0.35)),
+            ("scopia/teapot", (3.4, 0.91, 3.85), dict(height=0.2)),
+            ("blendswap-cc-0/cactus", (4.45, 0, 0.5), dict(height=0.8))):
+        room.model(name, at, **how)
+    for z in (0.7, 3.5):
+        room.add(box("lamp-foot", (0.32, 0.5, z - 0.03), (0.38, 0.72, z + 0.03), material(METAL, color=(0.5, 0.4, 0.2))),
+                 sphere("lamp-shade", (0.35, 0.8, z), 0.11, material(color=(0.7, 0.6, 0.45), emission=(3.5, 2.2, 1.1))))
+    room.add(box("mirror-frame", (2.2, 1.1, 4.16), (3.8, 2.1, 4.199), material(SATIN, color=(0.2, 0.1, 0.05))),
+             quad("mirror", (3.72, 1.18, 4.155), (-1.44, 0, 0), (0, 0.84, 0),
+                  material(color=(0.25, 0.27, 0.28), roughness=0.12, specular=1.0)))
+    up, around = directions()
+    room.sky = np.where(up > 0, (3, 3.6, 4.5) - up * np.array((1.5, 1.5, 1.2)), (1.0, 0.9, 0.7)) * np.ones_like(around)
+    sun = np.array((0.72, 0.55, 0.3)) / np.linalg.norm((0.72, 0.55, 0.3))
+    toward = np.sqrt(1 - up * up) * (np.sin(around) * sun[0] - np.cos(around) * sun[2]) + up * sun[1]
+    room.sky += np.where(toward > np.cos(np.radians(3)), (900, 800, 640), (0, 0, 0))
+    return room
+
+
+def lounge(rng):
+    room = Room((6.5, 3.2, 5.0), rng)
+    room.walls(floor=material(POLISHED, texture=tiles(rng, ((0.25, 0.14, 0.08), (0.4, 0.26, 0.15)), count=8,
+                                                      joint=(0.1, 0.06, 0.04), joint_width=2)),
+               wall=material(color=(0.42, 0.5, 0.52)), ceiling=material(color=(0.78, 0.76, 0.7)))
+    for k in range(3):
+        room.add(quad("pane", (6.49, 1.0, 1.15 + 0.95 * k), (0, 0, 0.85), (0, 1.5, 0), material(emission=(7, 8, 9.5))))
+    room.add(box("window-frame", (6.46, 0.9, 1.0), (6.498, 1.0, 4.0), material(SATIN, color=(0.85, 0.85, 0.85))),
+             box("window-frame", (6.46, 2.5, 1.0), (6.498, 2.6, 4.0), material(SATIN, color=(0.85, 0.85, 0.85))))
+    for z in (1.0, 2.0, 2.95, 3.9):
+        room.add(box("window-post", (6.46, 1.0, z), (6.498, 2.5, z + 0.14), material(SATIN, color=(0.85, 0.85, 0.85))))
+    for name, at, how in (
+            ("blendswap-cc-0/pianoAQueue", (4.6, 0, 3.9), dict(width=1.6, turned=200)),
+            ("blendswap-cc-0/winchesterSofa", (1.6, 0, 0.6), dict(width=2.0)),
+            ("blendswap-cc-0/winchesterArmchair", (0.7, 0, 2.4), dict(width=1.0, turned=80)),
+            ("blendswap-cc-0/oakTable", (4.3, 0, 1.4), dict(height=0.75)),
+            ("blendswap-cc-0/thonet", (4.3, 0, 0.7), dict(height=0.95)),
+            ("blendswap-cc-0/thonet", (4.2, 0, 2.2), dict(height=0.95, turned=180)),
+            ("blendswap-cc-0/electricGuitar", (0.25, 0.02, 3.6), dict(height=1.0, turned=90)),
+            ("blendswap-cc-0/decorativePlant", (6.0, 0, 0.5), dict(height=1.4)),
+            ("katorlegaz/oriental-rug", (1.8, 0.002, 2.4), dict(width=2.2, blocks=False)),
+            ("blendswap-cc-by/coffeeTable", (1.8, 0.01, 2.2), dict(height=0.42)),
+            ("scopia/vase2", (4.3, 0.76, 1.4), dict(height=0.3)),
+            ("blendswap-cc-by/bulldog", (2.9, 0, 3.4), dict(height=0.4, turned=150)),
+            ("blendswap-cc-by/laptop", (1.8, 0.43, 2.2), dict(width=0.35, turned=20)),
+            ("scopia/fireplace1", (2.2, 0, 4.75), dict(height=1.2, turned=180))):
+        room.model(name, at, **how)
+    brass = material(METAL, color=(0.6, 0.42, 0.15))
+    room.add(box("chandelier", (3.2, 2.35, 2.3), (3.3, 3.2, 2.4), brass))
+    for k in range(12):
+        x, z = 3.25 + 0.4 * np.cos(np.pi * k / 6), 2.35 + 0.4 * np.sin(np.pi * k / 6)
+        room.add(sphere("bulb", (x, 2.42, z), 0.03, material(emission=(45, 36, 24)), rows=10),
+                 box("arm", (min(x, 3.25), 2.36, min(z, 2.35)), (max(x, 3.25) + 0.01, 2.38, max(z, 2.35) + 0.01), brass))
+    room.add(box("stand", (0.38, 0, 4.48), (0.42, 1.5, 4.52), brass),
+             sphere("warm-lamp", (0.4, 1.6, 4.5), 0.13, material(emission=(16, 8, 2.5))),
+             quad("blue-tube", (5.2, 3.19, 0.2), (1.0, 0, 0), (0, 0, 0.06), material(emission=(2, 5, 20))))
+    for x in (3.2, 4.9):
+        room.add(quad("picture", (x, 1.5, 0.03), (1.1, 0, 0), (0, 0.8, 0), material(texture=picture(rng))))
+    return room
+
+
+def directions(height=128, width=256):
+    """Of the pixels of a map of light: the sine of elevation [height][1][1], the azimuth [1][width][1]."""
+    up = np.cos(np.pi * (np.arange(height) + 0.5) / height)[:, None, None]
+    return up, (2 * np.pi * (np.arange(width) + 0.5) / width)[None, :, None]
 
 
 # --- rendering -----------------------------------------------------------------------------------
@@ -296,7 +378,7 @@ def write_truth(room, poses, out):
 
 def main():
     kind, out, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 256
-    room = {"kitchen": kitchen, "parlour": parlour}[kind](np.random.default_rng(1))
+    room = {"kitchen": kitchen, "parlour": parlour, "bedroom": bedroom, "lounge": lounge}[kind](np.random.default_rng(1))
     for folder in ("images", "sdr", "truth"):
         os.makedirs(f"{out}/{folder}", exist_ok=True)
     print(f"{kind}: {len(room.parts)} objects, {sum(len(p.faces) for p in room.parts)} triangles", flush=True)

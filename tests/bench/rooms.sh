@@ -1,13 +1,13 @@
 #!/bin/bash
 # Makes the rooms of furnished_room.py, as bundles for FIDELITY_ROOMS, under BUILD/rooms. One that is there
-# stays. ROOM_SPP: samples a pixel (256: an hour or two on two cores).
+# stays. ROOM_SPP: samples a pixel (256: an hour each on two cores).
 #
 # usage: rooms.sh BUILD
 set -u
 build=$1
 . tests/bench/lib.sh
 mitsuba_ready || exit 77
-for kind in kitchen parlour; do
+for kind in kitchen parlour bedroom lounge; do
     room=$build/rooms/$kind
     [ -e "$room/truth/objects.json" ] && continue
     mkdir -p "$room"

@@ -1,0 +1,443 @@
+/* sun_find.c -- see sun_find.h. */
+#include "server/reconstruct/sun_find.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/reconstruct/survey.h"
+#include "server/render/bsdf.h"
+#include "server/render/sampler.h"
+
+#define POINTS 16384
+#define WAYS 128 /* directions a point */
+#define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
+/* Logarithms of base colour: what of it is odd counts up to this much when directions are asked; a point that
+ * is so much brighter than its segment is bright. */
+#define ODD_MOST 1.0f
+#define BRIGHT 0.5f
+/* So many bright points must be there, and be lit. */
+#define LEAST_BRIGHT 12
+/* Directions asked: so far apart, in degrees, at so many bright points and others, of which the likeliest ones
+ * are fitted. */
+#define ASKED_DEGREES 3.0
+#define ASKED_POINTS 768
+#define CANDIDATES 24
+/* White paint; standard deviations of the logarithm of base colour within a segment and above white; and light
+ * beside which a share of the room's median is nothing. */
+#define WHITE_BASE_COLOR 0.9f
+#define SPREAD_WITHIN 0.3f
+#define SPREAD_BEYOND 0.15f
+#define DARK 0.01f
+/* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
+ * and nearer to the best. */
+#define FAINTEST 0.1f
+#define STRONGER 2.0f
+#define STRENGTHS 16
+#define NEARER 5
+/* Points of which the median of a segment is taken. */
+#define MEDIAN_POINTS 512
+/* Half the angles of discs tried, in degrees: first the sun's own; in haze it is wider. What is best explained by
+ * the last one is no disc, but a sky that no photograph shows. */
+static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f};
+#define RADII (sizeof radius_degrees / sizeof *radius_degrees)
+#define DISC_RAYS 16
+/* A sun must explain this share of what it could, were all that it lights odd without it and as usual with it. */
+#define EXPLAINS 0.7
+/* Where the best of the likeliest directions explains less than this part of that there is none. */
+#define HOPEFUL 0.25
+#define STEPS 24 /* to better directions, or to smaller steps */
+
+struct place {
+    uint32_t segment;
+    struct surface_point at;
+    rgb shown, white; /* what photographs show, and what a white surface would show in the light that is known */
+    float odd;        /* logarithm of base colour, without a sun, over the median of the segment or over white */
+    float lit;        /* by the sun that is tried: cosine x part of the disc */
+};
+
+struct search {
+    struct reconstruction *r;
+    struct survey survey;
+    size_t count;
+    struct place *place;   /* [count] by segment; owned, as all below */
+    float *base;           /* [count] scratch of `misfit`, as the next */
+    float *sorted;
+    struct sun sun;        /* that is tried */
+    int rays;              /* a point, to see how much of it is open */
+};
+
+/* A direction and how odd what it lights is. */
+struct candidate {
+    vec3 direction;
+    double score;
+};
+
+/* --- what is known --------------------------------------------------------------------------------- */
+
+static void gather_place(void *user, size_t index, int thread) {
+    struct search *s = user;
+    const struct reconstruction *r = s->r;
+    struct place *p = &s->place[index];
+    uint32_t texel = s->survey.texel[index];
+    struct irradiance light;
+    *p = (struct place){.segment = reconstruction_segment(r, texel), .shown = fused_radiance(&r->fused, texel)};
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
+        return;
+    irradiance_gather(&light, &s->survey.scratch[thread], &s->survey.field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
+    p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+}
+
+static int by_segment(const void *a, const void *b) {
+    const struct place *first = a, *second = b;
+    if (first->segment != second->segment)
+        return first->segment < second->segment ? -1 : 1;
+    return (first->at.triangle > second->at.triangle) - (first->at.triangle < second->at.triangle);
+}
+
+/* Where the segment of a place ends. */
+static size_t end_of_segment(const struct search *s, size_t first) {
+    size_t end = first;
+    while (end < s->count && s->place[end].segment == s->place[first].segment)
+        end++;
+    return end;
+}
+
+/* Keeps light from being nothing. */
+static void floor_light(struct search *s) {
+    float *mean = mem_array(s->count + 1, sizeof *mean);
+    for (size_t i = 0; i < s->count; i++)
+        mean[i] = rgb_mean(s->place[i].shown);
+    float dark = fmaxf(DARK * quantile(mean, s->count, 0.5), 1e-20f);
+    for (size_t i = 0; i < s->count; i++) {
+        s->place[i].shown = rgb_add(s->place[i].shown, rgb_gray(dark));
+        s->place[i].white = rgb_add(s->place[i].white, rgb_gray(dark));
+    }
+    mem_free(mean);
+}
+
+static float log_base(const struct place *p) {
+    return logf(rgb_mean(p->shown) / rgb_mean(p->white));
+}
+
+/* Leaves out segments of which most is brighter than white: lamps, for all one knows. */
+static void leave_out_lamps(struct search *s) {
+    size_t kept = 0;
+    for (size_t first = 0, end; first < s->count; first = end) {
+        size_t bright = 0;
+        end = end_of_segment(s, first);
+        for (size_t i = first; i < end; i++)
+            bright += log_base(&s->place[i]) > logf(WHITE_BASE_COLOR) + BRIGHT;
+        for (size_t i = first; i < end && 2 * bright < end - first; i++)
+            s->place[kept++] = s->place[i];
+    }
+    s->count = kept;
+}
+
+static void find_odd(struct search *s) {
+    for (size_t first = 0, end; first < s->count; first = end) {
+        end = end_of_segment(s, first);
+        for (size_t i = first; i < end; i++)
+            s->sorted[i - first] = log_base(&s->place[i]);
+        float median = quantile(s->sorted, end - first, 0.5);
+        for (size_t i = first; i < end; i++) {
+            float log = log_base(&s->place[i]);
+            s->place[i].odd = clampf(fmaxf(log - median, log - logf(WHITE_BASE_COLOR)), -ODD_MOST, ODD_MOST);
+        }
+    }
+}
+
+/* --- directions ------------------------------------------------------------------------------------ */
+
+struct asked {
+    const struct search *s;
+    size_t count;
+    uint32_t *place;           /* [count] */
+    float *weight;             /* [count] places of the room that it stands for */
+    double mean, deviation;    /* of how odd places are */
+    struct candidate *candidate;
+};
+
+static void ask_direction(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct asked *a = user;
+    struct candidate *c = &a->candidate[index];
+    struct sun sun = {.direction = c->direction};
+    double sum = 0.0, weights = 0.0;
+    for (size_t i = 0; i < a->count; i++) {
+        const struct place *p = &a->s->place[a->place[i]];
+        double weight = (double)(a->weight[i] * sun_visible(&sun, a->s->r->world.accel, &p->at, 1));
+        sum += weight * ((double)p->odd - a->mean);
+        weights += weight;
+    }
+    c->score = sum / (sqrt(weights + 1.0) * a->deviation);
+}
+
+/* Up to ASKED_POINTS places that are bright, or not. */
+static void choose_asked(struct asked *a, bool bright) {
+    size_t all = 0, met = 0, first = a->count;
+    for (size_t i = 0; i < a->s->count; i++)
+        all += (a->s->place[i].odd > BRIGHT) == bright;
+    size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
+    for (size_t i = 0; i < a->s->count && a->count - first < wanted; i++) {
+        if ((a->s->place[i].odd > BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
+            a->weight[a->count] = (float)all / (float)wanted;
+            a->place[a->count++] = (uint32_t)i;
+        }
+    }
+}
+
+static int by_score(const void *a, const void *b) {
+    const struct candidate *first = a, *second = b;
+    return (first->score < second->score) - (first->score > second->score);
+}
+
+/* Fills candidate[CANDIDATES] with the likeliest unseen directions; returns their number. */
+static size_t ask_directions(const struct search *s, struct candidate candidate[CANDIDATES]) {
+    struct asked a = {.s = s};
+    size_t rows = (size_t)(180.0 / ASKED_DEGREES), count = 0;
+    a.place = mem_array(2 * ASKED_POINTS, sizeof *a.place);
+    a.weight = mem_array(2 * ASKED_POINTS, sizeof *a.weight);
+    a.candidate = mem_array(2 * rows * rows, sizeof *a.candidate);
+    for (size_t row = 0; row < rows; row++) {
+        double theta = PI * ((double)row + 0.5) / (double)rows;
+        size_t columns = (size_t)ceil(2.0 * (double)rows * sin(theta));
+        for (size_t column = 0; column < columns; column++) {
+            double phi = 2.0 * PI * ((double)column + 0.5) / (double)columns;
+            vec3 d = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+            if (!s->r->environment.map.pixel || !environment_is_seen(&s->r->environment, d))
+                a.candidate[count++].direction = d;
+        }
+    }
+    double squares = 0.0;
+    for (size_t i = 0; i < s->count; i++) {
+        a.mean += (double)s->place[i].odd / (double)s->count;
+        squares += (double)(s->place[i].odd * s->place[i].odd) / (double)s->count;
+    }
+    a.deviation = sqrt(fmax(squares - a.mean * a.mean, 1e-12));
+    choose_asked(&a, true);
+    choose_asked(&a, false);
+    parallel_for(s->r->pool, count, ask_direction, &a);
+    qsort(a.candidate, count, sizeof *a.candidate, by_score);
+    count = count < CANDIDATES ? count : CANDIDATES;
+    memcpy(candidate, a.candidate, count * sizeof *candidate);
+    mem_free(a.candidate);
+    mem_free(a.weight);
+    mem_free(a.place);
+    return count;
+}
+
+/* --- fit --------------------------------------------------------------------------------------------- */
+
+/* The mean of the channels, or one of them. */
+enum { MEAN = 3 };
+
+static float channel_of(rgb value, int channel) {
+    return channel == MEAN ? rgb_mean(value) : (&value.r)[channel];
+}
+
+/* From 0, as usual, to 1, not to be explained (Geman and McClure). */
+static double oddity(float off, float spread) {
+    double e = (double)(off / spread);
+    return e * e / (1.0 + e * e);
+}
+
+/* The median of base[first, end), of not too many of them. */
+static float median_of(const struct search *s, size_t first, size_t end) {
+    size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
+    for (size_t i = first; i < end; i += stride)
+        s->sorted[count++] = s->base[i];
+    return quantile(s->sorted, count, 0.5);
+}
+
+/* How odd the base colours of segments that the sun lights at all are, if a white surface which faces it
+ * sends out `strength` by it. */
+static double misfit(const struct search *s, float strength, int channel) {
+    double sum = 0.0;
+    for (size_t first = 0, end; first < s->count; first = end) {
+        bool any = false;
+        end = end_of_segment(s, first);
+        for (size_t i = first; i < end; i++)
+            any = any || s->place[i].lit > 0.0f;
+        for (size_t i = first; any && i < end; i++) {
+            const struct place *p = &s->place[i];
+            s->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
+        }
+        float median = any ? median_of(s, first, end) : 0.0f;
+        for (size_t i = first; any && i < end; i++)
+            sum += oddity(s->base[i] - median, SPREAD_WITHIN) +
+                   oddity(fmaxf(s->base[i] - logf(WHITE_BASE_COLOR), 0.0f), SPREAD_BEYOND);
+    }
+    return sum;
+}
+
+/* The strength that explains most. */
+static float fit_strength(const struct search *s, int channel, double *explained) {
+    double mean = 0.0, without = misfit(s, 0.0f, channel), least = without;
+    float best = 0.0f, step = STRONGER;
+    for (size_t i = 0; i < s->count; i++)
+        mean += (double)channel_of(s->place[i].white, channel) / (double)s->count;
+    float strength = FAINTEST * (float)mean;
+    for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
+        double here = misfit(s, strength, channel);
+        if (here < least)
+            least = here, best = strength;
+    }
+    for (int i = 0; i < NEARER && best > 0.0f; i++) {
+        step = sqrtf(step);
+        float middle = best;
+        for (int side = -1; side <= 1; side += 2) {
+            float other = side < 0 ? middle / step : middle * step;
+            double here = misfit(s, other, channel);
+            if (here < least)
+                least = here, best = other;
+        }
+    }
+    *explained = without - least;
+    return best;
+}
+
+static void light_place(void *user, size_t index, int thread) {
+    (void)thread;
+    struct search *s = user;
+    struct place *p = &s->place[index];
+    p->lit = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
+    if (p->lit > 0.0f)
+        p->lit *= vec3_dot(s->sun.direction, p->at.shading);
+}
+
+/* How much a sun in a direction explains. */
+static double try_direction(struct search *s, vec3 direction) {
+    double explained;
+    s->sun.direction = direction;
+    parallel_for(s->r->pool, s->count, light_place, s);
+    fit_strength(s, MEAN, &explained);
+    return explained;
+}
+
+/* Moves the best direction by ever smaller steps for as long as more is explained. */
+static void walk(struct search *s, struct candidate *best, double degrees, double least_degrees) {
+    for (int i = 0; i < STEPS && degrees >= least_degrees; i++) {
+        bool moved = false;
+        vec3 middle = best->direction, across, up;
+        float step = (float)tan(degrees * PI / 180.0);
+        vec3_frame(middle, &across, &up);
+        for (int k = 0; k < 8; k++) {
+            float angle = (float)k * 0.25f * BSDF_PI;
+            vec3 d = vec3_mad(vec3_mad(middle, step * cosf(angle), across), step * sinf(angle), up);
+            struct candidate other = {vec3_normalize(d), 0.0};
+            other.score = try_direction(s, other.direction);
+            if (other.score > best->score)
+                *best = other, moved = true;
+        }
+        if (!moved)
+            degrees *= 0.5;
+    }
+}
+
+/* Places that the sun lights and that are odder than this. */
+static size_t count_lit(const struct search *s, float odd) {
+    size_t lit = 0;
+    for (size_t i = 0; i < s->count; i++)
+        lit += s->place[i].lit > 0.0f && s->place[i].odd > odd;
+    return lit;
+}
+
+static struct candidate best_direction(struct search *s) {
+    struct candidate candidate[CANDIDATES], best = {.score = 0.0};
+    size_t count = ask_directions(s, candidate);
+    s->rays = 1;
+    for (size_t i = 0; i < count; i++) {
+        candidate[i].score = try_direction(s, candidate[i].direction);
+        if (candidate[i].score > best.score)
+            best = candidate[i];
+    }
+    if (best.score > 0.0)
+        try_direction(s, best.direction);
+    if (best.score <= HOPEFUL * EXPLAINS * (double)count_lit(s, -INFINITY))
+        best.score = 0.0;
+    else
+        walk(s, &best, 2.0, 0.25);
+    return best;
+}
+
+/* False where the light is wider than a disc. */
+static bool find_radius(struct search *s, struct candidate *best) {
+    size_t radius = 0;
+    best->score = 0.0;
+    s->rays = DISC_RAYS;
+    for (size_t i = 0; i < RADII; i++) {
+        s->sun.radius_rad = radius_degrees[i] * BSDF_PI / 180.0f;
+        double explained = try_direction(s, best->direction);
+        if (explained > best->score)
+            best->score = explained, radius = i;
+    }
+    s->sun.radius_rad = radius_degrees[radius] * BSDF_PI / 180.0f;
+    walk(s, best, 0.5, 0.1);
+    return radius + 1 < RADII;
+}
+
+/* --- the whole ------------------------------------------------------------------------------------- */
+
+static size_t count_bright(const struct search *s) {
+    size_t bright = 0;
+    for (size_t i = 0; i < s->count; i++)
+        bright += s->place[i].odd > BRIGHT;
+    return bright;
+}
+
+/* Fills s->sun; the share of what it lights that it explains goes to *explains. */
+static void look_for_sun(struct search *s, double *explains) {
+    struct candidate best = best_direction(s);
+    if (!(best.score > 0.0))
+        return;
+    bool is_disc = find_radius(s, &best);
+    try_direction(s, best.direction);
+    *explains = best.score / fmax((double)count_lit(s, -INFINITY), 1.0);
+    s->sun.is_there = is_disc && count_lit(s, BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
+    for (int c = 0; c < 3; c++) {
+        double explained;
+        (&s->sun.irradiance.r)[c] = BSDF_PI * fit_strength(s, c, &explained);
+    }
+}
+
+static void report(const struct search *s, double explains) {
+    const struct reconstruction *r = s->r;
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
+    json_add_bool(figures, "found", r->sun.is_there);
+    json_add_number(figures, "explains", explains);
+    json_add_number(figures, "lights_share", (double)count_lit(s, -INFINITY) / fmax((double)s->count, 1.0));
+    if (!r->sun.is_there)
+        return;
+    cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
+    for (int c = 0; c < 3; c++) {
+        cJSON_AddItemToArray(direction, cJSON_CreateNumber((double)(&r->sun.direction.x)[c]));
+        cJSON_AddItemToArray(irradiance, cJSON_CreateNumber((double)(&r->sun.irradiance.r)[c]));
+    }
+    json_add_number(figures, "radius_deg", (double)r->sun.radius_rad * 180.0 / PI);
+}
+
+void sun_find(struct reconstruction *r, const struct views *views) {
+    struct search s = {.r = r};
+    double explains = 0.0;
+    survey_init(&s.survey, r, views, POINTS);
+    s.count = s.survey.count;
+    s.place = mem_array(s.count + 1, sizeof *s.place);
+    s.base = mem_array(s.count + 1, sizeof *s.base);
+    s.sorted = mem_array(s.count + 1, sizeof *s.sorted);
+    parallel_for(r->pool, s.count, gather_place, &s);
+    survey_release(&s.survey);
+    qsort(s.place, s.count, sizeof *s.place, by_segment);
+    floor_light(&s);
+    leave_out_lamps(&s);
+    find_odd(&s);
+    if (count_bright(&s) >= LEAST_BRIGHT)
+        look_for_sun(&s, &explains);
+    r->sun = s.sun;
+    report(&s, explains);
+    mem_free(s.sorted);
+    mem_free(s.base);
+    mem_free(s.place);
+}

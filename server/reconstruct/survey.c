@@ -1,0 +1,75 @@
+/* survey.c -- see survey.h. */
+#include "server/reconstruct/survey.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/reconstruct/emitters.h"
+
+/* What texels send out: of those that no photograph shows the mean of their segment, or of the room. */
+static void fill_radiance(struct survey *s) {
+    const struct reconstruction *r = s->r;
+    size_t segments = r->segments.count;
+    double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
+    s->radiance = mem_calloc_large((size_t)r->fused.width * r->fused.height, sizeof *s->radiance);
+    memcpy(s->radiance, r->fused.radiance, (size_t)r->fused.width * r->fused.height * sizeof *s->radiance);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        rgb shown = fused_radiance(&r->fused, texel);
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        for (size_t to = reconstruction_segment(r, texel), k = 0; k < 2; to = segments, k++) {
+            sum[to][0] += (double)shown.r;
+            sum[to][1] += (double)shown.g;
+            sum[to][2] += (double)shown.b;
+            sum[to][3] += 1.0;
+        }
+    }
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        const double *from = sum[segment][3] > 0.0 ? sum[segment] : sum[segments];
+        for (int c = 0; c < 3 && !(r->fused.count[texel] > 0.0f) && from[3] > 0.0; c++)
+            s->radiance[texel][c] = image_half_from_float((float)(from[c] / from[3]));
+    }
+    mem_free(sum);
+}
+
+/* A surface that photographs show and that is no lamp. */
+static bool tells(const struct reconstruction *r, uint32_t texel) {
+    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[reconstruction_segment(r, texel)]);
+}
+
+static void choose_points(struct survey *s, size_t points) {
+    const struct reconstruction *r = s->r;
+    size_t seen = 0, met = 0;
+    for (size_t i = 0; i < r->inverse.valid_count; i++)
+        seen += tells(r, r->inverse.valid[i]);
+    size_t wanted = seen < points ? seen : points;
+    s->texel = mem_array(wanted + 1, sizeof *s->texel);
+    for (size_t i = 0; i < r->inverse.valid_count && s->count < wanted; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        if (tells(r, texel) && met++ == s->count * seen / wanted)
+            s->texel[s->count++] = texel;
+    }
+}
+
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, size_t points) {
+    *s = (struct survey){.r = r};
+    fill_radiance(s);
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
+    struct emitter_evidence *evidence = mem_calloc(r->segments.count, sizeof *evidence);
+    emitters_observe(r, views, evidence);
+    emitters_light_bright(r, views, evidence);
+    mem_free(evidence);
+    choose_points(s, points);
+    s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);
+}
+
+void survey_release(struct survey *s) {
+    struct reconstruction *r = s->r;
+    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
+    world_update_lights(&r->world);
+    mem_free(s->scratch);
+    mem_free(s->texel);
+    mem_free(s->radiance);
+}

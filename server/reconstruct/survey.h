@@ -1,0 +1,27 @@
+/* survey.h -- points all over the surface, and rays from them that read what photographs show: what is known of
+ * the light before anything is known of materials. */
+#ifndef UNBAKE_RECONSTRUCT_SURVEY_H
+#define UNBAKE_RECONSTRUCT_SURVEY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/reconstruct/incident.h"
+#include "server/reconstruct/reconstruction.h"
+#include "server/reconstruct/views.h"
+
+struct survey {
+    struct reconstruction *r;   /* borrowed */
+    uint16_t (*radiance)[3];    /* [height][width] half precision: what texels send out; owned, as all below */
+    struct light_field field;
+    size_t count;
+    uint32_t *texel;            /* [count] evenly spread, shown by photographs, of no lamp */
+    struct incident *scratch;   /* [threads] */
+};
+
+/* What was seen must be fused. Until survey_release whatever outshines the room is a light of the world: small
+ * lamps must be looked for. At most `points` points. */
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, size_t points);
+void survey_release(struct survey *s);
+
+#endif

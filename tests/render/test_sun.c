@@ -1,0 +1,147 @@
+/* sun.h, sun_find.h: a sun that shines through a window onto the floor, and that no photograph shows, is found where
+ * it is and as strong as it is, its patch is gone from the floor's base colour and it is in the environment's map;
+ * a lamp, and a sky without a sun, are none. The same for any number of threads. */
+#include "server/reconstruct/reconstruct.h"
+#include "tests/check.h"
+#include "tests/render/shell.h"
+#include "tests/render/small_room.h"
+
+#define FLOOR 0
+#define SKY_WIDTH 256
+#define SKY_HEIGHT 128
+#define SUN_ROW 23 /* 57 degrees above, towards -z: column 0 */
+#define SUN_RADIANCE 30000.0f
+
+/* The room of small_room.h with a window of 2 x 1.5 m in the wall at z = 0. */
+static void make_room(struct mesh *m) {
+    size_t quads = OBJECTS + 3;
+    *m = (struct mesh){0};
+    m->position = mem_array(4 * quads, sizeof *m->position);
+    m->index = mem_array(2 * quads, sizeof *m->index);
+    m->face = mem_array(2 * quads, sizeof *m->face);
+    m->object_id = mem_array(2 * quads, sizeof *m->object_id);
+    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
+    add_quad(m, FLOOR, (vec3){0, 0, 0}, z, x);
+    add_quad(m, 1, (vec3){0, 3, 0}, x, z);
+    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
+    add_quad(m, 3, (vec3){4, 0, 0}, z, y);
+    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
+    add_quad(m, 4, (vec3){0, 0, 0}, x, (vec3){0, 1.25f, 0});
+    add_quad(m, 4, (vec3){0, 2.75f, 0}, x, (vec3){0, 0.25f, 0});
+    add_quad(m, 4, (vec3){0, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
+    add_quad(m, 4, (vec3){3, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
+    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
+}
+
+static void make_sky(struct image *sky, float sun) {
+    image_init_rgb(sky, SKY_WIDTH, SKY_HEIGHT);
+    for (size_t i = 0; i < 3 * SKY_WIDTH * SKY_HEIGHT; i++)
+        sky->pixel[i] = 0.5f;
+    for (size_t c = 0; c < 3; c++)
+        sky->pixel[3 * SUN_ROW * SKY_WIDTH + c] = sun;
+}
+
+static float sun_theta(void) {
+    return 3.14159265f * (SUN_ROW + 0.5f) / SKY_HEIGHT;
+}
+
+/* Of a surface that faces it. */
+static float sun_irradiance(void) {
+    return SUN_RADIANCE * (2.0f * 3.14159265f / SKY_WIDTH) * (3.14159265f / SKY_HEIGHT) * sinf(sun_theta());
+}
+
+static void reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
+    struct settings s = shell_settings("{\"texture_size\":192,\"iterations\":2,\"report_samples\":1,"
+                                      "\"gather_samples\":64,\"texels_per_iteration\":64}");
+    struct shell shell = {.polls_until_stop = -1};
+    CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
+/* Mean base colour of the floor's texels that the sun lights. */
+static rgb color_of_patch(const struct reconstruction *r) {
+    rgb sum = rgb_gray(0.0f);
+    float count = 0.0f;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        struct surface_point at;
+        if (r->segments.id[reconstruction_segment(r, texel)] != FLOOR ||
+            !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) ||
+            sun_visible(&r->sun, r->world.accel, &at, 0) < 1.0f)
+            continue;
+        const float *c = r->materials.base_color.texel[texel];
+        sum = rgb_add(sum, rgb_make(c[0], c[1], c[2]));
+        count += 1.0f;
+    }
+    CHECK(count > 20.0f);
+    return rgb_scale(sum, 1.0f / count);
+}
+
+/* What of the map's light comes from within a few degrees of the sun. */
+static float irradiance_in_map(const struct environment *e, vec3 direction) {
+    float sum = 0.0f;
+    for (size_t row = 0; row < e->map.height; row++) {
+        for (size_t column = 0; column < e->map.width; column++) {
+            vec3 d = environment_direction(e, column, row);
+            float angle = 2.0f * 3.14159265f * 3.14159265f / (float)(e->map.width * e->map.height);
+            if (vec3_dot(d, direction) > 0.995f)
+                sum += angle * sqrtf(1.0f - d.y * d.y) * e->map.pixel[3 * (row * e->map.width + column)];
+        }
+    }
+    return sum;
+}
+
+static void test_sun(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_room(&scene.mesh);
+    make_sky(&sky, SUN_RADIANCE);
+    photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_anywhere, pool);
+    vec3 truth = {0.0f, cosf(sun_theta()), -sinf(sun_theta())};
+    const int threads[] = {1, 3};
+    struct sun found[2] = {{0}};
+    for (int i = 0; i < 2; i++) {
+        struct reconstruction r;
+        reconstruct(&scene, threads[i], &r);
+        found[i] = r.sun;
+        float expected = sun_irradiance();
+        CHECK(r.sun.is_there);
+        CHECK_THAT(vec3_dot(r.sun.direction, truth) > cosf(0.03f), "%g %g %g", (double)r.sun.direction.x,
+                   (double)r.sun.direction.y, (double)r.sun.direction.z);
+        CHECK_NEAR(r.sun.irradiance.r, expected, 0.1f * expected);
+        CHECK_NEAR(r.sun.irradiance.b, expected, 0.1f * expected);
+        CHECK_NEAR(irradiance_in_map(&r.environment, r.sun.direction), r.sun.irradiance.r, 0.03f * r.sun.irradiance.r);
+        rgb patch = color_of_patch(&r);
+        CHECK_NEAR(patch.r, wall_color[FLOOR].r, 0.15f * wall_color[FLOOR].r);
+        CHECK_NEAR(patch.b, wall_color[FLOOR].b, 0.15f * wall_color[FLOOR].b);
+        for (size_t s = 0; s < r.segments.count; s++)
+            CHECK_THAT(!r.is_emitter[s] || r.segments.id[s] == LAMP, "segment %zu", s);
+        reconstruct_release(&r);
+    }
+    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
+static void test_no_sun(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_room(&scene.mesh);
+    make_sky(&sky, 0.5f);
+    photograph_mesh(&scene, lamp_radiance, &sky, look_anywhere, pool);
+    struct reconstruction r;
+    reconstruct(&scene, 0, &r);
+    CHECK(!r.sun.is_there);
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    test_sun(pool);
+    test_no_sun(pool);
+    parallel_free(pool);
+    return check_result();
+}
