@@ -7,6 +7,9 @@
 
 #include "common/image.h"
 #include "tests/fuzz/fuzz.h"
+
+#define READ_MAX ((size_t)1 << 20)
+
 static volatile float picture_sum; /* so that the reading is not left out */
 
 static inline void picture_read(const uint8_t *data, size_t size) {
@@ -18,8 +21,10 @@ static inline void picture_read(const uint8_t *data, size_t size) {
         MUST(image.width > 0 && image.height > 0 && image.channel_count > 0);
         MUST(info.orientation >= 1 && info.orientation <= 8);
         size_t count = (size_t)image.width * image.height * image.channel_count;
-        float sum = 0;
-        for (size_t i = 0; i < count; i++)
+        /* Of a picture that is nearly all empty, which takes a few bytes, only some: it would take a minute. */
+        size_t step = count / READ_MAX + 1;
+        float sum = image.pixel[count - 1];
+        for (size_t i = 0; i < count; i += step)
             sum += image.pixel[i];
         picture_sum = sum;
     } else {
