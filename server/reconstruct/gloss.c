@@ -16,10 +16,13 @@
 /* Light and base colour are off by about this part of the misfit, which adds to the standard error of what one
  * candidate's is beyond another's. */
 #define MISFIT_FLOOR 0.01
-/* Before anything is seen, so many of the segments that are hard to tell are matt. Others are dielectrics, most of
+/* Before anything is seen, so many of the segments that are hard to tell are matt, and of those that are a large
+ * part of the surface, which mostly are painted walls and ceilings. Others are dielectrics, most of
  * them near an index of refraction of 1.5 (specular .5), and the likelier the smoother: what has a highlight is
  * varnished or polished. */
 #define MATT_PRIOR 0.35
+#define MATT_PRIOR_LARGE 0.65
+#define LARGE_PART 0.05
 #define PRIOR_SPECULAR 0.5f
 #define PRIOR_WEIGHT 1.0f /* of the square of the difference to that, in the misfit of the best candidate */
 /* Rougher highlights cannot be told from matt reflection. */
@@ -157,7 +160,7 @@ static double likelihood(const struct evidence *e, struct candidate c, struct ca
     return errors > 0.0 ? exp(-0.5 * errors * errors) : 1.0;
 }
 
-static struct belief believe(const struct evidence *e, struct candidate best) {
+static struct belief believe(const struct evidence *e, struct candidate best, double matt_prior) {
     double all = 0.0, glossy = 0.0, roughness = 0.0, specular = 0.0;
     for (size_t k = 0; k < ROUGHNESSES; k++) {
         for (size_t m = 1; m < SPECULARS; m++) {
@@ -169,7 +172,7 @@ static struct belief believe(const struct evidence *e, struct candidate best) {
             specular += weight * (double)specular_of[m];
         }
     }
-    double as_matt = MATT_PRIOR * likelihood(e, matt, best), scale = (1.0 - MATT_PRIOR) / all;
+    double as_matt = matt_prior * likelihood(e, matt, best), scale = (1.0 - matt_prior) / all;
     double sum = as_matt + scale * glossy;
     return (struct belief){as_matt / sum, (as_matt + scale * roughness) / sum, scale * specular / sum};
 }
@@ -232,6 +235,12 @@ static void set_between(struct materials *materials, size_t segment, const struc
               (double)interpolate(specular_of, m, across));
 }
 
+static double matt_prior_of(const struct gloss_looker *l, size_t segment) {
+    double texels = (double)(l->texels.first[segment + 1] - l->texels.first[segment]);
+    double part = texels / (double)l->r->inverse.valid_count;
+    return MATT_PRIOR + (MATT_PRIOR_LARGE - MATT_PRIOR) * fmin(part / LARGE_PART, 1.0);
+}
+
 static void fit_segment(void *user, size_t segment, int thread) {
     const struct gloss_job *job = user;
     const struct reconstruction *r = job->looker.r;
@@ -248,7 +257,7 @@ static void fit_segment(void *user, size_t segment, int thread) {
         return;
     }
     struct candidate best = best_of(e);
-    struct belief belief = believe(e, best);
+    struct belief belief = believe(e, best, matt_prior_of(&job->looker, segment));
     if (belief.matt > SURELY_MATT)
         set_gloss(job->materials, segment, 1.0, 0.0);
     else if (best.m > 0 && belief.matt < 1.0 - SURELY_GLOSSY)
