@@ -1,6 +1,7 @@
 #!/bin/bash
 # Fails when a folder includes what the design forbids it, a library's header is included by another
-# file than the one that owns it, or units (x.c with x.h) include each other in a circle.
+# file than the one that owns it, or units (x.c with x.h) include each other in a circle; and when a test
+# forgets to tell whether its checks held.
 set -u
 bad=0
 
@@ -65,4 +66,6 @@ if ! circle=$(units | tsort 2>&1 >/dev/null); then
     printf 'these include each other:\n%s\n' "$circle"
     bad=1
 fi
+silent=$(grep -L 'check_result()' tests/{unit,gradient,render,api,chaos,soak}/test_*.c 2>/dev/null)
+[ -z "$silent" ] || { printf 'cannot fail, for want of check_result:\n%s\n' "$silent"; bad=1; }
 exit $bad

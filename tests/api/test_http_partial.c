@@ -135,5 +135,5 @@ int main(void) {
     test_two(&rig, RIVAL_FINISH);
     test_two(&rig, RIVAL_CLAIM);
     rig_stop(&rig);
-    return check_failed_count > 0;
+    return check_result();
 }

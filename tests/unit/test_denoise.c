@@ -151,5 +151,5 @@ int main(void) {
     test_threads();
     parallel_free(pool);
     mem_free(measured);
-    return check_failed_count > 0;
+    return check_result();
 }

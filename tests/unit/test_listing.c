@@ -114,5 +114,5 @@ int main(void) {
     check_fails("an upload", list_upload, STATUS_OK);
     check_fails("the size", size_of_all, STATUS_OK);
     check_fails("removal", remove_all, STATUS_OK);
-    return check_failed_count > 0;
+    return check_result();
 }

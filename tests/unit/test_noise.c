@@ -111,5 +111,5 @@ int main(void) {
     test_draw();
     for (int t = 0; t < PHOTOGRAPHS; t++)
         mem_free(photograph[t].pixel);
-    return check_failed_count > 0;
+    return check_result();
 }

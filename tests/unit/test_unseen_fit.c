@@ -99,5 +99,5 @@ int main(void) {
     for (size_t i = 0; i < POINTS; i++)
         point[i].filled = white[i] - KNOWN;
     CHECK_NEAR(unseen_base_color(point, POINTS, 0.8, NULL), 0.75, 0.1);
-    return 0;
+    return check_result();
 }
