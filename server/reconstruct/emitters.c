@@ -14,6 +14,8 @@
 #define LEAST_LOOKS 12
 #define RING_PIXELS 4.0f
 #define OUTSHINES 1.3f
+/* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
+#define OWN_PART 0.25f
 /* Part of the looks that must have measured something for their median to count. */
 #define MEASURED_PART 0.1f
 /* Part of the shown radiance that must be beyond reflection. Specular reflection and noise stay
@@ -126,7 +128,8 @@ static void observe_segment(void *user, size_t segment, int thread) {
         if (red->count + red->saturated_count < LEAST_LOOKS)
             best = &shown[edge];
     }
-    if (best->channel[0].count + best->channel[0].saturated_count < best->outshone_count)
+    size_t told = best->channel[0].count + best->channel[0].saturated_count;
+    if ((float)told < OWN_PART * (float)(told + best->outshone_count))
         best = &shown[0]; /* most often it is not what shines: nothing is known */
     job->evidence[segment].mixed = best == &shown[VIEWS_EDGE];
     job->evidence[segment].shown =
