@@ -189,6 +189,8 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);
+    if (run->r->sun.is_there && !run->r->environment.map.pixel)
+        environment_make_unseen(&run->r->environment); /* it is drawn there when solve is done */
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     return STATUS_OK;

@@ -106,8 +106,6 @@ static double cover(struct image *map, vec3 middle, float radius_rad, const rgb 
 void sun_draw(const struct sun *sun, struct environment *e) {
     if (!sun->is_there)
         return;
-    if (!e->map.pixel)
-        environment_make_unseen(e);
     while (e->map.width < ENVIRONMENT_MAX_WIDTH && BSDF_PI / (float)e->map.height > sun->radius_rad) {
         refine_image(&e->map);
         refine_image(&e->confidence);

@@ -27,7 +27,7 @@ float sun_visible(const struct sun *sun, const struct accel *accel, const struct
 void sun_add_light(const struct sun *sun, const struct accel *accel, const struct surface_point *at,
                    struct irradiance *irradiance);
 
-/* Adds it to the map, which is made finer first if its pixels are larger than the disc, or made. */
+/* Adds it to the map, which is made finer first if its pixels are larger than the disc. */
 void sun_draw(const struct sun *sun, struct environment *environment);
 
 #endif

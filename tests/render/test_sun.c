@@ -124,6 +124,29 @@ static void test_sun(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* Nobody looks at the window or out of it. */
+static vec3 look_away(int frame) {
+    vec3 at = spread(frame * 7 + 3, 0.0f);
+    return (vec3){at.x, 0.3f * at.y, 3.0f};
+}
+
+/* Not even the sky is known then: where the sun is, and that it is in the map, is all that can be asked. */
+static void test_without_sky(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_room(&scene.mesh);
+    make_sky(&sky, SUN_RADIANCE);
+    photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_away, pool);
+    struct reconstruction r;
+    reconstruct(&scene, 0, &r);
+    CHECK(r.sun.is_there && r.environment.map.pixel != NULL);
+    CHECK(vec3_dot(r.sun.direction, (vec3){0.0f, cosf(sun_theta()), -sinf(sun_theta())}) > cosf(0.05f));
+    CHECK_NEAR(irradiance_in_map(&r.environment, r.sun.direction), r.sun.irradiance.r, 0.03f * r.sun.irradiance.r);
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
 static void test_no_sun(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
@@ -141,6 +164,7 @@ static void test_no_sun(struct parallel *pool) {
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_sun(pool);
+    test_without_sky(pool);
     test_no_sun(pool);
     parallel_free(pool);
     return check_result();
