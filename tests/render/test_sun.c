@@ -51,7 +51,7 @@ static float sun_irradiance(void) {
 }
 
 static void reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
-    struct settings s = shell_settings("{\"texture_size\":192,\"iterations\":2,\"report_samples\":1,"
+    struct settings s = shell_settings("{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,"
                                       "\"gather_samples\":64,\"texels_per_iteration\":64}");
     struct shell shell = {.polls_until_stop = -1};
     CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
