@@ -34,13 +34,16 @@ void nearest_init(struct nearest *n, const char *typed) {
 
 void nearest_offer(struct nearest *n, const char *candidate) {
     size_t typed_length = strlen(n->typed), length = strlen(candidate);
-    size_t longer = typed_length > length ? typed_length : length;
+    size_t longer = typed_length > length ? typed_length : length, shorter = typed_length + length - longer;
+    size_t edits_max = longer / 3 + 1;
     if (longer > LENGTH_MAX)
         return;
     bool begins = typed_length >= 2 && typed_length < length &&
                   memcmp(n->typed, candidate, typed_length) == 0;
+    if (!begins && longer - shorter > edits_max) /* the distance is no less */
+        return;
     size_t edits = begins ? 1 : distance(n->typed, candidate);
-    if (edits > longer / 3 + 1 || edits >= longer)
+    if (edits > edits_max || edits >= longer)
         return;
     if (!n->best || edits < n->distance) {
         n->best = candidate;

@@ -4,6 +4,7 @@
  *          alone cuts the file short at so many 256ths */
 #include "server/worker/checkpoint.h"
 
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include "common/file.h"
@@ -24,6 +25,7 @@ static void fill(uint8_t *to, size_t size, unsigned factor) {
 static void save_good(const char *path) {
     struct checkpoint *c;
     char note[512];
+    sqlite3_config(SQLITE_CONFIG_PAGECACHE, NULL, 0, 0); /* or a megabyte and more is mapped for each input */
     fill(texture, sizeof texture, 77);
     fill(counter, sizeof counter, 9);
     struct state_array arrays[2] = {{"texture", texture, sizeof texture}, {"counter", counter, sizeof counter}};
