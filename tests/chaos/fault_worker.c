@@ -1,10 +1,13 @@
 /* fault_worker BUILD ROOM ARCHIVE disk|memory STEP ALL [FROM] -- a worker's n-th operation on a file or n-th
- * allocation fails, for every STEP-th n from FROM (1) on: a disk by ENOSPC or EIO, once or from then on,
- * memory once or from then on (ALL: 1 for all of these at each n, 0 for one in turn). The worker ends with
- * the status that says so (server/worker/progress.h), by which the daemon pauses the job or tries again with
- * less, never by a signal, and without a leak; a full disk leaves no half-written file. The next attempt,
- * when all is well again, ends with the textures of one that nobody disturbed. The same of the check of a
- * scene, which never finds fault with the scene for it. */
+ * allocation fails: a disk by ENOSPC or EIO, once or from then on, memory once or from then on. The worker
+ * ends with the status that says so (server/worker/progress.h), by which the daemon pauses the job or tries
+ * again with less, never by a signal, and without a leak; a full disk leaves no half-written file. The next
+ * attempt, when all is well again, ends with the textures of one that nobody disturbed. The same of the check
+ * of a scene, which never finds fault with the scene for it.
+ *
+ * Of operations every STEP-th fails, from FROM (1) on; ALL: 1 for all of these ways at each, 0 for one in turn.
+ * Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such stack
+ * of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -14,13 +17,25 @@
     "\"texture_size\":64,\"iterations\":6,\"texels_per_iteration\":64,\"coarse_levels\":1,"                         \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
+/* What is to fail, and how. */
+struct turn {
+    long n;         /* 0: none */
+    uint64_t calls; /* to this allocation, when none failed */
+    int error;
+    bool for_good;
+};
+
 static char binary[512], library[PATH_MAX], log_path[128];
+static const char *room, *archive;
+static char *root; /* the faults are below it */
+static char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]; /* the outputs when nothing failed */
 static struct faults *faults;
 static bool is_memory; /* not the disk */
 static long vague;     /* attempts that could not say that it was memory */
+static long astray;    /* allocations that failed elsewhere than planned: progress is told by the clock */
 
 /* One attempt; its wait status. */
-static int attempt(const char *dir, const char *room, int number) {
+static int attempt(const char *dir, int number) {
     int fd, status;
     /* libseccomp (2.5.4) uses memory that it did not get. */
     worker_order(dir, room, number, 1, 0.0, !is_memory, SETTINGS);
@@ -43,18 +58,20 @@ static long count_scraps(const char *dir) {
     return count;
 }
 
-/* False when there is no n-th operation. */
-static bool strike(const char *root, const char *room, long n, int error, bool for_good,
-                   char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]) {
+static void strike(const struct turn *t) {
     char sums[WORKER_OUTPUTS][SHA256_HEX_SIZE];
+    long n = t->n;
+    int error = t->error;
+    bool for_good = t->for_good;
     const char *word = strerrorname_np(error), *how = for_good ? "for good" : "once";
     char *dir = file_join(root, "job");
     int wanted = is_memory ? PROGRESS_EXIT_MEMORY : error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
     file_make_dirs(dir, NULL);
     faults_arm(faults, FAULTS_WORKER, n, error, for_good);
-    int status = attempt(dir, room, 1);
+    int status = attempt(dir, 1);
     bool has_struck = atomic_load(&faults->failed) > 0;
     faults_lift(faults);
+    astray += is_memory && n > 0 && faults->calls[0] != t->calls;
     CHECK_THAT(WIFEXITED(status), "operation %ld fails %s with %s: signal %d", n, how, word, WTERMSIG(status));
     /* Some it may do without. */
     bool is_vague = is_memory && WEXITSTATUS(status) == PROGRESS_EXIT_FAILED;
@@ -63,7 +80,7 @@ static bool strike(const char *root, const char *room, long n, int error, bool f
                "operation %ld fails %s with %s: exit status %d", n, how, word, WEXITSTATUS(status));
     CHECK_THAT(error != ENOSPC || count_scraps(dir) == 0, "operation %ld fails %s with %s: scraps are left", n, how, word);
     if (WEXITSTATUS(status) != 0) {
-        status = attempt(dir, room, 2);
+        status = attempt(dir, 2);
         CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == 0, "after operation %ld failed %s with %s: %x", n, how, word,
                    (unsigned)status);
     }
@@ -75,7 +92,6 @@ static bool strike(const char *root, const char *room, long n, int error, bool f
     if (check_failed_count == 0)
         file_remove_tree(dir, NULL);
     mem_free(dir);
-    return has_struck;
 }
 
 /* One check; its wait status. No problem is told. */
@@ -90,8 +106,11 @@ static int check(const char *dir) {
 }
 
 /* As strike, of the check of the archive. */
-static bool strike_check(const char *root, const char *archive, long n, int error, bool for_good) {
+static void strike_check(const struct turn *t) {
     struct buf bytes;
+    long n = t->n;
+    int error = t->error;
+    bool for_good = t->for_good;
     const char *word = strerrorname_np(error), *how = for_good ? "for good" : "once";
     char *dir = file_join(root, "scene"), *copy = file_join(dir, "archive"), *files = file_join(dir, "files");
     int wanted = is_memory ? PROGRESS_EXIT_MEMORY : error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
@@ -104,6 +123,7 @@ static bool strike_check(const char *root, const char *archive, long n, int erro
     int status = check(dir);
     bool has_struck = atomic_load(&faults->failed) > 0, is_good = WIFEXITED(status) && WEXITSTATUS(status) == 0;
     faults_lift(faults);
+    astray += is_memory && n > 0 && faults->calls[0] != t->calls;
     CHECK_THAT(WIFEXITED(status), "check, operation %ld fails %s with %s: signal %d", n, how, word, WTERMSIG(status));
     bool is_vague = is_memory && WEXITSTATUS(status) == PROGRESS_EXIT_FAILED;
     vague += is_vague;
@@ -117,16 +137,97 @@ static bool strike_check(const char *root, const char *archive, long n, int erro
     mem_free(files);
     mem_free(copy);
     mem_free(dir);
-    return has_struck;
+}
+
+/* --- which of them ------------------------------------------------------------------------------ */
+
+struct plan {
+    struct turn *turn; /* [count], owned */
+    size_t count;
+    int ways;
+};
+
+static void add(struct plan *p, long n, int way) {
+    p->turn = mem_realloc_array(p->turn, p->count + 1, sizeof *p->turn);
+    struct turn *t = &p->turn[p->count++];
+    if (is_memory)
+        *t = (struct turn){n, faults->calls[n - 1], ENOMEM, way == 1};
+    else
+        *t = (struct turn){n, 0, way % 2 ? EIO : ENOSPC, way / 2 == 1};
+}
+
+/* All ways, or one in turn. */
+static void add_ways(struct plan *p, long n, long index, bool all) {
+    for (int way = 0; way < p->ways; way++)
+        if (all || way == index % p->ways)
+            add(p, n, way);
+}
+
+/* The allocations that the same calls led to as to the n-th, which is the first: where they are, ascending;
+ * how many. */
+static long find_alike(long n, long count, long *where) {
+    long alike = 0;
+    for (long i = n; i <= count; i++)
+        if (faults->calls[i - 1] == faults->calls[n - 1])
+            where[alike++] = i;
+    return alike;
+}
+
+static bool is_first(long n) {
+    long i = 1;
+    while (faults->calls[i - 1] != faults->calls[n - 1])
+        i++;
+    return i == n;
+}
+
+/* How many stacks there are. */
+static long plan_stacks(struct plan *p, long step, bool all, long count) {
+    static long where[FAULTS_CALLS_MAX];
+    long stacks = 0;
+    for (long n = 1; n <= count; n++) {
+        if (!is_first(n) || stacks++ % step != 0)
+            continue;
+        long alike = find_alike(n, count, where), index = stacks / step;
+        add_ways(p, n, index, all);
+        if (all && alike > 1)
+            add(p, where[alike - 1], (int)(index % 2));
+        if (all && alike > 2)
+            add(p, where[alike / 2], (int)((index + 1) % 2));
+    }
+    return stacks;
+}
+
+/* How many were made to fail. */
+static long campaign(const char *what, void (*strike_one)(const struct turn *), long step, bool all, long from) {
+    struct plan p = {.ways = is_memory ? 2 : 4};
+    strike_one(&(struct turn){0}); /* counts them */
+    long count = atomic_load(&faults->count), index = 0;
+    CHECK(count > 0 && count <= FAULTS_CALLS_MAX);
+    if (is_memory && check_failed_count == 0) {
+        long stacks = plan_stacks(&p, step, all, count);
+        printf("%s: %ld allocations by %ld stacks of calls\n", what, count, stacks);
+    } else {
+        for (long n = from; n <= count; n += step)
+            add_ways(&p, n, index++, all);
+        printf("%s: %ld operations on files\n", what, count);
+    }
+    for (size_t i = 0; i < p.count && check_failed_count == 0; i++)
+        strike_one(&p.turn[i]);
+    printf("%s: %zu made to fail\n", what, p.count);
+    mem_free(p.turn);
+    return (long)p.count;
 }
 
 int main(int argc, char **argv) {
-    long step = argc >= 7 ? strtol(argv[5], NULL, 10) : 0, n = argc > 7 ? strtol(argv[7], NULL, 10) : 1, strikes = 0;
-    bool all = step > 0 && argv[6][0] == '1', more = true;
-    char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE], top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
+    long step = argc >= 7 ? strtol(argv[5], NULL, 10) : 0, from = argc > 7 ? strtol(argv[7], NULL, 10) : 1;
+    bool all = step > 0 && argv[6][0] == '1';
+    char top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
     if (step <= 0 || !mkdtemp(top))
         return 2;
-    char *root = file_join(top, "jobs"), *dir = file_join(root, "job");
+    root = file_join(top, "jobs");
+    room = argv[2];
+    archive = argv[3];
+    char *dir = file_join(root, "job");
     snprintf(binary, sizeof binary, "%s/unbaked", argv[1]);
     snprintf(log_path, sizeof log_path, "%s/log", top);
     snprintf(page, sizeof page, "%s/faults", top);
@@ -137,33 +238,20 @@ int main(int argc, char **argv) {
         return 1;
     setenv("UNBAKE_FAULTS", page, 1);
     file_make_dirs(dir, NULL);
-    CHECK(attempt(dir, argv[2], 1) == 0);
+    CHECK(attempt(dir, 1) == 0);
     worker_hash(dir, peace);
     file_remove_tree(dir, NULL);
-    long ways = is_memory ? 2 : 4;
-    for (long turn = 0; more && check_failed_count == 0; n += step, turn++)
-        for (long way = all ? 0 : turn % ways; more && way < (all ? ways : turn % ways + 1); way++, strikes++)
-            more = strike(root, argv[2], n, is_memory ? ENOMEM : way % 2 ? EIO : ENOSPC, is_memory ? way % 2 : way / 2,
-                          peace);
-    printf("workers: %ld %s, %ld of them made to fail\n", n - step, is_memory ? "allocations" : "operations on files",
-           strikes - 1);
-    more = true;
-    long m = 1, checks = 0, stride = (step + 6) / 7; /* a check does less than a job, and sooner */
-    for (long turn = 0; more && check_failed_count == 0; m += stride, turn++)
-        for (long way = all ? 0 : turn % ways; more && way < (all ? ways : turn % ways + 1); way++, checks++)
-            more = strike_check(root, argv[3], m, is_memory ? ENOMEM : way % 2 ? EIO : ENOSPC, is_memory ? way % 2 : way / 2);
-    printf("checks of scenes: %ld %s, %ld of them made to fail\n", m - stride,
-           is_memory ? "allocations" : "operations on files", checks - 1);
-    strikes += checks - 1;
+    long strikes = campaign("workers", strike, step, all, from);
+    strikes += campaign("checks of scenes", strike_check, (step + 6) / 7, all, 1); /* they do less, and sooner */
     if (is_memory) {
-        figure("no memory, workers: allocations made to fail", (double)strikes - 1, 500, "higher");
+        figure("no memory, workers: allocations made to fail", (double)strikes, 5000, "higher");
+        figure("no memory, workers: of them elsewhere than planned", (double)astray, 0.05 * (double)strikes, "lower");
         figure("no memory, workers: attempts that cannot say so", (double)vague, 0.02 * (double)strikes, "lower");
         figure("no memory, workers: wrong ends, textures that differ", check_failed_count, 0, "lower");
     } else {
-        figure("failing disk, workers: operations made to fail", (double)strikes - 1, 1000, "higher");
+        figure("failing disk, workers: operations made to fail", (double)strikes, 1000, "higher");
         figure("failing disk, workers: wrong ends, leaks, textures that differ", check_failed_count, 0, "lower");
     }
-    CHECK(n > 100);
     if (check_failed_count == 0)
         file_remove_tree(top, NULL);
     else

@@ -15,6 +15,8 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
+#define FAULTS_CALLS_MAX 65536
+
 enum faults_role { FAULTS_DAEMON = 1, FAULTS_WORKER = 2 };
 
 struct faults {
@@ -27,6 +29,9 @@ struct faults {
     atomic_bool for_good; /* all later ones fail, too */
     atomic_int error;    /* errno of operations */
     atomic_long failed;  /* so many have */
+    /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
+     * the first that does. */
+    uint64_t calls[FAULTS_CALLS_MAX];
     /* The log, where log_path is not empty. One operation at a time is done and logged. */
     pthread_mutex_t mutex; /* of all processes; survives the death of one that holds it */
     char log_path[256];
@@ -104,7 +109,7 @@ static inline struct faults *faults_new(const char *path, const char *root, cons
     return f;
 }
 
-/* From now on the n-th operation or allocation fails, and `for_good` all that follow. */
+/* From now on the n-th operation or allocation fails, and `for_good` all that follow; 0: they are counted. */
 static inline void faults_arm(struct faults *f, int roles, long n, int error, bool for_good) {
     atomic_store(&f->count, 0);
     atomic_store(&f->failed, 0);
@@ -120,12 +125,15 @@ static inline void faults_lift(struct faults *f) {
 
 /* --- the libraries' side ------------------------------------------------------------------------ */
 
+/* One more; which, from 1, or 0 where this role's do not count. */
+static inline long faults_count(struct faults *f, int role) {
+    return f && (atomic_load(&f->roles) & role) ? atomic_fetch_add(&f->count, 1) + 1 : 0;
+}
+
 /* Whether it is the one that fails. */
-static inline bool faults_strikes(struct faults *f, int role) {
-    if (!f || !(atomic_load(&f->roles) & role))
-        return false;
-    long count = atomic_fetch_add(&f->count, 1) + 1, at = atomic_load(&f->fail_at);
-    if (at == 0 || (atomic_load(&f->for_good) ? count < at : count != at))
+static inline bool faults_strikes(struct faults *f, long which) {
+    long at = which > 0 ? atomic_load(&f->fail_at) : 0;
+    if (at == 0 || (atomic_load(&f->for_good) ? which < at : which != at))
         return false;
     atomic_fetch_add(&f->failed, 1);
     return true;

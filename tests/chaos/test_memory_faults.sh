@@ -1,8 +1,7 @@
 #!/bin/bash
 # There is no memory for the n-th allocation: see fault_daemon.c and fault_worker.c. Most end the
-# process, which then has to be started again, so UNBAKE_STEP is larger than that of the disk (97, and
-# 997 of a worker, once or for good in turn; in the long form every one of the daemon, in both ways,
-# and every 13th of a worker).
+# process, which then has to be started again, so UNBAKE_STEP is larger than that of the disk (97, and of a
+# worker every 200th stack of calls, once or for good in turn; in the long form every one, in both ways).
 set -u
 . tests/api/client.sh "$@"
 if ldd "$build/unbaked" | grep -q 'lib[at]san'; then
@@ -11,7 +10,7 @@ if ldd "$build/unbaked" | grep -q 'lib[at]san'; then
 fi
 make_room "$work/room"
 tar -C "$work/room" -cf "$work/room.tar" .
-if [ -n "${UNBAKE_LONG:-}" ]; then step=1 all=1 worker=13; else step=97 all=0 worker=997; fi
+if [ -n "${UNBAKE_LONG:-}" ]; then step=1 all=1 worker=1; else step=97 all=0 worker=200; fi
 "$build/tests/chaos/fault_daemon" "$build" "$work/room.tar" memory "${UNBAKE_STEP:-$step}" $all || fail "the daemon"
-"$build/tests/chaos/fault_worker" "$build" "$work/room" "$work/room.tar" memory "${UNBAKE_STEP:-$worker}" 0 || fail "a worker"
+"$build/tests/chaos/fault_worker" "$build" "$work/room" "$work/room.tar" memory "${UNBAKE_STEP:-$worker}" $all || fail "a worker"
 finish

@@ -99,7 +99,7 @@ static bool find_fd(int fd, uint64_t *inode) {
 /* --- failing, logging ---------------------------------------------------------------------------- */
 
 static bool fails(void) {
-    if (!faults_strikes(faults, role))
+    if (!faults_strikes(faults, faults_count(faults, role)))
         return false;
     errno = atomic_load(&faults->error);
     return true;
