@@ -221,7 +221,7 @@ static long campaign(const char *what, void (*strike_one)(const struct turn *), 
 int main(int argc, char **argv) {
     long step = argc >= 7 ? strtol(argv[5], NULL, 10) : 0, from = argc > 7 ? strtol(argv[7], NULL, 10) : 1;
     bool all = step > 0 && argv[6][0] == '1';
-    char top[] = "/tmp/unbake-chaos-XXXXXX", page[64];
+    char top[] = "/dev/shm/unbake-chaos-XXXXXX", page[64]; /* in memory: thousands of attempts wait for syncs */
     if (step <= 0 || !mkdtemp(top))
         return 2;
     root = file_join(top, "jobs");
