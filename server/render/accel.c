@@ -88,10 +88,23 @@ static void no_memory(void) {
     mem_exhausted("the ray tracing library");
 }
 
+/* TBB, under Embree, opens its allocator, whose constructor opens itself again; where that finds no memory to
+ * say why it fails, glibc (2.36) takes its mark of the lack for an address. So the allocator is opened before
+ * TBB does it, and after a call that fails and is told of: then glibc has that memory, and keeps it. */
+static void open_allocator(void) {
+    static const char absent[] = "no such thing";
+    const char *why = dlsym(RTLD_DEFAULT, absent) ? NULL : dlerror();
+    if (why && strcmp(why, "out of memory") == 0)
+        no_memory();
+    dlsym(RTLD_DEFAULT, absent); /* what has been told of would be freed */
+    dlopen("libtbbmalloc.so.2", RTLD_NOW); /* without it TBB does with malloc */
+}
+
 /* It throws std::bad_alloc also where nobody catches it, which would look like a crash: with
  * std::set_new_handler (by the name that the C++ ABI gives it) running out of memory comes to us first. */
 static void watch_memory(void) {
     void (*(*set_new_handler)(void (*)(void)))(void);
+    open_allocator();
     *(void **)&set_new_handler = dlsym(RTLD_DEFAULT, "_ZSt15set_new_handlerPFvvE");
     if (set_new_handler)
         set_new_handler(no_memory);

@@ -5,9 +5,9 @@
  * attempt, when all is well again, ends with the textures of one that nobody disturbed. The same of the check
  * of a scene, which never finds fault with the scene for it.
  *
- * Of operations every STEP-th fails, from FROM (1) on; ALL: 1 for all of these ways at each, 0 for one in turn.
- * Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such stack
- * of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
+ * From n = FROM (1) on. Of operations every STEP-th fails; ALL: 1 for all of these ways at each, 0 for one in
+ * turn. Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such
+ * stack of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
 #include <dirent.h>
 
 #include "tests/chaos/faults.h"
@@ -181,11 +181,11 @@ static bool is_first(long n) {
 }
 
 /* How many stacks there are. */
-static long plan_stacks(struct plan *p, long step, bool all, long count) {
+static long plan_stacks(struct plan *p, long step, bool all, long from, long count) {
     static long where[FAULTS_CALLS_MAX];
     long stacks = 0;
     for (long n = 1; n <= count; n++) {
-        if (!is_first(n) || stacks++ % step != 0)
+        if (!is_first(n) || stacks++ % step != 0 || n < from)
             continue;
         long alike = find_alike(n, count, where), index = stacks / step;
         add_ways(p, n, index, all);
@@ -204,7 +204,7 @@ static long campaign(const char *what, void (*strike_one)(const struct turn *), 
     long count = atomic_load(&faults->count), index = 0;
     CHECK(count > 0 && count <= FAULTS_CALLS_MAX);
     if (is_memory && check_failed_count == 0) {
-        long stacks = plan_stacks(&p, step, all, count);
+        long stacks = plan_stacks(&p, step, all, from, count);
         printf("%s: %ld allocations by %ld stacks of calls\n", what, count, stacks);
     } else {
         for (long n = from; n <= count; n += step)
