@@ -2,7 +2,7 @@
 
 Not unseen any more: constants of gloss.c were chosen on a draft of these rooms, too.
 
-usage: furnished_room.py kitchen|parlour|bedroom|lounge OUT [SPP]
+usage: furnished_room.py kitchen|parlour|bedroom|lounge|study OUT [SPP]
 
 OUT becomes a bundle like those of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: 72
 training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb; SPP samples a pixel, 256), HDR and
@@ -13,6 +13,7 @@ models it uses; nothing of them is kept here.
   parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books
   bedroom   sun through one window, a red wall, two lamps with shades that shine, a patterned bed
   lounge    a window whose panes shine as one emitter, twelve small bulbs, a warm and a blue lamp, black polish
+  study     sun through blinds, a hall with a brighter lamp behind a door, a panelled wall, a screen with a picture
 """
 import json
 import os
@@ -182,9 +183,7 @@ def bedroom(rng):
                   material(color=(0.25, 0.27, 0.28), roughness=0.12, specular=1.0)))
     up, around = directions()
     room.sky = np.where(up > 0, (3, 3.6, 4.5) - up * np.array((1.5, 1.5, 1.2)), (1.0, 0.9, 0.7)) * np.ones_like(around)
-    sun = np.array((0.72, 0.55, 0.3)) / np.linalg.norm((0.72, 0.55, 0.3))
-    toward = np.sqrt(1 - up * up) * (np.sin(around) * sun[0] - np.cos(around) * sun[2]) + up * sun[1]
-    room.sky += np.where(toward > np.cos(np.radians(3)), (900, 800, 640), (0, 0, 0))
+    sun_at(room.sky, (0.72, 0.55, 0.3), (900, 800, 640))
     return room
 
 
@@ -229,19 +228,72 @@ def lounge(rng):
     return room
 
 
+def study(rng):
+    room = Room((7.0, 2.7, 4.5), rng)
+    wall = material(color=(0.66, 0.62, 0.54))
+    room.walls(floor=material(POLISHED, texture=planks(rng, count=10, color=(0.3, 0.17, 0.09))), wall=wall,
+               ceiling=material(color=(0.8, 0.8, 0.8)), windows=((1.0, 3.4, 0.8, 2.2),))
+    slats = [quad("blinds", (6.94, y, 1.02), (0, 0, 2.36), (0.022, 0.012, 0), wall) for y in np.arange(0.82, 2.18, 0.035)]
+    room.add(join("blinds", slats, material(roughness=0.4472, specular=0.5, color=(0.75, 0.73, 0.68))),
+             box("partition", (2.35, 0, 0), (2.45, 2.7, 1.4), wall), box("partition", (2.35, 0, 2.3), (2.45, 2.7, 4.5), wall),
+             box("lintel", (2.35, 2.0, 1.4), (2.45, 2.7, 2.3), wall),
+             sphere("hall-lamp", (1.2, 2.3, 2.2), 0.1, material(emission=(34, 32, 28))))
+    room.boxes += [(np.array((2.1, 0, 0)), np.array((2.7, 2.7, 1.6))), (np.array((2.1, 0, 2.1)), np.array((2.7, 2.7, 4.5)))]
+    room.add(box("panels", (3.0, 0, 4.47), (7.0, 1.3, 4.499), material(POLISHED, texture=planks(rng, color=(0.16, 0.08, 0.05)))),
+             box("mirror-frame", (4.1, 0.5, 0.001), (5.9, 2.1, 0.03), material(SATIN, color=(0.03, 0.03, 0.03))),
+             quad("mirror", (4.15, 0.55, 0.035), (1.7, 0, 0), (0, 1.5, 0),
+                  material(color=(0.3, 0.32, 0.33), roughness=0.05, specular=1.0)),
+             box("screen-body", (2.451, 1.1, 2.6), (2.48, 1.95, 4.0), material(POLISHED, color=(0.03, 0.03, 0.03))),
+             quad("screen", (2.485, 1.15, 3.95), (0, 0, -1.3), (0, 0.75, 0),
+                  material(color=(0.02, 0.02, 0.02), emission=3.0 * picture(rng) ** 2)))
+    for name, at, how in (
+            ("katorlegaz/custom-desk", (5.2, 0, 3.7), dict(width=1.8, turned=180)),
+            ("katorlegaz/office-chair", (5.1, 0, 2.8), dict(height=1.0, turned=20)),
+            ("blendswap-cc-0/verticalShelves", (3.5, 0, 0.3), dict(height=2.0)),
+            ("blendswap-cc-by/bookcase", (0.25, 0, 1.2), dict(height=2.0, turned=90)),
+            ("blendswap-cc-0/designChair", (3.3, 0, 3.3), dict(height=0.9, turned=130)),
+            ("blendswap-cc-by/suitcase", (0.5, 0, 3.9), dict(height=0.6, turned=60)),
+            ("blendswap-cc-by/yuccaPlant", (6.5, 0, 0.5), dict(height=1.4)),
+            ("scopia/cardboard-box", (1.8, 0, 0.5), dict(height=0.4, turned=15)),
+            ("blendswap-cc-by/radio", (5.8, 0.78, 3.8), dict(height=0.2, turned=180)),
+            ("scopia/round-carpet", (4.6, 0.003, 1.8), dict(width=1.8, blocks=False)),
+            ("blendswap-cc-by/clock", (0.1, 2.1, 3.2), dict(height=0.35, turned=90, blocks=False))):
+        room.model(name, at, **how)
+    room.add(box("lamp-hood", (4.6, 1.25, 3.6), (4.9, 1.29, 3.9), material(SATIN, color=(0.05, 0.15, 0.08))),
+             box("lamp-rod", (4.73, 0.78, 3.87), (4.77, 1.25, 3.9), material(METAL, color=(0.5, 0.5, 0.5))),
+             sphere("lamp", (4.75, 1.2, 3.75), 0.04, material(emission=(60, 44, 26))))
+    up, around = directions()
+    room.sky = np.where(up > 0, (4, 4.8, 6) - up * np.array((2, 2, 2)), (1.2, 1.1, 0.8)) * np.ones_like(around)
+    sun_at(room.sky, (0.75, 0.42, -0.25), (700, 600, 450))
+    return room
+
+
 def directions(height=128, width=256):
     """Of the pixels of a map of light: the sine of elevation [height][1][1], the azimuth [1][width][1]."""
     up = np.cos(np.pi * (np.arange(height) + 0.5) / height)[:, None, None]
     return up, (2 * np.pi * (np.arange(width) + 0.5) / width)[None, :, None]
 
 
+def sun_at(sky, direction, radiance):
+    """A disc of 3 degrees around the direction."""
+    up, around = directions(*sky.shape[:2])
+    sun = np.array(direction) / np.linalg.norm(direction)
+    toward = np.sqrt(1 - up * up) * (np.sin(around) * sun[0] - np.cos(around) * sun[2]) + up * sun[1]
+    sky += np.where(toward > np.cos(np.radians(3)), radiance, (0, 0, 0))
+
+
 # --- rendering -----------------------------------------------------------------------------------
 
 
+def spectrum(color):
+    """Of a colour, or of a texture."""
+    if np.ndim(color) == 1:
+        return {"type": "rgb", "value": [float(c) for c in color]}
+    return {"type": "bitmap", "bitmap": mi.Bitmap(color.astype(np.float32)), "raw": True}
+
+
 def texture_of(of):
-    if of.texture is None:
-        return {"type": "rgb", "value": [float(c) for c in of.color]}
-    return {"type": "bitmap", "bitmap": mi.Bitmap(of.texture.astype(np.float32)), "raw": True}
+    return spectrum(of.color if of.texture is None else of.texture)
 
 
 def scene_of(room, shines):
@@ -251,7 +303,7 @@ def scene_of(room, shines):
         scene["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(room.sky.astype(np.float32))}
     for number, part in enumerate(room.parts):
         of, props = part.material, mi.Properties()
-        radiance = {"type": "rgb", "value": [float(c) for c in of.emission]}
+        radiance = spectrum(of.emission)
         bsdf = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
         if shines:
             radiance = shines(number, part)
@@ -259,7 +311,7 @@ def scene_of(room, shines):
             bsdf = {"type": "twosided", "bsdf": {"type": "principled", "base_color": texture_of(of),
                                                  "roughness": of.roughness, "specular": of.specular}}
         props["bsdf"] = mi.load_dict(bsdf)
-        if shines or max(of.emission) > 0:
+        if shines or np.max(of.emission) > 0:
             props["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
         mesh = mi.Mesh(f"part{number}", len(part.positions), len(part.faces), has_vertex_normals=True,
                        has_vertex_texcoords=True, props=props)
@@ -352,15 +404,12 @@ def write_photographs(room, scene, poses, out, spp):
 
 def write_truth(room, poses, out):
     """Base colour averaged over the pixel; all else at one random place of it, the same for all."""
-    def constant(*values):
-        return {"type": "rgb", "value": [float(v) for v in values]}
-
     emitted = {"type": "path", "max_depth": 1}
     colors = scene_of(room, lambda number, part: texture_of(part.material))
     # A shape whose light is black would be no emitter: numbers from 1, all else a little more than 0.
-    others = scene_of(room, lambda number, part: constant(part.material.roughness, part.material.specular + 1e-9,
-                                                          number + 1))
-    lights = scene_of(room, lambda number, part: constant(*(e + 1e-9 for e in part.material.emission)))
+    others = scene_of(room, lambda number, part: spectrum((part.material.roughness, part.material.specular + 1e-9,
+                                                           number + 1)))
+    lights = scene_of(room, lambda number, part: spectrum(np.array(part.material.emission) + 1e-9))
     for k in range(TRAIN, TRAIN + TEST):
         color = render(colors, poses[k], 64, emitted, 1)
         other, light = render(others, poses[k], 1, emitted, 2), render(lights, poses[k], 1, emitted, 2)
@@ -371,14 +420,15 @@ def write_truth(room, poses, out):
         mi.Bitmap(channels, pixel_format=mi.Bitmap.PixelFormat.MultiChannel,
                   channel_names=names + ["roughness", "specular", "object_id", "depth"]).write(f"{out}/truth/{k:03d}.exr")
     json.dump([{"id": k, "name": p.name, "roughness": p.material.roughness, "specular": p.material.specular,
-                "emission": list(map(float, p.material.emission)), "base_color": list(map(float, p.material.color)),
+                "emission": np.reshape(p.material.emission, (-1, 3)).mean(0).tolist(), "base_color": list(map(float, p.material.color)),
                 "base_color_texture": None if p.material.texture is None else p.name, "triangles": len(p.faces)}
                for k, p in enumerate(room.parts)], open(out + "/truth/objects.json", "w"), indent=1)
 
 
 def main():
     kind, out, spp = sys.argv[1], sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 256
-    room = {"kitchen": kitchen, "parlour": parlour, "bedroom": bedroom, "lounge": lounge}[kind](np.random.default_rng(1))
+    room = {"kitchen": kitchen, "parlour": parlour, "bedroom": bedroom, "lounge": lounge,
+            "study": study}[kind](np.random.default_rng(1))
     for folder in ("images", "sdr", "truth"):
         os.makedirs(f"{out}/{folder}", exist_ok=True)
     print(f"{kind}: {len(room.parts)} objects, {sum(len(p.faces) for p in room.parts)} triangles", flush=True)

@@ -20,7 +20,7 @@ class Material:
     texture: np.ndarray = None  # [height][width][3] in place of the colour
     roughness: float = 1.0
     specular: float = 0.0
-    emission: tuple = (0.0, 0.0, 0.0)
+    emission: tuple = (0.0, 0.0, 0.0)  # or a texture
 
 
 MATT = Material()
