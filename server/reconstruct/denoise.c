@@ -15,9 +15,6 @@
 /* Power is averaged over a square of this many steps of the level's filter to either side. */
 #define WINDOW_STEPS 5
 #define WINDOW_MAX 32
-/* Bounds of how much more variance noise has at a place than by the pictures as a whole. */
-#define NOISE_SCALE_MIN 1.0f
-#define NOISE_SCALE_MAX 8.0f
 /* Noise of rare, far outliers has more power around a few texels than a draw of it tells. */
 #define NOISE_SAFETY 1.5f
 /* Beyond so many times the noise outliers are too many to be outliers. */
@@ -26,7 +23,7 @@
 /* Reach of all filters together: 2 steps of each level, and the widest window. */
 #define MARGIN (2 * ((1 << LEVELS) - 1) + WINDOW_MAX)
 
-enum { RED, GREEN, BLUE, NOISE, MIXING, WEIGHT, PLANES };
+enum { RED, GREEN, BLUE, NOISE, MIXING = NOISE + 3, WEIGHT, PLANES };
 
 struct box {
     long x0, y0, x1, y1; /* [x0, x1) x [y0, y1), texels of the atlas */
@@ -102,13 +99,11 @@ static void tile_read(struct tile *t, const struct denoise_job *job, const struc
             if (t->inside[at])
                 m = job->measured[texel];
             rgb value = measured_value(&m);
-            const float plane[PLANES] = {value.r, value.g, value.b, image_float_from_half(m.noise),
-                                         image_float_from_half(m.mixing), 1.0f};
+            const float plane[PLANES] = {value.r, value.g, value.b,
+                                         image_float_from_half(m.noise[0]), image_float_from_half(m.noise[1]),
+                                         image_float_from_half(m.noise[2]), image_float_from_half(m.mixing), 1.0f};
             for (int p = 0; p < PLANES; p++)
                 t->fine[p][at] = m.weight * plane[p];
-            t->power[at] = m.weight * image_float_from_half(m.spread);
-            t->noise_power[at] = m.weight * image_float_from_half(m.noise_spread);
-            t->count[at] = m.weight * image_float_from_half(m.light_noise);
             for (int c = 0; c < 3; c++)
                 t->total[c][at] = 0.0f;
         }
@@ -188,21 +183,16 @@ static void window_sums(float *plane, float *scratch, size_t width, size_t heigh
 
 /* --- the filter --------------------------------------------------------------------------------- */
 
-/* Makes the draw of the photographs' noise as strong around each texel as photographs of the same texels
- * differ, and adds that of the light. Both are where tile_read left them. */
-static void scale_noise(struct tile *t) {
-    size_t texels = t->width * t->height;
-    window_sums(t->power, t->scratch, t->width, t->height, WINDOW_MAX);
-    window_sums(t->noise_power, t->scratch, t->width, t->height, WINDOW_MAX);
-    for (size_t at = 0; at < texels; at++) {
-        float scale = t->noise_power[at] > 0.0f ? t->power[at] / t->noise_power[at] : 1.0f;
-        t->fine[NOISE][at] *= sqrtf(clampf(scale, NOISE_SCALE_MIN, NOISE_SCALE_MAX));
-        t->fine[NOISE][at] += t->count[at];
-    }
-}
-
 static float detail(const struct tile *t, int plane, size_t at) {
     return t->fine[plane][at] / t->fine[WEIGHT][at] - t->coarse[plane][at] / t->coarse[WEIGHT][at];
+}
+
+/* Of the three planes from `first` on. */
+static float detail_power(const struct tile *t, int first, size_t at) {
+    float power = 0.0f;
+    for (int p = first; p < first + 3; p++)
+        power += detail(t, p, at) * detail(t, p, at);
+    return power;
 }
 
 static bool counts(const struct tile *t, size_t at) {
@@ -219,8 +209,7 @@ static void measure_noise(struct tile *t, size_t radius) {
     size_t texels = t->width * t->height;
     for (size_t at = 0; at < texels; at++) {
         float weight = counts(t, at) ? t->fine[WEIGHT][at] : 0.0f;
-        float noise = weight > 0.0f ? detail(t, NOISE, at) : 0.0f;
-        t->noise_power[at] = weight * noise * noise;
+        t->noise_power[at] = weight > 0.0f ? weight * detail_power(t, NOISE, at) : 0.0f;
         t->weight_sum[at] = weight;
         t->count[at] = weight > 0.0f ? 1.0f : 0.0f;
     }
@@ -235,8 +224,7 @@ static void measure_power(struct tile *t, size_t radius) {
     for (size_t at = 0; at < texels; at++) {
         float power = 0.0f, bound = 0.0f;
         if (counts(t, at)) {
-            for (int c = RED; c <= BLUE; c++)
-                power += detail(t, c, at) * detail(t, c, at);
+            power = detail_power(t, RED, at);
             bound = POWER_BOUND * noise_variance(t, at);
         }
         t->power[at] = t->fine[WEIGHT][at] * power;
@@ -269,7 +257,6 @@ static void keep_texture(struct tile *t) {
 }
 
 static void filter_tile(struct tile *t) {
-    scale_noise(t);
     for (int level = 0; level < LEVELS; level++) {
         size_t step = (size_t)1 << level;
         for (int p = 0; p < PLANES; p++) {

@@ -7,6 +7,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/reconstruct/color_prior.h"
+#include "server/reconstruct/halves.h"
 #include "server/reconstruct/highlight.h"
 #include "server/reconstruct/robust.h"
 #include "server/render/sampler.h"
@@ -35,8 +36,6 @@
  * what its base colour reflects, and the share of the former from which it is taken as it is. */
 #define MIXING_TOLD 0.01f
 #define MOSTLY_KNOWN 0.9f
-/* Looks of this share of the greatest weight are compared with each other. */
-#define NEAR_WEIGHT 0.3f
 
 /* What is gathered of one texel. */
 struct texel_looks {
@@ -100,13 +99,19 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
         float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
-    rgb deviation = noise_deviation(d->noise, d->views, view, fused_radiance(&d->r->fused, texel));
+    rgb fused = fused_radiance(&d->r->fused, texel), deviation = noise_deviation(d->noise, d->views, view, fused);
+    rgb usual = rgb_clamp(divide_channels(fused, white, DARKEST * median), 0.0f, MOST);
     rgb base = rgb_clamp(divide_channels(rgb_sub(shown, gloss), white, DARKEST * median), -MOST, MOST);
     rgb noise = rgb_clamp(divide_channels(deviation, white, DARKEST * median), 0.0f, MOST);
     looks->look[looks->count++] = (struct robust_sample){
-        base, logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
-        weight * noise_weight(d->noise, d->views, view, typical, mixing),
-        sqrtf(rgb_dot(noise, noise)) * noise_draw(view, sharp), mixing * rgb_dot(base, base)};
+        .value = base,
+        .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
+        .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
+        .weight = weight * noise_weight(d->noise, d->views, view, typical, mixing),
+        .source = view->train,
+        .sharp = view->weight,
+        .noise = rgb_scale(noise, noise_draw(view, sharp)),
+        .mixing = mixing * rgb_dot(base, base)};
 }
 
 static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,
@@ -136,47 +141,23 @@ static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
     return rgb_make(from[0], from[1], from[2]);
 }
 
-/* How far the looks differ that count about as much as the greatest does: those from further away
- * show the texel less sharply, which is no noise. */
-static void measure_spread(const struct texel_looks *looks, struct measured *m) {
-    float most = 0.0f, weights = 0.0f, noise = 0.0f, noise_squares = 0.0f, squares = 0.0f;
-    rgb mean = {0.0f, 0.0f, 0.0f};
-    for (size_t i = 0; i < looks->count; i++)
-        most = fmaxf(most, looks->look[i].weight);
-    for (size_t i = 0; i < looks->count; i++) {
-        const struct robust_sample *l = &looks->look[i];
-        if (l->weight < NEAR_WEIGHT * most)
-            continue;
-        weights += l->weight;
-        mean = rgb_mad(mean, l->weight, l->value);
-        squares += l->weight * rgb_dot(l->value, l->value);
-        noise += l->weight * l->noise;
-        noise_squares += l->weight * l->noise * l->noise;
-    }
-    mean = rgb_scale(mean, 1.0f / weights);
-    noise /= weights;
-    m->spread = image_half_from_float(fmaxf(squares / weights - rgb_dot(mean, mean), 0.0f));
-    m->noise_spread = image_half_from_float(fmaxf(noise_squares / weights - noise * noise, 0.0f));
-}
-
 static struct measured mean_of(struct texel_looks *looks, const struct irradiance *light) {
     struct measured m = {.weight = robust_weigh(looks->look, looks->count, OUTLIER_SCALE)};
-    rgb value = {0.0f, 0.0f, 0.0f};
-    float noise = 0.0f, mixing = 0.0f;
+    rgb value = {0.0f, 0.0f, 0.0f}, noise = value;
+    float mixing = 0.0f;
     for (size_t i = 0; i < looks->count; i++) {
         const struct robust_sample *l = &looks->look[i];
         float share = l->weight / m.weight;
         value = rgb_mad(value, share, l->value);
-        noise += share * l->noise;
+        noise = rgb_mad(noise, share, l->noise);
         mixing += share * l->mixing;
     }
     const float *sum = light->moment[0];
     rgb off = divide_channels(rgb_mul(value, light->noise), rgb_make(sum[0], sum[1], sum[2]), FLT_MIN);
+    halves_draw(looks->look, looks->count, &noise);
     set_half(m.value, value);
-    m.noise = image_half_from_float(noise);
-    m.light_noise = image_half_from_float(copysignf(sqrtf(rgb_dot(off, off)), rgb_mean(off)));
+    set_half(m.noise, rgb_add(noise, off));
     m.mixing = image_half_from_float(mixing);
-    measure_spread(looks, &m);
     return m;
 }
 

@@ -58,8 +58,12 @@ static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t c
         weights += weight;
     }
     rgb mean = rgb_scale(sum, 1.0f / weights);
-    for (size_t i = 0; i < count; i++)
+    float floor_radiance = LOG_FLOOR * job->views->median_radiance;
+    for (size_t i = 0; i < count; i++) {
+        rgb deviation = noise_deviation(job->noise, job->views, &l->view[i], mean);
+        l->look[i].deviation = rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
         l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i]);
+    }
 }
 
 static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {

@@ -3,6 +3,9 @@
 
 #include <stdlib.h>
 
+/* Of normal noise, Cauchy's weight wastes 5 % of the measurements at a scale of so many deviations. */
+#define EFFICIENT 2.385f
+
 static int compare_gray(const void *a, const void *b) {
     float x = ((const struct robust_sample *)a)->gray, y = ((const struct robust_sample *)b)->gray;
     return (x > y) - (x < y);
@@ -18,8 +21,8 @@ float robust_weigh(struct robust_sample *sample, size_t count, float scale) {
         middle++;
     float median = sample[middle].gray;
     for (size_t i = 0; i < count; i++) {
-        float off = (sample[i].gray - median) / scale;
-        sample[i].weight /= 1.0f + off * off;
+        float off = sample[i].gray - median, usual = EFFICIENT * sample[i].deviation;
+        sample[i].weight /= 1.0f + off * off / (scale * scale + usual * usual);
         weights += sample[i].weight;
     }
     return weights;

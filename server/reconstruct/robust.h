@@ -3,18 +3,24 @@
 #define UNBAKE_RECONSTRUCT_ROBUST_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/vec.h"
 
 struct robust_sample {
     rgb value;
-    float gray;   /* what outliers are told by: the logarithm of a brightness */
-    float weight; /* above 0 */
-    float noise, mixing; /* of the value, see denoise.h; not looked at here */
+    float gray;      /* what outliers are told by: the logarithm of a brightness */
+    float deviation; /* standard deviation of `gray` by noise alone, as far as is known */
+    float weight;    /* above 0 */
+    /* Not looked at here: */
+    uint32_t source; /* which photograph */
+    float sharp;     /* solid angle per area of surface */
+    rgb noise;       /* of the value, as the next; see denoise.h */
+    float mixing;
 };
 
 /* Lowers the weights of those of count > 0 samples that are off the weighted median of `gray`: to half
- * at a distance of `scale` (Cauchy's weight). Sorts the samples. Returns the sum of the weights. */
+ * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples. Returns the sum of the weights. */
 float robust_weigh(struct robust_sample *sample, size_t count, float scale);
 
 /* The mean of count > 0 samples after robust_weigh. */

@@ -30,6 +30,7 @@
 #define WHITE_BASE_COLOR 0.9f
 #define SPREAD_WITHIN 0.3f
 #define SPREAD_BEYOND 0.15f
+#define GLOSS 0.04f
 #define DARK 0.01f
 /* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
  * and nearer to the best. */
@@ -55,7 +56,8 @@ struct place {
     struct surface_point at;
     rgb shown, white; /* what photographs show, and what a white surface would show in the light that is known */
     float odd;        /* logarithm of base colour, without a sun, over the median of the segment or over white */
-    float lit;        /* by the sun that is tried: cosine x part of the disc */
+    float open;       /* the part of the disc of the sun that is tried which it sees, */
+    float lit;        /* times the cosine */
 };
 
 struct search {
@@ -267,7 +269,7 @@ static double misfit(const struct search *s, float strength, int channel) {
         }
         float median = any ? median_of(s, first, end) : 0.0f;
         for (size_t i = first; any && i < end; i++)
-            sum += oddity(s->base[i] - median, SPREAD_WITHIN) +
+            sum += oddity(s->base[i] - median, SPREAD_WITHIN + GLOSS * expf(-median)) +
                    oddity(fmaxf(s->base[i] - logf(WHITE_BASE_COLOR), 0.0f), SPREAD_BEYOND);
     }
     return sum;
@@ -303,9 +305,8 @@ static void light_place(void *user, size_t index, int thread) {
     (void)thread;
     struct search *s = user;
     struct place *p = &s->place[index];
-    p->lit = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
-    if (p->lit > 0.0f)
-        p->lit *= vec3_dot(s->sun.direction, p->at.shading);
+    p->open = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
+    p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
 }
 
 /* How much a sun in a direction explains. */
@@ -337,11 +338,11 @@ static void walk(struct search *s, struct candidate *best, double degrees, doubl
     }
 }
 
-/* Places that the sun lights and that are odder than this. */
-static size_t count_lit(const struct search *s, float odd) {
-    size_t lit = 0;
+/* So many places that are odder than this the sun lights; one that sees half of it is half a place. */
+static double count_lit(const struct search *s, float odd) {
+    double lit = 0.0;
     for (size_t i = 0; i < s->count; i++)
-        lit += s->place[i].lit > 0.0f && s->place[i].odd > odd;
+        lit += s->place[i].odd > odd ? (double)s->place[i].open : 0.0;
     return lit;
 }
 
@@ -356,7 +357,7 @@ static struct candidate best_direction(struct search *s) {
     }
     if (best.score > 0.0)
         try_direction(s, best.direction);
-    if (best.score <= HOPEFUL * EXPLAINS * (double)count_lit(s, -INFINITY))
+    if (best.score <= HOPEFUL * EXPLAINS * count_lit(s, -INFINITY))
         best.score = 0.0;
     else
         walk(s, &best, 2.0, 0.25);
@@ -395,7 +396,7 @@ static void look_for_sun(struct search *s, double *explains) {
         return;
     bool is_disc = find_radius(s, &best);
     try_direction(s, best.direction);
-    *explains = best.score / fmax((double)count_lit(s, -INFINITY), 1.0);
+    *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
     s->sun.is_there = is_disc && count_lit(s, BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
     for (int c = 0; c < 3; c++) {
         double explained;
@@ -408,7 +409,7 @@ static void report(const struct search *s, double explains) {
     cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
     json_add_bool(figures, "found", r->sun.is_there);
     json_add_number(figures, "explains", explains);
-    json_add_number(figures, "lights_share", (double)count_lit(s, -INFINITY) / fmax((double)s->count, 1.0));
+    json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->count, 1.0));
     if (!r->sun.is_there)
         return;
     cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");

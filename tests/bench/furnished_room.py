@@ -1,6 +1,6 @@
 """Makes a furnished room with its truth, to measure fidelity beyond the rooms of the test data.
 
-Not unseen any more: constants of gloss.c were chosen on a draft of these rooms, too.
+Not unseen any more: constants of gloss.c and sun_find.c were chosen on these rooms, too.
 
 usage: furnished_room.py kitchen|parlour|bedroom|lounge|study OUT [SPP]
 

@@ -39,9 +39,11 @@ static float truth(uint32_t x, uint32_t y) {
 
 static void set(uint32_t x, uint32_t y, float value, float noise, float mixing) {
     struct measured *m = &measured[y * WIDTH + x];
-    *m = (struct measured){.weight = 1.0f, .noise = image_half_from_float(noise), .mixing = image_half_from_float(mixing)};
-    for (int c = 0; c < 3; c++)
+    *m = (struct measured){.weight = 1.0f, .mixing = image_half_from_float(mixing)};
+    for (int c = 0; c < 3; c++) {
         m->value[c] = image_half_from_float(value);
+        m->noise[c] = image_half_from_float(noise);
+    }
 }
 
 /* Gray noise: the same of all channels; its draws are independent of it. */
@@ -49,7 +51,7 @@ static void measure(void) {
     for (uint32_t y = 0; y < HEIGHT; y++)
         for (uint32_t x = 0; x < WIDTH; x++)
             set(x, y, truth(x, y) + DEVIATION * normal(1, y * WIDTH + x),
-                sqrtf(3.0f) * DEVIATION * normal(2, y * WIDTH + x), 0.0f);
+                DEVIATION * normal(2, y * WIDTH + x), 0.0f);
 }
 
 static void filter(void) {
