@@ -12,6 +12,8 @@
 #define LOG_FLOOR 0.01f
 /* Difference of logarithms from the median at which a look-up has half its weight. */
 #define OUTLIER_SCALE 0.3f
+/* Noise of a look-up between four pixels over that of one, on average. */
+#define BILINEAR_DEVIATION 0.67f
 #define MAX_LOOKS 256
 #define CHUNK 1024 /* valid texels a work item */
 
@@ -61,7 +63,7 @@ static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t c
     float floor_radiance = LOG_FLOOR * job->views->median_radiance;
     for (size_t i = 0; i < count; i++) {
         rgb deviation = noise_deviation(job->noise, job->views, &l->view[i], mean);
-        l->look[i].deviation = rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
+        l->look[i].deviation = BILINEAR_DEVIATION * rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
         l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i]);
     }
 }
