@@ -7,17 +7,9 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/reconstruct/survey.h"
+#include "server/reconstruct/sun_places.h"
 #include "server/render/bsdf.h"
-#include "server/render/sampler.h"
 
-#define POINTS 16384
-#define WAYS 128 /* directions a point */
-#define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
-/* Logarithms of base colour: what of it is odd counts up to this much when directions are asked; a point that
- * is so much brighter than its segment is bright. */
-#define ODD_MOST 1.0f
-#define BRIGHT 0.5f
 /* So many bright points must be there, and be lit. */
 #define LEAST_BRIGHT 12
 /* Directions asked: so far apart, in degrees, at so many bright points and others, of which the likeliest ones
@@ -25,13 +17,11 @@
 #define ASKED_DEGREES 3.0
 #define ASKED_POINTS 768
 #define CANDIDATES 24
-/* White paint; standard deviations of the logarithm of base colour within a segment and above white; and light
- * beside which a share of the room's median is nothing. */
-#define WHITE_BASE_COLOR 0.9f
+/* Standard deviations of the logarithm of base colour within a segment and above white; and what a highlight, not
+ * known yet, may add to base colour, which makes dark surfaces less alike. */
 #define SPREAD_WITHIN 0.3f
 #define SPREAD_BEYOND 0.15f
 #define GLOSS 0.04f
-#define DARK 0.01f
 /* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
  * and nearer to the best. */
 #define FAINTEST 0.1f
@@ -51,21 +41,10 @@ static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f
 #define HOPEFUL 0.25
 #define STEPS 24 /* to better directions, or to smaller steps */
 
-struct place {
-    uint32_t segment;
-    struct surface_point at;
-    rgb shown, white; /* what photographs show, and what a white surface would show in the light that is known */
-    float odd;        /* logarithm of base colour, without a sun, over the median of the segment or over white */
-    float open;       /* the part of the disc of the sun that is tried which it sees, */
-    float lit;        /* times the cosine */
-};
-
 struct search {
     struct reconstruction *r;
-    struct survey survey;
-    size_t count;
-    struct place *place;   /* [count] by segment; owned, as all below */
-    float *base;           /* [count] scratch of `misfit`, as the next */
+    struct sun_places places;
+    float *base;           /* [places.count] scratch of `misfit`, as the next; owned */
     float *sorted;
     struct sun sun;        /* that is tried */
     int rays;              /* a point, to see how much of it is open */
@@ -76,80 +55,6 @@ struct candidate {
     vec3 direction;
     double score;
 };
-
-/* --- what is known --------------------------------------------------------------------------------- */
-
-static void gather_place(void *user, size_t index, int thread) {
-    struct search *s = user;
-    const struct reconstruction *r = s->r;
-    struct place *p = &s->place[index];
-    uint32_t texel = s->survey.texel[index];
-    struct irradiance light;
-    *p = (struct place){.segment = reconstruction_segment(r, texel), .shown = fused_radiance(&r->fused, texel)};
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
-        return;
-    irradiance_gather(&light, &s->survey.scratch[thread], &s->survey.field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
-    p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
-}
-
-static int by_segment(const void *a, const void *b) {
-    const struct place *first = a, *second = b;
-    if (first->segment != second->segment)
-        return first->segment < second->segment ? -1 : 1;
-    return (first->at.triangle > second->at.triangle) - (first->at.triangle < second->at.triangle);
-}
-
-/* Where the segment of a place ends. */
-static size_t end_of_segment(const struct search *s, size_t first) {
-    size_t end = first;
-    while (end < s->count && s->place[end].segment == s->place[first].segment)
-        end++;
-    return end;
-}
-
-/* Keeps light from being nothing. */
-static void floor_light(struct search *s) {
-    float *mean = mem_array(s->count + 1, sizeof *mean);
-    for (size_t i = 0; i < s->count; i++)
-        mean[i] = rgb_mean(s->place[i].shown);
-    float dark = fmaxf(DARK * quantile(mean, s->count, 0.5), 1e-20f);
-    for (size_t i = 0; i < s->count; i++) {
-        s->place[i].shown = rgb_add(s->place[i].shown, rgb_gray(dark));
-        s->place[i].white = rgb_add(s->place[i].white, rgb_gray(dark));
-    }
-    mem_free(mean);
-}
-
-static float log_base(const struct place *p) {
-    return logf(rgb_mean(p->shown) / rgb_mean(p->white));
-}
-
-/* Leaves out segments of which most is brighter than white: lamps, for all one knows. */
-static void leave_out_lamps(struct search *s) {
-    size_t kept = 0;
-    for (size_t first = 0, end; first < s->count; first = end) {
-        size_t bright = 0;
-        end = end_of_segment(s, first);
-        for (size_t i = first; i < end; i++)
-            bright += log_base(&s->place[i]) > logf(WHITE_BASE_COLOR) + BRIGHT;
-        for (size_t i = first; i < end && 2 * bright < end - first; i++)
-            s->place[kept++] = s->place[i];
-    }
-    s->count = kept;
-}
-
-static void find_odd(struct search *s) {
-    for (size_t first = 0, end; first < s->count; first = end) {
-        end = end_of_segment(s, first);
-        for (size_t i = first; i < end; i++)
-            s->sorted[i - first] = log_base(&s->place[i]);
-        float median = quantile(s->sorted, end - first, 0.5);
-        for (size_t i = first; i < end; i++) {
-            float log = log_base(&s->place[i]);
-            s->place[i].odd = clampf(fmaxf(log - median, log - logf(WHITE_BASE_COLOR)), -ODD_MOST, ODD_MOST);
-        }
-    }
-}
 
 /* --- directions ------------------------------------------------------------------------------------ */
 
@@ -169,7 +74,7 @@ static void ask_direction(void *user, size_t index, int thread) {
     struct sun sun = {.direction = c->direction};
     double sum = 0.0, weights = 0.0;
     for (size_t i = 0; i < a->count; i++) {
-        const struct place *p = &a->s->place[a->place[i]];
+        const struct sun_place *p = &a->s->places.place[a->place[i]];
         double weight = (double)(a->weight[i] * sun_visible(&sun, a->s->r->world.accel, &p->at, 1));
         sum += weight * ((double)p->odd - a->mean);
         weights += weight;
@@ -180,11 +85,11 @@ static void ask_direction(void *user, size_t index, int thread) {
 /* Up to ASKED_POINTS places that are bright, or not. */
 static void choose_asked(struct asked *a, bool bright) {
     size_t all = 0, met = 0, first = a->count;
-    for (size_t i = 0; i < a->s->count; i++)
-        all += (a->s->place[i].odd > BRIGHT) == bright;
+    for (size_t i = 0; i < a->s->places.count; i++)
+        all += (a->s->places.place[i].odd > SUN_BRIGHT) == bright;
     size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
-    for (size_t i = 0; i < a->s->count && a->count - first < wanted; i++) {
-        if ((a->s->place[i].odd > BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
+    for (size_t i = 0; i < a->s->places.count && a->count - first < wanted; i++) {
+        if ((a->s->places.place[i].odd > SUN_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
             a->weight[a->count] = (float)all / (float)wanted;
             a->place[a->count++] = (uint32_t)i;
         }
@@ -214,9 +119,9 @@ static size_t ask_directions(const struct search *s, struct candidate candidate[
         }
     }
     double squares = 0.0;
-    for (size_t i = 0; i < s->count; i++) {
-        a.mean += (double)s->place[i].odd / (double)s->count;
-        squares += (double)(s->place[i].odd * s->place[i].odd) / (double)s->count;
+    for (size_t i = 0; i < s->places.count; i++) {
+        a.mean += (double)s->places.place[i].odd / (double)s->places.count;
+        squares += (double)(s->places.place[i].odd * s->places.place[i].odd) / (double)s->places.count;
     }
     a.deviation = sqrt(fmax(squares - a.mean * a.mean, 1e-12));
     choose_asked(&a, true);
@@ -258,19 +163,19 @@ static float median_of(const struct search *s, size_t first, size_t end) {
  * sends out `strength` by it. */
 static double misfit(const struct search *s, float strength, int channel) {
     double sum = 0.0;
-    for (size_t first = 0, end; first < s->count; first = end) {
+    for (size_t first = 0, end; first < s->places.count; first = end) {
         bool any = false;
-        end = end_of_segment(s, first);
+        end = sun_places_end(&s->places, first);
         for (size_t i = first; i < end; i++)
-            any = any || s->place[i].lit > 0.0f;
+            any = any || s->places.place[i].lit > 0.0f;
         for (size_t i = first; any && i < end; i++) {
-            const struct place *p = &s->place[i];
+            const struct sun_place *p = &s->places.place[i];
             s->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
         }
         float median = any ? median_of(s, first, end) : 0.0f;
         for (size_t i = first; any && i < end; i++)
             sum += oddity(s->base[i] - median, SPREAD_WITHIN + GLOSS * expf(-median)) +
-                   oddity(fmaxf(s->base[i] - logf(WHITE_BASE_COLOR), 0.0f), SPREAD_BEYOND);
+                   oddity(fmaxf(s->base[i] - logf(SUN_WHITE), 0.0f), SPREAD_BEYOND);
     }
     return sum;
 }
@@ -279,8 +184,8 @@ static double misfit(const struct search *s, float strength, int channel) {
 static float fit_strength(const struct search *s, int channel, double *explained) {
     double mean = 0.0, without = misfit(s, 0.0f, channel), least = without;
     float best = 0.0f, step = STRONGER;
-    for (size_t i = 0; i < s->count; i++)
-        mean += (double)channel_of(s->place[i].white, channel) / (double)s->count;
+    for (size_t i = 0; i < s->places.count; i++)
+        mean += (double)channel_of(s->places.place[i].white, channel) / (double)s->places.count;
     float strength = FAINTEST * (float)mean;
     for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
         double here = misfit(s, strength, channel);
@@ -304,7 +209,7 @@ static float fit_strength(const struct search *s, int channel, double *explained
 static void light_place(void *user, size_t index, int thread) {
     (void)thread;
     struct search *s = user;
-    struct place *p = &s->place[index];
+    struct sun_place *p = &s->places.place[index];
     p->open = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
     p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
 }
@@ -313,7 +218,7 @@ static void light_place(void *user, size_t index, int thread) {
 static double try_direction(struct search *s, vec3 direction) {
     double explained;
     s->sun.direction = direction;
-    parallel_for(s->r->pool, s->count, light_place, s);
+    parallel_for(s->r->pool, s->places.count, light_place, s);
     fit_strength(s, MEAN, &explained);
     return explained;
 }
@@ -341,8 +246,8 @@ static void walk(struct search *s, struct candidate *best, double degrees, doubl
 /* So many places that are odder than this the sun lights; one that sees half of it is half a place. */
 static double count_lit(const struct search *s, float odd) {
     double lit = 0.0;
-    for (size_t i = 0; i < s->count; i++)
-        lit += s->place[i].odd > odd ? (double)s->place[i].open : 0.0;
+    for (size_t i = 0; i < s->places.count; i++)
+        lit += s->places.place[i].odd > odd ? (double)s->places.place[i].open : 0.0;
     return lit;
 }
 
@@ -382,13 +287,6 @@ static bool find_radius(struct search *s, struct candidate *best) {
 
 /* --- the whole ------------------------------------------------------------------------------------- */
 
-static size_t count_bright(const struct search *s) {
-    size_t bright = 0;
-    for (size_t i = 0; i < s->count; i++)
-        bright += s->place[i].odd > BRIGHT;
-    return bright;
-}
-
 /* Fills s->sun; the share of what it lights that it explains goes to *explains. */
 static void look_for_sun(struct search *s, double *explains) {
     struct candidate best = best_direction(s);
@@ -397,7 +295,7 @@ static void look_for_sun(struct search *s, double *explains) {
     bool is_disc = find_radius(s, &best);
     try_direction(s, best.direction);
     *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
-    s->sun.is_there = is_disc && count_lit(s, BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
+    s->sun.is_there = is_disc && count_lit(s, SUN_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
     for (int c = 0; c < 3; c++) {
         double explained;
         (&s->sun.irradiance.r)[c] = BSDF_PI * fit_strength(s, c, &explained);
@@ -409,7 +307,7 @@ static void report(const struct search *s, double explains) {
     cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
     json_add_bool(figures, "found", r->sun.is_there);
     json_add_number(figures, "explains", explains);
-    json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->count, 1.0));
+    json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->places.count, 1.0));
     if (!r->sun.is_there)
         return;
     cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
@@ -423,22 +321,14 @@ static void report(const struct search *s, double explains) {
 void sun_find(struct reconstruction *r, const struct views *views) {
     struct search s = {.r = r};
     double explains = 0.0;
-    survey_init(&s.survey, r, views, POINTS);
-    s.count = s.survey.count;
-    s.place = mem_array(s.count + 1, sizeof *s.place);
-    s.base = mem_array(s.count + 1, sizeof *s.base);
-    s.sorted = mem_array(s.count + 1, sizeof *s.sorted);
-    parallel_for(r->pool, s.count, gather_place, &s);
-    survey_release(&s.survey);
-    qsort(s.place, s.count, sizeof *s.place, by_segment);
-    floor_light(&s);
-    leave_out_lamps(&s);
-    find_odd(&s);
-    if (count_bright(&s) >= LEAST_BRIGHT)
+    sun_places_init(&s.places, r, views);
+    s.base = mem_array(s.places.count + 1, sizeof *s.base);
+    s.sorted = mem_array(s.places.count + 1, sizeof *s.sorted);
+    if (sun_places_odder(&s.places, SUN_BRIGHT) >= LEAST_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;
     report(&s, explains);
     mem_free(s.sorted);
     mem_free(s.base);
-    mem_free(s.place);
+    sun_places_release(&s.places);
 }
