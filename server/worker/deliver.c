@@ -65,6 +65,14 @@ void deliver_sign(const char *secret, const char *id, long long timestamp, const
     mem_free(signed_text);
 }
 
+int deliver_status(const char *line) {
+    bool is_http = strncmp(line, "HTTP/1.0 ", 9) == 0 || strncmp(line, "HTTP/1.1 ", 9) == 0;
+    const char *code = line + 9;
+    if (!is_http || strspn(code, "0123456789") != 3 || code[0] == '0' || !strchr(" \r\n", code[3]))
+        return 0;
+    return (code[0] - '0') * 100 + (code[1] - '0') * 10 + (code[2] - '0');
+}
+
 /* A connection to the first of the host's addresses that takes one; -1 with the reason. */
 static int call(const struct url *url, bool may_be_private, struct error *err) {
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV}, *found;
@@ -116,9 +124,10 @@ static enum status talk(int fd, gnutls_session_t tls, const struct buf *request,
             break;
         got += (size_t)n;
     }
-    if (sscanf(line, "HTTP/1.%*1[01] %3d", code) == 1)
-        return STATUS_OK;
-    return error_set(err, STATUS_UNAVAILABLE, "there was no reply");
+    *code = deliver_status(line);
+    if (*code == 0)
+        return error_set(err, STATUS_UNAVAILABLE, "there was no reply");
+    return STATUS_OK;
 }
 
 static enum status talk_tls(int fd, const char *host, const struct buf *request, int *code, struct error *err) {

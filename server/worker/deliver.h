@@ -20,4 +20,8 @@ bool deliver_is_public(const struct sockaddr *address);
 void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body,
                   char signature[64]);
 
+/* The status, from 100 to 999, that is told by the first line of a reply of HTTP/1.0 or 1.1; 0 where it is none.
+ * The line may go on, or end where it was cut off. */
+int deliver_status(const char *line);
+
 #endif

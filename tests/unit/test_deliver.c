@@ -1,4 +1,4 @@
-/* test_deliver.c -- which addresses a webhook may call, its URLs, its signature. */
+/* test_deliver.c -- which addresses a webhook may call, its URLs, its signature, what an answer says. */
 #include <arpa/inet.h>
 
 #include "common/url.h"
@@ -44,6 +44,16 @@ int main(void) {
         "http://x/#f", "http://[::1/", "http://[x]/", "http://x\\y/", "HTTP://x/", "http://x:/", "http://[::1]x/"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK_THAT(url_parse(bad[i], &url, &err) == STATUS_INPUT, "%s", bad[i]);
+
+    CHECK(deliver_status("HTTP/1.1 200 OK\r\n") == 200);
+    CHECK(deliver_status("HTTP/1.0 404 Not Found\n") == 404);
+    CHECK(deliver_status("HTTP/1.1 204\r\n") == 204);
+    CHECK(deliver_status("HTTP/1.1 503") == 503);
+    static const char *const no_status[] = {"", "HTTP/1.1", "HTTP/1.1 ", "HTTP/1.1 20", "HTTP/1.1 -20 OK", "HTTP/1.1 2000 OK",
+                                            "HTTP/1.1 099 OK", "HTTP/1.1 200OK", "HTTP/1.1  200 OK", "HTTP/1.2 200 OK",
+                                            "HTTP/2 200", "http/1.1 200 OK", "ICY 200 OK"};
+    for (size_t i = 0; i < sizeof no_status / sizeof *no_status; i++)
+        CHECK_THAT(deliver_status(no_status[i]) == 0, "%s", no_status[i]);
 
     /* From: printf %s 'msg_1.1700000000.{}' | openssl dgst -sha256 -hmac a-secret-of-mine -binary | base64 */
     char signature[64];
