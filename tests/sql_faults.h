@@ -1,0 +1,121 @@
+/* sql_faults.h -- for one file of a test: the functions of SQLite that sql.c and backup.c call, before the library's
+ * own. The n-th call fails without being made, once. A rollback does not: SQLite makes it in memory. */
+#ifndef UNBAKE_TESTS_SQL_FAULTS_H
+#define UNBAKE_TESTS_SQL_FAULTS_H
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <sqlite3.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "common/error.h"
+
+/* As SQLite fails, and what that is to the store. */
+static const struct sql_fault {
+    int code, number; /* errno */
+    enum status status;
+} sql_faults[] = {
+    {SQLITE_IOERR_WRITE, EIO, STATUS_IO},
+    {SQLITE_FULL, 0, STATUS_NO_SPACE},
+    {SQLITE_IOERR_FSYNC, ENOSPC, STATUS_NO_SPACE},
+    {SQLITE_BUSY, 0, STATUS_UNAVAILABLE},
+    {SQLITE_CORRUPT, 0, STATUS_CORRUPT},
+    {SQLITE_CANTOPEN, EACCES, STATUS_IO},
+    {SQLITE_CANTOPEN, EDQUOT, STATUS_NO_SPACE},
+    {SQLITE_IOERR_READ, 0, STATUS_IO},
+    {SQLITE_LOCKED, 0, STATUS_UNAVAILABLE},
+    {SQLITE_NOTADB, 0, STATUS_CORRUPT},
+    {SQLITE_MISUSE, 0, STATUS_INTERNAL},
+};
+#define SQL_FAULTS (sizeof sql_faults / sizeof *sql_faults)
+
+static const struct sql_fault *sql_fault; /* the one that is to come */
+static atomic_long sql_faults_left;       /* calls until then; 0: none fails */
+static _Thread_local bool sql_is_inner;   /* SQLite calls itself */
+
+/* The n-th call from now on fails; how, goes by n. */
+static inline void sql_faults_arm(long n) {
+    sql_fault = &sql_faults[(size_t)n % SQL_FAULTS];
+    atomic_store(&sql_faults_left, n);
+}
+
+/* From now on none does; whether one has. */
+static inline bool sql_faults_lift(void) {
+    return atomic_exchange(&sql_faults_left, 0) <= 0;
+}
+
+static inline bool sql_fails(void) {
+    if (sql_is_inner || atomic_load(&sql_faults_left) == 0 || atomic_fetch_sub(&sql_faults_left, 1) != 1)
+        return false;
+    errno = sql_fault->number;
+    return true;
+}
+
+/* The library's own; what it calls meanwhile does not fail. */
+#define SQL_PASS(name, type, ...)                                                                                   \
+    __typeof__(name) *call;                                                                                         \
+    bool outer = sql_is_inner;                                                                                      \
+    *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                      \
+    sql_is_inner = true;                                                                                            \
+    type result = call(__VA_ARGS__);                                                                                \
+    sql_is_inner = outer;                                                                                           \
+    return result
+
+static inline bool sql_is_rollback(const char *text) {
+    return text && strcmp(text, "ROLLBACK") == 0;
+}
+
+int sqlite3_step(sqlite3_stmt *stmt) {
+    if (!sql_is_rollback(sqlite3_sql(stmt)) && sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_step, int, stmt);
+}
+
+int sqlite3_prepare_v3(sqlite3 *db, const char *text, int size, unsigned flags, sqlite3_stmt **stmt, const char **tail) {
+    *stmt = NULL;
+    if (!sql_is_rollback(text) && sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_prepare_v3, int, db, text, size, flags, stmt, tail);
+}
+
+int sqlite3_prepare_v2(sqlite3 *db, const char *text, int size, sqlite3_stmt **stmt, const char **tail) {
+    *stmt = NULL;
+    if (sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_prepare_v2, int, db, text, size, stmt, tail);
+}
+
+int sqlite3_bind_text(sqlite3_stmt *stmt, int index, const char *text, int size, void (*release)(void *)) {
+    if (sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_bind_text, int, stmt, index, text, size, release);
+}
+
+int sqlite3_exec(sqlite3 *db, const char *text, int (*each)(void *, int, char **, char **), void *user, char **why) {
+    if (sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_exec, int, db, text, each, user, why);
+}
+
+int sqlite3_open_v2(const char *path, sqlite3 **db, int flags, const char *vfs) {
+    *db = NULL;
+    if (sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_open_v2, int, path, db, flags, vfs);
+}
+
+sqlite3_backup *sqlite3_backup_init(sqlite3 *to, const char *to_name, sqlite3 *from, const char *from_name) {
+    if (sql_fails())
+        return NULL;
+    SQL_PASS(sqlite3_backup_init, sqlite3_backup *, to, to_name, from, from_name);
+}
+
+int sqlite3_backup_step(sqlite3_backup *backup, int pages) {
+    if (sql_fails())
+        return sql_fault->code;
+    SQL_PASS(sqlite3_backup_step, int, backup, pages);
+}
+
+#endif
