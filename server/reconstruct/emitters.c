@@ -117,6 +117,8 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
+    if (job->evidence[segment].hidden)
+        return; /* it is known from elsewhere */
     struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
     size_t wanted = texel_count(&job->texels, segment, TEXELS_PER_SEGMENT);
     for (size_t i = 0; i < wanted; i++)
@@ -131,6 +133,7 @@ static void observe_segment(void *user, size_t segment, int thread) {
     size_t told = best->channel[0].count + best->channel[0].saturated_count;
     if ((float)told < OWN_PART * (float)(told + best->outshone_count))
         best = &shown[0]; /* most often it is not what shines: nothing is known */
+    job->evidence[segment].seen = told > 0;
     job->evidence[segment].mixed = best == &shown[VIEWS_EDGE];
     job->evidence[segment].shown =
         rgb_make(median(&best->channel[0]), median(&best->channel[1]), median(&best->channel[2]));
@@ -149,7 +152,7 @@ void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
         rgb shown = evidence[i].shown;
-        bool shines = rgb_mean(shown) > BRIGHT * views->median_radiance;
+        bool shines = evidence[i].hidden || rgb_mean(shown) > BRIGHT * views->median_radiance;
         r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);
@@ -200,7 +203,7 @@ void emitters_decide(struct reconstruction *r, const struct views *views, struct
         struct emitter_evidence *e = &evidence[s];
         float shown = rgb_mean(e->shown);
         e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
-        r->is_emitter[s] = e->share >= EMITTER_SHARE;
+        r->is_emitter[s] = e->hidden || e->share >= EMITTER_SHARE;
         rgb own = rgb_sub(e->shown, rgb_scale(e->arrived, NEUTRAL_BASE_COLOR));
         r->materials.emission[s] =
             r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))

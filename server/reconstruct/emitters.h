@@ -16,7 +16,9 @@
 /* What is known of a segment's light. */
 struct emitter_evidence {
     rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
+    bool seen;   /* some photograph shows it, and not what is beside or behind it */
     bool mixed;  /* it was only seen in pixels that mix surfaces */
+    bool hidden; /* a lamp that no photograph shows: `shown` is what it lights (lamp_find.h) */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */
 };

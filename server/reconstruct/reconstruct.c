@@ -9,6 +9,7 @@
 #include "common/protocol.h"
 #include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/emitters.h"
+#include "server/reconstruct/lamp_find.h"
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/orient.h"
 #include "server/reconstruct/refine.h"
@@ -187,6 +188,7 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
+    lamp_find(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);
     if (run->r->sun.is_there && !run->r->environment.map.pixel)

@@ -159,6 +159,7 @@ void report_emitters(struct reconstruction *r) {
         json_add_int(entry, "segment", (int64_t)s);
         json_add_int(entry, "object_id", r->segments.id[s]);
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
+        json_add_bool(entry, "hidden", r->evidence[s].hidden);
         json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].share);
         const rgb *e = &r->materials.emission[s];
         const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};

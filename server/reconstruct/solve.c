@@ -9,6 +9,7 @@
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
+#include "server/reconstruct/lamp_find.h"
 #include "server/reconstruct/probes.h"
 
 #define PASSES 2
@@ -151,7 +152,7 @@ static void decide_emitters(struct solve *s) {
         struct emitter_evidence *e = &r->evidence[i];
         float shown = rgb_mean(e->shown);
         e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
-        r->is_emitter[i] = e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) +
+        r->is_emitter[i] = e->hidden || e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) +
                                           EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
     }
 }
@@ -161,7 +162,7 @@ static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
     for (size_t i = 0; i < r->segments.count; i++) {
         const struct emitter_evidence *e = &r->evidence[i];
-        rgb own = rgb_mad(e->shown, -NEUTRAL_BASE_COLOR, e->arrived);
+        rgb own = rgb_mad(e->shown, e->hidden ? 0.0f : -NEUTRAL_BASE_COLOR, e->arrived);
         r->materials.emission[i] = r->is_emitter[i]
                                        ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))
                                        : rgb_gray(0.0f);
@@ -212,10 +213,12 @@ static bool is_short(const struct solve *s, double seconds) {
 }
 
 static bool solve_pass(struct solve *s, int pass) {
-    if (pass == 0)
+    if (pass == 0) {
         emitters_light_bright(s->r, s->views, s->r->evidence);
-    else
+    } else {
+        lamp_fit(s->r, s->views, (const uint16_t(*)[3])s->radiance);
         set_lights(s);
+    }
     if (!gather(s, pass))
         return false;
     decide_emitters(s);

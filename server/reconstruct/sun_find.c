@@ -6,8 +6,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "common/quantile.h"
-#include "server/reconstruct/sun_places.h"
+#include "server/reconstruct/missing_light.h"
 #include "server/render/bsdf.h"
 
 /* So many bright points must be there, and be lit. */
@@ -17,19 +16,6 @@
 #define ASKED_DEGREES 3.0
 #define ASKED_POINTS 768
 #define CANDIDATES 24
-/* Standard deviations of the logarithm of base colour within a segment and above white; and what a highlight, not
- * known yet, may add to base colour, which makes dark surfaces less alike. */
-#define SPREAD_WITHIN 0.3f
-#define SPREAD_BEYOND 0.15f
-#define GLOSS 0.04f
-/* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
- * and nearer to the best. */
-#define FAINTEST 0.1f
-#define STRONGER 2.0f
-#define STRENGTHS 16
-#define NEARER 5
-/* Points of which the median of a segment is taken. */
-#define MEDIAN_POINTS 512
 /* Half the angles of discs tried, in degrees: first the sun's own; in haze it is wider. What is best explained by
  * the last one is no disc, but a sky that no photograph shows. */
 static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f};
@@ -43,9 +29,8 @@ static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f
 
 struct search {
     struct reconstruction *r;
-    struct sun_places places;
-    float *base;           /* [places.count] scratch of `misfit`, as the next; owned */
-    float *sorted;
+    struct light_places places;
+    struct missing_light missing;
     struct sun sun;        /* that is tried */
     int rays;              /* a point, to see how much of it is open */
 };
@@ -74,7 +59,7 @@ static void ask_direction(void *user, size_t index, int thread) {
     struct sun sun = {.direction = c->direction};
     double sum = 0.0, weights = 0.0;
     for (size_t i = 0; i < a->count; i++) {
-        const struct sun_place *p = &a->s->places.place[a->place[i]];
+        const struct light_place *p = &a->s->places.place[a->place[i]];
         double weight = (double)(a->weight[i] * sun_visible(&sun, a->s->r->world.accel, &p->at, 1));
         sum += weight * ((double)p->odd - a->mean);
         weights += weight;
@@ -86,10 +71,10 @@ static void ask_direction(void *user, size_t index, int thread) {
 static void choose_asked(struct asked *a, bool bright) {
     size_t all = 0, met = 0, first = a->count;
     for (size_t i = 0; i < a->s->places.count; i++)
-        all += (a->s->places.place[i].odd > SUN_BRIGHT) == bright;
+        all += (a->s->places.place[i].odd > PLACE_BRIGHT) == bright;
     size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
     for (size_t i = 0; i < a->s->places.count && a->count - first < wanted; i++) {
-        if ((a->s->places.place[i].odd > SUN_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
+        if ((a->s->places.place[i].odd > PLACE_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
             a->weight[a->count] = (float)all / (float)wanted;
             a->place[a->count++] = (uint32_t)i;
         }
@@ -138,78 +123,10 @@ static size_t ask_directions(const struct search *s, struct candidate candidate[
 
 /* --- fit --------------------------------------------------------------------------------------------- */
 
-/* The mean of the channels, or one of them. */
-enum { MEAN = 3 };
-
-static float channel_of(rgb value, int channel) {
-    return channel == MEAN ? rgb_mean(value) : (&value.r)[channel];
-}
-
-/* From 0, as usual, to 1, not to be explained (Geman and McClure). */
-static double oddity(float off, float spread) {
-    double e = (double)(off / spread);
-    return e * e / (1.0 + e * e);
-}
-
-/* The median of base[first, end), of not too many of them. */
-static float median_of(const struct search *s, size_t first, size_t end) {
-    size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
-    for (size_t i = first; i < end; i += stride)
-        s->sorted[count++] = s->base[i];
-    return quantile(s->sorted, count, 0.5);
-}
-
-/* How odd the base colours of segments that the sun lights at all are, if a white surface which faces it
- * sends out `strength` by it. */
-static double misfit(const struct search *s, float strength, int channel) {
-    double sum = 0.0;
-    for (size_t first = 0, end; first < s->places.count; first = end) {
-        bool any = false;
-        end = sun_places_end(&s->places, first);
-        for (size_t i = first; i < end; i++)
-            any = any || s->places.place[i].lit > 0.0f;
-        for (size_t i = first; any && i < end; i++) {
-            const struct sun_place *p = &s->places.place[i];
-            s->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
-        }
-        float median = any ? median_of(s, first, end) : 0.0f;
-        for (size_t i = first; any && i < end; i++)
-            sum += oddity(s->base[i] - median, SPREAD_WITHIN + GLOSS * expf(-median)) +
-                   oddity(fmaxf(s->base[i] - logf(SUN_WHITE), 0.0f), SPREAD_BEYOND);
-    }
-    return sum;
-}
-
-/* The strength that explains most. */
-static float fit_strength(const struct search *s, int channel, double *explained) {
-    double mean = 0.0, without = misfit(s, 0.0f, channel), least = without;
-    float best = 0.0f, step = STRONGER;
-    for (size_t i = 0; i < s->places.count; i++)
-        mean += (double)channel_of(s->places.place[i].white, channel) / (double)s->places.count;
-    float strength = FAINTEST * (float)mean;
-    for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
-        double here = misfit(s, strength, channel);
-        if (here < least)
-            least = here, best = strength;
-    }
-    for (int i = 0; i < NEARER && best > 0.0f; i++) {
-        step = sqrtf(step);
-        float middle = best;
-        for (int side = -1; side <= 1; side += 2) {
-            float other = side < 0 ? middle / step : middle * step;
-            double here = misfit(s, other, channel);
-            if (here < least)
-                least = here, best = other;
-        }
-    }
-    *explained = without - least;
-    return best;
-}
-
-static void light_place(void *user, size_t index, int thread) {
+static void shine_on(void *user, size_t index, int thread) {
     (void)thread;
     struct search *s = user;
-    struct sun_place *p = &s->places.place[index];
+    struct light_place *p = &s->places.place[index];
     p->open = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
     p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
 }
@@ -218,8 +135,8 @@ static void light_place(void *user, size_t index, int thread) {
 static double try_direction(struct search *s, vec3 direction) {
     double explained;
     s->sun.direction = direction;
-    parallel_for(s->r->pool, s->places.count, light_place, s);
-    fit_strength(s, MEAN, &explained);
+    parallel_for(s->r->pool, s->places.count, shine_on, s);
+    missing_light_strength(&s->missing, MISSING_MEAN, &explained);
     return explained;
 }
 
@@ -295,11 +212,8 @@ static void look_for_sun(struct search *s, double *explains) {
     bool is_disc = find_radius(s, &best);
     try_direction(s, best.direction);
     *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
-    s->sun.is_there = is_disc && count_lit(s, SUN_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
-    for (int c = 0; c < 3; c++) {
-        double explained;
-        (&s->sun.irradiance.r)[c] = BSDF_PI * fit_strength(s, c, &explained);
-    }
+    s->sun.is_there = is_disc && count_lit(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
+    s->sun.irradiance = rgb_scale(missing_light_color(&s->missing), BSDF_PI);
 }
 
 static void report(const struct search *s, double explains) {
@@ -321,14 +235,16 @@ static void report(const struct search *s, double explains) {
 void sun_find(struct reconstruction *r, const struct views *views) {
     struct search s = {.r = r};
     double explains = 0.0;
-    sun_places_init(&s.places, r, views);
-    s.base = mem_array(s.places.count + 1, sizeof *s.base);
-    s.sorted = mem_array(s.places.count + 1, sizeof *s.sorted);
-    if (sun_places_odder(&s.places, SUN_BRIGHT) >= LEAST_BRIGHT)
+    struct survey survey;
+    survey_init(&survey, r, views, NULL, LIGHT_PLACES);
+    light_places_init(&s.places, &survey);
+    survey_release(&survey);
+    light_places_leave_out_lamps(&s.places);
+    missing_light_init(&s.missing, &s.places, PLACE_WHITE);
+    if (light_places_odder(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;
     report(&s, explains);
-    mem_free(s.sorted);
-    mem_free(s.base);
-    sun_places_release(&s.places);
+    missing_light_release(&s.missing);
+    light_places_release(&s.places);
 }

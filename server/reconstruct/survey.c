@@ -6,13 +6,11 @@
 #include "common/mem.h"
 #include "server/reconstruct/emitters.h"
 
-/* What texels send out: of those that no photograph shows the mean of their segment, or of the room. */
+/* What was fused, and of those that no photograph shows the mean of their segment, or of the room. */
 static void fill_radiance(struct survey *s) {
     const struct reconstruction *r = s->r;
     size_t segments = r->segments.count;
     double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
-    s->radiance = mem_calloc_large((size_t)r->fused.width * r->fused.height, sizeof *s->radiance);
-    memcpy(s->radiance, r->fused.radiance, (size_t)r->fused.width * r->fused.height * sizeof *s->radiance);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
         rgb shown = fused_radiance(&r->fused, texel);
@@ -53,11 +51,16 @@ static void choose_points(struct survey *s, size_t points) {
     }
 }
 
-void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, size_t points) {
-    *s = (struct survey){.r = r};
-    fill_radiance(s);
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
+                 const uint16_t (*radiance)[3], size_t points) {
+    size_t texels = (size_t)r->fused.width * r->fused.height;
+    *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
+    memcpy(s->radiance, radiance ? radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
+    if (!radiance)
+        fill_radiance(s);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
-    struct emitter_evidence *evidence = mem_calloc(r->segments.count, sizeof *evidence);
+    struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
+    memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
     emitters_observe(r, views, evidence);
     emitters_light_bright(r, views, evidence);
     mem_free(evidence);

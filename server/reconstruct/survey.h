@@ -19,9 +19,11 @@ struct survey {
     struct incident *scratch;   /* [threads] */
 };
 
-/* What was seen must be fused. Until survey_release whatever outshines the room is a light of the world: small
+/* radiance[height][width], half precision, is what all texels send out; NULL: what was fused, and of texels that no
+ * photograph shows the mean of their segment, or of the room. What was seen must be fused. Until survey_release whatever outshines the room is a light of the world: small
  * lamps must be looked for. At most `points` points. */
-void survey_init(struct survey *s, struct reconstruction *r, const struct views *views, size_t points);
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
+                 const uint16_t (*radiance)[3], size_t points);
 void survey_release(struct survey *s);
 
 #endif

@@ -1,0 +1,47 @@
+/* light_places.h -- what is known of places all over the surface before missing light is looked for: what photographs show,
+ * what a white surface would show by the light that is known, and how odd the base colour between them is.
+ */
+#ifndef UNBAKE_RECONSTRUCT_LIGHT_PLACES_H
+#define UNBAKE_RECONSTRUCT_LIGHT_PLACES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/reconstruct/survey.h"
+#include "server/scene/surface.h"
+
+/* White paint; and what is so much brighter than its segment, in the logarithm, is bright. */
+#define PLACE_WHITE 0.9f
+#define PLACE_BRIGHT 0.5f
+
+struct light_place {
+    uint32_t segment;
+    struct surface_point at;
+    rgb shown, white;
+    float weight; /* to whoever looks for light: 1, or less */
+    float odd;  /* logarithm of base colour, without a sun, over the median of the segment or over white */
+    float open; /* the part of the disc of the sun that is tried which it sees, */
+    float lit;  /* times the cosine: for who looks for it */
+};
+
+struct light_places {
+    size_t count;
+    struct light_place *place; /* [count] by segment; owned */
+};
+
+/* Takes over what a survey tells, of so many points at best. */
+#define LIGHT_PLACES 16384
+void light_places_init(struct light_places *places, const struct survey *survey);
+/* `most` of them, evenly spread. */
+void light_places_thin(struct light_places *thin, const struct light_places *places, size_t most);
+/* Leaves out segments of which most is brighter than white: lamps, for all one knows. */
+void light_places_leave_out_lamps(struct light_places *places);
+void light_places_release(struct light_places *places);
+
+/* Where the segment of place `first` ends. */
+size_t light_places_end(const struct light_places *places, size_t first);
+
+/* So many are odder than that. */
+size_t light_places_odder(const struct light_places *places, float odd);
+
+#endif

@@ -1,0 +1,135 @@
+/* missing_light.c -- see missing_light.h. */
+#include "server/reconstruct/missing_light.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+
+/* Standard deviations of the logarithm of base colour within a segment and above white; and what a highlight, not
+ * known yet, may add to base colour, which makes dark surfaces less alike. */
+#define SPREAD_WITHIN 0.3f
+#define SPREAD_BEYOND 0.15f
+#define GLOSS 0.04f
+/* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
+ * and nearer to the best. */
+#define FAINTEST 0.1f
+#define STRONGER 2.0f
+#define STRENGTHS 16
+#define NEARER 5
+/* Points of which the median of a segment is taken. */
+#define MEDIAN_POINTS 512
+
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white) {
+    *m = (struct missing_light){.places = places, .white = white};
+    m->base = mem_array(places->count + 1, sizeof *m->base);
+    m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
+    m->spread = mem_array(places->count + 1, sizeof *m->spread);
+    missing_light_renew(m);
+}
+
+void missing_light_release(struct missing_light *m) {
+    mem_free(m->spread);
+    mem_free(m->sorted);
+    mem_free(m->base);
+    *m = (struct missing_light){0};
+}
+
+static float channel_of(rgb value, int channel) {
+    return channel == MISSING_MEAN ? rgb_mean(value) : (&value.r)[channel];
+}
+
+/* From 0, as usual, to 1, not to be explained (Geman and McClure). */
+static double oddity(float off, float spread) {
+    double e = (double)(off / spread);
+    return e * e / (1.0 + e * e);
+}
+
+/* The median of base[first, end), of not too many of them. */
+static float median_of(const struct missing_light *m, size_t first, size_t end) {
+    size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
+    for (size_t i = first; i < end; i += stride)
+        m->sorted[count++] = m->base[i];
+    return quantile(m->sorted, count, 0.5);
+}
+
+/* Fills base[first, end): logarithms. */
+static void find_base(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
+    for (size_t i = first; i < end; i++) {
+        const struct light_place *p = &m->places->place[i];
+        m->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
+    }
+}
+
+void missing_light_renew(struct missing_light *m) {
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        find_base(m, first, end, 0.0f, MISSING_MEAN);
+        m->spread[first] = SPREAD_WITHIN + GLOSS * expf(-median_of(m, first, end));
+    }
+}
+
+/* How odd the base colours of a segment are. */
+static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
+    double sum = 0.0;
+    find_base(m, first, end, strength, channel);
+    float median = median_of(m, first, end);
+    for (size_t i = first; i < end; i++)
+        sum += (double)m->places->place[i].weight * (oddity(m->base[i] - median, m->spread[first]) +
+                                                     oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND));
+    return sum;
+}
+
+/* The same for all segments that the light reaches. */
+static double misfit(const struct missing_light *m, float strength, int channel) {
+    double sum = 0.0;
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        bool any = false;
+        end = light_places_end(m->places, first);
+        for (size_t i = first; i < end; i++)
+            any = any || m->places->place[i].lit > 0.0f;
+        if (any)
+            sum += segment_misfit(m, first, end, strength, channel);
+    }
+    return sum;
+}
+
+double missing_light_misfit(const struct missing_light *m) {
+    double sum = 0.0;
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        sum += segment_misfit(m, first, end, 0.0f, MISSING_MEAN);
+    }
+    return sum;
+}
+
+float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
+    double mean = 0.0, without = misfit(m, 0.0f, channel), least = without;
+    float best = 0.0f, step = STRONGER;
+    for (size_t i = 0; i < m->places->count; i++)
+        mean += (double)channel_of(m->places->place[i].white, channel) / (double)m->places->count;
+    float strength = FAINTEST * (float)mean;
+    for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
+        double here = misfit(m, strength, channel);
+        if (here < least)
+            least = here, best = strength;
+    }
+    for (int i = 0; i < NEARER && best > 0.0f; i++) {
+        step = sqrtf(step);
+        float middle = best;
+        for (int side = -1; side <= 1; side += 2) {
+            float other = side < 0 ? middle / step : middle * step;
+            double here = misfit(m, other, channel);
+            if (here < least)
+                least = here, best = other;
+        }
+    }
+    *explained = without - least;
+    return best;
+}
+
+rgb missing_light_color(const struct missing_light *m) {
+    double explained;
+    float r = missing_light_strength(m, 0, &explained), g = missing_light_strength(m, 1, &explained);
+    return rgb_make(r, g, missing_light_strength(m, 2, &explained));
+}

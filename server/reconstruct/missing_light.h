@@ -1,0 +1,39 @@
+/* missing_light.h -- how much less odd places would be if light came from somewhere that no photograph shows.
+ *
+ * At each place what photographs show is base colour times (light that is known + light that is missing). Base
+ * colours differ little within a segment and are never above that of white paint: the right light, in the right
+ * strength, makes them so. Both are judged robustly: a texture, or a lamp, is odd whatever is done about it. */
+#ifndef UNBAKE_RECONSTRUCT_MISSING_LIGHT_H
+#define UNBAKE_RECONSTRUCT_MISSING_LIGHT_H
+
+#include "server/reconstruct/light_places.h"
+
+/* The mean of the channels, in place of one of them. */
+#define MISSING_MEAN 3
+
+struct missing_light {
+    const struct light_places *places; /* borrowed */
+    float white;
+    float *spread;                     /* [places->count] of a segment, at its first place; owned */
+    float *base, *sorted;              /* [places->count] scratch; owned */
+};
+
+/* Base colours beyond `white` are odd. */
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white);
+void missing_light_release(struct missing_light *m);
+
+/* Takes over places that changed. */
+void missing_light_renew(struct missing_light *m);
+
+/* The strength that explains most: a place is lit by that times its `lit`, as a white surface would show it.
+ * 0: none does. How much less odd the places of all segments that are lit at all are with it goes to *explained,
+ * in places. */
+float missing_light_strength(const struct missing_light *m, int channel, double *explained);
+
+/* The same by channel, without asking what it explains. */
+rgb missing_light_color(const struct missing_light *m);
+
+/* How odd all places are as they are, in places. */
+double missing_light_misfit(const struct missing_light *m);
+
+#endif

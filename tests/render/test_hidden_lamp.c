@@ -1,0 +1,92 @@
+/* lamp_find.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
+ * was photographed nothing else is taken for one. The same for any number of threads. */
+#include "server/reconstruct/emitters.h"
+#include "server/reconstruct/reconstruction.h"
+#include "tests/check.h"
+#include "tests/render/shell.h"
+#include "tests/render/small_room.h"
+
+#define FLOOR 0
+
+/* Steeply enough that neither the lamp nor the ceiling is seen. */
+static vec3 look_down(int frame) {
+    vec3 from = spread(frame, 0.4f);
+    float angle = 2.4f * (float)frame;
+    return (vec3){from.x + cosf(angle), from.y - 1.0f, from.z + sinf(angle)};
+}
+
+static void reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
+    struct settings s = shell_settings("{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,"
+                                      "\"gather_samples\":64,\"texels_per_iteration\":64}");
+    struct shell shell = {.polls_until_stop = -1};
+    CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
+static rgb mean_color(const struct reconstruction *r, int64_t object) {
+    rgb sum = rgb_gray(0.0f);
+    float count = 0.0f;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        if (r->segments.id[reconstruction_segment(r, texel)] != object)
+            continue;
+        const float *c = r->materials.base_color.texel[texel];
+        sum = rgb_add(sum, rgb_make(c[0], c[1], c[2]));
+        count += 1.0f;
+    }
+    return rgb_scale(sum, 1.0f / count);
+}
+
+static void test_hidden(struct parallel *pool) {
+    struct scene scene = {0};
+    make_mesh(&scene.mesh);
+    photograph_mesh(&scene, lamp_radiance, NULL, look_down, pool);
+    const int threads[] = {1, 3};
+    rgb found[2];
+    for (int i = 0; i < 2; i++) {
+        struct reconstruction r;
+        reconstruct(&scene, threads[i], &r);
+        for (size_t s = 0; s < r.segments.count; s++) {
+            bool is_lamp = r.segments.id[s] == LAMP;
+            CHECK_THAT(r.evidence[s].hidden == is_lamp && r.is_emitter[s] == is_lamp, "segment %zu", s);
+            if (is_lamp)
+                found[i] = r.materials.emission[s];
+        }
+        CHECK_NEAR(found[i].r, lamp_radiance.r, 0.2f * lamp_radiance.r);
+        CHECK_NEAR(found[i].g, lamp_radiance.g, 0.2f * lamp_radiance.g);
+        CHECK_NEAR(found[i].b, lamp_radiance.b, 0.2f * lamp_radiance.b);
+        /* What the white ceiling sends down nobody can know. */
+        rgb color = mean_color(&r, FLOOR);
+        CHECK_NEAR(color.r, wall_color[FLOOR].r, 0.2f * wall_color[FLOOR].r);
+        CHECK_NEAR(color.b, wall_color[FLOOR].b, 0.2f * wall_color[FLOOR].b);
+        reconstruct_release(&r);
+    }
+    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    scene_release(&scene);
+}
+
+static vec3 look_up(int frame) {
+    return (vec3){2.0f + 0.1f * (float)(frame % 5), 2.9f, 1.5f};
+}
+
+/* Nothing of the floor is seen, but the lamp is. */
+static void test_none_hidden(struct parallel *pool) {
+    struct scene scene = {0};
+    make_mesh(&scene.mesh);
+    photograph_mesh(&scene, lamp_radiance, NULL, look_up, pool);
+    struct reconstruction r;
+    reconstruct(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++)
+        CHECK_THAT(!r.evidence[s].hidden && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    test_hidden(pool);
+    test_none_hidden(pool);
+    parallel_free(pool);
+    return check_result();
+}
