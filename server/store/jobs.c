@@ -176,6 +176,8 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
             fill(&jobs[(*count)++], stmt);
     }
     store_unlock(store);
+    while (status != STATUS_OK && *count > 0)
+        job_release(&jobs[--*count]);
     return status;
 }
 

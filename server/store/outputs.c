@@ -119,5 +119,11 @@ enum status store_output_list(struct store *store, int64_t job_id, struct output
         fill(&(*rows)[(*count)++], stmt);
     }
     store_unlock(store);
+    if (status != STATUS_OK) {
+        while (*count > 0)
+            output_row_release(&(*rows)[--*count]);
+        mem_free(*rows);
+        *rows = NULL;
+    }
     return status;
 }

@@ -220,6 +220,8 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
         fill(&rows[(*count)++], stmt);
     }
     store_unlock(store);
+    while (status != STATUS_OK && *count > 0)
+        scene_row_release(&rows[--*count]);
     return status;
 }
 

@@ -8,6 +8,7 @@
  *    when that forbids it; unknown ids are STATUS_NOT_FOUND.
  * 4. A transition appends its `state` event in the same transaction.
  * 5. Event ids grow over all jobs and are never used twice.
+ * 6. A list of scenes, jobs, outputs or uploads that cannot be read to its end has no rows.
  *
  * All functions are thread-safe. */
 #ifndef UNBAKE_STORE_STORE_H

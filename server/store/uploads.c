@@ -129,6 +129,8 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
             fill(&rows[(*count)++], stmt);
     }
     store_unlock(store);
+    while (status != STATUS_OK && *count > 0)
+        upload_row_release(&rows[--*count]);
     return status;
 }
 

@@ -58,6 +58,7 @@ static enum status list_scenes(void) {
     char cursor[128];
     size_t count;
     enum status status = store_scene_list(store, NULL, "", 1, rows, &count, cursor, &err);
+    CHECK(status == STATUS_OK || count == 0);
     for (size_t i = 0; i < count; i++)
         scene_row_release(&rows[i]);
     return status;
@@ -134,6 +135,7 @@ static enum status list_by(int state) {
     struct job rows[4];
     size_t count;
     enum status status = store_job_list(store, &alice, state, 0, 4, rows, &count, &err);
+    CHECK(status == STATUS_OK || count == 0);
     for (size_t i = 0; i < count; i++)
         job_release(&rows[i]);
     return status;
@@ -231,6 +233,7 @@ static enum status list_outputs(void) {
     struct output_row *rows;
     size_t count;
     enum status status = store_output_list(store, job, &rows, &count, &err);
+    CHECK(status == STATUS_OK || (count == 0 && !rows));
     for (size_t i = 0; i < count; i++)
         output_row_release(&rows[i]);
     mem_free(rows);
@@ -273,6 +276,7 @@ static enum status list_uploads(void) {
     char cursor[128];
     size_t count;
     enum status status = store_upload_list(store, &alice, "", "", 1, rows, &count, cursor, &err);
+    CHECK(status == STATUS_OK || count == 0);
     for (size_t i = 0; i < count; i++)
         upload_row_release(&rows[i]);
     return status;
