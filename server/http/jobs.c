@@ -89,19 +89,23 @@ struct response *jobs_list(struct api *api, struct request *r) {
 
 /* --- submitting -------------------------------------------------------------------------- */
 
-/* The scene that the wish names, if a job may use it; else an entry in params. */
+/* The scene that the wish names, if a job may use it; else an entry in params, or *refusal where the
+ * database is at fault. */
 static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
-                       cJSON *params) {
+                       cJSON *params, struct response **refusal) {
     size_t digits = strspn(id, "0123456789abcdef");
     struct error err;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
         problem_param(params, "scene", NULL, "is no scene's id: 8 to 64 lower-case hex digits");
         return false;
     }
-    if (auth_find_scene(api, r, id, row, &err) != STATUS_OK) {
+    enum status status = auth_find_scene(api, r, id, row, &err);
+    if (status == STATUS_NOT_FOUND || status == STATUS_CONFLICT)
         problem_param(params, "scene", NULL, "%s", err.message);
+    else if (status != STATUS_OK)
+        *refusal = problem_from(r, &err);
+    if (status != STATUS_OK)
         return false;
-    }
     if (row->state != SCENE_REJECTED)
         return true;
     problem_param(params, "scene", "GET /v1/scenes/{id} lists what is wrong with it", "was rejected");
@@ -186,7 +190,7 @@ struct response *jobs_add(struct api *api, struct request *r) {
     if (!reply)
         wish_settings(&w, &settings, params);
     if (!reply && w.scene)
-        has_scene = find_scene(api, r, w.scene, &scene, params);
+        has_scene = find_scene(api, r, w.scene, &scene, params, &reply);
     if (!reply && cJSON_GetArraySize(params) > 0) {
         reply = problem_invalid(r, "the job cannot be taken as it is", params);
         params = NULL;

@@ -1,0 +1,219 @@
+/* test_http_faults.c -- each call of SQLite that a request leads to fails once: the reply has the status of that
+ * fault and a sentence, nothing leaks, and the same request succeeds when it is made again. */
+#include "server/http/problem.h"
+#include "tests/api/rig.h"
+#include "tests/sql_faults.h"
+
+#define UPLOADED 600 /* bytes */
+
+static struct rig rig;
+static struct error err;
+static int64_t job;
+static char upload[80], scene[SCENE_ID_SIZE] = RIG_SCENE;
+static char bytes[UPLOADED];
+static char token_field[TOKEN_SIZE + 40]; /* "" while the daemon is open */
+
+/* --- requests ------------------------------------------------------------------------------------ */
+
+/* The path with {j}, {u} and {s} replaced; the caller's. */
+static char *fill_in(const char *path) {
+    char number[24];
+    const char *mark = strchr(path, '{');
+    snprintf(number, sizeof number, "%lld", (long long)job);
+    if (!mark)
+        return mem_strdup(path);
+    return mem_printf("%.*s%s%s", (int)(mark - path), path, mark[1] == 'j' ? number : mark[1] == 'u' ? upload : scene,
+                      mark + 3);
+}
+
+static int ask(const char *method, const char *path, const char *fields, const void *body, size_t length,
+               struct buf *reply) {
+    struct buf request;
+    char *full = fill_in(path);
+    buf_init(&request, 1 << 20);
+    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s%s", method, full, token_field, fields);
+    if (strcmp(method, "GET") != 0)
+        buf_printf(&request, "Content-Length: %zu\r\n", length);
+    buf_puts(&request, "\r\n");
+    buf_append(&request, body, length);
+    int status = rig_ask(&rig, request.data, request.length, reply);
+    buf_release(&request);
+    mem_free(full);
+    return status;
+}
+
+/* --- what there must be before ------------------------------------------------------------------- */
+
+static void queued_job(void) {
+    job = rig_job(&rig);
+}
+
+static void ended_job(void) {
+    job = rig_job(&rig);
+    rig_must(store_job_cancel(rig.store, job, &err), &err, "cancel");
+}
+
+static void resumable_job(void) {
+    ended_job();
+    char *dir = mem_printf("%s/jobs/%lld", rig.dir, (long long)job), *path = file_join(dir, "checkpoint.db");
+    rig_must(file_make_dirs(dir, &err), &err, "a folder");
+    rig_must(file_replace(path, "x", 1, &err), &err, "a checkpoint");
+    mem_free(path);
+    mem_free(dir);
+}
+
+static void job_with_output(void) {
+    queued_job();
+    int attempt = rig_run_job(&rig, job);
+    char *dir = mem_printf("%s/jobs/%lld/out", rig.dir, (long long)job), *path = file_join(dir, "a.png");
+    rig_must(file_make_dirs(dir, &err), &err, "a folder");
+    rig_must(file_replace(path, "abc", 3, &err), &err, "an output");
+    for (int i = 0; i < 2; i++)
+        rig_must(store_output_put(rig.store, job, attempt, EVENT_OUTPUT, i ? "b.png" : "a.png", 3, RIG_SCENE, "image/png",
+                                  &err), &err, "store_output_put");
+    mem_free(path);
+    mem_free(dir);
+}
+
+static void new_bytes(void) {
+    static long number;
+    number++;
+    memset(bytes, 'x', sizeof bytes);
+    memcpy(bytes + 100, &number, sizeof number);
+}
+
+static void unused_scene(void) {
+    static int number;
+    bool existed;
+    snprintf(scene, sizeof scene, "%08x%s", ++number, RIG_SCENE + 8);
+    rig_must(store_scene_add(rig.store, scene, "room", 10, 0, &existed, &err), &err, "store_scene_add");
+    rig_must(store_scene_ready(rig.store, scene, "{}", &err), &err, "store_scene_ready");
+}
+
+static void rig_scene_again(void) {
+    strcpy(scene, RIG_SCENE);
+}
+
+#define TUS "Tus-Resumable: 1.0.0\r\n"
+
+static void new_upload(void) {
+    struct buf reply;
+    new_bytes();
+    CHECK(ask("POST", "/v1/uploads", TUS "Upload-Length: 600\r\n", "", 0, &reply) == 201);
+    const char *location = strstr(buf_text(&reply), "\r\nLocation: /v1/uploads/");
+    CHECK(location && sscanf(location + 24, "%32[0-9a-f]", upload) == 1);
+    buf_release(&reply);
+}
+
+/* Jobs, a scene and an upload that are to go, and are in doubt: what has expired is removed as far as it can be. */
+static void expired_things(void) {
+    new_upload();
+    unused_scene();
+    ended_job();
+    rig_must(store_keep(rig.store, 1, 1, 1, &err), &err, "store_keep");
+    usleep(3000);
+}
+
+/* --- requests, in this order --------------------------------------------------------------------------- */
+
+#define JSON "Content-Type: application/json\r\nIf-Match: *\r\n"
+#define PART TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
+#define PART_CHECKED PART "Upload-Checksum: sha256 "
+
+static const struct step {
+    const char *method, *path, *fields, *body; /* NULL: UPLOADED bytes */
+    void (*before)(void); /* each time; NULL: nothing */
+    bool is_tolerant;     /* it may do without: an empty stream, say */
+} steps[] = {
+    {"GET", "/readyz", "", "", NULL, false},
+    {"GET", "/metrics", "", "", NULL, false},
+    {"GET", "/v1/session", "", "", NULL, false},
+    {"POST", "/v1/scenes?name=x", "", NULL, new_bytes, false},
+    {"GET", "/v1/scenes", "", "", unused_scene, false},
+    {"GET", "/v1/scenes/{s}", "", "", NULL, false},
+    {"GET", "/v1/scenes/00112233", "", "", queued_job, false},
+    {"PATCH", "/v1/scenes/{s}", JSON, "{\"name\":\"y\",\"pinned\":false}", NULL, false},
+    {"DELETE", "/v1/scenes/{s}?dry_run=1", "", "", NULL, false},
+    {"DELETE", "/v1/scenes/{s}", "", "", unused_scene, false},
+    {"GET", "/v1/version", "", "", rig_scene_again, false},
+    {"POST", "/v1/uploads", TUS "Upload-Length: 600\r\n", "", NULL, false},
+    {"GET", "/v1/uploads", "", "", new_upload, false},
+    {"GET", "/v1/uploads/{u}", "", "", NULL, false},
+    {"PATCH", "/v1/uploads/{u}", JSON, "{\"pinned\":true}", NULL, false},
+    {"PATCH", "/v1/uploads/{u}", PART, NULL, new_upload, false},
+    {"DELETE", "/v1/uploads/{u}?dry_run=1", TUS, "", new_upload, false},
+    {"DELETE", "/v1/uploads/{u}", TUS, "", new_upload, false},
+    {"POST", "/v1/jobs", JSON, "{\"scene\":\"" RIG_SCENE "\"}", queued_job, false},
+    {"POST", "/v1/jobs", JSON "Idempotency-Key: k\r\n", "{\"scene\":\"00112233\",\"webhook\":"
+     "{\"url\":\"http://x/\",\"secret\":\"0123456789abcdef\"}}", NULL, false},
+    {"POST", "/v1/jobs?dry_run=1", JSON, "{\"scene\":\"" RIG_SCENE "\"}", NULL, false},
+    {"GET", "/v1/jobs", "", "", NULL, false},
+    {"GET", "/v1/jobs?state=queued&limit=1", "", "", NULL, false},
+    {"GET", "/v1/jobs/{j}", "", "", NULL, false},
+    {"GET", "/v1/jobs/{j}?wait=1", "If-None-Match: \"rev-1\"\r\n", "", ended_job, false},
+    {"PATCH", "/v1/jobs/{j}", JSON, "{\"name\":\"n\",\"order\":\"first\"}", queued_job, false},
+    {"POST", "/v1/jobs/{j}/pause", "", "", queued_job, false},
+    {"POST", "/v1/jobs/{j}/resume", "", "", queued_job, false},
+    {"POST", "/v1/jobs/{j}/cancel", "", "", queued_job, false},
+    {"POST", "/v1/jobs/{j}/retry?from=refine", "", "", ended_job, false},
+    {"POST", "/v1/jobs/{j}/extend", JSON, "{\"time_limit_sec\":60}", resumable_job, false},
+    {"GET", "/v1/jobs/{j}/log", "", "", queued_job, false},
+    {"GET", "/v1/jobs/{j}/outputs", "", "", job_with_output, false},
+    {"GET", "/v1/jobs/{j}/outputs/a.png", "", "", job_with_output, false},
+    {"GET", "/v1/jobs/{j}/events?after=0&follow=0", "", "", queued_job, true},
+    {"GET", "/v1/jobs/{j}/events?after=0&follow=0", "", "", ended_job, true},
+    {"GET", "/v1/jobs/{j}/events?follow=0", "", "", queued_job, true},
+    {"GET", "/v1/events?after=0&follow=0", "", "", NULL, true},
+    {"GET", "/v1/events?follow=0", "", "", NULL, true},
+    {"DELETE", "/v1/jobs/{j}?dry_run=1", "", "", ended_job, false},
+    {"DELETE", "/v1/jobs/{j}", "", "", ended_job, false},
+    {"POST", "/v1/collect?dry_run=1", "", "", expired_things, false},
+    {"POST", "/v1/collect", "", "", expired_things, true},
+};
+
+/* Its n-th call fails; false where it has fewer. */
+static bool strike(const struct step *step, long n) {
+    struct buf reply;
+    if (step->before)
+        step->before();
+    sql_faults_arm(n);
+    int status = ask(step->method, step->path, step->fields, step->body ? step->body : bytes,
+                     step->body ? strlen(step->body) : UPLOADED, &reply);
+    bool struck = sql_faults_lift(), is_done = status / 100 == 2;
+    /* For a removal, room is made on a full disk. */
+    bool may_be_done = step->is_tolerant || (sql_fault->status == STATUS_NO_SPACE && strcmp(step->method, "DELETE") == 0);
+    int wanted = strcmp(step->path, "/readyz") == 0 ? 503 : problem_status(sql_fault->status);
+    if (struck)
+        CHECK_THAT(status == wanted || (may_be_done && is_done), "%s %s, call %ld: %d, not %d: %s", step->method, step->path, n,
+                   status, wanted, buf_text(&reply));
+    else
+        CHECK_THAT(is_done, "%s %s: %d: %s", step->method, step->path, status, buf_text(&reply));
+    CHECK_THAT(is_done || strstr(buf_text(&reply), "\"detail\":\""), "%s %s, call %ld: no sentence", step->method, step->path, n);
+    buf_release(&reply);
+    return struck;
+}
+
+static long strike_all(void) {
+    long calls = 0;
+    for (size_t i = 0; i < sizeof steps / sizeof *steps && check_failed_count == 0; i++)
+        for (long n = 1; strike(&steps[i], n) && check_failed_count == 0; n++)
+            calls++;
+    return calls;
+}
+
+int main(void) {
+    char token[TOKEN_SIZE];
+    int64_t id;
+    rig_start(&rig, &rig_patient, 60.0);
+    log_set_level(LOG_ERROR);
+    rig.api->config.queue_limit = 100000;
+    long calls = strike_all();
+    rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
+    rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
+    snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
+    rig.api->config.user_max_bytes = (uint64_t)1 << 30;
+    calls += strike_all();
+    printf("%ld calls failed\n", calls);
+    rig_stop(&rig);
+    return check_result();
+}
