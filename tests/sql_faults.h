@@ -33,7 +33,7 @@ static const struct sql_fault {
 
 static const struct sql_fault *sql_fault; /* the one that is to come */
 static atomic_long sql_faults_left;       /* calls until then; 0: none fails */
-static _Thread_local bool sql_is_inner;   /* SQLite calls itself */
+static _Thread_local bool faults_are_off; /* in this thread, as while SQLite calls itself */
 
 /* The n-th call from now on fails; how, goes by n. */
 static inline void sql_faults_arm(long n) {
@@ -47,7 +47,7 @@ static inline bool sql_faults_lift(void) {
 }
 
 static inline bool sql_fails(void) {
-    if (sql_is_inner || atomic_load(&sql_faults_left) == 0 || atomic_fetch_sub(&sql_faults_left, 1) != 1)
+    if (faults_are_off || atomic_load(&sql_faults_left) == 0 || atomic_fetch_sub(&sql_faults_left, 1) != 1)
         return false;
     errno = sql_fault->number;
     return true;
@@ -56,11 +56,11 @@ static inline bool sql_fails(void) {
 /* The library's own; what it calls meanwhile does not fail. */
 #define SQL_PASS(name, type, ...)                                                                                   \
     __typeof__(name) *call;                                                                                         \
-    bool outer = sql_is_inner;                                                                                      \
+    bool outer = faults_are_off;                                                                                      \
     *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                      \
-    sql_is_inner = true;                                                                                            \
+    faults_are_off = true;                                                                                            \
     type result = call(__VA_ARGS__);                                                                                \
-    sql_is_inner = outer;                                                                                           \
+    faults_are_off = outer;                                                                                           \
     return result
 
 static inline bool sql_is_rollback(const char *text) {

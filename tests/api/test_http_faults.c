@@ -1,8 +1,8 @@
-/* test_http_faults.c -- each call of SQLite that a request leads to fails once: the reply has the status of that
- * fault and a sentence, nothing leaks, and the same request succeeds when it is made again. */
+/* test_http_faults.c -- each call of SQLite, and each of the system, that a request leads to fails once: the reply has
+ * the status of that fault and a sentence, nothing leaks, and the same request succeeds when it is made again. */
 #include "server/http/problem.h"
 #include "tests/api/rig.h"
-#include "tests/sql_faults.h"
+#include "tests/system_faults.h"
 
 #define UPLOADED 600 /* bytes */
 
@@ -171,32 +171,38 @@ static const struct step {
     {"POST", "/v1/collect", "", "", expired_things, true},
 };
 
-/* Its n-th call fails; false where it has fewer. */
-static bool strike(const struct step *step, long n) {
+/* Its n-th call of SQLite, or of the system, fails; false where it has fewer. */
+static bool strike(const struct step *step, bool is_sql, long n) {
     struct buf reply;
     if (step->before)
         step->before();
-    sql_faults_arm(n);
+    if (is_sql)
+        sql_faults_arm(n);
+    else
+        system_faults_arm(n);
     int status = ask(step->method, step->path, step->fields, step->body ? step->body : bytes,
                      step->body ? strlen(step->body) : UPLOADED, &reply);
-    bool struck = sql_faults_lift(), is_done = status / 100 == 2;
-    /* For a removal, room is made on a full disk. */
-    bool may_be_done = step->is_tolerant || (sql_fault->status == STATUS_NO_SPACE && strcmp(step->method, "DELETE") == 0);
-    int wanted = strcmp(step->path, "/readyz") == 0 ? 503 : problem_status(sql_fault->status);
+    bool struck = is_sql ? sql_faults_lift() : system_faults_lift(), is_done = status / 100 == 2;
+    enum status fault = is_sql ? sql_fault->status : system_fault == ENOSPC ? STATUS_NO_SPACE : STATUS_IO;
+    /* For a removal, room is made on a full disk; not all that is done to files must be. */
+    bool may_be_done = step->is_tolerant || !is_sql || (fault == STATUS_NO_SPACE && strcmp(step->method, "DELETE") == 0);
+    int wanted = strcmp(step->path, "/readyz") == 0 ? 503 : problem_status(fault);
+    const char *what = is_sql ? "SQLite" : "the system";
     if (struck)
-        CHECK_THAT(status == wanted || (may_be_done && is_done), "%s %s, call %ld: %d, not %d: %s", step->method, step->path, n,
-                   status, wanted, buf_text(&reply));
+        CHECK_THAT(status == wanted || (may_be_done && is_done), "%s %s, call %ld of %s: %d, not %d: %s", step->method,
+                   step->path, n, what, status, wanted, buf_text(&reply));
     else
         CHECK_THAT(is_done, "%s %s: %d: %s", step->method, step->path, status, buf_text(&reply));
-    CHECK_THAT(is_done || strstr(buf_text(&reply), "\"detail\":\""), "%s %s, call %ld: no sentence", step->method, step->path, n);
+    CHECK_THAT(is_done || strstr(buf_text(&reply), "\"detail\":\""), "%s %s, call %ld of %s: no sentence", step->method,
+               step->path, n, what);
     buf_release(&reply);
     return struck;
 }
 
-static long strike_all(void) {
+static long strike_all(bool is_sql) {
     long calls = 0;
     for (size_t i = 0; i < sizeof steps / sizeof *steps && check_failed_count == 0; i++)
-        for (long n = 1; strike(&steps[i], n) && check_failed_count == 0; n++)
+        for (long n = 1; strike(&steps[i], is_sql, n) && check_failed_count == 0; n++)
             calls++;
     return calls;
 }
@@ -207,12 +213,13 @@ int main(void) {
     rig_start(&rig, &rig_patient, 60.0);
     log_set_level(LOG_ERROR);
     rig.api->config.queue_limit = 100000;
-    long calls = strike_all();
+    faults_are_off = true; /* in this thread */
+    long calls = strike_all(true) + strike_all(false);
     rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
     rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
     rig.api->config.user_max_bytes = (uint64_t)1 << 30;
-    calls += strike_all();
+    calls += strike_all(true);
     printf("%ld calls failed\n", calls);
     rig_stop(&rig);
     return check_result();

@@ -1,0 +1,108 @@
+/* system_faults.h -- for one file of a test: calls of the system that the daemon makes, before libc's own. The n-th call
+ * fails without being made, once. What SQLite calls does not count, nor does what is done to anything but files and
+ * folders by their descriptors. */
+#ifndef UNBAKE_TESTS_SYSTEM_FAULTS_H
+#define UNBAKE_TESTS_SYSTEM_FAULTS_H
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <sys/eventfd.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "tests/sql_faults.h"
+
+static atomic_long system_faults_left; /* calls until one fails; 0: none does */
+static int system_fault;               /* errno, then */
+
+/* The n-th call from now on fails, by EIO or ENOSPC in turn. */
+static inline void system_faults_arm(long n) {
+    system_fault = n % 2 ? EIO : ENOSPC;
+    atomic_store(&system_faults_left, n);
+}
+
+/* From now on none does; whether one has. */
+static inline bool system_faults_lift(void) {
+    return atomic_exchange(&system_faults_left, 0) <= 0;
+}
+
+static inline bool system_fails(void) {
+    if (faults_are_off || atomic_load(&system_faults_left) == 0 || atomic_fetch_sub(&system_faults_left, 1) != 1)
+        return false;
+    errno = system_fault;
+    return true;
+}
+
+static inline bool system_fails_file(int fd) {
+    struct stat info;
+    return syscall(SYS_fstat, fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode)) && system_fails();
+}
+
+#define SYSTEM_CALL(type, name, failed, is_struck, parameters, ...)                                                 \
+    type name parameters {                                                                                          \
+        __typeof__(name) *call;                                                                                     \
+        if (is_struck)                                                                                              \
+            return failed;                                                                                          \
+        *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                  \
+        return call(__VA_ARGS__);                                                                                   \
+    }
+
+SYSTEM_CALL(int, chmod, -1, system_fails(), (const char *path, mode_t mode), path, mode)
+SYSTEM_CALL(int, eventfd, -1, system_fails(), (unsigned count, int flags), count, flags)
+SYSTEM_CALL(int, fallocate, -1, system_fails(), (int fd, int mode, off_t at, off_t length), fd, mode, at, length)
+SYSTEM_CALL(int, fchmod, -1, system_fails(), (int fd, mode_t mode), fd, mode)
+SYSTEM_CALL(int, fdatasync, -1, system_fails(), (int fd), fd)
+SYSTEM_CALL(int, flock, -1, system_fails(), (int fd, int operation), fd, operation)
+SYSTEM_CALL(pid_t, fork, -1, system_fails(), (void))
+SYSTEM_CALL(int, fstat, -1, system_fails_file(fd), (int fd, struct stat *info), fd, info)
+SYSTEM_CALL(int, fsync, -1, system_fails(), (int fd), fd)
+SYSTEM_CALL(int, ftruncate, -1, system_fails(), (int fd, off_t length), fd, length)
+SYSTEM_CALL(ssize_t, getrandom, -1, system_fails(), (void *data, size_t length, unsigned flags), data, length, flags)
+SYSTEM_CALL(int, listen, -1, system_fails(), (int fd, int backlog), fd, backlog)
+SYSTEM_CALL(int, lstat, -1, system_fails(), (const char *path, struct stat *info), path, info)
+SYSTEM_CALL(int, mkdir, -1, system_fails(), (const char *path, mode_t mode), path, mode)
+SYSTEM_CALL(char *, mkdtemp, NULL, system_fails(), (char *template), template)
+SYSTEM_CALL(int, mkostemp, -1, system_fails(), (char *template, int flags), template, flags)
+SYSTEM_CALL(DIR *, opendir, NULL, system_fails(), (const char *path), path)
+SYSTEM_CALL(int, pipe2, -1, system_fails(), (int ends[2], int flags), ends, flags)
+SYSTEM_CALL(ssize_t, pread, -1, system_fails_file(fd), (int fd, void *data, size_t length, off_t at), fd, data, length, at)
+SYSTEM_CALL(int, pthread_create, errno, system_fails(),
+            (pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *user), thread, attributes, run,
+            user)
+SYSTEM_CALL(ssize_t, pwrite, -1, system_fails_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length,
+            at)
+SYSTEM_CALL(ssize_t, read, -1, system_fails_file(fd), (int fd, void *data, size_t length), fd, data, length)
+SYSTEM_CALL(int, rename, -1, system_fails(), (const char *from, const char *to), from, to)
+SYSTEM_CALL(int, socket, -1, system_fails(), (int family, int kind, int protocol), family, kind, protocol)
+SYSTEM_CALL(int, statvfs, -1, system_fails(), (const char *path, struct statvfs *info), path, info)
+SYSTEM_CALL(int, unlink, -1, system_fails(), (const char *path), path)
+SYSTEM_CALL(ssize_t, write, -1, system_fails_file(fd), (int fd, const void *data, size_t length), fd, data, length)
+
+#define SYSTEM_OPEN_MODE                                                                                            \
+    mode_t mode = 0;                                                                                                \
+    if (flags & O_CREAT) {                                                                                          \
+        va_list args;                                                                                               \
+        va_start(args, flags);                                                                                      \
+        mode = va_arg(args, mode_t);                                                                                \
+        va_end(args);                                                                                               \
+    }
+
+int open(const char *path, int flags, ...) {
+    SYSTEM_OPEN_MODE
+    return system_fails() ? -1 : (int)syscall(SYS_openat, AT_FDCWD, path, flags, mode);
+}
+
+int openat(int folder, const char *path, int flags, ...) {
+    SYSTEM_OPEN_MODE
+    return system_fails() ? -1 : (int)syscall(SYS_openat, folder, path, flags, mode);
+}
+
+#endif
