@@ -101,7 +101,14 @@ static int check_surroundings(const char *dir) {
  * of another size. An exit status where it cannot even lie. */
 static int lie(struct progress *p, const char *dir) {
     static const char garbage[] = "\n{\"type\":\n[1,2]\n\"x\"\nnull\n{}\n{\"type\":7}\n\xff\xfe\n"
-                                  "{\"type\":\"progress\",\"stage\":3}\n";
+                                  "{\"type\":\"progress\",\"stage\":3}\n"
+                                  "{\"type\":\"end\",\"status\":7}\n{\"type\":\"end\",\"status\":\"input\",\"message\":7}\n"
+                                  "{\"type\":\"end\",\"status\":\"input\",\"hint\":7}\n"
+                                  "{\"type\":\"checkpoint\",\"iteration\":\"x\"}\n{\"type\":\"checkpoint\",\"bytes\":\"x\"}\n"
+                                  "{\"type\":\"checkpoint\",\"seconds\":\"x\"}\n{\"type\":\"metric\",\"series\":7}\n"
+                                  "{\"type\":\"metric\",\"step\":\"x\"}\n{\"type\":\"metric\",\"value\":\"x\"}\n"
+                                  "{\"type\":\"output\",\"name\":7}\n{\"type\":\"output\",\"sha256\":7}\n"
+                                  "{\"type\":\"output\",\"content_type\":7}\n{\"type\":\"output\",\"bytes\":\"x\"}\n";
     if (write(PROGRESS_FD, garbage, sizeof garbage - 1) < 0)
         return 98;
     char *huge = mem_alloc(300000);
@@ -168,6 +175,18 @@ static int play(const char *role, const char *dir, int attempt) {
     }
     if (strcmp(role, "silent") == 0)
         return 0;
+    if (strcmp(role, "two-faced") == 0) {
+        progress_end(&p, STATUS_IO, "the disk is broken", "");
+        return 0;
+    }
+    if (strcmp(role, "broken") == 0) {
+        progress_end(&p, STATUS_IO, "the disk is broken", "");
+        return PROGRESS_EXIT_FAILED;
+    }
+    if (strcmp(role, "late") == 0) {
+        progress_end(&p, STATUS_OK, "", "");
+        return PROGRESS_EXIT_FAILED;
+    }
     if (strcmp(role, "deserter") == 0)
         return PROGRESS_EXIT_STOPPED;
     if (strcmp(role, "surroundings") == 0) {
@@ -444,7 +463,8 @@ static void test_outcomes(struct daemon *d) {
     int64_t input = submit(d, SCENE_A, "input"), full = submit(d, SCENE_A, "full");
     int64_t memory = submit(d, SCENE_A, "memory"), killed = submit(d, SCENE_A, "killed");
     int64_t silent = submit(d, SCENE_A, "silent"), deserter = submit(d, SCENE_A, "deserter");
-    int64_t around = submit(d, SCENE_A, "surroundings");
+    int64_t around = submit(d, SCENE_A, "surroundings"), damaged = submit(d, SCENE_A, "\"");
+    int64_t two_faced = submit(d, SCENE_A, "two-faced"), broken = submit(d, SCENE_A, "broken"), late = submit(d, SCENE_A, "late");
     expect(d, good, JOB_SUCCEEDED, 1, "", "");
     check_whole_life(d, good, 3);
     expect(d, once, JOB_SUCCEEDED, 2, "", "");
@@ -462,6 +482,10 @@ static void test_outcomes(struct daemon *d) {
     expect(d, silent, JOB_FAILED, 2, "without a result", "");
     expect(d, deserter, JOB_FAILED, 2, "told to stop from outside", "");
     expect(d, around, JOB_SUCCEEDED, 1, "", "");
+    expect(d, damaged, JOB_FAILED, 1, "the job's settings", "");
+    expect(d, two_faced, JOB_FAILED, 2, "without a result", "");
+    expect(d, broken, JOB_FAILED, 2, "the disk is broken", "");
+    expect(d, late, JOB_FAILED, 2, "ended with status", "");
     daemon_stop(d);
 }
 
