@@ -207,14 +207,59 @@ static long strike_all(bool is_sql) {
     return calls;
 }
 
+/* The HTTP side starts, or says why not. */
+static bool start_once(bool is_sql, long n) {
+    struct api_config config = {.data_dir = rig.dir, .max_attempts = 2, .queue_limit = 50, .max_upload_bytes = 8 << 20,
+                                .max_streams = 9, .keepalive_sec = 60, .upload_keep_ms = 3600000};
+    struct listener_config network = {.address = "127.0.0.1", .connection_max = 9, .limits = rig_patient};
+    struct api *api;
+    struct listener *listener;
+    err = (struct error){0};
+    faults_are_off = false;
+    if (is_sql)
+        sql_faults_arm(n);
+    else
+        system_faults_arm(n);
+    enum status status = service_new(&api, &config, rig.store, rig.scheduler, &err);
+    if (status == STATUS_OK)
+        status = listener_start(&listener, &network, api, &err);
+    bool struck = is_sql ? sql_faults_lift() : system_faults_lift(), has_begun = status == STATUS_OK;
+    faults_are_off = true;
+    CHECK_THAT(has_begun ? true : struck && err.status == status && *err.message, "a start, call %ld: %s", n, err.message);
+    if (has_begun) {
+        listener_quiesce(listener);
+        listener_stop(listener);
+    }
+    service_free(api);
+    return struck;
+}
+
+static long strike_start(void) {
+    struct scheduler_config work = {.data_dir = rig.dir, .worker_binary = "/bin/false", .max_running = 1};
+    long calls = 0;
+    snprintf(rig.dir, sizeof rig.dir, "/tmp/unbake-rig-XXXXXX");
+    CHECK(mkdtemp(rig.dir) != NULL);
+    rig_must(store_open(&rig.store, rig.dir, &err), &err, "store_open");
+    rig_must(scheduler_new(&rig.scheduler, &work, rig.store, &err), &err, "scheduler_new");
+    for (int is_sql = 0; is_sql < 2; is_sql++)
+        for (long n = 1; start_once(is_sql, n) && check_failed_count == 0; n++)
+            calls++;
+    scheduler_free(rig.scheduler);
+    store_close(rig.store);
+    rig_must(file_remove_tree(rig.dir, &err), &err, "file_remove_tree");
+    return calls;
+}
+
 int main(void) {
     char token[TOKEN_SIZE];
     int64_t id;
+    log_set_level(LOG_ERROR);
+    faults_are_off = true; /* in this thread */
+    long calls = strike_start();
     rig_start(&rig, &rig_patient, 60.0);
     log_set_level(LOG_ERROR);
     rig.api->config.queue_limit = 100000;
-    faults_are_off = true; /* in this thread */
-    long calls = strike_all(true) + strike_all(false);
+    calls += strike_all(true) + strike_all(false);
     rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
     rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);

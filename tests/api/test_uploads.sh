@@ -130,7 +130,10 @@ exec 3>&- 3<&-
 grep -q '^HTTP/1.1 409' "$work/old" || fail "the older one is told: $(cat "$work/old")"
 equal "$(offset "$upload")" 1500000 "after the change of hands"
 
-# --- the daemon is killed in the middle of it ---
+# --- the daemon is stopped, and killed in the middle of it ---
+stop_daemon
+start_daemon --set max_upload_mib=64
+equal "$(offset "$upload")" 1500000 "after a stop"
 send_some 1500000 1500000 "$work/room" 600000
 wait_for 60 arrived 2100000
 kill -KILL "$daemon_pid"; wait "$daemon_pid" 2>/dev/null

@@ -14,7 +14,7 @@
 #include "tests/check.h"
 #include "tests/system_faults.h"
 
-#define LIVES 40      /* of each kind */
+#define LIVES 60      /* of each kind */
 #define TRIES 30000   /* of 2 ms: others may have the machine */
 #define SHA "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 
