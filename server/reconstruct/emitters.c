@@ -131,9 +131,10 @@ static void observe_segment(void *user, size_t segment, int thread) {
             best = &shown[edge];
     }
     size_t told = best->channel[0].count + best->channel[0].saturated_count;
-    if ((float)told < OWN_PART * (float)(told + best->outshone_count))
+    bool is_own = told > 0 && (float)told >= OWN_PART * (float)(told + best->outshone_count);
+    if (!is_own)
         best = &shown[0]; /* most often it is not what shines: nothing is known */
-    job->evidence[segment].seen = told > 0;
+    job->evidence[segment].seen = is_own;
     job->evidence[segment].mixed = best == &shown[VIEWS_EDGE];
     job->evidence[segment].shown =
         rgb_make(median(&best->channel[0]), median(&best->channel[1]), median(&best->channel[2]));
