@@ -1,6 +1,6 @@
-/* light_places.h -- what is known of places all over the surface before missing light is looked for: what photographs show,
- * what a white surface would show by the light that is known, and how odd the base colour between them is.
- */
+/* light_places.h -- what is known of places all over the surface before missing light is looked for: what
+ * photographs show, what a white surface would show by the light that is known, and how odd the base colour between
+ * them is. */
 #ifndef UNBAKE_RECONSTRUCT_LIGHT_PLACES_H
 #define UNBAKE_RECONSTRUCT_LIGHT_PLACES_H
 
@@ -18,10 +18,11 @@ struct light_place {
     uint32_t segment;
     struct surface_point at;
     rgb shown, white;
-    float weight; /* to whoever looks for light: 1, or less */
-    float odd;  /* logarithm of base colour, without a sun, over the median of the segment or over white */
-    float open; /* the part of the disc of the sun that is tried which it sees, */
-    float lit;  /* times the cosine: for who looks for it */
+    float odd;    /* logarithm of base colour, without more light, over the median of the segment or over white */
+    /* For whoever looks for light: */
+    float weight; /* 1, or less */
+    float lit;    /* what a white surface would show of a strength of 1 of the light that is tried */
+    float open;   /* the part of the disc of the sun that is tried which it sees */
 };
 
 struct light_places {

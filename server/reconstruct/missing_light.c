@@ -11,9 +11,9 @@
 #define SPREAD_WITHIN 0.3f
 #define SPREAD_BEYOND 0.15f
 #define GLOSS 0.04f
-/* Strengths tried: from this share of the light that is known on average up, each so much stronger; then nearer
- * and nearer to the best. */
-#define FAINTEST 0.1f
+/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
+ * much stronger; then nearer and nearer to the best. */
+#define FAINTEST 0.1
 #define STRONGER 2.0f
 #define STRENGTHS 16
 #define NEARER 5
@@ -103,12 +103,19 @@ double missing_light_misfit(const struct missing_light *m) {
     return sum;
 }
 
+static float faintest_strength(const struct missing_light *m, int channel) {
+    double light = 0.0, lit = 0.0, lit_count = 0.0;
+    for (size_t i = 0; i < m->places->count; i++) {
+        light += (double)channel_of(m->places->place[i].white, channel);
+        lit += (double)m->places->place[i].lit;
+        lit_count += m->places->place[i].lit > 0.0f;
+    }
+    return lit > 0.0 ? (float)(FAINTEST * light / (double)m->places->count * lit_count / lit) : 0.0f;
+}
+
 float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
-    double mean = 0.0, without = misfit(m, 0.0f, channel), least = without;
-    float best = 0.0f, step = STRONGER;
-    for (size_t i = 0; i < m->places->count; i++)
-        mean += (double)channel_of(m->places->place[i].white, channel) / (double)m->places->count;
-    float strength = FAINTEST * (float)mean;
+    double without = misfit(m, 0.0f, channel), least = without;
+    float best = 0.0f, step = STRONGER, strength = faintest_strength(m, channel);
     for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
         double here = misfit(m, strength, channel);
         if (here < least)

@@ -25,8 +25,7 @@ void missing_light_release(struct missing_light *m);
 /* Takes over places that changed. */
 void missing_light_renew(struct missing_light *m);
 
-/* The strength that explains most: a place is lit by that times its `lit`, as a white surface would show it.
- * 0: none does. How much less odd the places of all segments that are lit at all are with it goes to *explained,
+/* The strength, times which its `lit` is added to a place's light, that explains most; 0: none does. How much less odd the places of all segments that are lit at all are with it goes to *explained,
  * in places. */
 float missing_light_strength(const struct missing_light *m, int channel, double *explained);
 
