@@ -19,6 +19,7 @@
 #include "server/reconstruct/sun_find.h"
 #include "server/reconstruct/unseen_light.h"
 #include "server/reconstruct/views.h"
+#include "server/scene/normals.h"
 
 /* Where every surface starts, with a neutral base colour: half rough, half glossy. */
 #define NEUTRAL_ROUGHNESS 0.5f
@@ -32,6 +33,8 @@ struct run {
     struct views views;
     struct optimiser *optimiser; /* of listing1 or refine; owned */
     size_t turned;               /* triangles whose back was taken for the front */
+    const char *normals;         /* where they come from: given, estimated, none */
+    float roughness;             /* of the mesh whose normals are estimated */
     cJSON *stages;               /* owned by the report */
 };
 
@@ -83,6 +86,8 @@ static void add_prepare_figures(const struct run *run) {
     json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
     json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
     json_add_int(figures, "triangles_turned", (int64_t)run->turned);
+    json_add_string(figures, "normals", run->normals);
+    json_add_number(figures, "mesh_roughness", (double)run->roughness);
     json_add_int(figures, "segments", (int64_t)r->segments.count);
     json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
     json_add_int(figures, "texture_width", r->atlas.width);
@@ -161,6 +166,14 @@ static enum status split_shining(struct run *run, struct error *err) {
     return STATUS_OK;
 }
 
+static void estimate_normals(struct run *run) {
+    struct mesh *mesh = &run->r->scene->mesh;
+    bool had_some = mesh->normal != NULL;
+    if (normals_estimate(mesh, run->r->pool, &run->roughness) && !had_some)
+        run->hooks->log(run->hooks->user, "mesh: it has no normals; they are estimated");
+    run->normals = had_some ? "given" : mesh->normal ? "estimated" : "none";
+}
+
 static enum status prepare(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -171,6 +184,7 @@ static enum status prepare(struct run *run, struct error *err) {
     enum status status = orient_mesh(r->scene, r->pool, &run->turned, err);
     if (status != STATUS_OK)
         return status;
+    estimate_normals(run);
     make_segments(r);
     status = map_surface(r, err);
     if (status != STATUS_OK)
