@@ -125,7 +125,7 @@ static bool is_lamp(const struct search *s, const struct missing_light *m, const
 /* Puts the segment that explains most in the first place; false where it is not enough. */
 static bool find_best(struct search *s, const struct missing_light *m) {
     struct missing_light few;
-    missing_light_init(&few, &s->few, WHITEST);
+    missing_light_init(&few, &s->few, WHITEST, false);
     for (size_t i = 0; i < s->candidate_count; i++)
         ask(s, &few, &s->few, &s->candidate[i], FEW_POINTS);
     missing_light_release(&few);
@@ -178,7 +178,7 @@ static void add_lamp(struct search *s, struct missing_light *m) {
 
 static void look_for_lamps(struct search *s) {
     struct missing_light m;
-    missing_light_init(&m, &s->all, WHITEST);
+    missing_light_init(&m, &s->all, WHITEST, false);
     while (s->lamp_count < MOST_LAMPS && find_best(s, &m))
         add_lamp(s, &m);
     fit_lamps(s, &m);
@@ -240,7 +240,7 @@ void lamp_fit(struct reconstruction *r, const struct views *views, const uint16_
         survey_places(&s, views, radiance);
         for (size_t i = 0; i < s.lamp_count; i++)
             light_lamp(&s, &s.lamp[i]);
-        missing_light_init(&m, &s.all, WHITEST);
+        missing_light_init(&m, &s.all, WHITEST, false);
         fit_lamps(&s, &m);
         missing_light_release(&m);
     }

@@ -20,8 +20,8 @@
 /* Points of which the median of a segment is taken. */
 #define MEDIAN_POINTS 512
 
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white) {
-    *m = (struct missing_light){.places = places, .white = white};
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches) {
+    *m = (struct missing_light){.places = places, .white = white, .in_patches = in_patches};
     m->base = mem_array(places->count + 1, sizeof *m->base);
     m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
     m->spread = mem_array(places->count + 1, sizeof *m->spread);
@@ -61,11 +61,16 @@ static void find_base(const struct missing_light *m, size_t first, size_t end, f
     }
 }
 
+/* Of base colours about a median. */
+static float spread_about(float median) {
+    return SPREAD_WITHIN + GLOSS * expf(-median);
+}
+
 void missing_light_renew(struct missing_light *m) {
     for (size_t first = 0, end; first < m->places->count; first = end) {
         end = light_places_end(m->places, first);
         find_base(m, first, end, 0.0f, MISSING_MEAN);
-        m->spread[first] = SPREAD_WITHIN + GLOSS * expf(-median_of(m, first, end));
+        m->spread[first] = spread_about(median_of(m, first, end));
     }
 }
 
@@ -73,9 +78,9 @@ void missing_light_renew(struct missing_light *m) {
 static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
     double sum = 0.0;
     find_base(m, first, end, strength, channel);
-    float median = median_of(m, first, end);
+    float median = median_of(m, first, end), spread = m->in_patches ? spread_about(median) : m->spread[first];
     for (size_t i = first; i < end; i++)
-        sum += (double)m->places->place[i].weight * (oddity(m->base[i] - median, m->spread[first]) +
+        sum += (double)m->places->place[i].weight * (oddity(m->base[i] - median, spread) +
                                                      oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND));
     return sum;
 }

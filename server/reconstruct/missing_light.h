@@ -14,12 +14,15 @@
 struct missing_light {
     const struct light_places *places; /* borrowed */
     float white;
+    bool in_patches;
     float *spread;                     /* [places->count] of a segment, at its first place; owned */
     float *base, *sorted;              /* [places->count] scratch; owned */
 };
 
-/* Base colours beyond `white` are odd. */
-void missing_light_init(struct missing_light *m, const struct light_places *places, float white);
+/* Base colours beyond `white` are odd. Light that falls `in_patches` leaves most of a segment as it is: how dark that
+ * is, and thus how much a highlight may add, is judged with the light that is tried. Light that may fall everywhere
+ * would make all dark, and explain anything: there it is judged without. */
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches);
 void missing_light_release(struct missing_light *m);
 
 /* Takes over places that changed. */
