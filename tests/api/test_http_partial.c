@@ -15,6 +15,7 @@
 
 static atomic_bool is_armed;
 static atomic_int begun, ended; /* syncs of uploads since */
+static atomic_bool is_asked;    /* the second is about to come */
 
 static bool is_upload(int fd) {
     char name[64], path[256];
@@ -35,7 +36,9 @@ int fdatasync(int fd) {
         return 0;
     int number = atomic_fetch_add(&begun, 1) + 1;
     if (number == 1) {
-        for (int i = 0; i < 50 && atomic_load(&ended) == 0; i++)
+        while (!atomic_load(&is_asked))
+            nap();
+        for (int i = 0; i < 100 && atomic_load(&ended) == 0; i++)
             nap();
         CHECK(pwrite(fd, "", 1, BYTES - 1) == 1);
         errno = EIO;
@@ -100,10 +103,12 @@ static void test_two(struct rig *rig, enum rival rival) {
     struct look first = {.partials = p, .id = row.id};
     atomic_store(&begun, 0);
     atomic_store(&ended, 0);
+    atomic_store(&is_asked, false);
     atomic_store(&is_armed, true);
     CHECK(pthread_create(&thread, NULL, look, &first) == 0);
     while (atomic_load(&begun) == 0)
         nap();
+    atomic_store(&is_asked, true);
     enum status status = rival == RIVAL_LOOK     ? partial_look(p, row.id, &found, &err)
                          : rival == RIVAL_FINISH ? claim_finish(claim, &found, &err)
                                                  : claim_take(p, row.id, 0, true, &late, &err);
