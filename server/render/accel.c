@@ -11,6 +11,7 @@
 #endif
 
 #include <dlfcn.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "common/mem.h"
@@ -100,11 +101,29 @@ static void open_allocator(void) {
     dlopen("libtbbmalloc.so.2", RTLD_NOW); /* without it TBB does with malloc */
 }
 
+/* Where there is no memory for a thread, TBB throws std::runtime_error, and nobody catches it. */
+static void on_terminate(void) {
+    const struct {
+        const void *table;
+        const char *name;
+    } *type; /* std::type_info, as the C++ ABI lays it out */
+    void *(*find_type)(void);
+    *(void **)&find_type = dlsym(RTLD_DEFAULT, "__cxa_current_exception_type");
+    type = find_type ? find_type() : NULL;
+    if (type && strcmp(type->name, "St13runtime_error") == 0)
+        no_memory();
+    abort();
+}
+
 /* It throws std::bad_alloc also where nobody catches it, which would look like a crash: with
  * std::set_new_handler (by the name that the C++ ABI gives it) running out of memory comes to us first. */
 static void watch_memory(void) {
     void (*(*set_new_handler)(void (*)(void)))(void);
+    void (*(*set_terminate)(void (*)(void)))(void);
     open_allocator();
+    *(void **)&set_terminate = dlsym(RTLD_DEFAULT, "_ZSt13set_terminatePFvvE");
+    if (set_terminate)
+        set_terminate(on_terminate);
     *(void **)&set_new_handler = dlsym(RTLD_DEFAULT, "_ZSt15set_new_handlerPFvvE");
     if (set_new_handler)
         set_new_handler(no_memory);
