@@ -207,6 +207,36 @@ static long strike_all(bool is_sql) {
     return calls;
 }
 
+static void check_refusals(void) {
+    static const struct {
+        const char *method, *path, *fields, *body;
+        int status;
+    } bad[] = {
+        {"POST", "/v1/session", JSON, "{", 400},
+        {"POST", "/v1/session", JSON, "{\"token\":7}", 400},
+        {"POST", "/v1/session", JSON, "{}", 400},
+        {"GET", "/v1/jobs/{j}/log?bytes=0", "", "", 400},
+        {"GET", "/v1/jobs/{j}/outputs/a.png", "Range: bytes=10-\r\n", "", 416},
+        {"DELETE", "/v1/jobs/{j}?dry_run=1", "", "", 409},
+        {"POST", "/v1/jobs/{j}/extend", JSON, "{", 400},
+        {"POST", "/v1/jobs/{j}/extend", JSON, "[]", 400},
+        {"POST", "/v1/jobs/{j}/extend", JSON, "{\"time_limit_sec\":1,\"seed\":2}", 400},
+        {"POST", "/v1/jobs", JSON, "{\"scene\":\"" RIG_SCENE "\",\"shared\":7}", 422},
+        {"POST", "/v1/collect?dry_run=2", "", "", 400},
+        {"GET", "/v1/uploads?sha256=x", "", "", 400},
+        {"GET", "/v1/uploads?cursor=x", "", "", 400},
+        {"POST", "/v1/scenes", "Repr-Digest: x\r\n", "archive", 400},
+    };
+    job_with_output();
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        struct buf reply;
+        int status = ask(bad[i].method, bad[i].path, bad[i].fields, bad[i].body, strlen(bad[i].body), &reply);
+        CHECK_THAT(status == bad[i].status && strstr(buf_text(&reply), "\"detail\":\""), "%s %s (%s): %d, not %d", bad[i].method,
+                   bad[i].path, bad[i].body, status, bad[i].status);
+        buf_release(&reply);
+    }
+}
+
 /* The HTTP side starts, or says why not. */
 static bool start_once(bool is_sql, long n) {
     struct api_config config = {.data_dir = rig.dir, .max_attempts = 2, .queue_limit = 50, .max_upload_bytes = 8 << 20,
@@ -259,6 +289,7 @@ int main(void) {
     rig_start(&rig, &rig_patient, 60.0);
     log_set_level(LOG_ERROR);
     rig.api->config.queue_limit = 100000;
+    check_refusals();
     calls += strike_all(true) + strike_all(false);
     rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
     rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");

@@ -421,6 +421,37 @@ static long strike_open(void) {
     return n;
 }
 
+/* What is not there, and what makes no sense. */
+static void check_refusals(void) {
+    static const char *const progress_[] = {"{", "{\"stage\":7}", "{\"done\":\"x\"}", "{\"total\":\"x\"}", "{\"eta_sec\":\"x\"}"};
+    struct scene_row scenes[1];
+    struct upload_row row;
+    size_t count;
+    char cursor[128], hash[2];
+    int number;
+    bool is_gone;
+    IS(store_job_start(store, 77, &number, &err), STATUS_NOT_FOUND);
+    IS(store_job_delete(store, 77, &err), STATUS_NOT_FOUND);
+    IS(store_event_add(store, 77, 1, EVENT_LOG, "{}", &err), STATUS_NOT_FOUND);
+    IS(store_event_list(store, 77, 0, 9, no_event, NULL, &err), STATUS_OK);
+    IS(store_scene_ready(store, SCENE_C, "{}", &err), STATUS_NOT_FOUND);
+    IS(store_scene_patch(store, SCENE_C, -1, "x", &(struct keeping){0}, &err), STATUS_NOT_FOUND);
+    IS(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err), STATUS_NOT_FOUND);
+    IS(store_scene_list(store, NULL, "yesterday", 1, scenes, &count, cursor, &err), STATUS_INPUT);
+    IS(store_upload_list(store, NULL, "", "yesterday", 1, &row, &count, cursor, &err), STATUS_INPUT);
+    IS(expire(EXPIRED_SCENE, SCENE_C), STATUS_CONFLICT);
+    OK(add_scene());
+    IS(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err), STATUS_CONFLICT);
+    OK(ready());
+    IS(ready(), STATUS_CONFLICT);
+    OK(add_upload());
+    IS(store_upload_get(store, UPLOAD, &row, hash, sizeof hash, &err), STATUS_CORRUPT);
+    OK(submit());
+    OK(start_job());
+    for (size_t i = 0; i < sizeof progress_ / sizeof *progress_; i++)
+        IS(store_event_add(store, job, attempt, EVENT_PROGRESS, progress_[i], &err), STATUS_INPUT);
+}
+
 int main(void) {
     dir = fresh_dir();
     long calls = strike_open();
@@ -431,6 +462,7 @@ int main(void) {
         for (long n = 1; strike(&steps[i], n) && check_failed_count == 0; n++)
             calls++;
     printf("%ld calls failed\n", calls);
+    check_refusals();
     store_close(store);
     drop_dir(dir);
     return check_result();
