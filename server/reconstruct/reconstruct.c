@@ -198,6 +198,20 @@ static enum status prepare(struct run *run, struct error *err) {
     return status;
 }
 
+/* Says what was found that no photograph shows. */
+static void log_unseen(const struct run *run) {
+    const struct reconstruction *r = run->r;
+    size_t lamps = 0;
+    char line[128];
+    for (size_t i = 0; i < r->segments.count; i++)
+        lamps += r->evidence[i].hidden;
+    snprintf(line, sizeof line, "light: %zu lamps that no photograph shows were found by what they light", lamps);
+    if (lamps > 0)
+        run->hooks->log(run->hooks->user, line);
+    if (r->sun.is_there)
+        run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
+}
+
 static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
     noise_measure(&run->r->noise, &run->views);
@@ -205,6 +219,7 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     lamp_find(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);
+    log_unseen(run);
     if (run->r->sun.is_there && !run->r->environment.map.pixel)
         environment_make_unseen(&run->r->environment); /* it is drawn there when solve is done */
     if (run->r->environment.map.pixel)
