@@ -23,7 +23,8 @@ struct emitter_evidence {
     float share; /* part of `shown` that base colour 1 could not reflect */
 };
 
-/* Fills `shown` of evidence[segment_count] from up to a few hundred texels of each. */
+/* Fills `shown`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of each; not those of
+ * hidden lamps. */
 void emitters_observe(const struct reconstruction *r, const struct views *views,
                       struct emitter_evidence *evidence);
 
