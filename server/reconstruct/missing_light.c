@@ -39,6 +39,11 @@ static float channel_of(rgb value, int channel) {
     return channel == MISSING_MEAN ? rgb_mean(value) : (&value.r)[channel];
 }
 
+float missing_light_part(const struct light_place *p, float strength) {
+    float light = strength * p->lit;
+    return light > 0.0f ? light / (light + rgb_mean(p->white)) : 0.0f;
+}
+
 /* From 0, as usual, to 1, not to be explained (Geman and McClure). */
 static double oddity(float off, float spread) {
     double e = (double)(off / spread);
@@ -74,14 +79,20 @@ void missing_light_renew(struct missing_light *m) {
     }
 }
 
+/* How odd place i is, of whose segment's base colours that is the median. */
+static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
+    double within = oddity(m->base[i] - median, spread);
+    double beyond = oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND);
+    return (double)m->places->place[i].weight * (within + beyond);
+}
+
 /* How odd the base colours of a segment are. */
 static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
     double sum = 0.0;
     find_base(m, first, end, strength, channel);
     float median = median_of(m, first, end), spread = m->in_patches ? spread_about(median) : m->spread[first];
     for (size_t i = first; i < end; i++)
-        sum += (double)m->places->place[i].weight * (oddity(m->base[i] - median, spread) +
-                                                     oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND));
+        sum += place_misfit(m, i, median, spread);
     return sum;
 }
 
@@ -95,6 +106,33 @@ static double misfit(const struct missing_light *m, float strength, int channel)
             any = any || m->places->place[i].lit > 0.0f;
         if (any)
             sum += segment_misfit(m, first, end, strength, channel);
+    }
+    return sum;
+}
+
+/* Adds the places of a segment in question, with the light or without. */
+static double share_misfit(const struct missing_light *m, size_t first, size_t end, float strength, float share,
+                           bool with) {
+    double sum = 0.0;
+    find_base(m, first, end, with ? strength : 0.0f, MISSING_MEAN);
+    float median = median_of(m, first, end);
+    for (size_t i = first; i < end; i++) {
+        if (missing_light_part(&m->places->place[i], strength) >= share)
+            sum += place_misfit(m, i, median, m->spread[first]);
+    }
+    return sum;
+}
+
+struct missing_share missing_light_share(const struct missing_light *m, float strength, float share) {
+    struct missing_share sum = {0.0, 0.0, 0.0};
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        for (size_t i = first; i < end; i++) {
+            const struct light_place *p = &m->places->place[i];
+            sum.count += missing_light_part(p, strength) >= share ? (double)p->weight : 0.0;
+        }
+        sum.before += share_misfit(m, first, end, strength, share, false);
+        sum.after += share_misfit(m, first, end, strength, share, true);
     }
     return sum;
 }

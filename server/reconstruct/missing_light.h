@@ -35,6 +35,16 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
 /* The same by channel, without asking what it explains. */
 rgb missing_light_color(const struct missing_light *m);
 
+/* The share of a place's light that a strength of the one that is tried would be. */
+float missing_light_part(const struct light_place *p, float strength);
+
+/* How odd the places are of whose light it would be such a share at least: without it and with it, in places, `count`
+ * of them. */
+struct missing_share {
+    double count, before, after;
+};
+struct missing_share missing_light_share(const struct missing_light *m, float strength, float share);
+
 /* How odd all places are as they are, in places. */
 double missing_light_misfit(const struct missing_light *m);
 

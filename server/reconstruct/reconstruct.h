@@ -14,7 +14,8 @@
 #include "server/reconstruct/reconstruction.h"
 #include "server/scene/scene.h"
 
-/* Runs all stages up to `report`. Solves unknown exposures in `scene`. STATUS_CANCELLED when
+/* Runs all stages up to `report`. Solves unknown exposures in `scene`, turns triangles
+ * that photographs see from behind, gives the mesh normals where it has none. STATUS_CANCELLED when
  * stopped (a checkpoint was saved). Whatever it returns, *r is to be released. */
 enum status reconstruct_run(struct scene *scene, const struct settings *settings,
                             struct parallel *pool, const struct reconstruct_hooks *hooks,

@@ -403,6 +403,7 @@ static void test_reconstruction(struct scene *scene, struct scene *masked, struc
 
     /* Where the openings are masked the light is estimated from what it does to the surfaces: nothing is
      * called an emitter, and base colours come out not much worse. */
+    masked->mesh = scene->mesh; /* which has normals by now */
     shell = (struct shell){.polls_until_stop = -1};
     CHECK(shell_run(masked, &s, 0, &shell, &r) == STATUS_OK);
     double without = wall_error(&r, &emitters);
