@@ -28,8 +28,8 @@ void missing_light_release(struct missing_light *m);
 /* Takes over places that changed. */
 void missing_light_renew(struct missing_light *m);
 
-/* The strength, times which its `lit` is added to a place's light, that explains most; 0: none does. How much less odd the places of all segments that are lit at all are with it goes to *explained,
- * in places. */
+/* The strength, times which its `lit` is added to a place's light, that explains most; 0: none does. How much less
+ * odd the places of all segments that are lit at all are with it goes to *explained, in places. */
 float missing_light_strength(const struct missing_light *m, int channel, double *explained);
 
 /* The same by channel, without asking what it explains. */

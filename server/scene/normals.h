@@ -12,8 +12,9 @@
 #include "server/scene/mesh.h"
 
 /* Gives the mesh normals, unless it has some or every triangle is to be shaded as it stands. Vertices at which edges
- * meet are doubled. *roughness: by how much neighbours' normals differ (length of the difference; half the triangles
- * have a quarter of their neighbours nearer). Returns whether there are normals now. The same for any number of threads. */
+ * meet are doubled; positions and indices may be new arrays then. *roughness: by how much neighbours' normals differ
+ * (length of the difference; half the triangles have a quarter of their neighbours nearer). Returns whether there are
+ * normals now. The same for any number of threads. */
 bool normals_estimate(struct mesh *mesh, struct parallel *pool, float *roughness);
 
 #endif
