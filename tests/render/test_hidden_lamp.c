@@ -15,15 +15,6 @@ static vec3 look_down(int frame) {
     return (vec3){from.x + cosf(angle), from.y - 1.0f, from.z + sinf(angle)};
 }
 
-static void reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
-    struct settings s = shell_settings("{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,"
-                                      "\"gather_samples\":64,\"texels_per_iteration\":64}");
-    struct shell shell = {.polls_until_stop = -1};
-    CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
-    shell_release(&shell);
-    settings_release(&s);
-}
-
 static rgb mean_color(const struct reconstruction *r, int64_t object) {
     rgb sum = rgb_gray(0.0f);
     float count = 0.0f;
@@ -46,7 +37,7 @@ static void test_hidden(struct parallel *pool) {
     rgb found[2];
     for (int i = 0; i < 2; i++) {
         struct reconstruction r;
-        reconstruct(&scene, threads[i], &r);
+        shell_solve(&scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
             bool is_lamp = r.segments.id[s] == LAMP;
             CHECK_THAT(r.evidence[s].hidden == is_lamp && r.is_emitter[s] == is_lamp, "segment %zu", s);
@@ -76,7 +67,7 @@ static void test_none_hidden(struct parallel *pool) {
     make_mesh(&scene.mesh);
     photograph_mesh(&scene, lamp_radiance, NULL, look_up, pool);
     struct reconstruction r;
-    reconstruct(&scene, 0, &r);
+    shell_solve(&scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(!r.evidence[s].hidden && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
     reconstruct_release(&r);

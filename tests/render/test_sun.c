@@ -50,15 +50,6 @@ static float sun_irradiance(void) {
     return SUN_RADIANCE * (2.0f * 3.14159265f / SKY_WIDTH) * (3.14159265f / SKY_HEIGHT) * sinf(sun_theta());
 }
 
-static void reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
-    struct settings s = shell_settings("{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,"
-                                      "\"gather_samples\":64,\"texels_per_iteration\":64}");
-    struct shell shell = {.polls_until_stop = -1};
-    CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
-    shell_release(&shell);
-    settings_release(&s);
-}
-
 /* Mean base colour of the floor's texels that the sun lights. */
 static rgb color_of_patch(const struct reconstruction *r) {
     rgb sum = rgb_gray(0.0f);
@@ -103,7 +94,7 @@ static void test_sun(struct parallel *pool) {
     struct sun found[2] = {{0}};
     for (int i = 0; i < 2; i++) {
         struct reconstruction r;
-        reconstruct(&scene, threads[i], &r);
+        shell_solve(&scene, threads[i], &r);
         found[i] = r.sun;
         float expected = sun_irradiance();
         CHECK(r.sun.is_there);
@@ -138,7 +129,7 @@ static void test_without_sky(struct parallel *pool) {
     make_sky(&sky, SUN_RADIANCE);
     photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_away, pool);
     struct reconstruction r;
-    reconstruct(&scene, 0, &r);
+    shell_solve(&scene, 0, &r);
     CHECK(r.sun.is_there && r.environment.map.pixel != NULL);
     CHECK(vec3_dot(r.sun.direction, (vec3){0.0f, cosf(sun_theta()), -sinf(sun_theta())}) > cosf(0.05f));
     CHECK_NEAR(irradiance_in_map(&r.environment, r.sun.direction), r.sun.irradiance.r, 0.03f * r.sun.irradiance.r);
@@ -154,7 +145,7 @@ static void test_no_sun(struct parallel *pool) {
     make_sky(&sky, 0.5f);
     photograph_mesh(&scene, lamp_radiance, &sky, look_anywhere, pool);
     struct reconstruction r;
-    reconstruct(&scene, 0, &r);
+    shell_solve(&scene, 0, &r);
     CHECK(!r.sun.is_there);
     reconstruct_release(&r);
     image_release(&sky);
