@@ -13,8 +13,8 @@
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
-    float white;
-    bool in_patches;
+    float white;                       /* base colours beyond it are odd */
+    bool in_patches;                   /* see missing_light_init */
     float *spread;                     /* [places->count] of a segment, at its first place; owned */
     float *base, *sorted;              /* [places->count] scratch; owned */
 };
