@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #define FAULTS_CALLS_MAX 65536
+#define FAULTS_KILL (-1) /* in place of an errno: whoever is about to do it is killed */
 
 enum faults_role { FAULTS_DAEMON = 1, FAULTS_WORKER = 2 };
 
@@ -27,7 +28,7 @@ struct faults {
     atomic_long count;   /* so many were done */
     atomic_long fail_at; /* n, from 1; 0: none */
     atomic_bool for_good; /* all later ones fail, too */
-    atomic_int error;    /* errno of operations */
+    atomic_int error;    /* errno of operations, or FAULTS_KILL */
     atomic_long failed;  /* so many have */
     /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
      * the first that does. */

@@ -18,6 +18,7 @@
  * that file again. */
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -102,6 +103,8 @@ static bool fails(void) {
     if (!faults_strikes(faults, faults_count(faults, role)))
         return false;
     errno = atomic_load(&faults->error);
+    if (errno == FAULTS_KILL)
+        kill(getpid(), SIGKILL);
     return true;
 }
 
