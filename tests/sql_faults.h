@@ -1,5 +1,6 @@
 /* sql_faults.h -- for one file of a test: the functions of SQLite that sql.c and backup.c call, before the library's
- * own. The n-th call fails without being made, once. A rollback does not: SQLite makes it in memory. */
+ * own. The n-th call fails without being made, once or from then on; of all or of those of some statements. A rollback
+ * does not: SQLite makes it in memory. */
 #ifndef UNBAKE_TESTS_SQL_FAULTS_H
 #define UNBAKE_TESTS_SQL_FAULTS_H
 
@@ -33,12 +34,32 @@ static const struct sql_fault {
 
 static const struct sql_fault *sql_fault; /* the one that is to come */
 static atomic_long sql_faults_left;       /* calls until then; 0: none fails */
+static const char *sql_faults_only;       /* what a statement has in it, or else does not count; NULL: all do */
+static bool sql_faults_stay;              /* all later ones fail, too */
 static _Thread_local bool faults_are_off; /* in this thread, as while SQLite calls itself */
 
-/* The n-th call from now on fails; how, goes by n. */
-static inline void sql_faults_arm(long n) {
+/* The n-th call from now on fails, and if `stays` all that follow; how, goes by n. */
+static inline void sql_faults_arm_only(const char *only, long n, bool stays) {
     sql_fault = &sql_faults[(size_t)n % SQL_FAULTS];
+    sql_faults_only = only;
+    sql_faults_stay = stays;
     atomic_store(&sql_faults_left, n);
+}
+
+static inline void sql_faults_arm(long n) {
+    sql_faults_arm_only(NULL, n, false);
+}
+
+/* One more call; whether it is the one that fails, or comes after it (`left` stays below 0 then). */
+static inline bool faults_strike(atomic_long *left, bool stays) {
+    long before = atomic_load(left);
+    if (before == 0)
+        return false;
+    if (before > 0)
+        before = atomic_fetch_sub(left, 1);
+    if (stays && before == 1)
+        atomic_store(left, -1);
+    return stays ? before <= 1 : before == 1;
 }
 
 /* From now on none does; whether one has. */
@@ -46,8 +67,9 @@ static inline bool sql_faults_lift(void) {
     return atomic_exchange(&sql_faults_left, 0) <= 0;
 }
 
-static inline bool sql_fails(void) {
-    if (faults_are_off || atomic_load(&sql_faults_left) == 0 || atomic_fetch_sub(&sql_faults_left, 1) != 1)
+static inline bool sql_fails(const char *text) {
+    if (faults_are_off || (sql_faults_only && !(text && strstr(text, sql_faults_only))) ||
+        !faults_strike(&sql_faults_left, sql_faults_stay))
         return false;
     errno = sql_fault->number;
     return true;
@@ -68,52 +90,52 @@ static inline bool sql_is_rollback(const char *text) {
 }
 
 int sqlite3_step(sqlite3_stmt *stmt) {
-    if (!sql_is_rollback(sqlite3_sql(stmt)) && sql_fails())
+    if (!sql_is_rollback(sqlite3_sql(stmt)) && sql_fails(sqlite3_sql(stmt)))
         return sql_fault->code;
     SQL_PASS(sqlite3_step, int, stmt);
 }
 
 int sqlite3_prepare_v3(sqlite3 *db, const char *text, int size, unsigned flags, sqlite3_stmt **stmt, const char **tail) {
     *stmt = NULL;
-    if (!sql_is_rollback(text) && sql_fails())
+    if (!sql_is_rollback(text) && sql_fails(text))
         return sql_fault->code;
     SQL_PASS(sqlite3_prepare_v3, int, db, text, size, flags, stmt, tail);
 }
 
 int sqlite3_prepare_v2(sqlite3 *db, const char *text, int size, sqlite3_stmt **stmt, const char **tail) {
     *stmt = NULL;
-    if (sql_fails())
+    if (sql_fails(text))
         return sql_fault->code;
     SQL_PASS(sqlite3_prepare_v2, int, db, text, size, stmt, tail);
 }
 
 int sqlite3_bind_text(sqlite3_stmt *stmt, int index, const char *text, int size, void (*release)(void *)) {
-    if (sql_fails())
+    if (sql_fails(sqlite3_sql(stmt)))
         return sql_fault->code;
     SQL_PASS(sqlite3_bind_text, int, stmt, index, text, size, release);
 }
 
 int sqlite3_exec(sqlite3 *db, const char *text, int (*each)(void *, int, char **, char **), void *user, char **why) {
-    if (sql_fails())
+    if (sql_fails(text))
         return sql_fault->code;
     SQL_PASS(sqlite3_exec, int, db, text, each, user, why);
 }
 
 int sqlite3_open_v2(const char *path, sqlite3 **db, int flags, const char *vfs) {
     *db = NULL;
-    if (sql_fails())
+    if (sql_fails(NULL))
         return sql_fault->code;
     SQL_PASS(sqlite3_open_v2, int, path, db, flags, vfs);
 }
 
 sqlite3_backup *sqlite3_backup_init(sqlite3 *to, const char *to_name, sqlite3 *from, const char *from_name) {
-    if (sql_fails())
+    if (sql_fails(NULL))
         return NULL;
     SQL_PASS(sqlite3_backup_init, sqlite3_backup *, to, to_name, from, from_name);
 }
 
 int sqlite3_backup_step(sqlite3_backup *backup, int pages) {
-    if (sql_fails())
+    if (sql_fails(NULL))
         return sql_fault->code;
     SQL_PASS(sqlite3_backup_step, int, backup, pages);
 }

@@ -1,6 +1,6 @@
 /* system_faults.h -- for one file of a test: calls of the system that the daemon makes, before libc's own. The n-th call
- * fails without being made, once. What SQLite calls does not count, nor does what is done to anything but files and
- * folders by their descriptors. */
+ * fails without being made, once or from then on; of all or of those of one name. What SQLite calls does not count, nor
+ * does what is done to anything but files and folders by their descriptors. */
 #ifndef UNBAKE_TESTS_SYSTEM_FAULTS_H
 #define UNBAKE_TESTS_SYSTEM_FAULTS_H
 
@@ -22,11 +22,19 @@
 
 static atomic_long system_faults_left; /* calls until one fails; 0: none does */
 static int system_fault;               /* errno, then */
+static const char *system_faults_only; /* the call that counts; NULL: all do */
+static bool system_faults_stay;        /* all later ones fail, too */
 
-/* The n-th call from now on fails, by EIO or ENOSPC in turn. */
-static inline void system_faults_arm(long n) {
+/* The n-th call from now on fails, and if `stays` all that follow, by EIO or ENOSPC in turn. */
+static inline void system_faults_arm_only(const char *only, long n, bool stays) {
     system_fault = n % 2 ? EIO : ENOSPC;
+    system_faults_only = only;
+    system_faults_stay = stays;
     atomic_store(&system_faults_left, n);
+}
+
+static inline void system_faults_arm(long n) {
+    system_faults_arm_only(NULL, n, false);
 }
 
 /* From now on none does; whether one has. */
@@ -34,57 +42,59 @@ static inline bool system_faults_lift(void) {
     return atomic_exchange(&system_faults_left, 0) <= 0;
 }
 
-static inline bool system_fails(void) {
-    if (faults_are_off || atomic_load(&system_faults_left) == 0 || atomic_fetch_sub(&system_faults_left, 1) != 1)
+static inline bool system_fails(const char *name) {
+    if (faults_are_off || (system_faults_only && strcmp(name, system_faults_only) != 0) ||
+        !faults_strike(&system_faults_left, system_faults_stay))
         return false;
     errno = system_fault;
     return true;
 }
 
-static inline bool system_fails_file(int fd) {
+static inline bool is_file(int fd) {
     struct stat info;
-    return syscall(SYS_fstat, fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode)) && system_fails();
+    return syscall(SYS_fstat, fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode));
 }
 
-#define SYSTEM_CALL(type, name, failed, is_struck, parameters, ...)                                                 \
+#define SYSTEM_CALL(type, name, failed, counts, parameters, ...)                                                    \
     type name parameters {                                                                                          \
         __typeof__(name) *call;                                                                                     \
-        if (is_struck)                                                                                              \
+        if ((counts) && system_fails(#name))                                                                        \
             return failed;                                                                                          \
         *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                  \
         return call(__VA_ARGS__);                                                                                   \
     }
 
-SYSTEM_CALL(int, chmod, -1, system_fails(), (const char *path, mode_t mode), path, mode)
-SYSTEM_CALL(int, eventfd, -1, system_fails(), (unsigned count, int flags), count, flags)
-SYSTEM_CALL(int, fallocate, -1, system_fails(), (int fd, int mode, off_t at, off_t length), fd, mode, at, length)
-SYSTEM_CALL(int, fchmod, -1, system_fails(), (int fd, mode_t mode), fd, mode)
-SYSTEM_CALL(int, fdatasync, -1, system_fails(), (int fd), fd)
-SYSTEM_CALL(int, flock, -1, system_fails(), (int fd, int operation), fd, operation)
-SYSTEM_CALL(pid_t, fork, -1, system_fails(), (void))
-SYSTEM_CALL(int, fstat, -1, system_fails_file(fd), (int fd, struct stat *info), fd, info)
-SYSTEM_CALL(int, fsync, -1, system_fails(), (int fd), fd)
-SYSTEM_CALL(int, ftruncate, -1, system_fails(), (int fd, off_t length), fd, length)
-SYSTEM_CALL(ssize_t, getrandom, -1, system_fails(), (void *data, size_t length, unsigned flags), data, length, flags)
-SYSTEM_CALL(int, listen, -1, system_fails(), (int fd, int backlog), fd, backlog)
-SYSTEM_CALL(int, lstat, -1, system_fails(), (const char *path, struct stat *info), path, info)
-SYSTEM_CALL(int, mkdir, -1, system_fails(), (const char *path, mode_t mode), path, mode)
-SYSTEM_CALL(char *, mkdtemp, NULL, system_fails(), (char *template), template)
-SYSTEM_CALL(int, mkostemp, -1, system_fails(), (char *template, int flags), template, flags)
-SYSTEM_CALL(DIR *, opendir, NULL, system_fails(), (const char *path), path)
-SYSTEM_CALL(int, pipe2, -1, system_fails(), (int ends[2], int flags), ends, flags)
-SYSTEM_CALL(ssize_t, pread, -1, system_fails_file(fd), (int fd, void *data, size_t length, off_t at), fd, data, length, at)
-SYSTEM_CALL(int, pthread_create, errno, system_fails(),
+SYSTEM_CALL(int, chmod, -1, true, (const char *path, mode_t mode), path, mode)
+SYSTEM_CALL(int, eventfd, -1, true, (unsigned count, int flags), count, flags)
+SYSTEM_CALL(int, fallocate, -1, true, (int fd, int mode, off_t at, off_t length), fd, mode, at, length)
+SYSTEM_CALL(int, fchmod, -1, true, (int fd, mode_t mode), fd, mode)
+SYSTEM_CALL(int, fdatasync, -1, true, (int fd), fd)
+SYSTEM_CALL(int, flock, -1, true, (int fd, int operation), fd, operation)
+SYSTEM_CALL(pid_t, fork, -1, true, (void))
+SYSTEM_CALL(int, fstat, -1, is_file(fd), (int fd, struct stat *info), fd, info)
+SYSTEM_CALL(int, fsync, -1, true, (int fd), fd)
+SYSTEM_CALL(int, ftruncate, -1, true, (int fd, off_t length), fd, length)
+SYSTEM_CALL(ssize_t, getrandom, -1, true, (void *data, size_t length, unsigned flags), data, length, flags)
+SYSTEM_CALL(int, listen, -1, true, (int fd, int backlog), fd, backlog)
+SYSTEM_CALL(int, lstat, -1, true, (const char *path, struct stat *info), path, info)
+SYSTEM_CALL(int, mkdir, -1, true, (const char *path, mode_t mode), path, mode)
+SYSTEM_CALL(char *, mkdtemp, NULL, true, (char *template), template)
+SYSTEM_CALL(int, mkostemp, -1, true, (char *template, int flags), template, flags)
+SYSTEM_CALL(DIR *, opendir, NULL, true, (const char *path), path)
+SYSTEM_CALL(int, pipe2, -1, true, (int ends[2], int flags), ends, flags)
+SYSTEM_CALL(ssize_t, pread, -1, is_file(fd), (int fd, void *data, size_t length, off_t at), fd, data, length, at)
+SYSTEM_CALL(int, pthread_create, errno, true,
             (pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *user), thread, attributes, run,
             user)
-SYSTEM_CALL(ssize_t, pwrite, -1, system_fails_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length,
+SYSTEM_CALL(ssize_t, pwrite, -1, is_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length,
             at)
-SYSTEM_CALL(ssize_t, read, -1, system_fails_file(fd), (int fd, void *data, size_t length), fd, data, length)
-SYSTEM_CALL(int, rename, -1, system_fails(), (const char *from, const char *to), from, to)
-SYSTEM_CALL(int, socket, -1, system_fails(), (int family, int kind, int protocol), family, kind, protocol)
-SYSTEM_CALL(int, statvfs, -1, system_fails(), (const char *path, struct statvfs *info), path, info)
-SYSTEM_CALL(int, unlink, -1, system_fails(), (const char *path), path)
-SYSTEM_CALL(ssize_t, write, -1, system_fails_file(fd), (int fd, const void *data, size_t length), fd, data, length)
+SYSTEM_CALL(ssize_t, read, -1, is_file(fd), (int fd, void *data, size_t length), fd, data, length)
+SYSTEM_CALL(int, rename, -1, true, (const char *from, const char *to), from, to)
+SYSTEM_CALL(int, socket, -1, true, (int family, int kind, int protocol), family, kind, protocol)
+SYSTEM_CALL(int, statvfs, -1, true, (const char *path, struct statvfs *info), path, info)
+SYSTEM_CALL(int, unlink, -1, true, (const char *path), path)
+SYSTEM_CALL(int, unlinkat, -1, true, (int folder, const char *path, int flags), folder, path, flags)
+SYSTEM_CALL(ssize_t, write, -1, is_file(fd), (int fd, const void *data, size_t length), fd, data, length)
 
 #define SYSTEM_OPEN_MODE                                                                                            \
     mode_t mode = 0;                                                                                                \
@@ -97,12 +107,20 @@ SYSTEM_CALL(ssize_t, write, -1, system_fails_file(fd), (int fd, const void *data
 
 int open(const char *path, int flags, ...) {
     SYSTEM_OPEN_MODE
-    return system_fails() ? -1 : (int)syscall(SYS_openat, AT_FDCWD, path, flags, mode);
+    return system_fails("open") ? -1 : (int)syscall(SYS_openat, AT_FDCWD, path, flags, mode);
 }
 
 int openat(int folder, const char *path, int flags, ...) {
     SYSTEM_OPEN_MODE
-    return system_fails() ? -1 : (int)syscall(SYS_openat, folder, path, flags, mode);
+    return system_fails("openat") ? -1 : (int)syscall(SYS_openat, folder, path, flags, mode);
+}
+
+int fcntl(int fd, int command, ...) {
+    va_list args;
+    va_start(args, command);
+    void *argument = va_arg(args, void *);
+    va_end(args);
+    return system_fails("fcntl") ? -1 : (int)syscall(SYS_fcntl, fd, command, argument);
 }
 
 #endif
