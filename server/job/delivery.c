@@ -1,6 +1,7 @@
 /* delivery.c -- see delivery.h. */
 #include "server/job/delivery.h"
 
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,12 +16,17 @@
 
 #define LIMIT_SEC 60.0
 
-static void empty(struct delivery *d) {
+/* Its process is gone, and so is what it was given. */
+static void clear_away(struct delivery *d) {
     struct error err;
     supervisor_release(&d->worker);
     if (file_remove_tree(d->dir, &err) != STATUS_OK)
         log_warning("%s", err.message);
     mem_free(d->dir);
+    d->dir = NULL;
+}
+
+static void forget(struct delivery *d) {
     *d = (struct delivery){.worker = {.pid_fd = -1, .pipe_fd = -1}};
 }
 
@@ -48,8 +54,10 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     mem_free(path);
     mem_free(text);
     cJSON_Delete(order);
-    if (status != STATUS_OK)
-        empty(d);
+    if (status != STATUS_OK) {
+        clear_away(d);
+        forget(d);
+    }
     return status;
 }
 
@@ -66,27 +74,43 @@ static void hear(void *user, const char *text, size_t length) {
     cJSON_Delete(line);
 }
 
-void delivery_kill(struct delivery *d) {
-    supervisor_signal(&d->worker, SIGKILL);
+/* Enters what became of it. */
+static bool settle(struct delivery *d, struct store *store) {
+    struct error err;
+    bool gave_up;
+    if (store_outbox_settle(store, d->id, d->delivered, &gave_up, &err) != STATUS_OK) {
+        if (!d->complained)
+            log_warning("a webhook's outcome cannot be recorded: %s", err.message);
+        d->complained = true;
+        return false;
+    }
+    if (!d->delivered)
+        log_warning("job %lld: its webhook cannot be called%s: %s", (long long)d->job_id,
+                    gave_up ? ", and will not be again" : "", d->reason[0] ? d->reason : "its time was up");
+    forget(d);
+    return true;
 }
 
 bool delivery_listen(struct delivery *d, struct store *store) {
     int wait_status;
-    struct error err;
-    bool gave_up;
     if (d->id == 0)
         return true;
-    supervisor_read(&d->worker, hear, d);
-    if (clock_sec() >= d->kill_at_sec)
-        delivery_kill(d);
-    if (!supervisor_bury(&d->worker, &wait_status, hear, d))
-        return false;
-    bool delivered = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == PROGRESS_EXIT_OK;
-    if (store_outbox_settle(store, d->id, delivered, &gave_up, &err) != STATUS_OK)
-        log_warning("a webhook's outcome cannot be recorded: %s", err.message);
-    else if (!delivered)
-        log_warning("job %lld: its webhook cannot be called%s: %s", (long long)d->job_id,
-                    gave_up ? ", and will not be again" : "", d->reason[0] ? d->reason : "its time was up");
-    empty(d);
-    return true;
+    if (!d->has_ended) {
+        supervisor_read(&d->worker, hear, d);
+        if (clock_sec() >= d->kill_at_sec)
+            supervisor_signal(&d->worker, SIGKILL);
+        if (!supervisor_bury(&d->worker, &wait_status, hear, d))
+            return false;
+        d->has_ended = true;
+        d->delivered = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == PROGRESS_EXIT_OK;
+        clear_away(d);
+    }
+    return settle(d, store);
+}
+
+void delivery_stop(struct delivery *d, struct store *store) {
+    supervisor_signal(&d->worker, SIGKILL);
+    while (!delivery_listen(d, store) && !d->has_ended)
+        poll(NULL, 0, 5);
+    forget(d);
 }

@@ -1,8 +1,9 @@
 /* delivery.h -- one message of the outbox on its way, by a worker process of its own.
  *
- *      empty ──start──> alive ──(process ends, or its time is up)──> empty
+ *      empty ──start──> alive ──(process ends, or its time is up)──> ended ──settle──> empty
  *
- * What became of it is entered when the process has ended; if that fails the message is sent
+ * settle can fail (the disk of state.db is full): the message stays ended and is settled again later,
+ * so that its receiver is not called over and over. After an end of the daemon before that it is sent
  * again: its Webhook-Id tells the receiver so. */
 #ifndef UNBAKE_JOB_DELIVERY_H
 #define UNBAKE_JOB_DELIVERY_H
@@ -18,13 +19,16 @@ struct delivery {
     struct worker worker;
     char *dir;
     char reason[256]; /* why it failed, by its own words */
+    bool has_ended, delivered; /* its process; the message, then */
+    bool complained;           /* that could not be entered, and the log says so */
 };
 
 /* Starts the message of that row. */
 enum status delivery_start(struct delivery *d, const struct scheduler_config *config,
                            const struct outbox_row *row, struct error *err);
-/* Notices its end, or brings it about. True when it is empty again. */
+/* Notices its end, or brings it about, and enters it. True when it is empty again. */
 bool delivery_listen(struct delivery *d, struct store *store);
-void delivery_kill(struct delivery *d);
+/* Ends it; it is empty then. */
+void delivery_stop(struct delivery *d, struct store *store);
 
 #endif

@@ -304,7 +304,9 @@ static int keep_deadlines(struct scheduler *s) {
     }
     for (size_t i = 0; i < DELIVERIES; i++) {
         const struct delivery *d = &s->delivery[i];
-        if (d->id)
+        if (d->has_ended) /* and could not be entered */
+            sleep = fmin(sleep, RETRY_SEC);
+        else if (d->id)
             sleep = fmin(sleep, d->worker.pid_fd < 0 ? NO_PIDFD_POLL_SEC : fmax(d->kill_at_sec - now, 0.05));
     }
     if (!atomic_load(&s->stopping))
@@ -422,11 +424,8 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         wait_for_something(s, keep_deadlines(s));
     }
     /* What was under way is sent again by the next start. */
-    for (size_t i = 0; i < DELIVERIES; i++) {
-        delivery_kill(&s->delivery[i]);
-        while (!delivery_listen(&s->delivery[i], s->store))
-            poll(NULL, 0, 5);
-    }
+    for (size_t i = 0; i < DELIVERIES; i++)
+        delivery_stop(&s->delivery[i], s->store);
     /* What could not be entered is "running" in the store: the next start queues it again. */
     return STATUS_OK;
 }
