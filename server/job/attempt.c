@@ -77,6 +77,7 @@ void attempt_empty(struct attempt *a) {
     mem_free(a->settings);
     cJSON_Delete(a->problems);
     cJSON_Delete(a->facts);
+    cJSON_Delete(a->untaken);
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
 }
 

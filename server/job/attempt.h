@@ -43,6 +43,7 @@ struct attempt {
     enum status end_status;
     char *end_message, *end_hint;
     cJSON *problems, *facts;      /* of a scene */
+    cJSON *untaken;               /* announced files that the store could not enter; NULL: none */
 };
 
 /* Starts the job, which is queued in the store. STATUS_OK: it has left the queue, and the attempt

@@ -1,6 +1,7 @@
 /* hearing.c -- see hearing.h. */
 #include "server/job/hearing.h"
 
+#include <errno.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -32,35 +33,80 @@ static void enter_event(const struct listener *l, const char *type, const cJSON 
     }
 }
 
-/* The file must be there, whole, and a plain file: what is announced is served to users. */
-static void enter_file(const struct listener *l, const char *type, const cJSON *line) {
-    struct attempt *a = l->attempt;
-    struct error err;
+/* The file must be there, whole, and a plain file: what is announced is served to users. A disk that cannot tell is
+ * asked once more, for the last time when the worker has ended. */
+static enum status put_file(const struct attempt *a, struct store *store, const char *type, const cJSON *line,
+                            bool is_last, struct error *err) {
     const char *name, *sha256, *content_type;
     double bytes;
-    if (a->job_id == 0 || a->event_count++ >= EVENTS_MAX)
-        return;
-    enum status status = json_string(line, "name", type, "", &name, &err);
+    enum status status = json_string(line, "name", type, "", &name, err);
     if (status == STATUS_OK)
-        status = json_string(line, "sha256", type, "", &sha256, &err);
+        status = json_string(line, "sha256", type, "", &sha256, err);
     if (status == STATUS_OK)
-        status = json_string(line, "content_type", type, "application/octet-stream", &content_type,
-                             &err);
+        status = json_string(line, "content_type", type, "application/octet-stream", &content_type, err);
     if (status == STATUS_OK)
-        status = json_number(line, "bytes", type, -1.0, &bytes, &err);
+        status = json_number(line, "bytes", type, -1.0, &bytes, err);
     if (status == STATUS_OK) {
         struct stat info;
         char *path = mem_printf("%s/out/%s", a->dir, name);
-        if (lstat(path, &info) != 0 || !S_ISREG(info.st_mode) || (double)info.st_size != bytes)
-            status = error_set(&err, STATUS_INPUT, "%s is not a file of %.0f bytes", name, bytes);
+        bool is_there = lstat(path, &info) == 0;
+        if (!is_there && errno != ENOENT && !is_last)
+            status = error_set_errno(err, errno, "cannot look at %s", path);
+        else if (!is_there || !S_ISREG(info.st_mode) || (double)info.st_size != bytes)
+            status = error_set(err, STATUS_INPUT, "%s is not a file of %.0f bytes", name, bytes);
         mem_free(path);
     }
     if (status == STATUS_OK)
-        status = store_output_put(l->store, a->job_id, a->number, type, name, (uint64_t)bytes,
-                                  sha256, content_type, &err);
+        status = store_output_put(store, a->job_id, a->number, type, name, (uint64_t)bytes, sha256, content_type, err);
+    return status;
+}
+
+/* Another try would end like this one. */
+static bool is_final(enum status status) {
+    return status == STATUS_OK || status == STATUS_INPUT || status == STATUS_CONFLICT || status == STATUS_NOT_FOUND;
+}
+
+/* A newer file has taken its place. */
+static void drop_untaken(struct attempt *a, const cJSON *line) {
+    const cJSON *name = cJSON_GetObjectItemCaseSensitive(line, "name");
+    for (int i = cJSON_GetArraySize(a->untaken); i-- > 0;)
+        if (cJSON_Compare(name, cJSON_GetObjectItemCaseSensitive(cJSON_GetArrayItem(a->untaken, i), "name"), true))
+            cJSON_DeleteItemFromArray(a->untaken, i);
+}
+
+static void log_file(const struct attempt *a, enum status status, const struct error *err) {
     if (status != STATUS_OK)
-        log_warning("job %lld: its worker announced a file that is not taken: %s",
-                    (long long)a->job_id, err.message);
+        log_warning("job %lld: its worker announced a file that is not taken%s: %s", (long long)a->job_id,
+                    is_final(status) ? "" : " yet", err->message);
+}
+
+static void enter_file(const struct listener *l, const char *type, const cJSON *line) {
+    struct attempt *a = l->attempt;
+    struct error err;
+    if (a->job_id == 0 || a->event_count++ >= EVENTS_MAX)
+        return;
+    drop_untaken(a, line);
+    enum status status = put_file(a, l->store, type, line, false, &err);
+    log_file(a, status, &err);
+    if (is_final(status))
+        return;
+    cJSON *kept = cJSON_Duplicate(line, true);
+    json_add_string(kept, "type", type);
+    a->untaken = a->untaken ? a->untaken : cJSON_CreateArray();
+    cJSON_AddItemToArray(a->untaken, kept);
+}
+
+enum status hearing_make_up(struct attempt *a, struct store *store, struct error *err) {
+    const cJSON *line;
+    while ((line = cJSON_GetArrayItem(a->untaken, 0)) != NULL) {
+        const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(line, "type"));
+        enum status status = put_file(a, store, type, line, true, err);
+        if (!is_final(status))
+            return status;
+        log_file(a, status, err);
+        cJSON_DeleteItemFromArray(a->untaken, 0);
+    }
+    return STATUS_OK;
 }
 
 static void note_end(struct attempt *a, const cJSON *line) {

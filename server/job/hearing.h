@@ -9,4 +9,7 @@
 /* Reads what there is, and notices the worker's end. */
 void hearing_listen(struct attempt *a, struct store *store, struct figures *figures);
 
+/* Enters the files that were announced while the store failed; those that still cannot be stay for another try. */
+enum status hearing_make_up(struct attempt *a, struct store *store, struct error *err);
+
 #endif

@@ -9,6 +9,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/job/hearing.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
 #include "server/worker/progress.h"
@@ -116,13 +117,12 @@ static void judge(const struct attempt *a, struct verdict *v) {
 static enum status settle_memory(const struct attempt *a, struct store *store,
                                  const struct verdict *v, struct error *err) {
     struct buf reason, what;
-    cJSON *settings = NULL;
+    cJSON *settings = cJSON_Parse(a->settings); /* as its order was made of them */
     int step = a->memory_step;
     buf_init(&what, 4096);
     buf_init(&reason, 4096);
     buf_puts(&reason, v->reason);
-    if (json_parse(a->settings, strlen(a->settings), "settings", &settings, NULL) == STATUS_OK &&
-        memory_can_reduce(settings, step, a->thread_count, &what)) {
+    if (memory_can_reduce(settings, step, a->thread_count, &what)) {
         step++;
         buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
     }
@@ -200,8 +200,9 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct figure
     attempt_charge(a, store, figures);
     housekeeping_drop_scraps(a->dir);
     judge(a, &verdict);
-    enum status status = a->job_id ? settle_job(a, store, &verdict, err)
-                                   : settle_check(a, store, &verdict, err);
+    enum status status = hearing_make_up(a, store, err);
+    if (status == STATUS_OK)
+        status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, &verdict, err);
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
