@@ -13,7 +13,9 @@
 #include "common/mem.h"
 
 enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
-    static const char *const names[] = {"checkpoint.db", "checkpoint.db-journal"};
+    /* The journal first: what is left of the two is looked for by the other's name, and a journal must not meet a
+     * database that is not its own. */
+    static const char *const names[] = {"checkpoint.db-journal", "checkpoint.db"};
     enum status status = STATUS_OK;
     for (size_t i = 0; status == STATUS_OK && i < sizeof names / sizeof names[0]; i++) {
         char *path = file_join(dir, names[i]);
