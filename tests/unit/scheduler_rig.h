@@ -39,7 +39,7 @@ static int play(const char *role, const char *dir, int attempt);
 static int play_check(const char *role, const char *dir);
 
 static volatile sig_atomic_t told_to_stop;
-static void on_term(int number) {
+static inline void on_term(int number) {
     (void)number;
     told_to_stop = 1;
 }

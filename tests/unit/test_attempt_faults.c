@@ -190,7 +190,7 @@ static void check_rejected(void) {
         char id[SCENE_ID_SIZE];
         struct attempt a = {0};
         struct job job;
-        snprintf(id, sizeof id, "bbb%d%.60s", i, SCENE_A);
+        snprintf(id, sizeof id, "bbbb%04x%.56s", (unsigned)i, SCENE_A);
         add_scene(id);
         struct job_new new = {.scene_id = id, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3};
         int64_t number;
@@ -251,7 +251,7 @@ static void check_unpacked(void) {
     char id[SCENE_ID_SIZE];
     log_forget();
     for (int i = 0; i < 2; i++) {
-        snprintf(id, sizeof id, "ffff%d%.59s", i, SCENE_A);
+        snprintf(id, sizeof id, "ffff%04x%.56s", (unsigned)i, SCENE_A);
         add_scene(id);
         char *files = mem_printf("%s/scenes/%s/files", dir, id);
         OK(attempt_start_check(&a, &config, id, 1, &err));
