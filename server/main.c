@@ -60,6 +60,7 @@ struct daemon {
     struct listener *listener;
     struct admin *admin;
     struct collector *collector;
+    char address[CONFIG_ADDRESS_SIZE]; /* that it listens on */
     unsigned long watched_rounds; /* of the scheduler, when the watchdog was last fed */
     struct api_library libraries[LIBRARY_COUNT];
 };
@@ -136,8 +137,8 @@ static struct api_config api_options(const struct config *c, const struct api_li
 }
 
 /* *address is where `listen` says, in the caller's memory; *is_loopback: nobody else can reach it. */
-static enum status listener_options(const struct config *c, struct listener_config *network,
-                                    char address[CONFIG_ADDRESS_SIZE], bool *is_loopback, struct error *err) {
+static void listener_options(const struct config *c, struct listener_config *network,
+                             char address[CONFIG_ADDRESS_SIZE], bool *is_loopback) {
     *network = (struct listener_config){
         .address = address,
         .connection_max = (unsigned)c->max_connections,
@@ -146,12 +147,11 @@ static enum status listener_options(const struct config *c, struct listener_conf
         .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec,
                    (double)c->body_min_bytes_per_sec},
     };
-    return config_address(c->listen, address, &network->port, is_loopback, err);
+    config_address(c->listen, address, &network->port, is_loopback, NULL); /* was checked with the rest */
 }
 
 static enum status build(struct daemon *d, struct error *err) {
     const struct config *c = d->config;
-    char address[CONFIG_ADDRESS_SIZE];
     bool is_loopback;
     struct listener_config network;
     struct library list[LIBRARY_COUNT];
@@ -160,9 +160,8 @@ static enum status build(struct daemon *d, struct error *err) {
         d->libraries[i] = (struct api_library){list[i].name, list[i].version};
     const struct scheduler_config work = scheduler_options(c);
     const struct api_config limits = api_options(c, d->libraries);
-    enum status status = listener_options(c, &network, address, &is_loopback, err);
-    if (status == STATUS_OK)
-        status = store_open(&d->store, c->data_dir, err);
+    listener_options(c, &network, d->address, &is_loopback);
+    enum status status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)
         store_keep_events(d->store, (size_t)c->events_per_job);
     if (status == STATUS_OK)
@@ -261,17 +260,11 @@ static void log_start(const struct daemon *d) {
 /* Says where it listens: in the log, on stdout and, where asked for, in a file. */
 static enum status announce(const struct daemon *d, const char *port_file, struct error *err) {
     char text[16];
-    char address[CONFIG_ADDRESS_SIZE];
-    uint16_t port = 0;
-    bool is_loopback;
-    enum status status = config_address(d->config->listen, address, &port, &is_loopback, err);
-    if (status != STATUS_OK)
-        return status;
-    port = listener_port(d->listener);
-    bool is_v6 = strchr(address, ':') != NULL;
-    printf("http%s://%s%s%s:%u\n", *d->config->tls_certificate ? "s" : "", is_v6 ? "[" : "", address, is_v6 ? "]" : "", port);
+    uint16_t port = listener_port(d->listener);
+    bool is_v6 = strchr(d->address, ':') != NULL;
+    printf("http%s://%s%s%s:%u\n", *d->config->tls_certificate ? "s" : "", is_v6 ? "[" : "", d->address, is_v6 ? "]" : "", port);
     fflush(stdout);
-    log_info("listening on %s port %u", address, port);
+    log_info("listening on %s port %u", d->address, port);
     int length = snprintf(text, sizeof text, "%u\n", port);
     return port_file ? file_replace(port_file, text, (size_t)length, err) : STATUS_OK;
 }

@@ -77,8 +77,9 @@ refused 2 'go together' "$build/unbaked" --data "$work/fresh" --set tls_key=x
 refused 1 'access = open is for loopback' "$build/unbaked" --data "$work/fresh" --set access=open --listen 0.0.0.0:0
 unbaked doctor --data "$work/fresh" --set listen=0.0.0.0:1 >"$work/out"; equal $? 1 "doctor's exit status"
 grep -q '^FAIL *tokens' "$work/out" || fail "doctor: $(cat "$work/out")"
-data=$work/open start_daemon --set access=tokens
+data=$work/open start_daemon --set access=tokens --listen 0.0.0.0:0
 call GET /v1/jobs; expect 401 "access = tokens without any"
+grep -q 'warning: without tls_certificate, tokens and scenes cross the network unencrypted' "$work/log" || fail "no warning without TLS"
 stop_daemon
 data=$work/open2; mkdir "$data"; unbaked token add eve --data "$data" >/dev/null
 start_daemon --set access=open --set log_format=logfmt
