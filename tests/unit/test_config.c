@@ -1,7 +1,10 @@
 /* Options: the table, the documented file, faults all at once, addresses. */
 #include "server/config.h"
 
+#include <fcntl.h>
+
 #include "common/mem.h"
+#include "server/invocation.h"
 #include "tests/check.h"
 
 static char *write_file(const char *text) {
@@ -167,10 +170,56 @@ static void check_addresses(void) {
     }
 }
 
+/* What cannot be read, or is no text, is refused as a whole. */
+static void check_files(void) {
+    struct config c;
+    struct buf problems;
+    struct error err;
+    char *path = write_file("");
+    config_init(&c);
+    buf_init(&problems, 65536);
+    CHECK(config_read(&c, path, &problems, &err) == STATUS_OK);
+    int fd = open(path, O_WRONLY | O_CLOEXEC);
+    CHECK(write(fd, "threads = 3\n\0", 13) == 13);
+    close(fd);
+    CHECK(config_read(&c, path, &problems, &err) == STATUS_INPUT && strstr(err.message, "is not a text file"));
+    unlink(path);
+    CHECK(config_read(&c, path, &problems, &err) == STATUS_NOT_FOUND && strstr(err.message, path));
+    CHECK(problems.length == 0 && c.threads == 0);
+    buf_release(&problems);
+    config_release(&c);
+    mem_free(path);
+}
+
+/* The file that commands read where they are told of none: it need not be there, but must be good. */
+static void check_default_file(void) {
+    static const struct flag flags[] = {INVOCATION_FLAGS, {0}};
+    char *good = write_file("threads = 3\n"), *bad = write_file("threads = many\n");
+    const struct {
+        const char *file, *option;
+        int code, threads;
+    } cases[] = {{good, NULL, -1, 3}, {bad, NULL, EXIT_USAGE, 0}, {"/", NULL, EXIT_USAGE, 0}, {"/", "--data=x", -1, 0},
+                 {"/nowhere/unbaked.conf", NULL, -1, 0}, {NULL, NULL, -1, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char *option = cases[i].option ? mem_strdup(cases[i].option) : NULL, *argv[] = {"unbaked", option, NULL};
+        struct invocation in;
+        CHECK_THAT(invocation_read(&in, option ? 2 : 1, argv, flags, cases[i].file) == cases[i].code, "%s", cases[i].file);
+        CHECK(in.config.threads == cases[i].threads);
+        invocation_release(&in);
+        mem_free(option);
+    }
+    unlink(good);
+    unlink(bad);
+    mem_free(good);
+    mem_free(bad);
+}
+
 int main(void) {
     check_defaults();
     check_documented();
     check_faults();
     check_addresses();
+    check_files();
+    check_default_file();
     return check_result();
 }
