@@ -107,7 +107,7 @@ $(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DR
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
 # What a test slips under a program of ours.
-$(B)/tests/%.so: tests/%.c $(wildcard tests/chaos/*.h)
+$(B)/tests/%.so: tests/%.c $(wildcard tests/*.h tests/chaos/*.h)
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -shared -fPIC -o $@ $< -ldl
 

@@ -30,7 +30,7 @@ struct admin {
     void *user;
     int listen_fd, stop_fd;
     pthread_t thread;
-    bool has_thread;
+    bool is_bound, has_thread;
 };
 
 /* --- what is done -------------------------------------------------------------------------- */
@@ -271,8 +271,9 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
     unlink(path); /* of an earlier life: this process holds the folder's lock */
     a->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     /* The mode of a socket that is not yet bound becomes that of the file. */
-    if (a->listen_fd < 0 || a->stop_fd < 0 || fchmod(a->listen_fd, 0600) != 0 ||
-        with_address(data_dir, a->listen_fd, bind) != 0 || listen(a->listen_fd, 16) != 0)
+    a->is_bound = a->listen_fd >= 0 && a->stop_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 &&
+                  with_address(data_dir, a->listen_fd, bind) == 0;
+    if (!a->is_bound || listen(a->listen_fd, 16) != 0)
         status = error_set_errno(err, errno, "cannot listen on %s", path);
     if (status == STATUS_OK) {
         int failed = pthread_create(&a->thread, NULL, serve, a);
@@ -294,6 +295,8 @@ void admin_stop(struct admin *a) {
     if (a->has_thread) {
         eventfd_write(a->stop_fd, 1);
         pthread_join(a->thread, NULL);
+    }
+    if (a->is_bound) {
         char *path = file_join(a->data_dir, "admin.sock");
         unlink(path);
         mem_free(path);

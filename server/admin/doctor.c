@@ -227,12 +227,15 @@ static void check_tls(struct doctor *d) {
              : "none: tokens and scenes cross the network unencrypted");
         return;
     }
-    if (tls_new(&tls, c->tls_certificate, c->tls_key, &err) != STATUS_OK ||
-        tls_days_left(c->tls_certificate, &days, &err) != STATUS_OK) {
+    enum status status = tls_new(&tls, c->tls_certificate, c->tls_key, &err);
+    if (status == STATUS_OK) {
+        tls_free(tls);
+        status = tls_days_left(c->tls_certificate, &days, &err);
+    }
+    if (status != STATUS_OK) {
         tell(d, BAD, "tls", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
         return;
     }
-    tls_free(tls);
     tell(d, days < 0 ? BAD : days < 14 ? WARN : GOOD, "tls", "the certificate %s %.0f days",
          days < 0 ? "has expired, for" : "is good for", days < 0 ? -days : days);
     if (stat(c->tls_key, &info) == 0 && info.st_mode & 07)
