@@ -47,9 +47,8 @@ static void release(png_structp png, png_voidp memory) {
 
 static void read_failed(png_structp png, png_const_charp message) {
     struct reader *r = png_get_error_ptr(png);
-    if (r->status == STATUS_OK)
-        r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s%s%s", r->source->name,
-                              message, r->warning[0] ? "; " : "", r->warning);
+    r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s%s%s", r->source->name, message,
+                          r->warning[0] ? "; " : "", r->warning);
     longjmp(png_jmpbuf(png), 1);
 }
 
@@ -199,8 +198,7 @@ struct writer {
 
 static void write_failed(png_structp png, png_const_charp message) {
     struct writer *w = png_get_error_ptr(png);
-    if (w->status == STATUS_OK)
-        w->status = error_set(w->err, STATUS_INTERNAL, "cannot write %s: %s", w->path, message);
+    w->status = error_set(w->err, STATUS_INTERNAL, "cannot write %s: %s", w->path, message);
     longjmp(png_jmpbuf(png), 1);
 }
 

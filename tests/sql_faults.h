@@ -50,6 +50,16 @@ static inline void sql_faults_arm(long n) {
     sql_faults_arm_only(NULL, n, false);
 }
 
+/* Until it is mended all calls fail as a disk does that neither reads nor writes. */
+static inline void sql_break(void) {
+    sql_faults_arm_only(NULL, SQL_FAULTS, true);
+    atomic_store(&sql_faults_left, 1);
+}
+
+static inline void sql_mend(void) {
+    atomic_store(&sql_faults_left, 0);
+}
+
 /* One more call; whether it is the one that fails, or comes after it (`left` stays below 0 then). */
 static inline bool faults_strike(atomic_long *left, bool stays) {
     long before = atomic_load(left);

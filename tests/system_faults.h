@@ -1,11 +1,12 @@
 /* system_faults.h -- for one file of a test: calls of the system that the daemon makes, before libc's own. The n-th call
- * fails without being made, once or from then on; of all or of those of one name. What SQLite calls does not count, nor
+ * fails without being made, once or from then on; of all or of those of some names. What SQLite calls does not count, nor
  * does what is done by descriptors to anything but files and folders, or to the standard streams. */
 #ifndef UNBAKE_TESTS_SYSTEM_FAULTS_H
 #define UNBAKE_TESTS_SYSTEM_FAULTS_H
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -23,7 +24,7 @@
 
 static atomic_long system_faults_left; /* calls until one fails; 0: none does */
 static int system_fault;               /* errno, then */
-static const char *system_faults_only; /* the call that counts; NULL: all do */
+static const char *system_faults_only; /* the calls that count, with blanks between; NULL: all do */
 static bool system_faults_stay;        /* all later ones fail, too */
 
 /* The n-th call from now on fails, and if `stays` all that follow, by EIO or ENOSPC in turn. */
@@ -43,8 +44,30 @@ static inline bool system_faults_lift(void) {
     return atomic_exchange(&system_faults_left, 0) <= 0;
 }
 
+/* Until they are mended all these calls fail. */
+static inline void system_break(const char *calls, int fault) {
+    system_faults_arm_only(calls, LONG_MAX, true);
+    system_fault = fault;
+    atomic_store(&system_faults_left, 1);
+}
+
+static inline void system_mend(void) {
+    atomic_store(&system_faults_left, 0);
+}
+
+static inline bool is_among(const char *name, const char *names) {
+    size_t length = strlen(name);
+    for (const char *at = names; *at; at += strspn(at, " ")) {
+        size_t word = strcspn(at, " ");
+        if (word == length && memcmp(at, name, length) == 0)
+            return true;
+        at += word;
+    }
+    return false;
+}
+
 static inline bool system_fails(const char *name) {
-    if (faults_are_off || (system_faults_only && strcmp(name, system_faults_only) != 0) ||
+    if (faults_are_off || (system_faults_only && !is_among(name, system_faults_only)) ||
         !faults_strike(&system_faults_left, system_faults_stay))
         return false;
     errno = system_fault;
@@ -73,6 +96,7 @@ SYSTEM_CALL(int, fdatasync, -1, true, (int fd), fd)
 SYSTEM_CALL(int, flock, -1, true, (int fd, int operation), fd, operation)
 SYSTEM_CALL(pid_t, fork, -1, true, (void))
 SYSTEM_CALL(int, fstat, -1, is_file(fd), (int fd, struct stat *info), fd, info)
+SYSTEM_CALL(int, fstatat, -1, true, (int folder, const char *path, struct stat *info, int flags), folder, path, info, flags)
 SYSTEM_CALL(int, fsync, -1, true, (int fd), fd)
 SYSTEM_CALL(int, ftruncate, -1, true, (int fd, off_t length), fd, length)
 SYSTEM_CALL(ssize_t, getrandom, -1, true, (void *data, size_t length, unsigned flags), data, length, flags)
@@ -89,7 +113,7 @@ SYSTEM_CALL(int, pthread_create, errno, true,
             user)
 SYSTEM_CALL(ssize_t, pwrite, -1, is_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length,
             at)
-SYSTEM_CALL(ssize_t, read, -1, is_file(fd), (int fd, void *data, size_t length), fd, data, length)
+SYSTEM_CALL(struct dirent *, readdir, NULL, true, (DIR *dir), dir)
 SYSTEM_CALL(int, rename, -1, true, (const char *from, const char *to), from, to)
 SYSTEM_CALL(int, setegid, -1, true, (gid_t gid), gid)
 SYSTEM_CALL(int, seteuid, -1, true, (uid_t uid), uid)
@@ -126,6 +150,29 @@ int fcntl(int fd, int command, ...) {
     void *argument = va_arg(args, void *);
     va_end(args);
     return system_fails("fcntl") ? -1 : (int)syscall(SYS_fcntl, fd, command, argument);
+}
+
+/* Where "lie" is what fails, files have not what was written. */
+ssize_t read(int fd, void *data, size_t length) {
+    if (is_file(fd) && system_fails("read"))
+        return -1;
+    __typeof__(read) *call;
+    *(void **)&call = dlsym(RTLD_NEXT, "read");
+    ssize_t got = call(fd, data, length);
+    if (got > 0 && system_faults_only && is_file(fd) && system_fails("lie"))
+        *(char *)data ^= 1;
+    return got;
+}
+
+/* It is closed, but what was written to it may be lost. Fails only where it is named. */
+int close(int fd) {
+    bool is_struck = system_faults_only && system_fails("close");
+    __typeof__(close) *call;
+    *(void **)&call = dlsym(RTLD_NEXT, "close");
+    int result = call(fd);
+    if (is_struck)
+        errno = system_fault;
+    return is_struck ? -1 : result;
 }
 
 #endif

@@ -8,7 +8,6 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/log.h"
@@ -37,19 +36,16 @@ static enum status open_file(struct intake *e, struct error *err) {
 
 /* Hashes what lies in the file from e->received to its end: written, but never counted. */
 static enum status believe_tail(struct intake *e, struct error *err) {
-    struct stat info;
-    if (fstat(e->fd, &info) != 0)
-        return error_set_errno(err, errno, "cannot look at upload %s", e->id);
-    uint64_t end = (uint64_t)info.st_size < e->length ? (uint64_t)info.st_size : e->length;
     char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
-    while (status == STATUS_OK && e->received < end) {
-        uint64_t left = end - e->received;
-        ssize_t got = pread(e->fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)e->received);
+    ssize_t got = 1;
+    while (got != 0 && e->received < e->length) {
+        uint64_t left = e->length - e->received;
+        got = pread(e->fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)e->received);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got <= 0) {
-            status = error_set_errno(err, got < 0 ? errno : EIO, "cannot read upload %s", e->id);
+        if (got < 0) {
+            status = error_set_errno(err, errno, "cannot read upload %s", e->id);
             break;
         }
         sha256_update(&e->hash, chunk, (size_t)got);

@@ -104,12 +104,12 @@ static bool find_scene(struct api *api, const struct request *r, const char *id,
         problem_param(params, "scene", NULL, "%s", err.message);
     else if (status != STATUS_OK)
         *refusal = problem_from(r, &err);
-    if (status != STATUS_OK)
-        return false;
-    if (row->state != SCENE_REJECTED)
+    else if (row->state != SCENE_REJECTED)
         return true;
-    problem_param(params, "scene", "GET /v1/scenes/{id} lists what is wrong with it", "was rejected");
-    scene_row_release(row);
+    else {
+        problem_param(params, "scene", "GET /v1/scenes/{id} lists what is wrong with it", "was rejected");
+        scene_row_release(row);
+    }
     return false;
 }
 
@@ -355,6 +355,18 @@ struct response *jobs_retry(struct api *api, struct request *r) {
 
 /* --- extending --------------------------------------------------------------------------- */
 
+/* What the database has as the job's settings: as they were given, and with all that they leave out. *given is
+ * the caller's. */
+static enum status read_settings(const struct job *job, cJSON **given, struct settings *full, struct error *err) {
+    enum status status = json_parse(job->settings, strlen(job->settings), "the settings", given, err);
+    if (status == STATUS_OK)
+        status = settings_apply(full, *given, NULL, err);
+    if (status == STATUS_OK)
+        return status;
+    error_prefix(err, "job %lld", (long long)job->id);
+    return err->status = STATUS_CORRUPT; /* they were checked when the job was made */
+}
+
 /* The job's settings with its limit, of iterations or of time, put off by what the body says;
  * NULL, and *refusal, where that makes no sense. The caller's (mem_free). */
 static char *longer_settings(const struct request *r, const struct job *job, struct response **refusal) {
@@ -363,12 +375,12 @@ static char *longer_settings(const struct request *r, const struct job *job, str
     struct settings full;
     char *text = NULL;
     settings_init(&full);
-    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK ||
-        json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, &err) != STATUS_OK) {
+    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK) {
         *refusal = problem(r, 400, "%s", err.message);
-    } else if (settings_apply(&full, settings, NULL, &err) != STATUS_OK || !cJSON_IsObject(body) ||
-               cJSON_GetArraySize(body) != 1) {
+    } else if (!cJSON_IsObject(body) || cJSON_GetArraySize(body) != 1) {
         *refusal = problem(r, 400, "the request body is not {\"iterations\": N} or {\"time_limit_sec\": SEC}");
+    } else if (read_settings(job, &settings, &full, &err) != STATUS_OK) {
+        *refusal = problem_from(r, &err);
     } else {
         /* The limit that the job has is the one that can be put off. */
         const char *limit = settings_number(&full, "iterations") > 0 ? "iterations" : "time_limit_sec";

@@ -51,7 +51,7 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
         status = sql_int(&store->sql, 0, &last, err,
                          "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC LIMIT 1 OFFSET 1",
                          "i", job_id);
-        if (status == STATUS_OK && last > 0)
+        if (status == STATUS_OK) /* before 0 there is none */
             status = prune_job(store, job_id, last, err);
         if (status == STATUS_OK)
             status = sql_run(&store->sql, err, "UPDATE jobs SET events_gone = 1 WHERE id = ?", "i",

@@ -281,14 +281,10 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
         error_set(err, STATUS_CONFLICT, "a job still uses scene %s", id);
         status = error_hint(err, "Cancel the job or wait for its end.");
     }
-    if (status == STATUS_OK && dry_run)
-        ; /* this far only */
-    else if (status == STATUS_OK && others)
-        status = sql_run(&store->sql, err,
-                         "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id,
-                         owner_id);
-    else if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
+    if (status == STATUS_OK && !dry_run)
+        status = others ? sql_run(&store->sql, err, "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id,
+                                  owner_id)
+                        : sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
     status = store_end(store, status, 0, err);
     *is_gone = status == STATUS_OK && !others;
     return status;

@@ -38,17 +38,12 @@ struct present {
     int attempt, attempts_left;
 };
 
-/* Locks, begins and reads the job. On an error everything is undone already. */
-static enum status job_begin(struct store *store, int64_t id, struct present *now,
-                             struct error *err) {
+/* Inside a transaction: reads the job. */
+static enum status look(struct store *store, int64_t id, struct present *now, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
-    enum status status = store_begin(store, err);
-    if (status != STATUS_OK)
-        return status;
-    status = sql_first(&store->sql, &stmt, &found, err,
-                       "SELECT state, wanted, attempt, attempts_left FROM jobs WHERE id = ?", "i",
-                       id);
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
+                                   "SELECT state, wanted, attempt, attempts_left FROM jobs WHERE id = ?", "i", id);
     if (found) {
         *now = (struct present){
             .id = id,
@@ -61,6 +56,16 @@ static enum status job_begin(struct store *store, int64_t id, struct present *no
     } else if (status == STATUS_OK) {
         status = error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)id);
     }
+    return status;
+}
+
+/* Locks, begins and reads the job. On an error everything is undone already. */
+static enum status job_begin(struct store *store, int64_t id, struct present *now,
+                             struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = look(store, id, now, err);
     return status == STATUS_OK ? status : store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
@@ -324,58 +329,56 @@ enum status store_job_block(struct store *store, int64_t id, int attempt, const 
     return finish(store, id, attempt, JOB_PAUSED, reason, hint, err);
 }
 
+/* Inside a transaction: gives one such job its reason. *id: which; 0: there was none. */
+static enum status explain_one(struct store *store, const char *reason, const char *prefix, const char *hint, int64_t *id,
+                               struct error *err) {
+    struct present now;
+    enum status status = sql_int(&store->sql, 0, id, err,
+                                 "SELECT id FROM jobs WHERE state = ?1 AND reason <> ?2"
+                                 " AND (?2 <> '' OR substr(reason, 1, length(?3)) = ?3) LIMIT 1",
+                                 "ntt", (int)JOB_QUEUED, reason, prefix);
+    if (status != STATUS_OK || *id == 0)
+        return status;
+    status = look(store, *id, &now, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE jobs SET revision = revision + 1, reason = ?, hint = ? WHERE id = ?",
+                         "tti", reason, hint, *id);
+    return status == STATUS_OK ? append_state(store, &now, reason, hint, err) : status;
+}
+
 enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
                               const char *hint, struct error *err) {
-    for (;;) {
+    for (;;) { /* a transaction each: others get their turns in between */
         int64_t id;
-        struct present now;
-        store_lock(store);
-        enum status status =
-            sql_int(&store->sql, 0, &id, err,
-                    "SELECT id FROM jobs WHERE state = ?1 AND reason <> ?2"
-                    " AND (?2 <> '' OR substr(reason, 1, length(?3)) = ?3) LIMIT 1",
-                    "ntt", (int)JOB_QUEUED, reason, prefix);
-        store_unlock(store);
+        enum status status = store_begin(store, err);
+        if (status != STATUS_OK)
+            return status;
+        status = explain_one(store, reason, prefix, hint, &id, err);
+        status = store_end(store, status, id ? id : STORE_NOTHING_CHANGED, err);
         if (status != STATUS_OK || id == 0)
-            return status;
-        status = job_begin(store, id, &now, err);
-        if (status == STATUS_NOT_FOUND)
-            continue; /* its user was faster */
-        if (status != STATUS_OK)
-            return status;
-        if (now.state == JOB_QUEUED)
-            status = sql_run(&store->sql, err,
-                             "UPDATE jobs SET revision = revision + 1, reason = ?, hint = ? WHERE id = ?",
-                             "tti", reason, hint, id);
-        if (status == STATUS_OK && now.state == JOB_QUEUED)
-            status = append_state(store, &now, reason, hint, err);
-        status = store_end(store, status, id, err);
-        if (status != STATUS_OK)
             return status;
     }
 }
 
+static enum status requeue_one(struct store *store, int64_t *id, struct error *err) {
+    struct present now;
+    enum status status = sql_int(&store->sql, 0, id, err, "SELECT id FROM jobs WHERE state = ? LIMIT 1", "n",
+                                 (int)JOB_RUNNING);
+    if (status != STATUS_OK || *id == 0)
+        return status;
+    status = look(store, *id, &now, err);
+    return status == STATUS_OK ? move(store, &now, JOB_QUEUED, "the daemon was restarted", "", err) : status;
+}
+
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err) {
-    *requeued = 0;
-    for (;;) {
+    for (*requeued = 0;; ++*requeued) {
         int64_t id;
-        struct present now;
-        store_lock(store);
-        enum status status =
-            sql_int(&store->sql, 0, &id, err, "SELECT id FROM jobs WHERE state = ? LIMIT 1", "n",
-                    (int)JOB_RUNNING);
-        store_unlock(store);
-        if (status != STATUS_OK || id == 0)
-            return status;
-        status = job_begin(store, id, &now, err);
-        if (status == STATUS_OK) {
-            status = now.state == JOB_RUNNING
-                         ? move(store, &now, JOB_QUEUED, "the daemon was restarted", "", err)
-                         : STATUS_OK;
-            status = store_end(store, status, id, err);
-        }
+        enum status status = store_begin(store, err);
         if (status != STATUS_OK)
             return status;
-        ++*requeued;
+        status = requeue_one(store, &id, err);
+        status = store_end(store, status, id ? id : STORE_NOTHING_CHANGED, err);
+        if (status != STATUS_OK || id == 0)
+            return status;
     }
 }
