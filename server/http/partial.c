@@ -30,6 +30,8 @@ static enum status place(struct partials *p, const struct upload_row *row, const
     enum status status = STATUS_OK;
     if (access(path, F_OK) == 0 || errno != ENOENT)
         status = upload_place(api, path, scene_id, err);
+    else /* there, but is that on disk? */
+        status = upload_sync_place(api, scene_id, err);
     if (status == STATUS_OK)
         status = store_scene_add(api->store, scene_id, row->name, row->length, row->owner_id,
                                  &existed, err);

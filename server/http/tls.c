@@ -72,7 +72,10 @@ static enum status parse(const struct tls *tls, struct pair *pair, const gnutls_
     if (status != STATUS_OK)
         return status;
     unsigned count = CHAIN_MAX;
-    int code = gnutls_pcert_list_import_x509_raw(pair->chain, &count, chain, GNUTLS_X509_FMT_PEM, 0);
+    int code = gnutls_pcert_list_import_x509_raw(pair->chain, &count, chain, GNUTLS_X509_FMT_PEM,
+                                                 GNUTLS_X509_CRT_LIST_IMPORT_FAIL_IF_EXCEED);
+    if (code == GNUTLS_E_SHORT_MEMORY_BUFFER)
+        return error_set(err, STATUS_INPUT, "%s has more than %d certificates", tls->certificate_file, CHAIN_MAX);
     if (code < 0)
         return failed(code, tls->certificate_file, err);
     pair->count = count;

@@ -133,6 +133,17 @@ struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_
     return problem_from(r, &err);
 }
 
+enum status upload_sync_place(struct api *api, const char *id, struct error *err) {
+    char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
+    char *archive = file_join(dir, "archive");
+    enum status status = file_sync_parent(archive, err);
+    if (status == STATUS_OK)
+        status = file_sync_parent(dir, err);
+    mem_free(archive);
+    mem_free(dir);
+    return status;
+}
+
 enum status upload_place(struct api *api, const char *path, const char *id, struct error *err) {
     char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
     char *archive = file_join(dir, "archive");
@@ -141,13 +152,9 @@ enum status upload_place(struct api *api, const char *path, const char *id, stru
         status = error_set_errno(err, errno, "cannot set the mode of %s", path);
     if (status == STATUS_OK && rename(path, archive) != 0)
         status = error_set_errno(err, errno, "cannot move the upload to %s", archive);
-    if (status == STATUS_OK)
-        status = file_sync_parent(archive, err);
-    if (status == STATUS_OK)
-        status = file_sync_parent(dir, err);
     mem_free(archive);
     mem_free(dir);
-    return status;
+    return status == STATUS_OK ? upload_sync_place(api, id, err) : status;
 }
 
 enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err) {

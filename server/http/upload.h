@@ -24,6 +24,8 @@ struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_
 enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err);
 /* Moves the file `path`, which is whole and synced, to where the archive of scene `id` belongs. */
 enum status upload_place(struct api *api, const char *path, const char *id, struct error *err);
+/* That the archive of scene `id` has its place is on disk: after an upload_place that failed half-way. */
+enum status upload_sync_place(struct api *api, const char *id, struct error *err);
 
 uint64_t upload_bytes(const struct upload *u);
 void upload_free(struct upload *u); /* NULL is fine */
