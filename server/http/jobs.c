@@ -358,7 +358,7 @@ struct response *jobs_retry(struct api *api, struct request *r) {
 /* What the database has as the job's settings: as they were given, and with all that they leave out. *given is
  * the caller's. */
 static enum status read_settings(const struct job *job, cJSON **given, struct settings *full, struct error *err) {
-    enum status status = json_parse(job->settings, strlen(job->settings), "the settings", given, err);
+    enum status status = json_parse(job->settings, strlen(job->settings), "the text of its settings", given, err);
     if (status == STATUS_OK)
         status = settings_apply(full, *given, NULL, err);
     if (status == STATUS_OK)

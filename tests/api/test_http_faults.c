@@ -141,6 +141,7 @@ static const struct step {
     {"GET", "/v1/uploads/{u}", "", "", NULL, false},
     {"PATCH", "/v1/uploads/{u}", JSON, "{\"pinned\":true}", NULL, false},
     {"PATCH", "/v1/uploads/{u}", PART, NULL, new_upload, false},
+    {"PATCH", "/v1/uploads/{u}", PART_CHECKED "ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n", "abc", new_upload, false},
     {"DELETE", "/v1/uploads/{u}?dry_run=1", TUS, "", new_upload, false},
     {"DELETE", "/v1/uploads/{u}", TUS, "", new_upload, false},
     {"POST", "/v1/jobs", JSON, "{\"scene\":\"" RIG_SCENE "\"}", queued_job, false},
@@ -165,11 +166,15 @@ static const struct step {
     {"GET", "/v1/jobs/{j}/events?follow=0", "", "", queued_job, true},
     {"GET", "/v1/events?after=0&follow=0", "", "", NULL, true},
     {"GET", "/v1/events?follow=0", "", "", NULL, true},
-    {"DELETE", "/v1/jobs/{j}?dry_run=1", "", "", ended_job, false},
-    {"DELETE", "/v1/jobs/{j}", "", "", ended_job, false},
+    {"DELETE", "/v1/jobs/{j}?dry_run=1", "", "", resumable_job, false},
+    {"DELETE", "/v1/jobs/{j}", "", "", resumable_job, false},
     {"POST", "/v1/collect?dry_run=1", "", "", expired_things, false},
-    {"POST", "/v1/collect", "", "", expired_things, true},
+    {"POST", "/v1/collect?dry_run=0", "", "", expired_things, true},
 };
+
+/* With a token that there is. */
+static char login[TOKEN_SIZE + 20];
+static const struct step login_step = {"POST", "/v1/session", JSON, login, NULL, false};
 
 /* Its n-th call of SQLite, or of the system, fails; false where it has fewer. */
 static bool strike(const struct step *step, bool is_sql, long n) {
@@ -199,11 +204,17 @@ static bool strike(const struct step *step, bool is_sql, long n) {
     return struck;
 }
 
+static long strike_each(const struct step *step, bool is_sql) {
+    long calls = 0;
+    for (long n = 1; strike(step, is_sql, n) && check_failed_count == 0; n++)
+        calls++;
+    return calls;
+}
+
 static long strike_all(bool is_sql) {
     long calls = 0;
     for (size_t i = 0; i < sizeof steps / sizeof *steps && check_failed_count == 0; i++)
-        for (long n = 1; strike(&steps[i], is_sql, n) && check_failed_count == 0; n++)
-            calls++;
+        calls += strike_each(&steps[i], is_sql);
     return calls;
 }
 
@@ -234,6 +245,32 @@ static void check_refusals(void) {
         CHECK_THAT(status == bad[i].status && strstr(buf_text(&reply), "\"detail\":\""), "%s %s (%s): %d, not %d", bad[i].method,
                    bad[i].path, bad[i].body, status, bad[i].status);
         buf_release(&reply);
+    }
+}
+
+static void check_answer(const char *method, const char *path, const char *fields, const char *body, int wanted,
+                         const char *word) {
+    struct buf reply;
+    int status = ask(method, path, fields, body, strlen(body), &reply);
+    CHECK_THAT(status == wanted && strstr(buf_text(&reply), word), "%d, not %d with \"%s\": %s", status, wanted, word,
+               buf_text(&reply));
+    buf_release(&reply);
+}
+
+static void check_metadata(void) {
+    char *fields = mem_printf(TUS "Upload-Length: 1\r\nUpload-Metadata: name %0996d\r\n", 0);
+    check_answer("POST", "/v1/uploads", fields, "", 400, "longer than 1000 bytes");
+    mem_free(fields);
+}
+
+/* What the database has as a job's settings makes no sense: that is no fault of the client's. */
+static void check_garbled(void) {
+    static const char *const settings[] = {"{", "[]", "{\"no_such\":1}"};
+    bool replayed;
+    for (size_t i = 0; i < sizeof settings / sizeof *settings; i++) {
+        struct job_new new = {.scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = settings[i], .max_attempts = 2};
+        rig_must(store_job_add(rig.store, &new, 1000, &job, &replayed, &err), &err, "store_job_add");
+        check_answer("POST", "/v1/jobs/{j}/extend", JSON, "{\"time_limit_sec\":60}", 500, "its log says more");
     }
 }
 
@@ -290,12 +327,15 @@ int main(void) {
     log_set_level(LOG_ERROR);
     rig.api->config.queue_limit = 100000;
     check_refusals();
+    check_metadata();
+    check_garbled();
     calls += strike_all(true) + strike_all(false);
     rig_must(store_keep(rig.store, 0, 0, 3600000, &err), &err, "store_keep");
     rig_must(store_token_add(rig.store, "root", ROLE_ADMIN, token, &id, &err), &err, "token");
     snprintf(token_field, sizeof token_field, "Authorization: Bearer %s\r\n", token);
+    snprintf(login, sizeof login, "{\"token\":\"%s\"}", token);
     rig.api->config.user_max_bytes = (uint64_t)1 << 30;
-    calls += strike_all(true);
+    calls += strike_all(true) + strike_each(&login_step, true);
     printf("%ld calls failed\n", calls);
     rig_stop(&rig);
     return check_result();
