@@ -376,6 +376,7 @@ struct stream *hub_subscribe(struct api *api, const struct caller *caller, const
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
     s->base.close = subscriber_close;
+    s->base.must_say = what->revision != 0;
     s->api = api;
     s->caller = *caller;
     s->what = *what;

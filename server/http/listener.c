@@ -46,6 +46,7 @@ struct exchange {
     /* Under listener->mutex: */
     bool is_waiting;            /* a stream; suspended until it is woken */
     bool is_woken;              /* while it was not waiting */
+    bool is_owed;               /* a clerk's reply, a short one, is on its way */
     struct exchange *next, *previous; /* among the waiting streams, or in the clerks' queue */
 };
 
@@ -64,6 +65,7 @@ struct listener {
     struct exchange *waiting;                /* streams, doubly linked */
     struct exchange *queue_first, *queue_last; /* for the clerks, singly linked */
     size_t stream_count;                     /* open, waiting or not */
+    size_t owed_count;                       /* exchanges that are owed a reply */
 };
 
 const char *listener_library_version(void) {
@@ -134,16 +136,17 @@ static bool is_closing(struct listener *l) {
 }
 
 static ssize_t read_stream(void *user, uint64_t position, char *to, size_t size) {
-    (void)position;
     struct exchange *x = user;
+    ssize_t end = position == 0 && x->reply->stream->must_say ? MHD_CONTENT_READER_END_WITH_ERROR
+                                                              : MHD_CONTENT_READER_END_OF_STREAM;
     for (;;) {
         if (is_closing(x->listener))
-            return MHD_CONTENT_READER_END_OF_STREAM;
+            return end;
         ssize_t got = x->reply->stream->read(x->reply->stream, to, size);
         if (got > 0)
             return got;
         if (got < 0)
-            return MHD_CONTENT_READER_END_OF_STREAM;
+            return end;
         if (wait_for_wake(x))
             return 0;
     }
@@ -248,8 +251,10 @@ static void *clerk(void *user) {
         x->next = NULL;
         pthread_mutex_unlock(&l->mutex);
         x->reply = x->is_resting ? routes_rest(l->api, &x->request) : routes_finish(l->api, &x->request);
-        MHD_resume_connection(x->connection);
         pthread_mutex_lock(&l->mutex);
+        x->is_owed = x->reply && x->reply->fd < 0;
+        l->owed_count += x->is_owed;
+        MHD_resume_connection(x->connection);
     }
     pthread_mutex_unlock(&l->mutex);
     return NULL;
@@ -416,6 +421,10 @@ static void on_completed(void *user, struct MHD_Connection *connection, void **c
     if (!x)
         return;
     *context = NULL;
+    pthread_mutex_lock(&l->mutex);
+    l->owed_count -= x->is_owed;
+    pthread_cond_broadcast(&l->changed);
+    pthread_mutex_unlock(&l->mutex);
     int status = x->reply ? x->reply->status : 0;
     tally_add(l->api->tally, &x->request, status);
     log_request(x, status, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
@@ -553,11 +562,18 @@ void listener_quiesce(struct listener *l) {
         shutdown(fd, SHUT_RDWR);
 }
 
-/* Ends the streams and the clerks' work, and waits for both: nothing is suspended after. */
-static void settle(struct listener *l) {
+/* Waits until none is left; for clients that do not read, not long enough; for others, plenty. */
+static void wait_for_none(struct listener *l, const size_t *count) {
     struct timespec until;
     clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_sec += 3; /* for streams whose clients do not read, too long; for others, plenty */
+    until.tv_sec += 3;
+    while (*count > 0 && pthread_cond_clockwait(&l->changed, &l->mutex, CLOCK_MONOTONIC, &until) == 0)
+        ;
+}
+
+/* Ends the streams and the clerks' work, and waits for both: nothing is suspended after, and what was done is
+ * answered. */
+static void settle(struct listener *l) {
     pthread_mutex_lock(&l->mutex);
     l->is_closing = true;
     l->clerks_stop = true;
@@ -567,11 +583,13 @@ static void settle(struct listener *l) {
         unlink_waiting(l, x);
         MHD_resume_connection(x->connection);
     }
-    while (l->stream_count > 0 && pthread_cond_clockwait(&l->changed, &l->mutex, CLOCK_MONOTONIC, &until) == 0)
-        ;
+    wait_for_none(l, &l->stream_count);
     pthread_mutex_unlock(&l->mutex);
     for (size_t i = 0; i < l->clerk_count; i++)
         pthread_join(l->clerks[i], NULL);
+    pthread_mutex_lock(&l->mutex);
+    wait_for_none(l, &l->owed_count);
+    pthread_mutex_unlock(&l->mutex);
 }
 
 void listener_stop(struct listener *l) {

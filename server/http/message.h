@@ -58,6 +58,7 @@ struct stream {
     /* Bytes put into to[size]; 0: nothing now, call again after stream_wake; -1: the end. */
     ssize_t (*read)(struct stream *s, char *to, size_t size);
     void (*close)(struct stream *s); /* frees s */
+    bool must_say; /* without a byte it must not look whole: its connection is cut */
     /* Set by the listener before the first read; thread-safe; may be called until close, also
      * when the stream is not waiting. */
     void (*wake)(void *waker);

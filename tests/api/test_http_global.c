@@ -126,6 +126,28 @@ static void check_waiting(void) {
     mem_free(path);
 }
 
+/* The job is removed meanwhile: there is nothing to say, and that does not look like a whole reply. */
+static void check_waiting_in_vain(void) {
+    struct buf reply;
+    struct job now;
+    int64_t job = rig_job(&rig);
+    rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
+    rig_must(store_job_get(rig.store, job, &now, &err), &err, "store_job_get");
+    char *request = mem_printf("GET /v1/jobs/%lld?wait=60 HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: \"rev-%lld\"\r\n\r\n",
+                               (long long)job, (long long)now.revision);
+    job_release(&now);
+    int fd = rig_connect(&rig);
+    buf_init(&reply, 1 << 16);
+    rig_send(fd, request, strlen(request));
+    rig_receive(fd, &reply, "\r\n\r\n");
+    rig_must(store_job_delete(rig.store, job, &err), &err, "store_job_delete");
+    rig_receive(fd, &reply, NULL);
+    CHECK_STRING(rig_body(&reply), "");
+    close(fd);
+    buf_release(&reply);
+    mem_free(request);
+}
+
 /* The oldest events are gone: whoever asks for them is told so, and goes on without a gap. */
 static void check_resync(void) {
     struct buf reply;
@@ -196,6 +218,7 @@ int main(void) {
     rig_start(&rig, &rig_patient, 60);
     rig_scene(&rig);
     check_waiting();
+    check_waiting_in_vain();
     check_resync();
     rig_stop(&rig);
     rig_start(&rig, &rig_patient, 60);

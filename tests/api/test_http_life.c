@@ -1,0 +1,124 @@
+/* test_http_life.c -- the HTTP side starts where it can, and stops without losing what it was given. */
+#include <pthread.h>
+
+#include "server/http/intake.h"
+#include "server/http/partial.h"
+#include "tests/api/rig.h"
+
+#define BYTES 1000
+#define HALF (BYTES / 2)
+
+static struct rig rig;
+static struct error err;
+
+static void check_start(void) {
+    static const char *const addresses[] = {"nowhere", "localhost:80", "127.0.0.256", ""};
+    for (size_t i = 0; i < sizeof addresses / sizeof *addresses; i++) {
+        struct listener_config network = {.address = addresses[i], .connection_max = 9, .limits = rig_patient};
+        struct listener *listener;
+        enum status status = listener_start(&listener, &network, rig.api, &err);
+        CHECK_THAT(status == STATUS_INPUT && strstr(err.message, "cannot listen on"), "\"%s\": %s, %s", addresses[i],
+                   status_name(status), err.message);
+    }
+}
+
+/* --- stopping -------------------------------------------------------------------------------------- */
+
+static void create(char id[UPLOAD_ID_SIZE]) {
+    struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
+    rig_must(partial_create(rig.api->partials, &row, &err), &err, "partial_create");
+    memcpy(id, row.id, UPLOAD_ID_SIZE);
+    upload_row_release(&row);
+}
+
+/* Sends all of the upload but `left` bytes of value `byte`; the connection. */
+static int send_all_but(const char *id, char byte, size_t left) {
+    char bytes[BYTES];
+    unsigned long long before = atomic_load(&rig.api->uploaded_bytes);
+    int fd = rig_connect(&rig);
+    char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nTus-Resumable: 1.0.0\r\n"
+                            "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
+                            "Content-Length: %d\r\n\r\n", id, BYTES);
+    memset(bytes, byte, sizeof bytes);
+    rig_send(fd, head, strlen(head));
+    rig_send(fd, bytes, BYTES - left);
+    while (atomic_load(&rig.api->uploaded_bytes) < before + BYTES - left)
+        usleep(1000);
+    mem_free(head);
+    return fd;
+}
+
+static void check_whole(const char *id) {
+    struct upload_row row;
+    rig_must(store_upload_get(rig.store, id, &row, NULL, 0, &err), &err, "store_upload_get");
+    CHECK_THAT(row.received == BYTES && *row.scene_id, "%llu bytes are counted", (unsigned long long)row.received);
+    upload_row_release(&row);
+}
+
+static void *stop(void *user) {
+    (void)user;
+    listener_quiesce(rig.listener);
+    listener_stop(rig.listener);
+    return NULL;
+}
+
+/* While one upload is being finished the daemon stops: that one gets its answer, another, whose end comes too late, is
+ * told to come back, and what of it was received is there. */
+static void check_stop(void) {
+    char first[UPLOAD_ID_SIZE], second[UPLOAD_ID_SIZE], bytes[HALF], path[128];
+    struct partials *p = rig.api->partials;
+    struct buf reply;
+    pthread_t thread;
+    snprintf(path, sizeof path, "GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\n\r\n", (long long)rig_job(&rig));
+    int stream = rig_connect(&rig);
+    buf_init(&reply, 1 << 20);
+    rig_send(stream, path, strlen(path));
+    rig_receive(stream, &reply, "\"snapshot\":true");
+
+    create(first);
+    create(second);
+    int late = send_all_but(second, 'b', HALF);
+    pthread_mutex_lock(&p->finishing);
+    int early = send_all_but(first, 'a', 0);
+    for (bool is_counted = false; !is_counted; usleep(1000)) { /* then it waits for the mutex above */
+        struct upload_row row;
+        rig_must(store_upload_get(rig.store, first, &row, NULL, 0, &err), &err, "store_upload_get");
+        is_counted = row.received == BYTES;
+        upload_row_release(&row);
+    }
+    CHECK(pthread_create(&thread, NULL, stop, NULL) == 0);
+    rig_receive(stream, &reply, "\r\n0\r\n\r\n"); /* by now it is stopping */
+    buf_release(&reply);
+    close(stream);
+
+    buf_init(&reply, 1 << 20);
+    memset(bytes, 'b', sizeof bytes);
+    rig_send(late, bytes, sizeof bytes);
+    rig_receive(late, &reply, "the daemon is stopping");
+    CHECK(rig_status(&reply) == 503 && strstr(buf_text(&reply), "the daemon is stopping"));
+    CHECK(strstr(buf_text(&reply), "Retry-After: "));
+    buf_release(&reply);
+    close(late);
+
+    pthread_mutex_unlock(&p->finishing);
+    buf_init(&reply, 1 << 20);
+    rig_receive(early, &reply, "\r\n\r\n");
+    CHECK_THAT(rig_status(&reply) == 204 && strstr(buf_text(&reply), "Link: </v1/scenes/"), "%s", buf_text(&reply));
+    buf_release(&reply);
+    close(early);
+    pthread_join(thread, NULL);
+    service_free(rig.api);
+    check_whole(first);
+    check_whole(second);
+}
+
+int main(void) {
+    rig_start(&rig, &rig_patient, 60);
+    log_set_level(LOG_ERROR);
+    check_start();
+    check_stop();
+    scheduler_free(rig.scheduler);
+    store_close(rig.store);
+    file_remove_tree(rig.dir, NULL);
+    return check_result();
+}
