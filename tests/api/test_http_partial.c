@@ -1,5 +1,5 @@
 /* test_http_partial.c -- two that count what one upload has received, at once, while the disk fails one
- * of them: what the kernel may have dropped is counted by neither, and is sent again. */
+ * of them: what the kernel may have dropped is counted by neither, and is sent again. And one that takes over. */
 #include <errno.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -132,6 +132,39 @@ static void test_two(struct rig *rig, enum rival rival) {
     upload_row_release(&row);
 }
 
+/* A part that is to be checked has come, but for the end of its request, and another request takes the upload over: what the
+ * first has brought does not count. */
+static void test_overtaken(struct rig *rig) {
+    struct partials *p = rig->api->partials;
+    struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
+    unsigned long long before = atomic_load(&rig->api->uploaded_bytes);
+    struct error err;
+    struct buf reply;
+    rig_must(partial_create(p, &row, &err), &err, "partial_create");
+    char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nTus-Resumable: 1.0.0\r\n"
+                            "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
+                            "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n"
+                            "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n", row.id);
+    int fd = rig_connect(rig);
+    rig_send(fd, head, strlen(head));
+    while (atomic_load(&rig->api->uploaded_bytes) < before + 3)
+        nap();
+    struct claim *late;
+    rig_must(claim_take(p, row.id, 0, false, &late, &err), &err, "claim_take");
+    rig_must(claim_write(late, "other", 5, &err), &err, "claim_write");
+    rig_must(claim_commit(late, &err), &err, "claim_commit");
+    claim_release(late);
+    buf_init(&reply, 1 << 16);
+    rig_send(fd, "0\r\n\r\n", 5);
+    rig_receive(fd, &reply, NULL);
+    CHECK_THAT(rig_status(&reply) == 409 && strstr(buf_text(&reply), "another request goes on"), "%s", buf_text(&reply));
+    check_received(rig, row.id, 5);
+    buf_release(&reply);
+    close(fd);
+    mem_free(head);
+    upload_row_release(&row);
+}
+
 int main(void) {
     struct rig rig;
     rig_start(&rig, &rig_patient, 15);
@@ -139,6 +172,7 @@ int main(void) {
     test_two(&rig, RIVAL_LOOK);
     test_two(&rig, RIVAL_FINISH);
     test_two(&rig, RIVAL_CLAIM);
+    test_overtaken(&rig);
     rig_stop(&rig);
     return check_result();
 }
