@@ -70,6 +70,31 @@ static void test_scenes(void) {
     drop_dir(dir);
 }
 
+/* Of two who keep a scene one may go while it is checked: it stays, and so does the check. */
+static void test_share(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    struct store *store;
+    struct caller who[2];
+    struct scene_row row;
+    int64_t id;
+    bool existed, is_gone;
+    OK(store_open(&store, dir, &err));
+    for (int i = 0; i < 2; i++) {
+        OK(store_token_add(store, i ? "bob" : "alice", ROLE_USER, token, &id, &err));
+        OK(store_token_find(store, token, &who[i], &err));
+        OK(store_scene_add(store, SCENE_A, "one", 10, who[i].user_id, &existed, &err));
+    }
+    OK(store_scene_delete(store, SCENE_A, who[0].user_id, false, &is_gone, &err));
+    CHECK(!is_gone);
+    OK(store_scene_find(store, &who[1], SCENE_A, &row, &err));
+    CHECK(row.state == SCENE_CHECKING);
+    scene_row_release(&row);
+    IS(store_scene_delete(store, SCENE_A, who[1].user_id, false, &is_gone, &err), STATUS_CONFLICT);
+    CHECK_THAT(strstr(err.message, "being checked") && !is_gone, "%s", err.message);
+    store_close(store);
+    drop_dir(dir);
+}
+
 /* --- events and outputs ------------------------------------------------------------------------ */
 
 static int64_t changed_job;
@@ -183,6 +208,15 @@ static void test_outbox(void) {
     OK(store_outbox_settle(store, first.id, true, &gave_up, &err));
     OK(store_outbox_wait(store, &wait, &err));
     CHECK(isinf(wait));
+
+    /* Who never answers is given up one day, and not before. */
+    int tries = 0;
+    for (gave_up = false; !gave_up && tries < 100; tries++) {
+        OK(store_outbox_settle(store, second.id, false, &gave_up, &err));
+        OK(store_outbox_wait(store, &wait, &err));
+        CHECK(isinf(wait) == gave_up);
+    }
+    CHECK_THAT(tries == 30, "%d tries", tries);
     outbox_row_release(&first);
     outbox_row_release(&second);
     store_close(store);
@@ -191,6 +225,7 @@ static void test_outbox(void) {
 
 int main(void) {
     test_scenes();
+    test_share();
     test_events();
     test_outbox();
     return check_result();
