@@ -194,9 +194,6 @@ static enum status check_channels(const struct reader *r, struct error *err) {
         if (strlen(entry->name.str) >= sizeof name)
             return error_set(err, STATUS_INPUT, "%s: the channel name %s... is too long", file,
                              name);
-        if (i > 0 && strcmp(list->entries[i - 1].name.str, entry->name.str) == 0)
-            return error_set(err, STATUS_INPUT, "%s: damaged EXR: two channels are named %s",
-                             file, name);
         half = half && entry->pixel_type == EXR_PIXEL_HALF;
     }
     if (r->compression <= EXR_COMPRESSION_PXR24 ||

@@ -36,7 +36,7 @@ static void test_refusals(void) {
 static void test_members(void) {
     cJSON *object = NULL;
     struct error err;
-    const char *text = "{\"n\":2.5,\"s\":\"x\",\"b\":true,\"z\":null}";
+    const char *text = "{\"n\":2.5,\"s\":\"x\",\"b\":true,\"z\":null,\"i\":1e999}";
     CHECK(json_parse(text, strlen(text), "body", &object, &err) == STATUS_OK);
     double n;
     const char *s;
@@ -45,10 +45,14 @@ static void test_members(void) {
     CHECK(json_number(object, "z", "body", 7, &n, &err) == STATUS_OK && n == 7);
     CHECK(json_number(object, "s", "body", 7, &n, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "body: \"s\" must be a number, found a string");
+    CHECK(json_number(object, "i", "body", 7, &n, &err) == STATUS_INPUT && n == 7);
+    CHECK_STRING(err.message, "body: \"i\" is not a finite number");
     CHECK(json_string(object, "s", "body", NULL, &s, &err) == STATUS_OK && strcmp(s, "x") == 0);
     CHECK(json_bool(object, "b", "body", false, &b, &err) == STATUS_OK && b);
     CHECK(json_bool(object, "n", "body", false, &b, &err) == STATUS_INPUT);
     cJSON_Delete(object);
+    CHECK(json_read("/nonexistent.json", 100, &object, &err) == STATUS_NOT_FOUND && object == NULL);
+    CHECK(json_read("/dev/null", 100, &object, &err) == STATUS_INPUT && object == NULL);
 }
 
 static void test_numbers(void) {
