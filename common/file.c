@@ -208,7 +208,7 @@ static enum status remove_at(int dir_fd, const char *name, const char *path, str
         return error_set_errno(err, errno, "cannot remove %s", path);
     enum status status = open_folder(dir_fd, name, path, &dir, &names, &count, err);
     if (status != STATUS_OK)
-        return status;
+        return status == STATUS_NOT_FOUND ? STATUS_OK : status;
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
         char *inner = file_join(path, names[i]);
         status = remove_at(dirfd(dir), names[i], inner, err);

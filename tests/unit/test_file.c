@@ -98,6 +98,11 @@ static void check_closing(void) {
     system_mend();
     CHECK_THAT(strstr(err.message, "cannot close") && strstr(err.message, path), "%s", err.message);
     check_alone("old");
+    system_break(" write close ", EIO); /* what came first is told */
+    CHECK(file_replace(path, "new", 3, &err) == STATUS_IO);
+    system_mend();
+    CHECK_THAT(strstr(err.message, "cannot write") && strstr(err.message, path), "%s", err.message);
+    check_alone("old");
 }
 
 /* --- trees ------------------------------------------------------------------------------------------ */
@@ -144,6 +149,24 @@ static void check_trees(void) {
     mem_free(tree);
 }
 
+/* Somebody else removes the same meanwhile: what is gone is no fault. */
+static void check_race(void) {
+    char *tree = file_join(dir, "tree");
+    uint64_t files, bytes;
+    bool struck = true;
+    for (long n = 1; struck; n++) {
+        OK(file_make_dirs(tree, &err));
+        for (int is_removal = 0; is_removal < 2; is_removal++) {
+            system_faults_arm(n);
+            system_fault = ENOENT;
+            OK(is_removal ? file_remove_tree(tree, &err) : file_tree_size(tree, &files, &bytes, &err));
+            struck = system_faults_lift();
+        }
+    }
+    CHECK(access(tree, F_OK) != 0);
+    mem_free(tree);
+}
+
 static void check_limit(void) {
     struct buf text;
     buf_init(&text, 2);
@@ -161,6 +184,7 @@ int main(void) {
         strike(&steps[i]);
     check_closing();
     check_trees();
+    check_race();
     check_limit();
     mem_free(path);
     OK(file_remove_tree(dir, &err));

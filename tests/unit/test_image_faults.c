@@ -34,6 +34,17 @@ png_infop png_create_info_struct(png_const_structrp png) {
     return png_is_broken ? NULL : call(png);
 }
 
+/* What was written cannot be kept, and this is told when it is closed. */
+static bool closing_is_broken;
+int fclose(FILE *file) {
+    int (*call)(FILE *);
+    *(void **)&call = dlsym(RTLD_NEXT, "fclose");
+    int result = call(file);
+    if (closing_is_broken)
+        errno = EIO;
+    return closing_is_broken ? EOF : result;
+}
+
 static enum status read_path(const char *from) {
     struct image image;
     enum status status = image_read(from, &image, NULL, &err);
@@ -79,11 +90,19 @@ static void check_writing(void) {
         image.pixel[i] = (float)(i * 2654435761u % 4096) / 4096.0f;
     IS(image_write_png("/nonexistent/a.png", &image, 1, &err), STATUS_NOT_FOUND, "cannot create");
     if (access("/dev/full", W_OK) == 0) {
-        IS(image_write_png("/dev/full", &image, 1, &err), STATUS_NO_SPACE, "/dev/full");
+        for (int i = 0; i < 2; i++) { /* what came first is told */
+            closing_is_broken = i;
+            IS(image_write_png("/dev/full", &image, 1, &err), STATUS_NO_SPACE, "/dev/full");
+        }
         IS(image_write_exr("/dev/full", &image, IMAGE_FLOAT, false, &err), STATUS_NO_SPACE, "/dev/full");
     }
+    closing_is_broken = true;
+    IS(image_write_png(path, &image, 1, &err), STATUS_IO, path);
+    closing_is_broken = false;
     system_break(" close ", EIO);
     IS(image_write_exr(path, &image, IMAGE_HALF, false, &err), STATUS_IO, "cannot close");
+    system_break(" pwrite close ", ENOSPC);
+    IS(image_write_exr(path, &image, IMAGE_HALF, false, &err), STATUS_NO_SPACE, "cannot write");
     system_mend();
     OK(image_write_exr(path, &image, IMAGE_HALF, false, &err));
     OK(read_path(path));
