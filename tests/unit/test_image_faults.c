@@ -227,7 +227,7 @@ static void make_header(const char *const *names, int count) {
 }
 
 static void check_channels(void) {
-    char names[IMAGE_MAX_CHANNELS][8], name[65];
+    char names[IMAGE_MAX_CHANNELS][16], name[65];
     const char *all[IMAGE_MAX_CHANNELS];
     for (int i = 0; i < IMAGE_MAX_CHANNELS; i++) {
         snprintf(names[i], sizeof names[i], "c%02d", i);
