@@ -275,7 +275,7 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
                   with_address(data_dir, a->listen_fd, bind) == 0;
     if (!a->is_bound || listen(a->listen_fd, 16) != 0)
         status = error_set_errno(err, errno, "cannot listen on %s", path);
-    if (status == STATUS_OK) {
+    else {
         int failed = pthread_create(&a->thread, NULL, serve, a);
         if (failed)
             status = error_set_errno(err, failed, "cannot start a thread");
@@ -319,7 +319,7 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
     enum status status = STATUS_OK;
     if (!send_line(socket_fd, request, -1) || !receive_line(socket_fd, &line, fd))
         status = error_set(err, STATUS_UNAVAILABLE, "the daemon does not answer on its admin socket");
-    if (status == STATUS_OK)
+    else
         status = json_parse(buf_text(&line), line.length, "the daemon's reply", reply, err);
     if (status == STATUS_OK)
         status = json_string(*reply, "error", "the daemon's reply", NULL, &message, err);

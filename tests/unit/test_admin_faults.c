@@ -188,6 +188,13 @@ int main(void) {
     faults_are_off = true;
     strike_commands(); /* no daemon */
     check_nonsense();
+    if (getuid() == 0) { /* what was at fault first is told */
+        faults_are_off = false;
+        system_faults_arm_only("seteuid", 2, false);
+        enum status status = ask("{\"command\":\"dance\"}");
+        faults_are_off = true;
+        CHECK(system_faults_lift() && status == STATUS_INPUT && strstr(err.message, "dance"));
+    }
 
     OK(folder_lock(dir, &lock, &err));
     CHECK(ask("{\"command\":\"backup\"}") == STATUS_CONFLICT && strstr(err.hint, "try again"));
