@@ -89,8 +89,10 @@ static int call(const struct url *url, bool may_be_private, struct error *err) {
             continue;
         }
         fd = socket(at->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        if (fd < 0)
+        if (fd < 0) {
+            error_set_errno(err, errno, "cannot make a socket");
             continue;
+        }
         setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
         setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
         if (connect(fd, at->ai_addr, at->ai_addrlen) != 0) {
