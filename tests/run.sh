@@ -11,7 +11,7 @@ passed=0 failed=0 skipped=0
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
 slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
-render/test_environment api/test_readme chaos/test_start_faults"
+render/test_environment api/test_readme chaos/test_start_faults chaos/test_worker_calls"
 # The thread sanitizer has nothing to find in one thread either.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment
 gradient/test_path render/test_calibrate_light render/test_calibrate_poses render/test_gloss render/test_sun

@@ -40,14 +40,15 @@ struct unpacking {
     struct error *err;
 };
 
-/* What libarchive says went wrong: a fault of the file, unless reading it failed. For want of memory it
- * often says nothing, or words of its own, and then errno tells: callers set it to 0 before. */
+/* What libarchive says went wrong: a fault of the file, unless reading it failed. For want of memory, or
+ * while it looks what kind of archive it is, it often says nothing, or words of its own, and then errno
+ * tells: callers set it to 0 before. */
 static enum status library_error(struct unpacking *u, const char *entry) {
     int number = archive_errno(u->archive);
     if (number == ENOMEM || errno == ENOMEM)
         mem_exhausted("libarchive");
     const char *text = archive_error_string(u->archive);
-    enum status status = number == EIO || number == EACCES ? STATUS_IO : STATUS_INPUT;
+    enum status status = number == EIO || number == EACCES || errno == EIO ? STATUS_IO : STATUS_INPUT;
     if (entry)
         return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry,
                          text ? text : "unknown fault");

@@ -1,5 +1,6 @@
 /* calls.c -- preloaded into the daemon: its n-th call of SQLite (UNBAKE_FAULTS_OF=sql) or of the system fails, once; see
- * sql_faults.h and system_faults.h. The page of faults.h says which, and hears whether there was one. */
+ * sql_faults.h and system_faults.h. The page of faults.h says which, and by what error (0: of the system, EIO or ENOSPC
+ * in turn), and hears whether there was one. */
 #include <stdlib.h>
 
 #include "tests/chaos/faults.h"
@@ -20,6 +21,8 @@ __attribute__((constructor)) static void begin(void) {
         sql_faults_arm(atomic_load(&faults->fail_at));
     else
         system_faults_arm(atomic_load(&faults->fail_at));
+    if (atomic_load(&faults->error))
+        system_fault = atomic_load(&faults->error);
 }
 
 __attribute__((destructor)) static void end(void) {
