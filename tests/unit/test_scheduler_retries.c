@@ -10,7 +10,10 @@
 
 static int play(const char *role, const char *dir, int attempt) {
     struct progress p = {PROGRESS_FD};
-    (void)role, (void)dir, (void)attempt;
+    char *go = file_join(dir, "go");
+    (void)attempt;
+    while (strcmp(role, "waits") == 0 && access(go, F_OK) != 0)
+        usleep(2000);
     progress_end(&p, STATUS_OK, "", "");
     return 0;
 }
@@ -114,6 +117,25 @@ static void test_orphans(struct daemon *d) {
     daemon_stop(d);
 }
 
+/* How an attempt ended is entered once the store can be written again: nothing is done twice. */
+static void test_unsettled(struct daemon *d) {
+    daemon_start(d, 1, "/proc/self/exe");
+    int64_t id = submit(d, SCENE_A, "waits");
+    char *go = mem_printf("%s/jobs/%lld/go", d->dir, (long long)id);
+    CHECK(wait_for(d, id, JOB_RUNNING, NULL));
+    let_go_on(d, 3);
+    sql_faults_arm_only("BEGIN IMMEDIATE", 1, true);
+    OK(file_replace(go, "", 0, &err));
+    for (int i = 0; i < WAIT_TRIES && atomic_load(&sql_faults_left) >= 0; i++)
+        let_go_on(d, 1);
+    let_go_on(d, 20);
+    CHECK(sql_faults_lift() && wait_for(d, id, JOB_RUNNING, NULL));
+    scheduler_wake(d->scheduler);
+    expect(d, id, JOB_SUCCEEDED, 1, "", "");
+    daemon_stop(d);
+    mem_free(go);
+}
+
 /* A start that fails says why, whichever of its statements it is. */
 static void test_start(struct daemon *d) {
     static const char *const statements[] = {"SELECT id FROM jobs WHERE state = ? LIMIT 1", "UPDATE scenes SET problems = '[]'"};
@@ -165,6 +187,7 @@ int main(int argc, char **argv) {
     faults_are_off = true; /* in this thread */
     test_postponed(&d);
     test_orphans(&d);
+    test_unsettled(&d);
     test_start(&d);
     test_low_disk(&d);
     daemon_end(&d);
