@@ -266,12 +266,17 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
     struct admin *a = mem_calloc(1, sizeof *a);
     *a = (struct admin){.data_dir = data_dir, .store = store, .revoked = revoked, .user = user,
                         .stop_fd = eventfd(0, EFD_CLOEXEC)};
+    if (a->stop_fd < 0) {
+        enum status failed = error_set_errno(err, errno, "cannot make an eventfd");
+        mem_free(a);
+        return failed;
+    }
     char *path = file_join(data_dir, "admin.sock");
     enum status status = STATUS_OK;
     unlink(path); /* of an earlier life: this process holds the folder's lock */
     a->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     /* The mode of a socket that is not yet bound becomes that of the file. */
-    a->is_bound = a->listen_fd >= 0 && a->stop_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 &&
+    a->is_bound = a->listen_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 &&
                   with_address(data_dir, a->listen_fd, bind) == 0;
     if (!a->is_bound || listen(a->listen_fd, 16) != 0)
         status = error_set_errno(err, errno, "cannot listen on %s", path);
@@ -303,8 +308,7 @@ void admin_stop(struct admin *a) {
     }
     if (a->listen_fd >= 0)
         close(a->listen_fd);
-    if (a->stop_fd >= 0)
-        close(a->stop_fd);
+    close(a->stop_fd);
     mem_free(a);
 }
 

@@ -55,7 +55,7 @@ struct listener {
     struct MHD_Daemon *daemon;
     struct guard *guard;
     struct tls *tls; /* NULL: plain HTTP */
-    int socket_fd; /* -1 once quiesced */
+    int socket_fd; /* -1 while the library has it, which closes it when it stops, or does not start */
     uint16_t port;
     pthread_t clerks[CLERK_THREADS];
     size_t clerk_count;
@@ -506,12 +506,14 @@ static enum status start_library(struct listener *l, const struct listener_confi
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
+    int fd = l->socket_fd;
+    l->socket_fd = -1;
     l->daemon = MHD_start_daemon(
         MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG |
             (l->tls ? (unsigned)MHD_USE_TLS : 0), 0, NULL,
         NULL, on_request, l,
         MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
-        MHD_OPTION_LISTEN_SOCKET, l->socket_fd,
+        MHD_OPTION_LISTEN_SOCKET, fd,
         MHD_OPTION_THREAD_POOL_SIZE, (unsigned)LIBRARY_THREADS,
         MHD_OPTION_CONNECTION_LIMIT, config->connection_max,
         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->limits.idle_sec,
@@ -557,9 +559,9 @@ enum status listener_start(struct listener **out, const struct listener_config *
 void listener_quiesce(struct listener *l) {
     /* The library gives the socket back, but its threads may still be about to look at it: it
      * stays open until the end, and clients are refused rather than left waiting. */
-    MHD_socket fd = MHD_quiesce_daemon(l->daemon);
-    if (fd >= 0)
-        shutdown(fd, SHUT_RDWR);
+    l->socket_fd = MHD_quiesce_daemon(l->daemon);
+    if (l->socket_fd >= 0)
+        shutdown(l->socket_fd, SHUT_RDWR);
 }
 
 /* Waits until none is left; for clients that do not read, not long enough; for others, plenty. */
