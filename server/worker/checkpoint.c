@@ -209,8 +209,9 @@ static void forget(struct checkpoint *c) {
     c->next_row = 1;
 }
 
+/* The journal first: it must not meet a new database. */
 static enum status remove_file(const char *path, struct error *err) {
-    static const char *const suffixes[] = {"", "-journal", "-wal", "-shm"};
+    static const char *const suffixes[] = {"-journal", "-wal", "-shm", ""};
     enum status status = STATUS_OK;
     for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0] && status == STATUS_OK; i++) {
         char *name = mem_printf("%s%s", path, suffixes[i]);
