@@ -30,6 +30,7 @@ struct faults {
     atomic_bool for_good; /* all later ones fail, too */
     atomic_int error;    /* errno of operations, or FAULTS_KILL */
     atomic_long failed;  /* so many have */
+    char what[16];       /* the call that did, with preload/calls.c */
     /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
      * the first that does. */
     uint64_t calls[FAULTS_CALLS_MAX];

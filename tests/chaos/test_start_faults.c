@@ -30,10 +30,22 @@ static pid_t run(const char *const *argv, bool is_sql, long n) {
 
 static bool has(const char *path, const char *word) {
     struct buf text;
-    buf_init(&text, (size_t)1 << 20);
-    bool found = file_read(path, &text, NULL) == STATUS_OK && strstr(buf_text(&text), word);
+    struct error err;
+    buf_init(&text, (size_t)16 << 20);
+    CHECK_THAT(file_read(path, &text, &err) == STATUS_OK, "%s", err.message);
+    bool found = strstr(buf_text(&text), word) != NULL;
     buf_release(&text);
     return found;
+}
+
+/* After a failure: what was struck, and what the program had to say. */
+static void tell(bool is_sql, long n) {
+    struct buf text;
+    buf_init(&text, (size_t)16 << 20);
+    file_read(d.log, &text, NULL);
+    fprintf(stderr, "call %ld of %s was %s; the log:\n%s", n, is_sql ? "SQLite" : "the system",
+            atomic_load(&faults->failed) > 0 ? faults->what : "not reached", buf_text(&text));
+    buf_release(&text);
 }
 
 /* Whether it was struck; it ended by itself, never by a signal. */
@@ -87,6 +99,21 @@ static bool start_once(bool is_sql, long n) {
     return struck;
 }
 
+/* Threads make calls, too, and in no fixed order: what fails is told at length and tried once more, and counts where it
+ * fails twice. */
+static bool start(bool is_sql, long n) {
+    int before = check_failed_count;
+    bool struck = start_once(is_sql, n);
+    if (check_failed_count == before)
+        return struck;
+    tell(is_sql, n);
+    check_failed_count = before;
+    struck = start_once(is_sql, n);
+    if (check_failed_count > before)
+        tell(is_sql, n);
+    return struck;
+}
+
 /* --- commands ----------------------------------------------------------------------------------------- */
 
 static bool command_once(const char *const *argv, const char *wanted, bool is_sql, long n) {
@@ -99,6 +126,8 @@ static bool command_once(const char *const *argv, const char *wanted, bool is_sq
     CHECK_THAT(code == 0 || has(d.log, "unbaked: ") || has(out, "FAIL "), "%s, call %ld: no sentence", argv[1], n);
     CHECK_THAT(access(part, F_OK) != 0, "call %ld: half a copy is left", n);
     CHECK_THAT(strcmp(argv[1], "backup") != 0 || (code == 0) == (access(copy, F_OK) == 0) || struck, "call %ld: the copy", n);
+    if (check_failed_count > 0)
+        tell(is_sql, n);
     return struck;
 }
 
@@ -140,7 +169,7 @@ int main(void) {
     if (!faults)
         return 1;
     for (int is_sql = 0; is_sql < 2; is_sql++)
-        for (long n = 1; start_once(is_sql, n) && check_failed_count == 0; n++)
+        for (long n = 1; start(is_sql, n) && check_failed_count == 0; n++)
             continue;
     strike_commands();
     printf("%ld calls failed\n", strikes);

@@ -26,6 +26,8 @@ __attribute__((constructor)) static void begin(void) {
 }
 
 __attribute__((destructor)) static void end(void) {
-    if (faults && (is_sql ? sql_faults_lift() : system_faults_lift()))
-        atomic_fetch_add(&faults->failed, 1);
+    if (!faults || !(is_sql ? sql_faults_lift() : system_faults_lift()))
+        return;
+    snprintf(faults->what, sizeof faults->what, "%s", is_sql ? "SQLite" : system_failed);
+    atomic_fetch_add(&faults->failed, 1);
 }
