@@ -30,6 +30,7 @@
 #define TYPICAL_BASE_COLOR 0.5f
 /* Less white light than this share of the median radiance tells nothing of base colour. */
 #define DARKEST 1e-4f
+#define DARK 1e-3f /* as much less tells nothing of detail */
 /* A base colour of which a look says more than this is not one. */
 #define MOST 4.0f
 /* Variance of base colour by light of others at which what photographs show of a texel counts as much as
@@ -200,6 +201,31 @@ static void divide_chunk(void *user, size_t chunk, int thread) {
 void divide_texels(struct divide *d, size_t first, size_t count) {
     struct divide_range range = {d, first, count};
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &range);
+}
+
+struct white_job {
+    const struct divide *divide;
+    uint16_t (*white)[3];
+};
+
+static void white_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct white_job *job = user;
+    const struct divide *d = job->divide;
+    const struct inverse_uv *inverse = &d->r->inverse;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t texel = inverse->valid[i];
+        rgb white;
+        bool known = d->measured[texel].weight > 0.0f && divide_white(d, texel, &white) &&
+                     fminf(white.r, fminf(white.g, white.b)) > DARK * d->views->median_radiance;
+        set_half(job->white[texel], known ? white : rgb_gray(0.0f));
+    }
+}
+
+void divide_white_all(const struct divide *d, uint16_t (*white)[3]) {
+    struct white_job job = {d, white};
+    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, white_chunk, &job);
 }
 
 /* What was measured as it is, and the priors where nothing was. */

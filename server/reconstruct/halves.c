@@ -33,6 +33,10 @@ static int half_of(uint32_t source, int way) {
     return (int)(rng_mix64(source) >> way & 1);
 }
 
+int halves_usual(uint32_t source) {
+    return half_of(source, 0);
+}
+
 /* The share of the weight that the lesser half has. */
 static float lesser_part(const struct robust_sample *sample, size_t count, float least_sharp, int way) {
     float weight[2] = {0.0f, 0.0f};

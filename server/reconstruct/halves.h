@@ -11,6 +11,9 @@
 
 #include "server/reconstruct/robust.h"
 
+/* In which half a photograph is unless that would leave too little for the other. */
+int halves_usual(uint32_t source);
+
 /* Draws the error of the samples' mean by their weights. False, with `draw` as it was, where there is but one
  * source, or no noise is expected of any. */
 bool halves_draw(const struct robust_sample *sample, size_t count, rgb *draw);

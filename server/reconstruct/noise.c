@@ -175,15 +175,19 @@ static float share_of(const struct noise *noise, const struct photograph *photo,
     return noise->share[octave_of(radiance * photo->exposure * gain)];
 }
 
+static rgb deviation_by_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
+    return rgb_make(radiance.r * share_of(noise, photo, radiance.r, photo->gain.r),
+                    radiance.g * share_of(noise, photo, radiance.g, photo->gain.g),
+                    radiance.b * share_of(noise, photo, radiance.b, photo->gain.b));
+}
+
 rgb noise_deviation(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance) {
     const struct photograph *photo = &v->scene->photograph[v->train[view->train]];
     const struct camera *camera = &photo->camera;
     uint32_t x = (uint32_t)clampf(view->x, 0.0f, (float)(camera->width - 1));
     uint32_t y = (uint32_t)clampf(view->y, 0.0f, (float)(camera->height - 1));
     float scale = noise->scale[view->train][y / NOISE_BLOCK * blocks(camera->width) + x / NOISE_BLOCK];
-    return rgb_make(scale * radiance.r * share_of(noise, photo, radiance.r, photo->gain.r),
-                    scale * radiance.g * share_of(noise, photo, radiance.g, photo->gain.g),
-                    scale * radiance.b * share_of(noise, photo, radiance.b, photo->gain.b));
+    return rgb_scale(deviation_by_brightness(noise, photo, radiance), scale);
 }
 
 float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
@@ -191,6 +195,12 @@ float noise_weight(const struct noise *noise, const struct views *v, const struc
     float deviation = rgb_mean(noise_deviation(noise, v, view, radiance)), mean = rgb_mean(radiance);
     float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
     return 1.0f / (share * share + mixing);
+}
+
+float noise_weight_of_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
+    float deviation = rgb_mean(deviation_by_brightness(noise, photo, radiance)), mean = rgb_mean(radiance);
+    float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
+    return 1.0f / (share * share);
 }
 
 /* Plus or minus 1 with equal chances: as good as normal noise for second moments. */

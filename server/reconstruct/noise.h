@@ -37,6 +37,10 @@ rgb noise_deviation(const struct noise *noise, const struct views *views, const 
 float noise_weight(const struct noise *noise, const struct views *views, const struct view *view, rgb radiance,
                    float mixing);
 
+/* The same by how brightly the photograph shows that radiance, wherever in it and without others' light: where texture is
+ * fine some of it is taken for noise. */
+float noise_weight_of_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance);
+
 /* What a bilinear or cubic look-up in a picture of independent noise of deviation 1 reads at the view's
  * place: the same for the same pixels, so that texels which share pixels share their noise. */
 float noise_draw(const struct view *view, bool cubic);

@@ -6,6 +6,7 @@
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
@@ -23,6 +24,8 @@
  * what the first pass took (highlights are looked at as well). */
 #define COARSE_STRIDE 2
 #define LAST_OVER_FIRST 6.0
+/* Steps of detail.h after it has measured every texel. More sharpen what glossy surfaces mirror, too. */
+#define DETAIL_STEPS 4
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -60,6 +63,7 @@ static bool advance(struct solve *s, double work) {
 
 /* Rays are the measure of work: about so many a texel when its highlights are gathered. */
 #define RAYS_A_TEXEL 100.0
+#define RAYS_A_DETAIL 10.0 /* and step */
 
 static size_t samples_of(const struct solve *s, int pass) {
     double samples = settings_number(s->r->settings, "gather_samples");
@@ -70,6 +74,7 @@ static void plan_work(struct solve *s) {
     for (int pass = 0; pass < PASSES; pass++)
         s->work_total += (double)s->probes.count * (double)samples_of(s, pass) +
                          RAYS_A_TEXEL * (double)s->r->inverse.valid_count;
+    s->work_total += DETAIL_STEPS * RAYS_A_DETAIL * (double)s->r->inverse.valid_count;
 }
 
 static bool gather(struct solve *s, int pass) {
@@ -95,6 +100,24 @@ static bool divide_all(struct solve *s) {
             return false;
     }
     return true;
+}
+
+/* Sharpens what was measured of every texel. */
+static bool find_detail(struct solve *s) {
+    const struct reconstruction *r = s->r;
+    size_t texels = (size_t)r->atlas.width * r->atlas.height;
+    uint16_t(*white)[3] = mem_calloc_large(texels, sizeof *white);
+    struct detail detail;
+    bool going = true;
+    divide_white_all(&s->divide, white);
+    detail_init(&detail, r, s->views, (const uint16_t(*)[3])white, s->divide.measured);
+    for (int i = 0; i < DETAIL_STEPS && going; i++) {
+        detail_step(&detail);
+        going = advance(s, RAYS_A_DETAIL * (double)r->inverse.valid_count);
+    }
+    detail_release(&detail);
+    mem_free(white);
+    return going;
 }
 
 /* --- emitters ----------------------------------------------------------------------------------- */
@@ -230,6 +253,8 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     if (pass == 0)
         s->hurries = is_short(s, LAST_OVER_FIRST * (clock_sec() - divide_sec));
+    if (s->divide.stride == 1 && s->divide.denoises && !find_detail(s))
+        return false;
     divide_finish(&s->divide, s->radiance);
     return true;
 }

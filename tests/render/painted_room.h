@@ -1,7 +1,7 @@
 /* painted_room.h -- the small room with radiance painted on its walls, and its photographs: the truth
  * is a formula, so a capture takes no path tracing and every error can be told exactly.
  *
- * Photographs have 2 x 2 samples a pixel and 1 % noise; surfaces are a little brighter towards one
+ * Photographs have PAINTED_SIDE squared samples a pixel and 1 % noise; surfaces are a little brighter towards one
  * side, as slightly glossy ones are. */
 #ifndef UNBAKE_TESTS_RENDER_PAINTED_ROOM_H
 #define UNBAKE_TESTS_RENDER_PAINTED_ROOM_H
@@ -12,8 +12,12 @@
 #include "server/scene/atlas.h"
 #include "tests/render/small_room.h"
 
+#ifndef PAINTED_WIDTH
 #define PAINTED_WIDTH 160
 #define PAINTED_HEIGHT 120
+#define PAINTED_GLOSS 0.03f
+#define PAINTED_SIDE 2 /* samples a row and column of a pixel */
+#endif
 #define PAINTED_FRAMES 24
 #define PAINTED_TEXTURE 256
 
@@ -50,18 +54,18 @@ static inline void painted_take(struct painted *room, int frame) {
     vec3 origin = camera_origin(&photo->camera);
     for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++) {
         rgb sum = {0, 0, 0};
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < PAINTED_SIDE * PAINTED_SIDE; k++) {
             vec3 direction;
             struct accel_hit hit;
-            float x = (float)(i % PAINTED_WIDTH) + ((float)(k % 2) + 0.5f) / 2.0f;
-            float y = (float)(i / PAINTED_WIDTH) + ((float)(k / 2) + 0.5f) / 2.0f;
+            float x = (float)(i % PAINTED_WIDTH) + ((float)(k % PAINTED_SIDE) + 0.5f) / PAINTED_SIDE;
+            float y = (float)(i / PAINTED_WIDTH) + ((float)(k / PAINTED_SIDE) + 0.5f) / PAINTED_SIDE;
             if (!camera_direction(&photo->camera, x, y, &direction) ||
                 !accel_intersect(room->accel, origin, direction, 0.0f, INFINITY, &hit))
                 continue;
             rgb value = painted_radiance(room, room->scene.mesh.object_id[hit.triangle],
                                          vec3_mad(origin, hit.distance_m, direction));
-            float gloss = 1.0f + 0.03f * direction.x;
-            sum = rgb_mad(sum, gloss / 4.0f, value);
+            float gloss = 1.0f + PAINTED_GLOSS * direction.x;
+            sum = rgb_mad(sum, gloss / (PAINTED_SIDE * PAINTED_SIDE), value);
         }
         const float value[3] = {sum.r, sum.g, sum.b};
         for (size_t c = 0; c < 3; c++) {
@@ -91,7 +95,7 @@ static inline void painted_make(struct painted *room, int threads, bool tiles) {
         photo->camera = look(spread(f, 0.4f), spread(f * 7 + 3, 0.0f));
         photo->camera.width = PAINTED_WIDTH;
         photo->camera.height = PAINTED_HEIGHT;
-        photo->camera.fx = photo->camera.fy = 100.0f;
+        photo->camera.fx = photo->camera.fy = PAINTED_WIDTH / 1.6f;
         photo->camera.cx = PAINTED_WIDTH / 2.0f;
         photo->camera.cy = PAINTED_HEIGHT / 2.0f;
         photo->pixel = mem_array(PAINTED_WIDTH * PAINTED_HEIGHT, sizeof *photo->pixel);
