@@ -19,7 +19,9 @@
 #define WINDOW_LEAST 12.0f
 /* The lesser half of the photographs of a texel must have this part of the weight. */
 #define HALF_LEAST 0.15f
-#define STEP_MOST 0.2f /* of base colour */
+/* Of base colour, at once: by one pixel, and of one texel. */
+#define OFF_MOST 0.2f
+#define STEP_MOST 0.2f
 #define BASE_MOST 1.2f
 /* Base colour by which looks are weighed, as in divide.c. */
 #define TYPICAL_BASE_COLOR 0.5f
@@ -115,6 +117,13 @@ static bool footprint_sends(const struct detail *d, const struct footprint *f, s
     return count >= KNOWN_LEAST * SIDE * SIDE;
 }
 
+/* Bounds each channel by a part of what is white: a single pixel that is far too bright, as a renderer's samples may
+ * leave it, would darken all around it when the mean is taken away. */
+static rgb bounded(rgb off, rgb white) {
+    rgb most = rgb_scale(white, OFF_MOST);
+    return rgb_make(clampf(off.r, -most.r, most.r), clampf(off.g, -most.g, most.g), clampf(off.b, -most.b, most.b));
+}
+
 /* What a pixel shows beyond what the texture tells; of noise it should show none. NAN where it is not asked. */
 static struct both pixel_off(const struct picture_job *job, uint32_t x, uint32_t y) {
     const struct detail *d = job->detail;
@@ -128,7 +137,10 @@ static struct both pixel_off(const struct picture_job *job, uint32_t x, uint32_t
         s.saturated[2] || !footprint_find(&f, &r->scene->mesh, &r->atlas, d->views->accel, &photo->camera, x, y) ||
         r->is_emitter[r->segments.of_triangle[f.triangle]] || !footprint_sends(d, &f, &told))
         return (struct both){{rgb_gray(NAN), rgb_gray(NAN)}};
-    return (struct both){{rgb_sub(s.radiance, told.of[VALUE]), rgb_scale(told.of[NOISE], -1.0f)}};
+    size_t middle = (size_t)f.middle.y * r->inverse.width + (size_t)f.middle.x;
+    rgb white = from_halves(d->white[middle]);
+    return (struct both){{bounded(rgb_sub(s.radiance, told.of[VALUE]), white),
+                          bounded(rgb_scale(told.of[NOISE], -1.0f), white)}};
 }
 
 static void find_row(void *user, size_t row, int thread) {
