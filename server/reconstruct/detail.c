@@ -11,6 +11,7 @@
 
 #define SIDE 3     /* places a row and column of a footprint at which the texture is read */
 #define CHUNK 4096 /* texels a work item */
+#define STRIDE 16  /* pixels, when it is asked how large they are */
 /* A pixel is asked only where most of what it covers is known. */
 #define KNOWN_LEAST 0.75f
 #define TAP_LEAST 0.05f /* weight of the known ones among the four texels of a look-up */
@@ -272,6 +273,23 @@ static void step_chunk(void *user, size_t chunk, int thread) {
 }
 
 /* --- the whole ---------------------------------------------------------------------------------- */
+
+bool detail_is_lost(const struct reconstruction *r, const struct views *views) {
+    double area = 0.0, count = 0.0;
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        const struct camera *camera = &r->scene->photograph[views->train[t]].camera;
+        for (uint32_t y = STRIDE / 2; y < camera->height; y += STRIDE) {
+            for (uint32_t x = STRIDE / 2; x < camera->width; x += STRIDE) {
+                struct footprint f;
+                if (!footprint_find(&f, &r->scene->mesh, &r->atlas, views->accel, camera, x, y))
+                    continue;
+                area += (double)fabsf(f.across.x * f.down.y - f.across.y * f.down.x);
+                count += 1.0;
+            }
+        }
+    }
+    return area > count;
+}
 
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
                  const uint16_t (*white)[3], struct measured *measured) {

@@ -11,6 +11,7 @@
 #ifndef UNBAKE_RECONSTRUCT_DETAIL_H
 #define UNBAKE_RECONSTRUCT_DETAIL_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "server/reconstruct/denoise.h"
@@ -25,6 +26,9 @@ struct detail {
     uint16_t (**off[2])[3];          /* [train_count][pixels] of value and noise: what a pixel shows beyond what
                                       * the texture tells; both owned */
 };
+
+/* Whether pixels cover more than a texel, in the mean: else no detail is lost that a texture could hold. */
+bool detail_is_lost(const struct reconstruction *r, const struct views *views);
 
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
                  const uint16_t (*white)[3], struct measured *measured);

@@ -253,7 +253,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     if (pass == 0)
         s->hurries = is_short(s, LAST_OVER_FIRST * (clock_sec() - divide_sec));
-    if (s->divide.stride == 1 && s->divide.denoises && !find_detail(s))
+    if (s->divide.stride == 1 && s->divide.denoises && detail_is_lost(s->r, s->views) && !find_detail(s))
         return false;
     divide_finish(&s->divide, s->radiance);
     return true;
