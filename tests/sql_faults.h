@@ -32,11 +32,11 @@ static const struct sql_fault {
 };
 #define SQL_FAULTS (sizeof sql_faults / sizeof *sql_faults)
 
-static const struct sql_fault *sql_fault; /* the one that is to come */
-static atomic_long sql_faults_left;       /* calls until then; 0: none fails */
-static const char *sql_faults_only;       /* what a statement has in it, or else does not count; NULL: all do */
-static bool sql_faults_stay;              /* all later ones fail, too */
-static _Thread_local bool faults_are_off; /* in this thread, as while SQLite calls itself */
+static const struct sql_fault *_Atomic sql_fault; /* the one that is to come */
+static atomic_long sql_faults_left;          /* calls until then; 0: none fails */
+static const char *_Atomic sql_faults_only;  /* what a statement has in it, or else does not count; NULL: all do */
+static atomic_bool sql_faults_stay;          /* all later ones fail, too */
+static _Thread_local bool faults_are_off;    /* in this thread, as while SQLite calls itself */
 
 /* The n-th call from now on fails, and if `stays` all that follow; how, goes by n. */
 static inline void sql_faults_arm_only(const char *only, long n, bool stays) {
@@ -78,7 +78,8 @@ static inline bool sql_faults_lift(void) {
 }
 
 static inline bool sql_fails(const char *text) {
-    if (faults_are_off || (sql_faults_only && !(text && strstr(text, sql_faults_only))) ||
+    const char *only = sql_faults_only;
+    if (faults_are_off || (only && !(text && strstr(text, only))) ||
         !faults_strike(&sql_faults_left, sql_faults_stay))
         return false;
     errno = sql_fault->number;

@@ -22,11 +22,11 @@
 
 #include "tests/sql_faults.h"
 
-static atomic_long system_faults_left; /* calls until one fails; 0: none does */
-static int system_fault;               /* errno, then */
-static const char *system_faults_only; /* the calls that count, with blanks between; NULL: all do */
-static bool system_faults_stay;        /* all later ones fail, too */
-static const char *system_failed;      /* the call that failed last */
+static atomic_long system_faults_left;         /* calls until one fails; 0: none does */
+static atomic_int system_fault;                /* errno, then */
+static const char *_Atomic system_faults_only; /* the calls that count, with blanks between; NULL: all do */
+static atomic_bool system_faults_stay;         /* all later ones fail, too */
+static const char *_Atomic system_failed;      /* the call that failed last */
 
 /* The n-th call from now on fails, and if `stays` all that follow, by EIO or ENOSPC in turn. */
 static inline void system_faults_arm_only(const char *only, long n, bool stays) {
@@ -68,7 +68,8 @@ static inline bool is_among(const char *name, const char *names) {
 }
 
 static inline bool system_fails(const char *name) {
-    if (faults_are_off || (system_faults_only && !is_among(name, system_faults_only)) ||
+    const char *only = system_faults_only;
+    if (faults_are_off || (only && !is_among(name, only)) ||
         !faults_strike(&system_faults_left, system_faults_stay))
         return false;
     system_failed = name;

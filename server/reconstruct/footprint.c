@@ -4,6 +4,7 @@
 #include <math.h>
 
 #define MIN_COSINE 0.05f
+#define FAR 1e6f /* texels: of a triangle hardly wider than a line */
 
 /* A triangle, and the plane that it lies in. */
 struct plane {
@@ -38,7 +39,7 @@ static bool place(const struct plane *p, const struct atlas *atlas, size_t trian
     float area = p->dot[0] * p->dot[2] - p->dot[1] * p->dot[1];
     *at = atlas_point(atlas, triangle, (d0 * p->dot[2] - d1 * p->dot[1]) / area,
                       (d1 * p->dot[0] - d0 * p->dot[1]) / area);
-    return isfinite(at->x) && isfinite(at->y);
+    return fabsf(at->x) < FAR && fabsf(at->y) < FAR;
 }
 
 bool footprint_find(struct footprint *f, const struct mesh *mesh, const struct atlas *atlas, const struct accel *accel,
