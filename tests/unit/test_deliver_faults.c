@@ -29,7 +29,7 @@ ssize_t send(int fd, const void *data, size_t length, int flags) {
 
 /* --- the receiver ------------------------------------------------------------------------------------ */
 
-static const char *reply; /* to the next who calls */
+static const char *_Atomic reply; /* to the next who calls */
 
 static void *receive(void *user) {
     char request[4096];
@@ -37,8 +37,9 @@ static void *receive(void *user) {
         int fd = accept4(*(int *)user, NULL, NULL, SOCK_CLOEXEC);
         if (fd < 0)
             return NULL;
+        const char *text = reply;
         if (recv(fd, request, sizeof request, 0) > 0)
-            CHECK(syscall(SYS_sendto, fd, reply, strlen(reply), MSG_NOSIGNAL, NULL, 0) >= 0);
+            CHECK(syscall(SYS_sendto, fd, text, strlen(text), MSG_NOSIGNAL, NULL, 0) >= 0);
         close(fd);
     }
 }
