@@ -4,7 +4,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <microhttpd.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <pthread.h>
@@ -18,6 +17,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/auth.h"
+#include "server/http/bind.h"
 #include "server/http/head.h"
 #include "server/http/hub.h"
 #include "server/http/problem.h"
@@ -470,31 +470,6 @@ static void log_library(void *user, const char *format, va_list args) {
     log_debug("libmicrohttpd: %s", text);
 }
 
-static enum status open_socket(struct listener *l, const struct listener_config *config, struct error *err) {
-    struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM,
-                             .ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE};
-    struct addrinfo *found;
-    char port[8];
-    snprintf(port, sizeof port, "%u", config->port);
-    int failed = getaddrinfo(config->address, port, &hints, &found);
-    if (failed)
-        return error_set(err, STATUS_INPUT, "cannot listen on %s: %s", config->address, gai_strerror(failed));
-    enum status status = STATUS_OK;
-    int one = 1;
-    struct sockaddr_storage bound;
-    socklen_t size = sizeof bound;
-    l->socket_fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (l->socket_fd < 0 || setsockopt(l->socket_fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one) != 0 ||
-        bind(l->socket_fd, found->ai_addr, found->ai_addrlen) != 0 || listen(l->socket_fd, 512) != 0 ||
-        getsockname(l->socket_fd, (struct sockaddr *)&bound, &size) != 0) {
-        error_set_errno(err, errno, "cannot listen on %s port %s", config->address, port);
-        status = error_hint(err, "--listen takes another address");
-    } else if (getnameinfo((struct sockaddr *)&bound, size, NULL, 0, port, sizeof port, NI_NUMERICSERV) == 0)
-        l->port = (uint16_t)strtoul(port, NULL, 10);
-    freeaddrinfo(found);
-    return status;
-}
-
 enum status listener_reload(struct listener *l, struct error *err) {
     return l->tls ? tls_reload(l->tls, err) : STATUS_OK;
 }
@@ -533,7 +508,8 @@ enum status listener_start(struct listener **out, const struct listener_config *
     l->socket_fd = -1;
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
-    enum status status = open_socket(l, config, err);
+    l->port = config->port;
+    enum status status = bind_listen(&l->socket_fd, config->address, &l->port, err);
     if (status == STATUS_OK && config->certificate_file)
         status = tls_new(&l->tls, config->certificate_file, config->key_file, err);
     if (status == STATUS_OK)
