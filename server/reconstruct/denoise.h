@@ -14,9 +14,9 @@
 
 #include <stdint.h>
 
-#include "common/image.h"
 #include "common/parallel.h"
 #include "common/vec.h"
+#include "server/reconstruct/rgb_half.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/texture.h"
@@ -31,8 +31,7 @@ struct measured {
 };
 
 static inline rgb measured_value(const struct measured *m) {
-    return rgb_make(image_float_from_half(m->value[0]), image_float_from_half(m->value[1]),
-                    image_float_from_half(m->value[2]));
+    return rgb_from_half(m->value);
 }
 
 /* What is known of a chart's colour before its texels are looked at. */

@@ -3,10 +3,10 @@
 
 #include <math.h>
 
-#include "common/image.h"
 #include "common/mem.h"
 #include "server/reconstruct/footprint.h"
 #include "server/reconstruct/halves.h"
+#include "server/reconstruct/rgb_half.h"
 #include "server/scene/surface.h"
 
 #define SIDE 3     /* places a row and column of a footprint at which the texture is read */
@@ -45,16 +45,6 @@ static float *channels_of(rgb *value) {
     return &value->r;
 }
 
-static rgb from_halves(const uint16_t half[3]) {
-    return rgb_make(image_float_from_half(half[0]), image_float_from_half(half[1]), image_float_from_half(half[2]));
-}
-
-static void to_halves(uint16_t half[3], rgb value) {
-    half[0] = image_half_from_float(value.r);
-    half[1] = image_half_from_float(value.g);
-    half[2] = image_half_from_float(value.b);
-}
-
 static const struct photograph *photograph_of(const struct detail *d, uint32_t train) {
     return &d->r->scene->photograph[d->views->train[train]];
 }
@@ -79,9 +69,9 @@ static bool texel_sends(const struct detail *d, long x, long y, uint32_t chart, 
     uint32_t triangle = inverse->triangle[texel];
     if (triangle == INVERSE_UV_NONE || d->r->atlas.chart_of_triangle[triangle] != chart || !is_known(d, texel))
         return false;
-    rgb white = from_halves(d->white[texel]);
-    radiance->of[VALUE] = rgb_mul(from_halves(d->measured[texel].value), white);
-    radiance->of[NOISE] = rgb_mul(from_halves(d->measured[texel].noise), white);
+    rgb white = rgb_from_half(d->white[texel]);
+    radiance->of[VALUE] = rgb_mul(rgb_from_half(d->measured[texel].value), white);
+    radiance->of[NOISE] = rgb_mul(rgb_from_half(d->measured[texel].noise), white);
     return true;
 }
 
@@ -139,7 +129,7 @@ static struct both pixel_off(const struct picture_job *job, uint32_t x, uint32_t
         r->is_emitter[r->segments.of_triangle[f.triangle]] || !footprint_sends(d, &f, &told))
         return (struct both){{rgb_gray(NAN), rgb_gray(NAN)}};
     size_t middle = (size_t)f.middle.y * r->inverse.width + (size_t)f.middle.x;
-    rgb white = from_halves(d->white[middle]);
+    rgb white = rgb_from_half(d->white[middle]);
     return (struct both){{bounded(rgb_sub(s.radiance, told.of[VALUE]), white),
                           bounded(rgb_scale(told.of[NOISE], -1.0f), white)}};
 }
@@ -174,7 +164,7 @@ static void flatten_row(void *user, size_t row, int thread) {
         }
         add(&off, count < WINDOW_LEAST ? NAN : -1.0f / count, &sum);
         for (int kind = 0; kind < KINDS; kind++)
-            to_halves(job->detail->off[kind][job->train][at], off.of[kind]);
+            rgb_to_half(job->detail->off[kind][job->train][at], off.of[kind]);
     }
 }
 
@@ -200,7 +190,7 @@ static bool off_at(const struct detail *d, const struct view *view, int kind, rg
     *off = rgb_gray(0.0f);
     for (int k = 0; k < 4; k++) {
         float weight = (k & 1 ? tx : 1.0f - tx) * (k & 2 ? ty : 1.0f - ty);
-        *off = rgb_mad(*off, weight, from_halves(d->off[kind][view->train][(y + (k >> 1)) * width + x + (k & 1)]));
+        *off = rgb_mad(*off, weight, rgb_from_half(d->off[kind][view->train][(y + (k >> 1)) * width + x + (k & 1)]));
     }
     return !isnan(off->r);
 }
@@ -237,12 +227,12 @@ static float agreement(const struct sums *s) {
 }
 
 static void move(uint16_t half[3], rgb by, rgb white) {
-    rgb value = from_halves(half);
+    rgb value = rgb_from_half(half);
     for (int c = 0; c < 3; c++) {
         float step = clampf(channels_of(&by)[c] / channels_of(&white)[c], -STEP_MOST, STEP_MOST);
         channels_of(&value)[c] = clampf(channels_of(&value)[c] + step, -BASE_MOST, BASE_MOST);
     }
-    to_halves(half, value);
+    rgb_to_half(half, value);
 }
 
 static void step_texel(struct detail *d, uint32_t texel) {
@@ -251,7 +241,7 @@ static void step_texel(struct detail *d, uint32_t texel) {
     struct sums s = {.weight = 0.0f};
     if (!is_known(d, texel) || !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    rgb white = from_halves(d->white[texel]);
+    rgb white = rgb_from_half(d->white[texel]);
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         struct view view;
         if (views_sees(d->views, t, at.position, at.normal, &view))

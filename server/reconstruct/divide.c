@@ -9,6 +9,7 @@
 #include "server/reconstruct/color_prior.h"
 #include "server/reconstruct/halves.h"
 #include "server/reconstruct/highlight.h"
+#include "server/reconstruct/rgb_half.h"
 #include "server/reconstruct/robust.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -131,12 +132,6 @@ static void look_all(const struct divide *d, uint32_t texel, struct incident *sc
     }
 }
 
-static void set_half(uint16_t half[3], rgb value) {
-    half[0] = image_half_from_float(value.r);
-    half[1] = image_half_from_float(value.g);
-    half[2] = image_half_from_float(value.b);
-}
-
 static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
     const float *from = r->materials.base_color.texel[texel];
     return rgb_make(from[0], from[1], from[2]);
@@ -156,8 +151,8 @@ static struct measured mean_of(struct texel_looks *looks, const struct irradianc
     const float *sum = light->moment[0];
     rgb off = divide_channels(rgb_mul(value, light->noise), rgb_make(sum[0], sum[1], sum[2]), FLT_MIN);
     halves_draw(looks->look, looks->count, &noise);
-    set_half(m.value, value);
-    set_half(m.noise, rgb_add(noise, off));
+    rgb_to_half(m.value, value);
+    rgb_to_half(m.noise, rgb_add(noise, off));
     m.mixing = image_half_from_float(mixing);
     return m;
 }
@@ -219,7 +214,7 @@ static void white_chunk(void *user, size_t chunk, int thread) {
         rgb white;
         bool known = d->measured[texel].weight > 0.0f && divide_white(d, texel, &white) &&
                      fminf(white.r, fminf(white.g, white.b)) > DARK * d->views->median_radiance;
-        set_half(job->white[texel], known ? white : rgb_gray(0.0f));
+        rgb_to_half(job->white[texel], known ? white : rgb_gray(0.0f));
     }
 }
 
@@ -252,7 +247,7 @@ static void send_out(const struct divide *d, uint32_t texel, uint16_t radiance[3
     if (known > MOSTLY_KNOWN || d->r->is_emitter[reconstruction_segment(d->r, texel)] || !divide_white(d, texel, &white))
         return;
     rgb reflected = rgb_mul(texel_color(d->r, texel), white);
-    set_half(radiance, rgb_mad(rgb_scale(reflected, 1.0f - known), known, fused_radiance(&d->r->fused, texel)));
+    rgb_to_half(radiance, rgb_mad(rgb_scale(reflected, 1.0f - known), known, fused_radiance(&d->r->fused, texel)));
 }
 
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {

@@ -10,8 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "common/image.h"
 #include "server/reconstruct/noise.h"
+#include "server/reconstruct/rgb_half.h"
 #include "server/reconstruct/views.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
@@ -28,9 +28,7 @@ void fuse(struct fused *f, const struct views *views, const struct noise *noise,
 void fused_release(struct fused *f);
 
 static inline rgb fused_radiance(const struct fused *f, uint32_t texel) {
-    const uint16_t *half = f->radiance[texel];
-    return rgb_make(image_float_from_half(half[0]), image_float_from_half(half[1]),
-                    image_float_from_half(half[2]));
+    return rgb_from_half(f->radiance[texel]);
 }
 
 #endif

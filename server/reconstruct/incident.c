@@ -4,10 +4,10 @@
 #include <assert.h>
 #include <string.h>
 
-#include "common/image.h"
 #include "server/render/bsdf.h"
 #include "server/render/light.h"
 #include "server/render/sampler.h"
+#include "server/reconstruct/rgb_half.h"
 
 enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT };
 
@@ -31,9 +31,7 @@ static rgb look_at(const struct light_field *field, const struct accel_hit *hit,
     uint32_t column = x > 0.0f ? (uint32_t)x : 0, row = y > 0.0f ? (uint32_t)y : 0;
     column = column < width ? column : width - 1;
     row = row < height ? row : height - 1;
-    const uint16_t *value = field->radiance[(size_t)row * width + column];
-    return rgb_make(image_float_from_half(value[0]), image_float_from_half(value[1]),
-                    image_float_from_half(value[2]));
+    return rgb_from_half(field->radiance[(size_t)row * width + column]);
 }
 
 void incident_trace(struct incident *in, const struct light_field *field,
