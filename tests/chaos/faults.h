@@ -16,7 +16,10 @@
 #include <unistd.h>
 
 #define FAULTS_CALLS_MAX 65536
-#define FAULTS_KILL (-1) /* in place of an errno: whoever is about to do it is killed */
+/* In place of an errno, with preload/files.c: whoever is about to do it is killed, or held up until
+ * something else is armed, or nothing. */
+#define FAULTS_KILL (-1)
+#define FAULTS_HOLD (-2)
 
 enum faults_role { FAULTS_DAEMON = 1, FAULTS_WORKER = 2 };
 
@@ -28,7 +31,8 @@ struct faults {
     atomic_long count;   /* so many were done */
     atomic_long fail_at; /* n, from 1; 0: none */
     atomic_bool for_good; /* all later ones fail, too */
-    atomic_int error;    /* errno of operations, or FAULTS_KILL */
+    atomic_int error;    /* errno of operations, or FAULTS_KILL, FAULTS_HOLD */
+    atomic_int armed;    /* so many times */
     atomic_long failed;  /* so many have */
     char what[16];       /* the call that did, with preload/calls.c */
     /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
@@ -119,10 +123,12 @@ static inline void faults_arm(struct faults *f, int roles, long n, int error, bo
     atomic_store(&f->for_good, for_good);
     atomic_store(&f->fail_at, n);
     atomic_store(&f->roles, roles);
+    atomic_fetch_add(&f->armed, 1);
 }
 
 static inline void faults_lift(struct faults *f) {
     atomic_store(&f->roles, 0);
+    atomic_fetch_add(&f->armed, 1);
 }
 
 /* --- the libraries' side ------------------------------------------------------------------------ */

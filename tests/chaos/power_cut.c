@@ -11,6 +11,7 @@
 #include "tests/chaos/promises.h"
 
 #define PIECE 30000 /* bytes of an upload's part */
+#define HELD_AT 40  /* of the operations that a worker does */
 
 static struct daemon daemon_;
 static struct faults *faults;
@@ -188,6 +189,9 @@ static void live_once(const char *archive) {
     struct parts first, second;
     daemon_scene(&daemon_, archive, scene);
     mark("scene %s 0 ready", scene);
+    /* Its worker is held up at its first operation until the others are in their places, and then in a
+     * checkpoint until it is told to pause: however fast it is, it is not done before. */
+    faults_arm(faults, FAULTS_WORKER, 1, FAULTS_HOLD, true);
     long long long_one = submit("runs", 120), waits = submit("waits", 3), goes = submit("goes", 3);
     parts_begin(&first, 1, 200000);
     parts_send(&first, PIECE, false, false);
@@ -200,9 +204,11 @@ static void live_once(const char *archive) {
     parts_look(&first);
     act(goes, "DELETE", "", "{}");
     parts_send(&second, PIECE, false, false);
+    faults_arm(faults, FAULTS_WORKER, HELD_AT, FAULTS_HOLD, true);
     for (int i = 0; i < 10; i++, usleep(20000))
         look(long_one, "succeeded");
     act(long_one, "POST", "/pause", "{}");
+    faults_lift(faults);
     await(long_one, "paused");
     act(waits, "POST", "/resume", "{}");
     act(long_one, "POST", "/resume", "{}");

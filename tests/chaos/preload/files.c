@@ -25,6 +25,7 @@
 #include <sys/random.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <time.h>
 
 #include "tests/chaos/faults.h"
 
@@ -100,11 +101,18 @@ static bool find_fd(int fd, uint64_t *inode) {
 /* --- failing, logging ---------------------------------------------------------------------------- */
 
 static bool fails(void) {
+    int armed = faults ? atomic_load(&faults->armed) : 0;
     if (!faults_strikes(faults, faults_count(faults, role)))
         return false;
-    errno = atomic_load(&faults->error);
-    if (errno == FAULTS_KILL)
+    int error = atomic_load(&faults->error);
+    if (error == FAULTS_KILL)
         kill(getpid(), SIGKILL);
+    if (error == FAULTS_HOLD) {
+        while (atomic_load(&faults->armed) == armed)
+            nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+        return false;
+    }
+    errno = error;
     return true;
 }
 
