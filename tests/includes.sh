@@ -24,7 +24,7 @@ own() {
     bad=1
 }
 
-engine='server/(ingest|scene|render|reconstruct|export)/'
+engine='server/(ingest|scene|render|capture|gather|reconstruct|export)/'
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
@@ -34,16 +34,18 @@ forbid server/job "$engine|server/http/" 'job never sees the engine or http'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
 forbid server/worker 'server/(http|job)/|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
-forbid "server/scene server/render server/reconstruct server/ingest server/export" \
+forbid "server/scene server/render server/capture server/gather server/reconstruct server/ingest server/export" \
     'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
-forbid server/scene 'server/(render|reconstruct|ingest|export)/' 'scene is data, no rays'
-forbid server/render 'server/(reconstruct|ingest|export)/' 'render sees only scene'
-forbid server/ingest 'server/(render|reconstruct|export)/' 'ingest sees only scene'
-forbid server/reconstruct 'server/(ingest|export)/' 'reconstruct sees only render and scene'
-forbid server/export 'server/(render|reconstruct|ingest)/' 'export sees only scene'
+forbid server/scene 'server/(render|capture|gather|reconstruct|ingest|export)/' 'scene is data, no rays'
+forbid server/render 'server/(capture|gather|reconstruct|ingest|export)/' 'render sees only scene'
+forbid server/ingest 'server/(render|capture|gather|reconstruct|export)/' 'ingest sees only scene'
+forbid server/capture 'server/(gather|reconstruct|ingest|export)/' 'capture sees only render and scene'
+forbid server/gather 'server/(reconstruct|ingest|export)/' 'gather sees only capture, render and scene'
+forbid server/reconstruct 'server/(ingest|export)/' 'reconstruct sees only gather and what is below it'
+forbid server/export 'server/(render|capture|gather|reconstruct|ingest)/' 'export sees only scene'
 
 forbid "server/demo server/evaluate" 'server/(http|store|job|worker)/' 'tools know only the engine'
-forbid server/demo 'server/(ingest|reconstruct|export|evaluate)/' 'demo sees only render and scene'
+forbid server/demo 'server/(ingest|capture|gather|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c sees the tools'
 

@@ -9,11 +9,11 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/capture/orient.h"
 #include "server/evaluate/recovered.h"
 #include "server/evaluate/seen.h"
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/metrics.h"
-#include "server/reconstruct/orient.h"
 #include "server/render/film.h"
 #include "server/scene/scene.h"
 

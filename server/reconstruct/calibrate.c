@@ -6,9 +6,9 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/reconstruct/calibrate_blur.h"
-#include "server/reconstruct/calibrate_light.h"
-#include "server/reconstruct/calibrate_poses.h"
+#include "server/capture/calibrate_blur.h"
+#include "server/capture/calibrate_light.h"
+#include "server/capture/calibrate_poses.h"
 
 static void say_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {

@@ -8,8 +8,8 @@
 #ifndef UNBAKE_RECONSTRUCT_CALIBRATE_H
 #define UNBAKE_RECONSTRUCT_CALIBRATE_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* Changes the photographs of r->scene, brings `views` up to date, adds "calibration" to r->report
  * and says in the log what was found. */

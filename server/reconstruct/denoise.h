@@ -16,9 +16,9 @@
 
 #include "common/parallel.h"
 #include "common/vec.h"
-#include "server/reconstruct/rgb_half.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
+#include "server/scene/rgb_half.h"
 #include "server/scene/texture.h"
 
 /* What was measured of a texel; half precision but for the weight, since there may be many millions.

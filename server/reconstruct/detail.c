@@ -4,9 +4,9 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/capture/halves.h"
 #include "server/reconstruct/footprint.h"
-#include "server/reconstruct/halves.h"
-#include "server/reconstruct/rgb_half.h"
+#include "server/scene/rgb_half.h"
 #include "server/scene/surface.h"
 
 #define SIDE 3     /* places a row and column of a footprint at which the texture is read */

@@ -14,9 +14,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "server/capture/views.h"
 #include "server/reconstruct/denoise.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 struct detail {
     const struct reconstruction *r;  /* borrowed, as all but the pictures */

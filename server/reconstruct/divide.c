@@ -6,12 +6,12 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/capture/halves.h"
+#include "server/capture/robust.h"
+#include "server/gather/highlight.h"
 #include "server/reconstruct/color_prior.h"
-#include "server/reconstruct/halves.h"
-#include "server/reconstruct/highlight.h"
-#include "server/reconstruct/rgb_half.h"
-#include "server/reconstruct/robust.h"
 #include "server/render/sampler.h"
+#include "server/scene/rgb_half.h"
 #include "server/scene/surface.h"
 
 #define CHUNK 256 /* texels a work item */

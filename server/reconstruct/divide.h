@@ -10,12 +10,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "server/capture/noise.h"
+#include "server/capture/views.h"
+#include "server/gather/incident.h"
+#include "server/gather/probes.h"
 #include "server/reconstruct/denoise.h"
-#include "server/reconstruct/incident.h"
-#include "server/reconstruct/noise.h"
-#include "server/reconstruct/probes.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 struct divide {
     struct reconstruction *r;         /* borrowed, as all below; r->materials.base_color is written */

@@ -9,9 +9,9 @@
 #ifndef UNBAKE_RECONSTRUCT_EMITTERS_H
 #define UNBAKE_RECONSTRUCT_EMITTERS_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/look.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* What is known of a segment's light. */
 struct emitter_evidence {

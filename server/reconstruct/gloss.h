@@ -12,9 +12,9 @@
 #include <stdint.h>
 
 #include "common/parallel.h"
-#include "server/reconstruct/probes.h"
+#include "server/capture/views.h"
+#include "server/gather/probes.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* Writes r->materials.roughness and .specular. */
 void gloss_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,

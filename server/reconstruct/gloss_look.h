@@ -9,11 +9,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "server/capture/views.h"
+#include "server/gather/highlight.h"
+#include "server/gather/probes.h"
 #include "server/reconstruct/by_segment.h"
-#include "server/reconstruct/highlight.h"
-#include "server/reconstruct/probes.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 #define GLOSS_VIEWS 10        /* photographs of a texel, at most */
 #define GLOSS_POINTS_MOST 256 /* texels of a segment, at most */

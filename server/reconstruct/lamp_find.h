@@ -8,8 +8,8 @@
 #ifndef UNBAKE_RECONSTRUCT_LAMP_FIND_H
 #define UNBAKE_RECONSTRUCT_LAMP_FIND_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* What was seen must be fused and the world be lit by r->environment, if it has a map. Fills r->evidence, with
  * `hidden` for lamps that were found; the report says which ("hidden_lamps"). The same for any number of threads. */

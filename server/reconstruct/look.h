@@ -9,8 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 #include "server/render/path.h"
 
 struct look {

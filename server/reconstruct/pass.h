@@ -11,10 +11,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "server/reconstruct/choose.h"
+#include "server/capture/choose.h"
+#include "server/capture/views.h"
 #include "server/reconstruct/look.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 #define PASS_CHUNK_TEXELS 32 /* a look batch has room for so many texels */
 

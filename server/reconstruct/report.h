@@ -3,8 +3,8 @@
 #ifndef UNBAKE_RECONSTRUCT_REPORT_H
 #define UNBAKE_RECONSTRUCT_REPORT_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A held-out frame
  * of unknown exposure is compared at the exposure that fits it best. STATUS_CANCELLED when stopped. */

@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/reconstruct/incident.h"
+#include "server/gather/incident.h"
 #include "server/reconstruct/unseen_fit.h"
 #include "server/render/sampler.h"
 

@@ -12,8 +12,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "server/capture/triangle_light.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/triangle_light.h"
 #include "server/reconstruct/unseen_fit.h"
 
 struct shining_place;

@@ -6,12 +6,12 @@
 
 #include "common/clock.h"
 #include "common/mem.h"
+#include "server/gather/probes.h"
 #include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
 #include "server/reconstruct/lamp_find.h"
-#include "server/reconstruct/probes.h"
 
 #define PASSES 2
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */

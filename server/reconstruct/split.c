@@ -11,8 +11,8 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/capture/triangle_light.h"
 #include "server/reconstruct/shining.h"
-#include "server/reconstruct/triangle_light.h"
 #include "server/scene/adjacency.h"
 
 #define FIRST_LEVEL 1.5f /* of the median of the photographs */

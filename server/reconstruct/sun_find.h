@@ -10,8 +10,8 @@
 #ifndef UNBAKE_RECONSTRUCT_SUN_FIND_H
 #define UNBAKE_RECONSTRUCT_SUN_FIND_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* What was seen must be fused and the world be lit by r->environment, if it has a map. Fills r->sun; the report says
  * what was found ("sun"). The same for any number of threads. */

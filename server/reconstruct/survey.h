@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "server/reconstruct/incident.h"
+#include "server/capture/views.h"
+#include "server/gather/incident.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 struct survey {
     struct reconstruction *r;   /* borrowed */

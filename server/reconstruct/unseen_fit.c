@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/reconstruct/conjugate.h"
+#include "server/capture/conjugate.h"
 
 #define COLUMNS UNSEEN_COLUMNS
 #define ROWS UNSEEN_ROWS

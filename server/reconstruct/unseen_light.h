@@ -12,8 +12,8 @@
 #ifndef UNBAKE_RECONSTRUCT_UNSEEN_LIGHT_H
 #define UNBAKE_RECONSTRUCT_UNSEEN_LIGHT_H
 
+#include "server/capture/views.h"
 #include "server/reconstruct/reconstruction.h"
-#include "server/reconstruct/views.h"
 
 /* What was seen must be fused, and the world be lit by r->environment if it has a map. Changes the part
  * of that map that was filled in, or makes one, unless the guess will do or hardly a ray leaves the room

@@ -7,7 +7,7 @@
 #define UNBAKE_TESTS_RENDER_PAINTED_ROOM_H
 
 #include "common/rng.h"
-#include "server/reconstruct/views.h"
+#include "server/capture/views.h"
 #include "server/render/accel.h"
 #include "server/scene/atlas.h"
 #include "tests/render/small_room.h"

@@ -1,5 +1,5 @@
 /* calibrate_blur.h: smeared photographs are found and trusted less; sharp ones are left alone. */
-#include "server/reconstruct/calibrate_blur.h"
+#include "server/capture/calibrate_blur.h"
 
 #include "tests/render/painted_room.h"
 

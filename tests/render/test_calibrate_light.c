@@ -1,6 +1,6 @@
 /* calibrate_light.h: drift, white balance and vignette are put into a capture and found again; a
  * capture without them is left alone. */
-#include "server/reconstruct/calibrate_light.h"
+#include "server/capture/calibrate_light.h"
 
 #include "tests/render/painted_room.h"
 

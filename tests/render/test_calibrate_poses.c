@@ -1,6 +1,6 @@
 /* calibrate_poses.h: cameras are moved by a few pixels and found again; a capture whose poses are right
  * is left alone. */
-#include "server/reconstruct/calibrate_poses.h"
+#include "server/capture/calibrate_poses.h"
 
 #include "tests/render/painted_room.h"
 

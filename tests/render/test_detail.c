@@ -1,7 +1,7 @@
 /* detail.h: of paint about as fine as the photographs' pixels less is lost than by the mean of what they show, on any
  * number of threads; and where edges are sharpened the draw of noise grows. */
+#include "server/capture/halves.h"
 #include "server/reconstruct/detail.h"
-#include "server/reconstruct/halves.h"
 #include "server/scene/surface.h"
 #define PAINTED_WIDTH 40 /* pixels larger than texels */
 #define PAINTED_HEIGHT 30

@@ -2,9 +2,9 @@
  * found in the photographs, lights the room, and can be replaced. */
 #include "common/file.h"
 #include "common/sha256.h"
+#include "server/capture/environment.h"
 #include "server/evaluate/relight.h"
 #include "server/export/outputs.h"
-#include "server/reconstruct/environment.h"
 #include "server/reconstruct/reconstruct.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"

@@ -2,8 +2,8 @@
  * against an independent renderer: what a white diffuse surface and what the specular lobes send to
  * a viewer, under a lamp and walls that send out a given light. Fixed seeds; the bounds are several
  * standard errors of both sides. */
-#include "server/reconstruct/highlight.h"
-#include "server/reconstruct/incident.h"
+#include "server/gather/highlight.h"
+#include "server/gather/incident.h"
 #include "server/render/path.h"
 #include "server/render/sampler.h"
 #include "tests/check.h"

@@ -1,5 +1,5 @@
 /* choose.h: permutations permute; an epoch visits every texel once, evenly over the surface. */
-#include "server/reconstruct/choose.h"
+#include "server/capture/choose.h"
 
 #include "tests/check.h"
 

@@ -1,5 +1,5 @@
 /* conjugate.h: a system of n unknowns is solved in n steps, and a good preconditioner needs fewer. */
-#include "server/reconstruct/conjugate.h"
+#include "server/capture/conjugate.h"
 
 #include "tests/check.h"
 

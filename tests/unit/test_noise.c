@@ -1,5 +1,5 @@
 /* noise.h: the noise of made-up photographs is found, and their texture is not taken for it. */
-#include "server/reconstruct/noise.h"
+#include "server/capture/noise.h"
 
 #include "common/image.h"
 #include "common/mem.h"

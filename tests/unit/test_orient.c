@@ -2,7 +2,7 @@
  * seen from the front, not at all, or by a held-out photograph only keeps its front. */
 #include <string.h>
 
-#include "server/reconstruct/orient.h"
+#include "server/capture/orient.h"
 #include "tests/check.h"
 
 #define SIZE 16

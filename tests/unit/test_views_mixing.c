@@ -2,7 +2,7 @@
  * the brighter the other side of the edge is. */
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/reconstruct/views.h"
+#include "server/capture/views.h"
 #include "tests/check.h"
 
 #define WIDTH 32

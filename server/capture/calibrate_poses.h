@@ -1,0 +1,27 @@
+/* calibrate_poses.h -- poses of photographs, corrected by a few pixels where that makes them agree.
+ *
+ * A photograph is moved (six degrees of freedom) so that at places of strong texture it shows what
+ * the other photographs show there (Lucas & Kanade 1981; robust Gauss-Newton over all photographs at
+ * once, coarse to fine). The mesh stays where it is. A correction is only kept
+ * when it is large enough to matter and makes the photograph agree clearly better at tracks that
+ * were held back; otherwise the pose stays exactly as it was. */
+#ifndef UNBAKE_CAPTURE_CALIBRATE_POSES_H
+#define UNBAKE_CAPTURE_CALIBRATE_POSES_H
+
+#include "common/parallel.h"
+#include "server/capture/tracks.h"
+#include "server/scene/scene.h"
+
+struct poses_found {
+    size_t moved_count;
+    double shift_px;  /* rms over the photographs that were moved, pixels */
+    float *shift;     /* [train_count] rms over a photograph's tracks, 0 where it stays; owned */
+};
+
+/* Moves the cameras of training photographs. The tracks stay valid, but what views knows of depth
+ * edges is then of the old poses. The same for any number of threads. */
+void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct parallel *pool,
+                     struct poses_found *found);
+void poses_found_release(struct poses_found *found);
+
+#endif

@@ -1,0 +1,32 @@
+/* choose.h -- which texels an iteration works on.
+ *
+ * The valid texels, in the order of inverse_uv.h (neighbours on the surface are neighbours in
+ * the list), are cut into as many strata as an iteration takes texels; each iteration takes one
+ * of each stratum, by a random permutation of the stratum that is drawn anew every epoch. So an
+ * iteration covers the whole surface evenly, and an epoch visits every texel exactly once. */
+#ifndef UNBAKE_CAPTURE_CHOOSE_H
+#define UNBAKE_CAPTURE_CHOOSE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define CHOOSE_NONE SIZE_MAX
+
+struct chooser {
+    size_t item_count;    /* valid texels */
+    size_t stratum_count; /* texels an iteration */
+    size_t epoch_length;  /* iterations until every texel was visited */
+    uint64_t seed;
+};
+
+void chooser_init(struct chooser *c, size_t item_count, size_t per_iteration, uint64_t seed);
+
+/* The item in [0, item_count) that `iteration` takes from `stratum`, or CHOOSE_NONE where this
+ * stratum is shorter than the epoch and done. */
+size_t chooser_item(const struct chooser *c, uint64_t iteration, size_t stratum);
+
+/* A random permutation of [0, count): the place of `index`. Multiply-and-shift rounds over the
+ * next power of two with cycle walking, as in Kensler 2013 (Correlated Multi-Jittered Sampling). */
+uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key);
+
+#endif

@@ -1,0 +1,372 @@
+/* environment.c -- see environment.h.
+ *
+ * Gathered, not scattered: each direction of the map asks every photograph that may look there,
+ * at several places over its cell where the photograph is finer than the map. What the photographs
+ * say is combined channel by channel: the median that a saturated value, a lower bound, moves only
+ * upwards (censored.h), then the mean of what agrees with it. A photograph weighs by its exposure, as
+ * the precision of a count of photons does; by the value itself it would favour the noise that is too
+ * bright. */
+#include "server/capture/environment.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/capture/censored.h"
+#include "server/capture/fill.h"
+
+/* A point so far away that every camera of a room sees it in the same direction, in metres. */
+#define FAR_M 1e6f
+/* Places over a cell, along each side, at most. */
+#define MAX_GRID 4
+/* Weight of a look-up within a pixel of the opening's rim, where poses that are a little wrong mix
+ * light and frame. */
+#define RIM_TRUST 0.1f
+/* Values this many deviations from the median take no part in the mean. */
+#define OUTLIER_DEVIATIONS 3.0f
+/* The least deviation, as a part of the median: two photographs that agree by chance must not make
+ * a third one an outlier. */
+#define LEAST_DEVIATION 0.05f
+
+/* A photograph that looks out somewhere. */
+struct window {
+    uint32_t train;
+    size_t pixel_count; /* open ones */
+    vec3 axis;          /* a cone around their directions */
+    float cosine;
+    int grid;           /* places over a cell, along each side */
+};
+
+/* Solid angles, in units of a cell at the equator. */
+struct seen {
+    double angle, saturated;
+};
+
+struct gather {
+    const struct views *views;
+    struct environment *e;
+    size_t window_count;
+    struct window *window; /* [window_count] */
+    struct censored *scratch; /* [threads][3][window_count] what photographs show in a direction */
+    struct seen *seen;     /* [height] by row */
+};
+
+/* --- photographs that look out -------------------------------------------------------------- */
+
+static void find_window(void *user, size_t train, int thread) {
+    (void)thread;
+    struct gather *g = user;
+    struct window *w = &g->window[train];
+    const struct views *v = g->views;
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    *w = (struct window){.train = (uint32_t)train, .cosine = 1.0f};
+    vec3 direction;
+    for (int pass = 0; pass < 2; pass++) {
+        for (uint32_t y = 0; y < camera->height; y++) {
+            for (uint32_t x = 0; x < camera->width; x++) {
+                if (v->shows[train][(size_t)y * camera->width + x] != VIEWS_OPEN ||
+                    !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction))
+                    continue;
+                w->pixel_count += pass == 0;
+                if (pass == 0)
+                    w->axis = vec3_add(w->axis, direction);
+                else
+                    w->cosine = fminf(w->cosine, vec3_dot(w->axis, direction));
+            }
+        }
+        w->axis = vec3_normalize(w->axis);
+    }
+    /* The pixels' own extent, twice. */
+    float angle = acosf(clampf(w->cosine, -1.0f, 1.0f)) + 2.0f / camera->fx;
+    w->cosine = angle < (float)PI ? cosf(angle) : -1.0f;
+}
+
+static const struct camera *camera_of(const struct gather *g, const struct window *w) {
+    return &g->views->scene->photograph[g->views->train[w->train]].camera;
+}
+
+/* Keeps the photographs that look out and returns the width of the map; 0: there are none. */
+static uint32_t find_windows(struct gather *g, struct parallel *pool) {
+    size_t train_count = g->views->train_count;
+    g->window = mem_calloc(train_count + 1, sizeof *g->window);
+    parallel_for(pool, train_count, find_window, g);
+    float *focal = mem_array(train_count + 1, sizeof *focal);
+    for (size_t t = 0; t < train_count; t++) {
+        if (g->window[t].pixel_count == 0)
+            continue;
+        g->window[g->window_count] = g->window[t];
+        focal[g->window_count] = camera_of(g, &g->window[g->window_count])->fx;
+        g->window_count++;
+    }
+    float wanted = 2.0f * (float)PI * quantile(focal, g->window_count, 0.5);
+    mem_free(focal);
+    if (g->window_count == 0)
+        return 0;
+    uint32_t width = ENVIRONMENT_MIN_WIDTH;
+    while (2 * width <= ENVIRONMENT_MAX_WIDTH && (float)(2 * width) <= wanted)
+        width *= 2;
+    for (size_t i = 0; i < g->window_count; i++) {
+        float pixels = 2.0f * (float)PI * camera_of(g, &g->window[i])->fx / (float)width;
+        g->window[i].grid = (int)clampf(ceilf(pixels - 0.5f), 1.0f, MAX_GRID);
+    }
+    return width;
+}
+
+/* --- what they say ---------------------------------------------------------------------------- */
+
+/* The mean of what agrees with the median. Sorts the values. */
+static float combine(struct censored *value, size_t count, bool *is_bound) {
+    float middle = censored_quantile(value, count, 0.5f, is_bound);
+    if (*is_bound || count < 3)
+        return middle;
+    /* The median absolute deviation is the farthest when the farther half is gone. */
+    size_t first = 0, end = count;
+    float half = 0.0f, gone = 0.0f, deviation = 0.0f, weight = 0.0f, sum = 0.0f;
+    for (size_t i = 0; i < count; i++)
+        half += value[i].is_bound ? 0.0f : 0.5f * value[i].weight;
+    while (first < end && gone < half) {
+        bool is_low = middle - value[first].value > value[end - 1].value - middle;
+        const struct censored *far = &value[is_low ? first++ : --end];
+        gone += far->is_bound ? 0.0f : far->weight;
+        deviation = fabsf(far->value - middle);
+    }
+    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, LEAST_DEVIATION * middle);
+    for (size_t i = 0; i < count; i++) {
+        if (value[i].is_bound || fabsf(value[i].value - middle) > limit)
+            continue;
+        weight += value[i].weight;
+        sum += value[i].weight * value[i].value;
+    }
+    return weight > 0.0f ? sum / weight : middle;
+}
+
+/* Solid angle of a cell. */
+static double row_angle(const struct environment *e, size_t row) {
+    return sin(PI * (double)row / (double)(e->map.height - 1));
+}
+
+/* A cell of the map: the direction of its centre, and the ways to its neighbours in column and row. */
+struct cell {
+    vec3 centre, along, down;
+};
+
+static struct cell cell_at(const struct image *map, size_t column, size_t row) {
+    double step_phi = 2.0 * PI / (double)map->width, step_theta = PI / (double)(map->height - 1);
+    double phi = step_phi * ((double)column + 0.5), theta = step_theta * (double)row;
+    double sp = sin(phi), cp = cos(phi), st = sin(theta), ct = cos(theta), across = step_phi * st;
+    return (struct cell){
+        .centre = {(float)(st * sp), (float)ct, (float)(-st * cp)},
+        .along = {(float)(across * cp), 0.0f, (float)(across * sp)},
+        .down = {(float)(step_theta * ct * sp), (float)(-step_theta * st), (float)(-step_theta * ct * cp)},
+    };
+}
+
+/* What a photograph shows of a cell, by channel; false: nothing. */
+static bool look_out(const struct gather *g, const struct window *w, const struct cell *cell,
+                     struct censored value[3]) {
+    const struct views *v = g->views;
+    const struct photograph *photo = &v->scene->photograph[v->train[w->train]];
+    vec3 origin = camera_origin(&photo->camera);
+    float sum[3] = {0}, trust_sum = 0.0f;
+    bool saturated[3] = {false, false, false};
+    for (int i = 0; i < w->grid * w->grid; i++) {
+        float dx = ((float)(i % w->grid) + 0.5f) / (float)w->grid - 0.5f;
+        float dy = ((float)(i / w->grid) + 0.5f) / (float)w->grid - 0.5f;
+        vec3 direction = vec3_mad(vec3_mad(cell->centre, dx, cell->along), dy, cell->down);
+        vec3 far = vec3_mad(origin, FAR_M, direction);
+        float x, y, depth_m;
+        struct photograph_sample sample;
+        if (!camera_project(&photo->camera, far, &x, &y, &depth_m) ||
+            !views_open(v, w->train, x, y, 0) || !photograph_sample(photo, x, y, &sample))
+            continue;
+        float trust = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_TRUST;
+        const float radiance[3] = {sample.radiance.r, sample.radiance.g, sample.radiance.b};
+        for (int c = 0; c < 3; c++) {
+            sum[c] += trust * fmaxf(radiance[c], 0.0f);
+            saturated[c] |= sample.saturated[c];
+        }
+        trust_sum += trust;
+    }
+    float weight = photo->exposure * trust_sum / (float)(w->grid * w->grid);
+    for (int c = 0; c < 3 && trust_sum > 0.0f; c++)
+        value[c] = (struct censored){sum[c] / trust_sum, weight, saturated[c]};
+    return trust_sum > 0.0f;
+}
+
+/* Standard deviation of the logarithm of the channels' mean. */
+struct spread {
+    double count, sum, square;
+};
+
+static void spread_add(struct spread *s, const struct censored value[3]) {
+    float mean = (value[0].value + value[1].value + value[2].value) / 3.0f;
+    if (value[0].is_bound || value[1].is_bound || value[2].is_bound || !(mean > 0.0f))
+        return;
+    double x = log((double)mean);
+    s->count += 1.0;
+    s->sum += x;
+    s->square += x * x;
+}
+
+static float spread_of(const struct spread *s) {
+    double squares = s->count > 1.0 ? s->square - s->sum * s->sum / s->count : 0.0;
+    return squares > 0.0 ? (float)sqrt(squares / (s->count - 1.0)) : 0.0f;
+}
+
+static void gather_cell(struct gather *g, size_t column, size_t row, struct censored *scratch) {
+    struct environment *e = g->e;
+    size_t count = 0, at = row * e->map.width + column;
+    struct cell cell = cell_at(&e->map, column, row);
+    struct spread spread = {0};
+    for (size_t i = 0; i < g->window_count; i++) {
+        const struct window *w = &g->window[i];
+        struct censored value[3];
+        if (vec3_dot(cell.centre, w->axis) < w->cosine || !look_out(g, w, &cell, value))
+            continue;
+        for (size_t c = 0; c < 3; c++)
+            scratch[c * g->window_count + count] = value[c];
+        spread_add(&spread, value);
+        count++;
+    }
+    if (count == 0)
+        return;
+    bool is_bound = false;
+    for (size_t c = 0; c < 3; c++) {
+        bool only_bound;
+        e->map.pixel[3 * at + c] = combine(scratch + c * g->window_count, count, &only_bound);
+        is_bound |= only_bound;
+    }
+    e->confidence.pixel[2 * at] = (float)count;
+    e->confidence.pixel[2 * at + 1] = spread_of(&spread);
+    double angle = row_angle(e, row);
+    g->seen[row].angle += angle;
+    g->seen[row].saturated += is_bound ? angle : 0.0;
+}
+
+static void gather_row(void *user, size_t row, int thread) {
+    struct gather *g = user;
+    for (size_t column = 0; column < g->e->map.width; column++)
+        gather_cell(g, column, row, g->scratch + (size_t)thread * 3 * g->window_count);
+}
+
+/* All columns of the first and of the last row are one direction: the mean of those that were seen. */
+static void join_pole(struct environment *e, size_t row) {
+    size_t width = e->map.width, seen = 0;
+    float *pixel = e->map.pixel + 3 * row * width, *confidence = e->confidence.pixel + 2 * row * width;
+    double sum[3] = {0}, count = 0.0;
+    for (size_t x = 0; x < width; x++) {
+        if (confidence[2 * x] == 0.0f)
+            continue;
+        seen++;
+        count = fmax(count, (double)confidence[2 * x]);
+        for (size_t c = 0; c < 3; c++)
+            sum[c] += (double)pixel[3 * x + c];
+    }
+    for (size_t x = 0; x < width && seen > 0; x++) {
+        confidence[2 * x] = (float)count;
+        for (size_t c = 0; c < 3; c++)
+            pixel[3 * x + c] = (float)(sum[c] / (double)seen);
+    }
+}
+
+/* --- the whole ---------------------------------------------------------------------------------- */
+
+void environment_update_figures(struct environment *e) {
+    size_t cells = (size_t)e->map.width * e->map.height, spread_count = 0;
+    double all = 0.0, seen = 0.0, luminance = 0.0, seen_luminance = 0.0;
+    float *spread = mem_array(cells, sizeof *spread);
+    for (size_t i = 0; i < cells; i++) {
+        const float *p = e->map.pixel + 3 * i, *known = e->confidence.pixel + 2 * i;
+        double angle = row_angle(e, i / e->map.width);
+        double light = angle * (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
+        all += angle;
+        luminance += light;
+        seen += known[0] > 0.0f ? angle : 0.0;
+        seen_luminance += known[0] > 0.0f ? light : 0.0;
+        if (known[0] > 1.0f)
+            spread[spread_count++] = known[1];
+    }
+    e->seen_share = seen / all;
+    e->median_spread = (double)quantile(spread, spread_count, 0.5);
+    e->luminance = luminance / all;
+    e->seen_luminance = seen > 0.0 ? seen_luminance / seen : 0.0;
+    mem_free(spread);
+}
+
+/* Empty map and confidence. */
+static void make_images(struct environment *e, uint32_t width) {
+    static const char *const confidence_channels[] = {"count", "spread"};
+    image_init_rgb(&e->map, width, width / 2);
+    image_init(&e->confidence, width, width / 2, 2, confidence_channels);
+}
+
+bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
+    struct gather g = {.views = views, .e = e};
+    struct seen seen = {0.0, 0.0};
+    *e = (struct environment){0};
+    uint32_t width = find_windows(&g, pool);
+    if (width > 0) {
+        make_images(e, width);
+        g.scratch = mem_array((size_t)parallel_thread_count(pool) * 3 * g.window_count, sizeof *g.scratch);
+        g.seen = mem_calloc(e->map.height, sizeof *g.seen);
+        parallel_for(pool, e->map.height, gather_row, &g);
+        join_pole(e, 0);
+        join_pole(e, e->map.height - 1);
+        for (uint32_t row = 0; row < e->map.height; row++) {
+            seen.angle += g.seen[row].angle;
+            seen.saturated += g.seen[row].saturated;
+        }
+    }
+    /* Pixels may be open and yet masked. */
+    bool any = seen.angle > 0.0;
+    if (any) {
+        fill_sphere(&e->map, &e->confidence);
+        environment_update_figures(e);
+        e->saturated_share = seen.saturated / seen.angle;
+        e->photograph_count = g.window_count;
+    } else {
+        environment_release(e);
+    }
+    mem_free(g.seen);
+    mem_free(g.scratch);
+    mem_free(g.window);
+    return any;
+}
+
+void environment_make_unseen(struct environment *e) {
+    *e = (struct environment){0};
+    make_images(e, ENVIRONMENT_MIN_WIDTH);
+}
+
+bool environment_is_seen(const struct environment *e, vec3 direction) {
+    uint32_t width = e->map.width, height = e->map.height;
+    double phi = atan2((double)direction.x, (double)-direction.z);
+    double theta = acos(fmin(fmax((double)direction.y, -1.0), 1.0));
+    double column = (phi < 0.0 ? phi + 2.0 * PI : phi) / (2.0 * PI) * (double)width;
+    double row = theta / PI * (double)(height - 1) + 0.5;
+    size_t x = (size_t)column < width ? (size_t)column : width - 1;
+    return e->confidence.pixel[2 * ((size_t)row * width + x)] > 0.0f;
+}
+
+vec3 environment_direction(const struct environment *e, size_t column, size_t row) {
+    return cell_at(&e->map, column, row).centre;
+}
+
+void environment_release(struct environment *e) {
+    image_release(&e->map);
+    image_release(&e->confidence);
+    *e = (struct environment){0};
+}
+
+cJSON *environment_figures(const struct environment *e) {
+    cJSON *figures = cJSON_CreateObject();
+    json_add_int(figures, "width", e->map.width);
+    json_add_int(figures, "height", e->map.height);
+    json_add_int(figures, "photographs", (int64_t)e->photograph_count);
+    json_add_number(figures, "seen_share_of_sphere", e->seen_share);
+    json_add_number(figures, "saturated_share_of_seen", e->saturated_share);
+    json_add_number(figures, "median_spread", e->median_spread);
+    json_add_number(figures, "mean_luminance_seen", e->seen_luminance);
+    json_add_number(figures, "mean_luminance", e->luminance);
+    return figures;
+}

@@ -1,0 +1,165 @@
+/* fill.c -- see fill.h. */
+#include "server/capture/fill.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "common/mem.h"
+#include "common/vec.h"
+
+/* What spreads is at most this many times the typical known luminance. */
+#define SPREAD_LIMIT 4.0
+#define SWEEPS 32
+
+/* One level of the pyramid: colours and how well they are known, 0 to 1. */
+struct level {
+    uint32_t width, height;
+    float (*value)[4]; /* [height][width]; owned */
+};
+
+static float sine_of_row(uint32_t row, uint32_t height) {
+    return (float)sin(PI * ((double)row + 0.5) / (double)height);
+}
+
+/* The square of the mean square root: a mean that a sun hardly moves. */
+static double typical_luminance(const struct image *map, const struct image *known) {
+    double sum = 0.0, weight = 0.0;
+    for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
+        const float *p = map->pixel + 3 * i;
+        if (!(known->pixel[i * known->channel_count] > 0.0f))
+            continue;
+        double angle = (double)sine_of_row((uint32_t)(i / map->width), map->height);
+        sum += angle * sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
+        weight += angle;
+    }
+    return (sum / weight) * (sum / weight);
+}
+
+static void start_finest(struct level *l, const struct image *map, const struct image *known) {
+    double limit = SPREAD_LIMIT * typical_luminance(map, known);
+    *l = (struct level){map->width, map->height, NULL};
+    l->value = mem_calloc((size_t)l->width * l->height, sizeof *l->value);
+    for (size_t i = 0; i < (size_t)l->width * l->height; i++) {
+        const float *p = map->pixel + 3 * i;
+        if (!(known->pixel[i * known->channel_count] > 0.0f))
+            continue;
+        double luminance = (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
+        float scale = luminance > limit ? (float)(limit / luminance) : 1.0f;
+        for (int c = 0; c < 3; c++)
+            l->value[i][c] = scale * p[c];
+        l->value[i][3] = 1.0f;
+    }
+}
+
+/* Half the size: means by solid angle and knowledge. One known cell of four makes a known one. */
+static void pull(const struct level *fine, struct level *coarse) {
+    *coarse = (struct level){fine->width / 2, fine->height / 2, NULL};
+    coarse->value = mem_calloc((size_t)coarse->width * coarse->height, sizeof *coarse->value);
+    for (uint32_t y = 0; y < coarse->height; y++) {
+        for (uint32_t x = 0; x < coarse->width; x++) {
+            float sum[3] = {0}, weight = 0.0f, all = 0.0f;
+            for (uint32_t k = 0; k < 4; k++) {
+                uint32_t row = 2 * y + k / 2;
+                const float *v = fine->value[(size_t)row * fine->width + 2 * x + k % 2];
+                float angle = sine_of_row(row, fine->height);
+                for (int c = 0; c < 3; c++)
+                    sum[c] += angle * v[3] * v[c];
+                weight += angle * v[3];
+                all += angle;
+            }
+            float *out = coarse->value[(size_t)y * coarse->width + x];
+            for (int c = 0; c < 3 && weight > 0.0f; c++)
+                out[c] = sum[c] / weight;
+            out[3] = fminf(1.0f, 4.0f * weight / all);
+        }
+    }
+}
+
+/* Mixes the coarser level, interpolated, into what is not known. */
+static void push(const struct level *coarse, struct level *fine) {
+    for (uint32_t y = 0; y < fine->height; y++) {
+        float row = clampf(0.5f * ((float)y + 0.5f) - 0.5f, 0.0f, (float)(coarse->height - 1));
+        uint32_t top = (uint32_t)row, low = top + 1 < coarse->height ? top + 1 : top;
+        float fy = row - (float)top;
+        for (uint32_t x = 0; x < fine->width; x++) {
+            float *out = fine->value[(size_t)y * fine->width + x], trust = out[3];
+            if (trust == 1.0f)
+                continue;
+            uint32_t left = (x / 2 + (x % 2 ? 0 : coarse->width - 1)) % coarse->width;
+            uint32_t right = (left + 1) % coarse->width;
+            float fx = x % 2 ? 0.25f : 0.75f;
+            const float(*up)[4] = (const float(*)[4])coarse->value + (size_t)top * coarse->width;
+            const float(*down)[4] = (const float(*)[4])coarse->value + (size_t)low * coarse->width;
+            for (int c = 0; c < 3; c++) {
+                float a = up[left][c] + fx * (up[right][c] - up[left][c]);
+                float b = down[left][c] + fx * (down[right][c] - down[left][c]);
+                out[c] = trust * out[c] + (1.0f - trust) * (a + fy * (b - a));
+            }
+        }
+    }
+}
+
+/* One Gauss-Seidel sweep of the Laplace equation over the inner rows; known cells hold still. */
+static void diffuse(struct level *l) {
+    uint32_t w = l->width;
+    double step_x = 2.0 * PI / w, step_y = PI / (l->height - 1);
+    for (uint32_t y = 1; y + 1 < l->height; y++) {
+        double sine = sin(step_y * y);
+        float up = (float)(sin(step_y * (y - 0.5)) * sine / (step_y * step_y));
+        float down = (float)(sin(step_y * (y + 0.5)) * sine / (step_y * step_y));
+        float side = (float)(1.0 / (step_x * step_x)), over = 1.0f / (up + down + 2.0f * side);
+        float(*row)[4] = l->value + (size_t)y * w;
+        for (uint32_t x = 0; x < w; x++) {
+            if (row[x][3] == 1.0f)
+                continue;
+            const float *left = row[(x + w - 1) % w], *right = row[(x + 1) % w];
+            for (int c = 0; c < 3; c++)
+                row[x][c] = over * (up * row[(ptrdiff_t)x - (ptrdiff_t)w][c] + down * row[x + w][c] +
+                                    side * (left[c] + right[c]));
+        }
+    }
+}
+
+/* A pole is one direction: the mean of the row beside it. */
+static void join_pole(struct level *l, uint32_t pole, uint32_t beside) {
+    float(*row)[4] = l->value + (size_t)pole * l->width;
+    double sum[3] = {0};
+    for (uint32_t x = 0; x < l->width; x++)
+        for (int c = 0; c < 3; c++)
+            sum[c] += (double)l->value[(size_t)beside * l->width + x][c] / l->width;
+    for (uint32_t x = 0; x < l->width && row[0][3] < 1.0f; x++)
+        for (int c = 0; c < 3; c++)
+            row[x][c] = (float)sum[c];
+}
+
+/* Two cells: what is not known of either is their mean. */
+static void fill_coarsest(struct level *l) {
+    float(*v)[4] = l->value;
+    float weight = v[0][3] + v[1][3];
+    for (int c = 0; c < 3; c++) {
+        float mean = (v[0][3] * v[0][c] + v[1][3] * v[1][c]) / weight;
+        for (int i = 0; i < 2; i++)
+            v[i][c] = v[i][3] * v[i][c] + (1.0f - v[i][3]) * mean;
+    }
+}
+
+void fill_sphere(struct image *map, const struct image *known) {
+    struct level level[32];
+    int count = 1;
+    start_finest(&level[0], map, known);
+    for (; level[count - 1].height > 1; count++)
+        pull(&level[count - 1], &level[count]);
+    fill_coarsest(&level[count - 1]);
+    for (int i = count - 1; i > 0; i--)
+        push(&level[i], &level[i - 1]);
+    for (int sweep = 0; sweep < SWEEPS; sweep++) {
+        join_pole(&level[0], 0, 1);
+        join_pole(&level[0], map->height - 1, map->height - 2);
+        diffuse(&level[0]);
+    }
+    for (size_t i = 0; i < (size_t)map->width * map->height; i++)
+        for (size_t c = 0; c < 3 && level[0].value[i][3] < 1.0f; c++)
+            map->pixel[3 * i + c] = level[0].value[i][c];
+    for (int i = 0; i < count; i++)
+        mem_free(level[i].value);
+}

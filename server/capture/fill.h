@@ -1,0 +1,17 @@
+/* fill.h -- filling in a latitude-longitude map where nothing is known.
+ *
+ * Pull-push (Gortler et al. 1996, The Lumigraph, section 3.4) by solid angle, around the seam, then
+ * diffusion with the sphere's metric: next to what is known the fill continues it, far from it
+ * it is the mean of what is known. Highlights do not spread: a sun at the rim of a window would
+ * otherwise light half of the sky. */
+#ifndef UNBAKE_CAPTURE_FILL_H
+#define UNBAKE_CAPTURE_FILL_H
+
+#include "common/image.h"
+
+/* map: three channels, finite, not negative, of a power of two times half of it. Pixels whose first
+ * channel in `known`, of the same size, is above 0 stay as they are; there must be one. The first and
+ * the last row of what is filled have one value each. */
+void fill_sphere(struct image *map, const struct image *known);
+
+#endif

@@ -1,0 +1,139 @@
+/* fuse.c -- see fuse.h. */
+#include "server/capture/fuse.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/capture/robust.h"
+#include "server/scene/surface.h"
+
+/* Radiance that is added before a logarithm, as a share of the median: black stays finite. */
+#define LOG_FLOOR 0.01f
+/* Difference of logarithms from the median at which a look-up has half its weight. */
+#define OUTLIER_SCALE 0.3f
+/* Noise of a look-up between four pixels over that of one, on average. */
+#define BILINEAR_DEVIATION 0.67f
+#define MAX_LOOKS 256
+#define CHUNK 1024 /* valid texels a work item */
+
+struct fuse_job {
+    struct fused *f;
+    const struct views *views;
+    const struct noise *noise;
+    const struct atlas *atlas;
+    const struct inverse_uv *inverse;
+};
+
+/* What the photographs show of a texel, the measured ones first. */
+struct looks {
+    size_t count, measured, clean;
+    struct robust_sample look[MAX_LOOKS];
+    struct view view[MAX_LOOKS];
+    float mixing[MAX_LOOKS]; /* see views_mixing */
+};
+
+static void add_look(struct looks *l, const struct photograph_sample *s, const struct view *view, float weight,
+                     float mixing, float floor_radiance) {
+    size_t at = l->count++;
+    if (!s->saturated[0] && !s->saturated[1] && !s->saturated[2]) {
+        l->look[at] = l->look[l->measured];
+        l->view[at] = l->view[l->measured];
+        l->mixing[at] = l->mixing[l->measured];
+        at = l->measured++;
+    }
+    float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + floor_radiance);
+    l->look[at] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
+    l->view[at] = *view;
+    l->mixing[at] = mixing;
+}
+
+/* Weighs the first `count` looks by their noise, which depends on how bright the texel is: that is
+ * told by all together, each by the light it had. */
+static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t count) {
+    rgb sum = {0.0f, 0.0f, 0.0f};
+    float weights = 0.0f;
+    for (size_t i = 0; i < count; i++) {
+        float weight = l->look[i].weight *
+                       job->views->scene->photograph[job->views->train[l->view[i].train]].exposure;
+        sum = rgb_mad(sum, weight, l->look[i].value);
+        weights += weight;
+    }
+    rgb mean = rgb_scale(sum, 1.0f / weights);
+    float floor_radiance = LOG_FLOOR * job->views->median_radiance;
+    for (size_t i = 0; i < count; i++) {
+        rgb deviation = noise_deviation(job->noise, job->views, &l->view[i], mean);
+        l->look[i].deviation = BILINEAR_DEVIATION * rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
+        l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i]);
+    }
+}
+
+static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {
+    const struct views *v = job->views;
+    l->count = l->measured = l->clean = 0;
+    for (uint32_t t = 0; t < v->train_count && l->count < MAX_LOOKS; t++) {
+        struct view view;
+        struct photograph_sample s;
+        if (views_sees(v, t, p->position, p->normal, &view) &&
+            photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
+            l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
+            add_look(l, &s, &view, view.weight * views_trust(v, &view, p->triangle),
+                     views_mixing(v, &view, p->triangle, s.radiance), LOG_FLOOR * v->median_radiance);
+        }
+    }
+}
+
+static float spread_of(const struct looks *l) {
+    double sum = 0.0, squares = 0.0, n = (double)l->count;
+    for (size_t i = 0; i < l->count; i++) {
+        double gray = (double)l->look[i].gray;
+        sum += gray;
+        squares += gray * gray;
+    }
+    return n > 1.0 ? (float)sqrt(fmax(0.0, (squares - sum * sum / n) / (n - 1.0))) : 0.0f;
+}
+
+static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
+    struct surface_point p;
+    struct looks l;
+    if (!surface_at_texel(&job->views->scene->mesh, job->atlas, job->inverse, texel, &p))
+        return;
+    look_all(job, &p, &l);
+    if (l.count == 0)
+        return;
+    job->f->count[texel] = (float)l.clean;
+    job->f->spread[texel] = spread_of(&l);
+    size_t count = l.measured > 0 ? l.measured : l.count;
+    weigh_by_noise(job, &l, count);
+    rgb mean = robust_mean(l.look, count, OUTLIER_SCALE);
+    const float channel[3] = {mean.r, mean.g, mean.b};
+    for (int c = 0; c < 3; c++)
+        job->f->radiance[texel][c] = image_half_from_float(fmaxf(channel[c], 0.0f));
+}
+
+static void fuse_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct fuse_job *job = user;
+    size_t end = (chunk + 1) * CHUNK;
+    end = end < job->inverse->valid_count ? end : job->inverse->valid_count;
+    for (size_t i = chunk * CHUNK; i < end; i++)
+        fuse_texel(job, job->inverse->valid[i]);
+}
+
+void fuse(struct fused *f, const struct views *views, const struct noise *noise, const struct atlas *atlas,
+          const struct inverse_uv *inverse, struct parallel *pool) {
+    size_t texels = (size_t)inverse->width * inverse->height;
+    *f = (struct fused){.width = inverse->width, .height = inverse->height};
+    f->radiance = mem_calloc_large(texels, sizeof *f->radiance);
+    f->count = mem_calloc_large(texels, sizeof *f->count);
+    f->spread = mem_calloc_large(texels, sizeof *f->spread);
+    struct fuse_job job = {f, views, noise, atlas, inverse};
+    parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, fuse_chunk, &job);
+}
+
+void fused_release(struct fused *f) {
+    mem_free(f->radiance);
+    mem_free(f->count);
+    mem_free(f->spread);
+    *f = (struct fused){0};
+}

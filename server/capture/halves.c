@@ -1,0 +1,83 @@
+/* halves.c -- see halves.h. */
+#include "server/capture/halves.h"
+
+#include <math.h>
+
+#include "common/rng.h"
+
+/* What shows a place less sharply than this share of the best is not held against it: texture would be taken for
+ * noise. Unless there is nothing else. */
+#define AS_SHARP 0.3f
+/* Ways to part photographs that are tried, until the lesser half has this part of the weight. */
+#define WAYS 32
+#define EVEN 0.25f
+
+/* A weighted mean, and its variance if its samples are as noisy as is expected. */
+struct mean {
+    float weight, variance;
+    rgb value;
+};
+
+static void add(struct mean *m, const struct robust_sample *s) {
+    m->weight += s->weight;
+    m->value = rgb_mad(m->value, s->weight, s->value);
+    m->variance += s->weight * s->weight * s->deviation * s->deviation;
+}
+
+static void finish(struct mean *m) {
+    m->value = rgb_scale(m->value, 1.0f / m->weight);
+    m->variance /= m->weight * m->weight;
+}
+
+static int half_of(uint32_t source, int way) {
+    return (int)(rng_mix64(source) >> way & 1);
+}
+
+int halves_usual(uint32_t source) {
+    return half_of(source, 0);
+}
+
+/* The share of the weight that the lesser half has. */
+static float lesser_part(const struct robust_sample *sample, size_t count, float least_sharp, int way) {
+    float weight[2] = {0.0f, 0.0f};
+    for (size_t i = 0; i < count; i++) {
+        if (sample[i].sharp >= least_sharp)
+            weight[half_of(sample[i].source, way)] += sample[i].weight;
+    }
+    return fminf(weight[0], weight[1]) / (weight[0] + weight[1]);
+}
+
+/* Of those samples alone that are as sharp as that. */
+static bool draw_of(const struct robust_sample *sample, size_t count, float least_sharp, rgb *draw) {
+    const struct mean none = {.weight = 0.0f};
+    struct mean all = none, half[2] = {none, none};
+    float best = 0.0f;
+    int way = 0;
+    for (int w = 0; w < WAYS && best < EVEN; w++) {
+        float part = lesser_part(sample, count, least_sharp, w);
+        if (part > best)
+            best = part, way = w;
+    }
+    if (!(best > 0.0f))
+        return false;
+    for (size_t i = 0; i < count; i++) {
+        add(&all, &sample[i]);
+        if (sample[i].sharp >= least_sharp)
+            add(&half[half_of(sample[i].source, way)], &sample[i]);
+    }
+    finish(&all);
+    finish(&half[0]);
+    finish(&half[1]);
+    float variance = half[0].variance + half[1].variance;
+    if (!(variance > 0.0f))
+        return false;
+    *draw = rgb_scale(rgb_sub(half[1].value, half[0].value), sqrtf(all.variance / variance));
+    return true;
+}
+
+bool halves_draw(const struct robust_sample *sample, size_t count, rgb *draw) {
+    float sharpest = 0.0f;
+    for (size_t i = 0; i < count; i++)
+        sharpest = fmaxf(sharpest, sample[i].sharp);
+    return draw_of(sample, count, AS_SHARP * sharpest, draw) || draw_of(sample, count, 0.0f, draw);
+}

@@ -1,0 +1,231 @@
+/* light_fit.c -- see light_fit.h.
+ *
+ * Iteratively reweighted least squares. With weights w, A the map from (G, v) to looks and M the
+ * weighted mean over the looks of a point, what remains after the L are eliminated is
+ *
+ *     (A' W (I - M) A + prior) x = A' W (I - M) y,
+ *
+ * solved by preconditioned conjugate gradients: the matrix is never formed, so a capture of
+ * thousands of photographs costs what its looks cost. Parameters that the model holds at none are
+ * projected out of each step; the preconditioner is one number a frame, so it commutes with that. */
+#include "server/capture/light_fit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/capture/conjugate.h"
+
+/* Standard deviations, in logarithms: of a look at a flat, frontal place; that a grazing one adds
+ * (times 1 / cosine - 1); of the priors on told exposures, white balance and vignette. */
+#define LOOK_SIGMA 0.02
+#define GRAZING_SIGMA 0.03
+#define UNTOLD_SIGMA 3.0
+#define DRIFT_SIGMA 0.2
+#define COLOR_SIGMA 0.2
+#define VIGNETTE_SIGMA 0.5
+
+#define ROUNDS 12
+#define CG_STEPS 60
+#define CG_TOLERANCE 1e-7
+
+void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
+    size_t looks = o->start[o->point_count];
+    *f = (struct light_fit){.o = o, .views = views, .frames = views->train_count, .scale = 1.0};
+    f->told = mem_calloc(f->frames + 1, sizeof *f->told);
+    f->radius = mem_calloc(looks + 1, sizeof *f->radius);
+    f->trust = mem_calloc(looks + 1, sizeof *f->trust);
+    f->weight = mem_calloc(looks + 1, sizeof *f->weight);
+    for (size_t t = 0; t < f->frames; t++) {
+        f->told[t] = views->scene->photograph[views->train[t]].exposure_known;
+        f->untold_count += !f->told[t];
+    }
+    for (size_t i = 0; i < looks; i++) {
+        const struct look_at *look = &o->look[i];
+        const struct photograph *photo = &views->scene->photograph[views->train[look->train]];
+        double s = (double)photograph_radius(photo, look->x, look->y);
+        double grazing = GRAZING_SIGMA * (1.0 / (double)look->cosine - 1.0);
+        double contrast = (double)look->contrast;
+        f->radius[i][0] = s;
+        f->radius[i][1] = s * s;
+        f->radius[i][2] = s * s * s;
+        f->trust[i] = 1.0 / (LOOK_SIGMA * LOOK_SIGMA + grazing * grazing + 0.25 * contrast * contrast);
+    }
+}
+
+void light_fit_release(struct light_fit *f) {
+    mem_free(f->told);
+    mem_free(f->radius);
+    mem_free(f->trust);
+    mem_free(f->weight);
+}
+
+/* --- the linear system ------------------------------------------------------------------------ */
+
+double light_fit_predict(const struct light_fit *f, const double *x, size_t look, int channel) {
+    const double *v = x + 3 * f->frames, *s = f->radius[look];
+    return x[3 * f->o->look[look].train + (size_t)channel] + v[0] * s[0] + v[1] * s[1] + v[2] * s[2];
+}
+
+/* out += A' W (I - M) z for the looks of one point and one channel, z[] by look of the point. */
+static void scatter(const struct light_fit *f, size_t point, int channel, const double *z, double *out) {
+    size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
+    double sum = 0.0, weight = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        sum += f->weight[first + i] * z[i];
+        weight += f->weight[first + i];
+    }
+    if (weight <= 0.0)
+        return;
+    double mean = sum / weight;
+    for (size_t i = 0; i < count; i++) {
+        double r = f->weight[first + i] * (z[i] - mean);
+        out[3 * f->o->look[first + i].train + (size_t)channel] += r;
+        for (size_t k = 0; k < 3; k++)
+            out[3 * f->frames + k] += r * f->radius[first + i][k];
+    }
+}
+
+/* Takes out of x what the model holds at none. */
+static void project(const struct light_fit *f, int model, double *x) {
+    for (size_t t = 0; t < f->frames; t++) {
+        double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
+        double level = f->told[t] && !(model & LIGHT_DRIFT) ? 0.0 : mean;
+        for (int c = 0; c < 3; c++)
+            g[c] = level + (model & LIGHT_COLOR ? g[c] - mean : 0.0);
+    }
+    for (size_t k = 0; k < 3 && !(model & LIGHT_VIGNETTE); k++)
+        x[3 * f->frames + k] = 0.0;
+}
+
+/* The linear system of a fit. */
+struct light_system {
+    const struct light_fit *fit;
+    int model;
+    double *inverse; /* [parameter_count] the preconditioner */
+};
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct light_system *system = user;
+    const struct light_fit *f = system->fit;
+    for (size_t t = 0; t < f->frames; t++) {
+        const double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
+        double sigma = f->told[t] ? DRIFT_SIGMA : UNTOLD_SIGMA;
+        for (int c = 0; c < 3; c++)
+            out[3 * t + (size_t)c] = mean / (sigma * sigma) + (g[c] - mean) / (COLOR_SIGMA * COLOR_SIGMA);
+    }
+    for (size_t k = 3 * f->frames; k < light_fit_parameter_count(f); k++)
+        out[k] = x[k] / (VIGNETTE_SIGMA * VIGNETTE_SIGMA);
+    for (size_t p = 0; p < f->o->point_count; p++) {
+        size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
+        for (int c = 0; c < 3 && !light_fit_is_held_back(f, p); c++) {
+            double z[OVERLAP_LOOKS_MAX];
+            for (size_t i = 0; i < count; i++)
+                z[i] = light_fit_predict(f, x, first + i, c);
+            scatter(f, p, c, z, out);
+        }
+    }
+    project(f, system->model, out);
+}
+
+/* Sums of weights: one number a frame, one each coefficient of the vignette. */
+static void make_preconditioner(const struct light_fit *f, double *inverse) {
+    size_t n = light_fit_parameter_count(f);
+    for (size_t i = 0; i < n; i++)
+        inverse[i] = 1.0;
+    for (size_t p = 0; p < f->o->point_count; p++) {
+        for (size_t i = f->o->start[p]; i < f->o->start[p + 1] && !light_fit_is_held_back(f, p); i++) {
+            for (size_t c = 0; c < 3; c++) {
+                inverse[3 * f->o->look[i].train + c] += f->weight[i];
+                inverse[3 * f->frames + c] += 3.0 * f->weight[i] * f->radius[i][c] * f->radius[i][c];
+            }
+        }
+    }
+    for (size_t i = 0; i < n; i++)
+        inverse[i] = 1.0 / inverse[i];
+}
+
+static void precondition(const void *user, const double *residual, double *out) {
+    const struct light_system *system = user;
+    for (size_t i = 0; i < light_fit_parameter_count(system->fit); i++)
+        out[i] = system->inverse[i] * residual[i];
+}
+
+/* Improves x by conjugate gradients on the system with the present weights. */
+static void solve_linear(const struct light_fit *f, int model, double *x) {
+    size_t n = light_fit_parameter_count(f);
+    double *residual = mem_calloc(2 * n, sizeof *residual);
+    struct light_system light = {f, model, residual + n};
+    const struct conjugate_system system = {n, multiply, precondition, &light};
+    make_preconditioner(f, light.inverse);
+    for (size_t point = 0; point < f->o->point_count; point++) {
+        size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
+        for (int c = 0; c < 3 && !light_fit_is_held_back(f, point); c++) {
+            double y[OVERLAP_LOOKS_MAX];
+            for (size_t i = 0; i < count; i++)
+                y[i] = (double)f->o->look[first + i].value[c];
+            scatter(f, point, c, y, residual);
+        }
+    }
+    project(f, model, residual);
+    double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(residual, residual, n);
+    conjugate_residual(&system, x, residual);
+    conjugate_solve(&system, CG_STEPS, goal, residual, x);
+    mem_free(residual);
+}
+
+/* --- robustness --------------------------------------------------------------------------------- */
+
+void light_fit_residuals(const struct light_fit *f, const double *x, size_t point, const double *weight,
+                            double *square) {
+    size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
+    memset(square, 0, count * sizeof *square);
+    for (int c = 0; c < 3; c++) {
+        double y[OVERLAP_LOOKS_MAX], sum = 0.0, total = 1e-30;
+        for (size_t i = 0; i < count; i++) {
+            y[i] = (double)f->o->look[first + i].value[c] - light_fit_predict(f, x, first + i, c);
+            sum += weight[i] * y[i];
+            total += weight[i];
+        }
+        double mean = sum / total;
+        for (size_t i = 0; i < count; i++) {
+            const struct look_at *look = &f->o->look[first + i];
+            double shown = (double)look->value[c] - (y[i] - mean);
+            bool usable = shown >= (double)look->least[c] && shown <= (double)look->most[c];
+            square[i] += usable ? f->trust[first + i] * (y[i] - mean) * (y[i] - mean) / 3.0 : INFINITY;
+        }
+    }
+}
+
+/* New weights and scale from the residuals; `gentle` weights do not give up on far ones. */
+static void reweight(struct light_fit *f, const double *x, bool gentle) {
+    size_t looks = f->o->start[f->o->point_count], used = 0;
+    double *square = mem_array(looks + 1, sizeof *square), *known = mem_array(looks + 1, sizeof *known);
+    for (size_t p = 0; p < f->o->point_count; p++) {
+        size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
+        light_fit_residuals(f, x, p, f->weight + first, square + first);
+        for (size_t i = 0; i < count && !light_fit_is_held_back(f, p); i++) {
+            if (isfinite(square[first + i]))
+                known[used++] = square[first + i];
+        }
+    }
+    f->scale = fmax(1.0, 1.48 * sqrt(quantile_double(known, used, 0.5)));
+    for (size_t i = 0; i < looks; i++) {
+        double e = square[i] / (f->scale * f->scale);
+        double robust = gentle ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + 0.25 * e);
+        f->weight[i] = f->trust[i] * robust / (f->scale * f->scale);
+    }
+    mem_free(known);
+    mem_free(square);
+}
+
+void light_fit_solve(struct light_fit *f, int model, double *x) {
+    size_t looks = f->o->start[f->o->point_count];
+    for (size_t i = 0; i < looks; i++)
+        f->weight[i] = f->trust[i];
+    for (int round = 0; round < ROUNDS; round++) {
+        reweight(f, x, round < 4);
+        solve_linear(f, model, x);
+    }
+}

@@ -1,0 +1,226 @@
+/* noise.c -- see noise.h. */
+#include "server/capture/noise.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "common/rng.h"
+
+#define LEAST_EXPONENT (-24) /* the first octave begins at 2^-24, a half's smallest number */
+#define SAMPLES 8192         /* differences kept of each octave */
+#define LEAST_SAMPLES 512    /* of fewer an octave tells nothing */
+#define QUANTILE 0.25
+#define QUANTILE_DEVIATIONS 0.3186f /* the quantile of the distance of normal noise from its mean */
+/* Var(b - (a + c) / 2) over that of one pixel. */
+#define DIFFERENCE_VARIANCE 1.5f
+#define MOST_SHARE 1.0f
+#define LEAST_SHARE 0.01f /* poses and colours are off by as much */
+/* Of a block of pixels: differences that it takes, and bounds of its noise over the octaves'. */
+#define LEAST_DIFFERENCES 64
+#define MEDIAN_DEVIATIONS 0.6745f /* as QUANTILE_DEVIATIONS */
+#define SCALE_MIN 0.5f
+#define SCALE_MAX 4.0f
+
+/* Differences met so far, of one octave; a later one takes a random place, so that those kept are an
+ * even sample (reservoir sampling, Vitter 1985). */
+struct octave {
+    uint64_t met;
+    float kept[SAMPLES];
+};
+
+static int octave_of(float value) {
+    int exponent = LEAST_EXPONENT;
+    if (value > 0.0f)
+        frexpf(value, &exponent);
+    int octave = exponent - LEAST_EXPONENT;
+    return octave < 0 ? 0 : octave >= NOISE_OCTAVES ? NOISE_OCTAVES - 1 : octave;
+}
+
+static void offer(struct octave *octave, float difference) {
+    uint64_t at = octave->met++;
+    if (at >= SAMPLES)
+        at = rng_mix64(at) % (at + 1);
+    if (at < SAMPLES)
+        octave->kept[at] = difference;
+}
+
+/* What rounding to 8 bits of sRGB adds to a linear value, as a share of it: a difference of 0 between
+ * two pixels of such a picture does not tell that there is no noise. */
+static float rounding_share(float value) {
+    float slope = value < 0.0031308f ? 1.0f / 12.92f : 2.4f / 1.055f * powf(value, 1.4f / 2.4f);
+    return slope / (255.0f * sqrtf(12.0f) * value);
+}
+
+/* Differences, as shares of the mean, of the pixels `lag` to the left and right of (x, y) from it, of the
+ * channels that have one; returns how many. Pixels that mix surfaces, are masked or clipped have none. */
+static int differences(const struct photograph *photo, const uint8_t *edge, uint32_t x, uint32_t y, uint32_t lag,
+                       float mean[3], float difference[3]) {
+    size_t at = (size_t)y * photo->camera.width + x;
+    if (x < lag || x + lag >= photo->camera.width)
+        return 0;
+    const size_t pixel[3] = {at - lag, at, at + lag};
+    for (int k = 0; k < 3; k++) {
+        if (edge[pixel[k]] == VIEWS_EDGE || (photo->mask && !photo->mask[pixel[k]]))
+            return 0;
+    }
+    int count = 0;
+    for (int c = 0; c < 3; c++) {
+        float value[3];
+        for (int k = 0; k < 3; k++)
+            value[k] = image_float_from_half(photo->pixel[pixel[k]][c]);
+        float m = (value[0] + value[1] + value[2]) / 3.0f;
+        if (!(m > 0.0f) || !isfinite(m) || fmaxf(value[0], fmaxf(value[1], value[2])) >= photo->clip)
+            continue;
+        mean[count] = m;
+        difference[count++] = fabsf(value[1] - 0.5f * (value[0] + value[2])) / m;
+    }
+    return count;
+}
+
+static void add_row(struct octave *octaves, const struct photograph *photo, const uint8_t *edge, uint32_t y) {
+    for (uint32_t x = 0; x < photo->camera.width; x++) {
+        float mean[3], difference[3];
+        int count = differences(photo, edge, x, y, 1, mean, difference);
+        for (int i = 0; i < count; i++)
+            offer(&octaves[octave_of(mean[i])], difference[i]);
+    }
+}
+
+static void measure_shares(struct noise *noise, const struct views *v) {
+    struct octave *octaves = mem_calloc(NOISE_OCTAVES, sizeof *octaves);
+    bool rounded = false;
+    for (size_t t = 0; t < v->train_count; t++) {
+        const struct photograph *photo = &v->scene->photograph[v->train[t]];
+        for (uint32_t y = 0; y < photo->camera.height; y++)
+            add_row(octaves, photo, v->edge[t], y);
+        rounded |= !photo->is_hdr;
+    }
+    float share = MOST_SHARE;
+    for (int k = 0; k < NOISE_OCTAVES; k++) {
+        struct octave *o = &octaves[k];
+        size_t count = o->met < SAMPLES ? (size_t)o->met : SAMPLES;
+        if (count >= LEAST_SAMPLES) {
+            float here = quantile(o->kept, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
+            if (rounded)
+                here = fmaxf(here, rounding_share(ldexpf(0.75f, k + LEAST_EXPONENT)));
+            share = fminf(share, here);
+        }
+        noise->share[k] = share;
+    }
+    mem_free(octaves);
+}
+
+/* --- from place to place ------------------------------------------------------------------------ */
+
+static uint32_t blocks(uint32_t pixels) {
+    return (pixels + NOISE_BLOCK - 1) / NOISE_BLOCK;
+}
+
+/* The median square of the differences at a lag over those that the octaves' shares lead to expect; 0
+ * where there are too few. */
+static float block_variance(const struct noise *noise, const struct photograph *photo, const uint8_t *edge,
+                            uint32_t x0, uint32_t y0, uint32_t lag) {
+    float ratio[3 * NOISE_BLOCK * NOISE_BLOCK];
+    size_t count = 0;
+    for (uint32_t y = y0; y < y0 + NOISE_BLOCK && y < photo->camera.height; y++) {
+        for (uint32_t x = x0; x < x0 + NOISE_BLOCK && x < photo->camera.width; x++) {
+            float mean[3], difference[3];
+            int n = differences(photo, edge, x, y, lag, mean, difference);
+            for (int i = 0; i < n; i++)
+                ratio[count++] = difference[i] / noise->share[octave_of(mean[i])];
+        }
+    }
+    if (count < LEAST_DIFFERENCES)
+        return 0.0f;
+    float median = quantile(ratio, count, 0.5) / MEDIAN_DEVIATIONS;
+    return median * median / DIFFERENCE_VARIANCE;
+}
+
+static float *measure_blocks(const struct noise *noise, const struct photograph *photo, const uint8_t *edge) {
+    uint32_t columns = blocks(photo->camera.width), rows = blocks(photo->camera.height);
+    float *scale = mem_array((size_t)columns * rows, sizeof *scale);
+    for (uint32_t row = 0; row < rows; row++) {
+        for (uint32_t column = 0; column < columns; column++) {
+            uint32_t x = column * NOISE_BLOCK, y = row * NOISE_BLOCK;
+            float near = block_variance(noise, photo, edge, x, y, 1);
+            float far = block_variance(noise, photo, edge, x, y, 2);
+            float nugget = far > near ? fmaxf(2.0f * near - far, 0.0f) : near;
+            scale[row * columns + column] =
+                near > 0.0f && far > 0.0f ? clampf(sqrtf(nugget), SCALE_MIN, SCALE_MAX) : 1.0f;
+        }
+    }
+    return scale;
+}
+
+void noise_measure(struct noise *noise, const struct views *v) {
+    *noise = (struct noise){.train_count = v->train_count};
+    measure_shares(noise, v);
+    noise->scale = mem_array(v->train_count, sizeof *noise->scale);
+    for (size_t t = 0; t < v->train_count; t++)
+        noise->scale[t] = measure_blocks(noise, &v->scene->photograph[v->train[t]], v->edge[t]);
+}
+
+void noise_release(struct noise *noise) {
+    for (size_t t = 0; t < noise->train_count; t++)
+        mem_free(noise->scale[t]);
+    mem_free(noise->scale);
+    *noise = (struct noise){0};
+}
+
+/* --- what a look-up is worth -------------------------------------------------------------------- */
+
+static float share_of(const struct noise *noise, const struct photograph *photo, float radiance, float gain) {
+    return noise->share[octave_of(radiance * photo->exposure * gain)];
+}
+
+static rgb deviation_by_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
+    return rgb_make(radiance.r * share_of(noise, photo, radiance.r, photo->gain.r),
+                    radiance.g * share_of(noise, photo, radiance.g, photo->gain.g),
+                    radiance.b * share_of(noise, photo, radiance.b, photo->gain.b));
+}
+
+rgb noise_deviation(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance) {
+    const struct photograph *photo = &v->scene->photograph[v->train[view->train]];
+    const struct camera *camera = &photo->camera;
+    uint32_t x = (uint32_t)clampf(view->x, 0.0f, (float)(camera->width - 1));
+    uint32_t y = (uint32_t)clampf(view->y, 0.0f, (float)(camera->height - 1));
+    float scale = noise->scale[view->train][y / NOISE_BLOCK * blocks(camera->width) + x / NOISE_BLOCK];
+    return rgb_scale(deviation_by_brightness(noise, photo, radiance), scale);
+}
+
+float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
+                   float mixing) {
+    float deviation = rgb_mean(noise_deviation(noise, v, view, radiance)), mean = rgb_mean(radiance);
+    float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
+    return 1.0f / (share * share + mixing);
+}
+
+float noise_weight_of_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
+    float deviation = rgb_mean(deviation_by_brightness(noise, photo, radiance)), mean = rgb_mean(radiance);
+    float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
+    return 1.0f / (share * share);
+}
+
+/* Plus or minus 1 with equal chances: as good as normal noise for second moments. */
+static float sign_of(uint32_t train, long x, long y) {
+    return rng_key(train, (uint64_t)x, (uint64_t)y) & 1 ? 1.0f : -1.0f;
+}
+
+float noise_draw(const struct view *view, bool cubic) {
+    float x = view->x - 0.5f, y = view->y - 0.5f, sum = 0.0f;
+    long column = (long)floorf(x), row = (long)floorf(y);
+    float fx = x - (float)column, fy = y - (float)row;
+    float wx[4] = {0.0f, 1.0f - fx, fx, 0.0f}, wy[4] = {0.0f, 1.0f - fy, fy, 0.0f};
+    if (cubic) {
+        photograph_cubic(fx, wx);
+        photograph_cubic(fy, wy);
+    }
+    for (int k = 0; k < 16; k++) {
+        float weight = wx[k % 4] * wy[k / 4];
+        if (weight != 0.0f)
+            sum += weight * sign_of(view->train, column - 1 + k % 4, row - 1 + k / 4);
+    }
+    return sum;
+}

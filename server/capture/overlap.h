@@ -1,0 +1,42 @@
+/* overlap.h -- points of the surface that several photographs see, and what each shows there.
+ *
+ * Evidence about photographs rather than about surfaces: whatever the surface is, its photographs
+ * should agree. Points are spread evenly over the atlas; a value is the mean of a small cross of
+ * pixels, whose contrast tells how much noise, texture and misplacement may do to it. Pixels that
+ * mix surfaces, are saturated or black take no part. Where a value should lie to be trusted is
+ * told beside it: to choose by the noisy value itself would keep what noise made brighter. */
+#ifndef UNBAKE_CAPTURE_OVERLAP_H
+#define UNBAKE_CAPTURE_OVERLAP_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/parallel.h"
+#include "server/capture/views.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+
+#define OVERLAP_LOOKS_MAX 12 /* photographs a point, drawn at random where more see it */
+
+/* What one photograph shows of one point. */
+struct look_at {
+    uint32_t train;     /* index into views.train */
+    float x, y;         /* place in the picture, pixels */
+    float cosine;       /* between the normal and the direction to the camera */
+    float value[3];     /* logarithm of radiance, by the present exposure, gain and falloff */
+    float least[3], most[3]; /* what `value` should be within: between dark and clipped, with margin */
+    float contrast;     /* standard deviation of the cross over its mean */
+};
+
+struct overlaps {
+    size_t point_count;
+    size_t *start;         /* [point_count + 1] into `look`; at least two looks a point; owned */
+    struct look_at *look;  /* owned */
+};
+
+/* Looks at up to `points` points. The same for any number of threads. */
+void overlaps_make(struct overlaps *o, const struct views *views, const struct atlas *atlas,
+                   const struct inverse_uv *inverse, size_t points, struct parallel *pool);
+void overlaps_release(struct overlaps *o);
+
+#endif

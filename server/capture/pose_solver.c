@@ -1,0 +1,295 @@
+/* pose_solver.c -- see pose_solver.h: cameras, sights, their derivatives and weights. */
+#include "server/capture/pose_solver.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+
+#define FIRST_SCALE 0.1      /* of residuals, before there are any */
+#define LEAST_SCALE 0.01     /* residuals below it are all as good */
+
+/* --- poses ----------------------------------------------------------------------------------- */
+
+static struct pose pose_of(const struct rigid *m) {
+    struct pose pose;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            pose.r[i][j] = (double)m->rotation[i][j];
+    pose.t[0] = (double)m->translation.x;
+    pose.t[1] = (double)m->translation.y;
+    pose.t[2] = (double)m->translation.z;
+    return pose;
+}
+
+/* exp(w) applied after the pose, then v added (Rodrigues' formula). */
+static struct pose twisted(const struct pose *pose, const double w[3], const double v[3]) {
+    double angle = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    double a = angle > 1e-9 ? sin(angle) / angle : 1.0;
+    double b = angle > 1e-9 ? (1.0 - cos(angle)) / (angle * angle) : 0.5;
+    const double k[3][3] = {{0, -w[2], w[1]}, {w[2], 0, -w[0]}, {-w[1], w[0], 0}};
+    struct pose out;
+    for (int i = 0; i < 3; i++) {
+        double e[3];
+        for (int j = 0; j < 3; j++)
+            e[j] = (i == j) + a * k[i][j] + b * (k[i][0] * k[0][j] + k[i][1] * k[1][j] + k[i][2] * k[2][j]);
+        for (int j = 0; j < 3; j++)
+            out.r[i][j] = e[0] * pose->r[0][j] + e[1] * pose->r[1][j] + e[2] * pose->r[2][j];
+        out.t[i] = e[0] * pose->t[0] + e[1] * pose->t[1] + e[2] * pose->t[2] + v[i];
+    }
+    return out;
+}
+
+static void set_pose(struct camera *camera, const struct pose *pose) {
+    struct rigid *to = &camera->camera_from_world, *from = &camera->world_from_camera;
+    double back[3];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            to->rotation[i][j] = (float)pose->r[i][j];
+            from->rotation[i][j] = (float)pose->r[j][i];
+        }
+        back[i] = -(pose->r[0][i] * pose->t[0] + pose->r[1][i] * pose->t[1] + pose->r[2][i] * pose->t[2]);
+    }
+    to->translation = (vec3){(float)pose->t[0], (float)pose->t[1], (float)pose->t[2]};
+    from->translation = (vec3){(float)back[0], (float)back[1], (float)back[2]};
+}
+
+static double size_of(const double twist[POSE_UNKNOWNS]) {
+    double squares = 0.0;
+    for (int k = 0; k < POSE_UNKNOWNS; k++)
+        squares += twist[k] * twist[k];
+    return sqrt(squares);
+}
+
+void pose_move(struct pose_solver *s, size_t f, double most) {
+    struct pose_frame *frame = &s->frame[f];
+    const double *twist = s->x + POSE_UNKNOWNS * f;
+    double size = size_of(twist), length = size > most ? most / size : 1.0;
+    double w[3], v[3], focal = (double)frame->now.fx;
+    if (frame->stays)
+        return;
+    for (int k = 0; k < 3; k++) {
+        w[k] = length * twist[k] / focal;
+        v[k] = length * twist[3 + k] * frame->depth_m / focal;
+    }
+    for (int k = 0; k < POSE_UNKNOWNS; k++)
+        frame->total[k] += length * twist[k];
+    frame->pose = twisted(&frame->pose, w, v);
+    set_pose(&frame->now, &frame->pose);
+}
+
+void pose_put_back(struct pose_solver *s, size_t f) {
+    struct pose_frame *frame = &s->frame[f];
+    frame->now = frame->before;
+    frame->pose = pose_of(&frame->before.camera_from_world);
+    memset(frame->total, 0, sizeof frame->total);
+    frame->stays = true;
+}
+
+/* --- linearisation ------------------------------------------------------------------------------ */
+
+static float value_at(const struct pose_solver *s, uint32_t frame, vec3 point, float *x, float *y) {
+    float depth_m;
+    if (!camera_project(&s->frame[frame].now, point, x, y, &depth_m))
+        return NAN;
+    return pyramid_value(&s->tracks->pyramid[frame], s->level, *x, *y);
+}
+
+/* What a sight shows of the track's surroundings. */
+struct patch {
+    float value, along[2];   /* change of the value per `right` and `down` */
+    float place[2][2];       /* change of the place in the picture per `right` and `down` */
+};
+
+static bool look_around(const struct pose_solver *s, const struct track *track, float step, uint32_t frame,
+                        struct patch *patch) {
+    const vec3 direction[2] = {track->right, track->down};
+    float x, y, x2[2], y2[2];
+    patch->value = value_at(s, frame, track->point, &x, &y);
+    for (int k = 0; k < 2; k++) {
+        float a = value_at(s, frame, vec3_mad(track->point, -step, direction[k]), &x2[0], &y2[0]);
+        float b = value_at(s, frame, vec3_mad(track->point, step, direction[k]), &x2[1], &y2[1]);
+        patch->along[k] = (b - a) / (2.0f * step);
+        if (!isfinite(patch->along[k]))
+            return false;
+        patch->place[k][0] = (x2[1] - x2[0]) / (2.0f * step);
+        patch->place[k][1] = (y2[1] - y2[0]) / (2.0f * step);
+    }
+    return isfinite(patch->value);
+}
+
+/* Derivative of the value by the twist of its camera, from the slope g by pixels. */
+static bool derive(const struct pose_frame *frame, vec3 point, const float g[2], float d[POSE_UNKNOWNS]) {
+    const struct camera *camera = &frame->now;
+    vec3 p = rigid_point(&camera->camera_from_world, point);
+    float x, y, depth_m, by_p[3];
+    if (!camera_project(camera, point, &x, &y, &depth_m))
+        return false;
+    float step = 2e-3f * depth_m, focal = camera->fx;
+    for (int k = 0; k < 3; k++) {
+        const float *axis = camera->camera_from_world.rotation[k];
+        float u, v;
+        vec3 moved = vec3_mad(point, step, (vec3){axis[0], axis[1], axis[2]});
+        if (!camera_project(camera, moved, &u, &v, &depth_m))
+            return false;
+        by_p[k] = (g[0] * (u - x) + g[1] * (v - y)) / (step * focal);
+    }
+    d[0] = by_p[2] * p.y - by_p[1] * p.z;
+    d[1] = by_p[0] * p.z - by_p[2] * p.x;
+    d[2] = by_p[1] * p.x - by_p[0] * p.y;
+    for (int k = 0; k < 3; k++)
+        d[3 + k] = by_p[k] * (float)frame->depth_m;
+    return true;
+}
+
+static void linearise_track(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct pose_solver *s = user;
+    const struct track *track = s->track[index];
+    struct pose_sight *sight = s->sight + index * POSE_SIGHTS_MAX;
+    struct patch patch[POSE_SIGHTS_MAX];
+    float step = (float)(1 << s->level) / s->tracks->pyramid[s->owner[index]].scale;
+    float along[2] = {0.0f, 0.0f}, total = 0.0f;
+    for (size_t k = 0; k < pose_sight_count(track); k++) {
+        const struct pose_frame *frame = &s->frame[sight[k].frame];
+        sight[k].value = NAN;
+        if (!look_around(s, track, step, sight[k].frame, &patch[k]))
+            continue;
+        float trust = (float)(1.0 / (frame->scale * frame->scale));
+        sight[k].value = patch[k].value;
+        along[0] += trust * patch[k].along[0];
+        along[1] += trust * patch[k].along[1];
+        total += trust;
+    }
+    for (size_t k = 0; k < pose_sight_count(track) && total > 0.0f; k++) {
+        /* The slope g by pixels has g . place[i] = along[i] / total. */
+        const float(*m)[2] = (const float(*)[2])patch[k].place;
+        if (!isfinite(sight[k].value))
+            continue;
+        float det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
+        float g[2] = {(along[0] * m[1][1] - along[1] * m[0][1]) / (det * total),
+                      (along[1] * m[0][0] - along[0] * m[1][0]) / (det * total)};
+        if (!(fabsf(det) > 1e-3f) || !derive(&s->frame[sight[k].frame], track->point, g, sight[k].d))
+            sight[k].value = NAN;
+    }
+}
+
+void pose_linearise(struct pose_solver *s, struct parallel *pool) {
+    parallel_for(pool, s->track_count, linearise_track, s);
+}
+
+/* --- weights ---------------------------------------------------------------------------------- */
+
+/* The track's L by what weights there are, offsets taken off; false where fewer than three tell. */
+static bool track_look(const struct pose_solver *s, size_t track, const double *weight, double *look) {
+    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
+    double sum = 0.0, total = 0.0;
+    size_t count = 0;
+    for (size_t k = 0; k < pose_sight_count(s->track[track]); k++) {
+        if (!isfinite(sight[k].value))
+            continue;
+        sum += weight[k] * ((double)sight[k].value - s->x[sight[k].offset]);
+        total += weight[k];
+        count++;
+    }
+    *look = sum / total;
+    return count >= 3;
+}
+
+/* Robust weights of a track's sights, by their distance from what they agree on. */
+void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
+                      double weight[POSE_SIGHTS_MAX]) {
+    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
+    size_t count = pose_sight_count(s->track[track]);
+    for (size_t k = 0; k < count; k++) {
+        double scale = s->frame[sight[k].frame].scale;
+        weight[k] = 1.0 / (scale * scale);
+    }
+    *look = NAN;
+    for (int round = 0; round < 4; round++) {
+        if (!track_look(s, track, weight, look)) {
+            memset(weight, 0, count * sizeof *weight);
+            return;
+        }
+        for (size_t k = 0; k < count; k++) {
+            double scale = s->frame[sight[k].frame].scale;
+            double e = ((double)sight[k].value - s->x[sight[k].offset] - *look) / scale;
+            weight[k] = isfinite(e) ? 1.0 / ((1.0 + e * e) * scale * scale) : 0.0;
+        }
+    }
+}
+
+void pose_reweight(struct pose_solver *s) {
+    double *sum = mem_calloc(2 * s->frames + 1, sizeof *sum), *count = sum + s->frames;
+    for (size_t i = 0; i < s->track_count; i++) {
+        struct pose_sight *sight = s->sight + i * POSE_SIGHTS_MAX;
+        double look, weight[POSE_SIGHTS_MAX];
+        pose_weigh_track(s, i, &look, weight);
+        for (size_t k = 0; k < pose_sight_count(s->track[i]); k++) {
+            sight[k].weight = pose_is_held_back(i) ? 0.0f : (float)weight[k];
+            if (weight[k] <= 0.0)
+                continue;
+            double r = fabs((double)sight[k].value - s->x[sight[k].offset] - look);
+            sum[sight[k].frame] += fmin(r, 2.0 * s->frame[sight[k].frame].scale);
+            count[sight[k].frame] += 1.0;
+        }
+    }
+    for (size_t f = 0; f < s->frames; f++) {
+        if (count[f] > 0.0)
+            s->frame[f].scale = fmax(LEAST_SCALE, 2.5 * sum[f] / count[f]);
+    }
+    mem_free(sum);
+}
+
+/* --- the whole ---------------------------------------------------------------------------- */
+
+static void init_sights(struct pose_solver *s, size_t index) {
+    const struct track *track = s->track[index];
+    for (size_t k = 0; k < pose_sight_count(track); k++) {
+        uint32_t f = k == 0 ? s->owner[index] : track->other[k - 1];
+        struct pose_frame *frame = &s->frame[f];
+        float x = 0.0f, y = 0.0f, depth_m = 0.0f;
+        camera_project(&frame->before, track->point, &x, &y, &depth_m);
+        size_t column = (size_t)(clampf(x / (float)frame->before.width, 0.0f, 0.999f) * POSE_CELL_COLUMNS);
+        size_t row = (size_t)(clampf(y / (float)frame->before.height, 0.0f, 0.999f) * POSE_CELL_ROWS);
+        size_t offset = POSE_UNKNOWNS * s->frames + f * POSE_CELLS + row * POSE_CELL_COLUMNS + column;
+        s->sight[index * POSE_SIGHTS_MAX + k] = (struct pose_sight){.frame = f, .offset = (uint32_t)offset};
+        frame->depth_m += (double)depth_m;
+        frame->sight_count++;
+    }
+}
+
+void pose_solver_init(struct pose_solver *s, const struct tracks *tracks) {
+    const struct views *views = tracks->views;
+    *s = (struct pose_solver){.tracks = tracks, .frames = views->train_count};
+    s->unknowns = (POSE_UNKNOWNS + POSE_CELLS) * s->frames;
+    s->frame = mem_calloc(s->frames + 1, sizeof *s->frame);
+    s->x = mem_calloc(s->unknowns + 1, sizeof *s->x);
+    s->track = mem_array(s->frames * tracks->capacity + 1, sizeof *s->track);
+    s->owner = mem_array(s->frames * tracks->capacity + 1, sizeof *s->owner);
+    for (size_t f = 0; f < s->frames; f++) {
+        struct pose_frame *frame = &s->frame[f];
+        frame->before = frame->now = views->scene->photograph[views->train[f]].camera;
+        frame->pose = pose_of(&frame->before.camera_from_world);
+        frame->scale = FIRST_SCALE;
+        for (size_t i = 0; i < tracks->count[f]; i++) {
+            s->owner[s->track_count] = (uint32_t)f;
+            s->track[s->track_count++] = &tracks->track[f * tracks->capacity + i];
+        }
+    }
+    s->sight = mem_calloc(s->track_count * POSE_SIGHTS_MAX + 1, sizeof *s->sight);
+    for (size_t i = 0; i < s->track_count; i++)
+        init_sights(s, i);
+    for (size_t f = 0; f < s->frames; f++) {
+        s->frame[f].depth_m /= fmax(1.0, (double)s->frame[f].sight_count);
+        s->frame[f].stays = s->frame[f].sight_count < POSE_LEAST_SIGHTS;
+    }
+}
+
+void pose_solver_release(struct pose_solver *s) {
+    mem_free(s->frame);
+    mem_free(s->x);
+    mem_free(s->track);
+    mem_free(s->owner);
+    mem_free(s->sight);
+}
+

@@ -1,0 +1,100 @@
+/* pose_solver.h -- the equations behind calibrate_poses.h: all photographs at all tracks, linearised.
+ *
+ * Photograph f moves by a twist (rotation w, translation v, in camera axes) of its camera_from_world:
+ * a track's point p in camera space moves by w x p + v. With I the photograph's pyramid, u the
+ * track's place in it and L what the track really looks like,
+ *
+ *     I(u) + grad I . du/dp . (-[p]x, 1) (w, v) - b - L = error,
+ *
+ * b being one offset for each cell of a coarse grid over the picture: what is left of a wrong
+ * exposure, a vignette and the slow change of glossy reflections. Both w and v are counted in
+ * pixels: w times the focal length, v times the focal length over the mean depth. grad I is the
+ * mean slope over all photographs of the track: noise in slopes would make steps too short. */
+#ifndef UNBAKE_CAPTURE_POSE_SOLVER_H
+#define UNBAKE_CAPTURE_POSE_SOLVER_H
+
+#include <math.h>
+
+#include "common/parallel.h"
+#include "server/capture/tracks.h"
+
+#define POSE_UNKNOWNS 6
+#define POSE_CELL_COLUMNS 8 /* of the grid of offsets */
+#define POSE_CELL_ROWS 6
+#define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
+#define POSE_SIGHTS_MAX (TRACK_OTHERS + 1)
+#define POSE_HELD_BACK_EVERY 3
+#define POSE_LEAST_SIGHTS 60 /* that must tell something, for a photograph to be moved */
+
+struct pose { /* camera_from_world */
+    double r[3][3], t[3];
+};
+
+struct pose_frame {
+    struct camera before, now;
+    struct pose pose;
+    double total[POSE_UNKNOWNS]; /* sum of the twists taken, pixels */
+    double depth_m;         /* mean over its sights */
+    double scale;           /* of its residuals */
+    double shift_px;        /* between `before` and `now`, as judged last */
+    size_t sight_count;
+    bool stays;
+};
+
+/* One photograph's look at one track. */
+struct pose_sight {
+    uint32_t frame;
+    uint32_t offset;     /* index into x: of its cell */
+    float value;         /* NAN: none */
+    float weight;        /* inverse variance, made robust; 0 where held back */
+    float d[POSE_UNKNOWNS];   /* derivative of `value` by the frame's twist, per pixel */
+};
+
+struct pose_solver {
+    const struct tracks *tracks;
+    size_t frames, track_count, unknowns;
+    const struct track **track; /* [track_count] */
+    uint32_t *owner;            /* [track_count] the photograph it comes from */
+    struct pose_sight *sight;        /* [track_count][POSE_SIGHTS_MAX], the owner's first */
+    struct pose_frame *frame;        /* [frames] */
+    double *x;                  /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
+    int level;
+};
+
+/* Every photograph at its camera; a photograph with few sights stays. `tracks` is borrowed. */
+void pose_solver_init(struct pose_solver *s, const struct tracks *tracks);
+void pose_solver_release(struct pose_solver *s);
+
+/* Values and derivatives of all sights with the cameras as they are now. */
+void pose_linearise(struct pose_solver *s, struct parallel *pool);
+
+/* Weights of all sights and scales of all frames, by how well sights agree now. */
+void pose_reweight(struct pose_solver *s);
+
+/* What a track looks like by the robust mean of its sights, offsets taken off (NAN where fewer than
+ * three tell), and the weight of each. */
+void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
+                      double weight[POSE_SIGHTS_MAX]);
+
+/* Solves for x: twists by which frames should move, and offsets. */
+void pose_solve(struct pose_solver *s);
+
+/* Moves a frame by its twist in x, at most `most` pixels; or back to where it was at first, for good. */
+void pose_move(struct pose_solver *s, size_t f, double most);
+void pose_put_back(struct pose_solver *s, size_t f);
+
+static inline size_t pose_sight_count(const struct track *track) {
+    return (size_t)track->other_count + 1;
+}
+
+/* Held-back tracks take part in no solve: they judge it. */
+static inline bool pose_is_held_back(size_t track) {
+    return track % POSE_HELD_BACK_EVERY == 0;
+}
+
+static inline double pose_robust(double residual, double scale) {
+    double e = residual / scale;
+    return log1p(e * e);
+}
+
+#endif

@@ -1,0 +1,181 @@
+/* pose_system.c -- pose_solve of pose_solver.h.
+ *
+ * The L of all tracks are eliminated and what remains is solved by conjugate gradients, as in
+ * calibrate_light.c: all twists and offsets at once, since one photograph after the other would
+ * hardly move where many are wrong together. What the evidence leaves open is decided by a prior
+ * that grows with the size of a correction and not with its square: rather a few photographs moved
+ * far than all a little. */
+#include "server/capture/pose_solver.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/capture/conjugate.h"
+
+#define OFFSET_SIGMA 0.3
+#define PRIOR_PX 0.1         /* size of the prior: a photograph moves this far for hardly any evidence */
+#define PRIOR_LEAST_PX 0.2   /* below it the prior is a square */
+#define DAMPING 0.01
+#define CG_STEPS 40
+#define CG_TOLERANCE 1e-3
+
+static double prior_of(const struct pose_frame *frame) {
+    double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
+    return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
+}
+
+/* out += A' W (I - M) z over the sights of a track, z[] by sight. */
+static void scatter(const struct pose_solver *s, size_t track, const double *z, double *out) {
+    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
+    size_t count = pose_sight_count(s->track[track]);
+    double sum = 0.0, weight = 0.0;
+    for (size_t k = 0; k < count; k++) {
+        if (sight[k].weight > 0.0f) {
+            sum += (double)sight[k].weight * z[k];
+            weight += (double)sight[k].weight;
+        }
+    }
+    for (size_t k = 0; k < count; k++) {
+        if (!(sight[k].weight > 0.0f))
+            continue;
+        double r = (double)sight[k].weight * (z[k] - sum / weight);
+        double *twist = out + POSE_UNKNOWNS * sight[k].frame;
+        for (int j = 0; j < POSE_UNKNOWNS; j++)
+            twist[j] += r * (double)sight[k].d[j];
+        out[sight[k].offset] -= r;
+    }
+}
+
+static void project(const struct pose_solver *s, double *x) {
+    for (size_t f = 0; f < s->frames; f++) {
+        if (s->frame[f].stays)
+            memset(x + POSE_UNKNOWNS * f, 0, POSE_UNKNOWNS * sizeof *x);
+    }
+}
+
+/* A factorised 6 x 6 block for each frame's twist, and the diagonal of the offsets. */
+struct preconditioner {
+    double (*block)[POSE_UNKNOWNS][POSE_UNKNOWNS]; /* [frames] lower Cholesky factors; owned */
+    double *diagonal;                              /* [unknowns]; owned */
+};
+
+struct twist_system {
+    const struct pose_solver *solver;
+    double *damping; /* [POSE_UNKNOWNS * frames] added to the diagonal of the twists; owned */
+    struct preconditioner preconditioner;
+};
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct twist_system *system = user;
+    const struct pose_solver *s = system->solver;
+    size_t twists = POSE_UNKNOWNS * s->frames;
+    for (size_t i = 0; i < s->unknowns; i++)
+        out[i] = x[i] * (i < twists ? prior_of(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
+                                    : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
+    for (size_t t = 0; t < s->track_count; t++) {
+        const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
+        double z[POSE_SIGHTS_MAX];
+        if (pose_is_held_back(t))
+            continue;
+        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++) {
+            const double *twist = x + POSE_UNKNOWNS * sight[k].frame;
+            z[k] = -x[sight[k].offset];
+            for (int j = 0; j < POSE_UNKNOWNS; j++)
+                z[k] += (double)sight[k].d[j] * twist[j];
+        }
+        scatter(s, t, z, out);
+    }
+    project(s, out);
+}
+
+static void factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
+    for (int i = 0; i < POSE_UNKNOWNS; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = a[i][j];
+            for (int k = 0; k < j; k++)
+                sum -= a[i][k] * a[j][k];
+            a[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / a[j][j];
+        }
+    }
+}
+
+static void preconditioner_init(struct preconditioner *p, const struct pose_solver *s, double *damping) {
+    p->block = mem_calloc(s->frames + 1, sizeof *p->block);
+    p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
+    for (size_t t = 0; t < s->track_count; t++) {
+        const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
+        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++) {
+            if (!(sight[k].weight > 0.0f))
+                continue;
+            double w = (double)sight[k].weight, (*a)[POSE_UNKNOWNS] = p->block[sight[k].frame];
+            p->diagonal[sight[k].offset] += w;
+            for (int i = 0; i < POSE_UNKNOWNS; i++)
+                for (int j = 0; j <= i; j++)
+                    a[i][j] += w * (double)sight[k].d[i] * (double)sight[k].d[j];
+        }
+    }
+    for (size_t f = 0; f < s->frames; f++) {
+        for (int i = 0; i < POSE_UNKNOWNS; i++) {
+            damping[POSE_UNKNOWNS * f + (size_t)i] = DAMPING * p->block[f][i][i];
+            p->block[f][i][i] += prior_of(&s->frame[f]) + DAMPING * p->block[f][i][i];
+        }
+        factorise(p->block[f]);
+    }
+    for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
+        p->diagonal[i] += 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA);
+}
+
+static void preconditioner_release(struct preconditioner *p) {
+    mem_free(p->block);
+    mem_free(p->diagonal);
+}
+
+static void precondition(const void *user, const double *r, double *z) {
+    const struct twist_system *system = user;
+    const struct pose_solver *s = system->solver;
+    const struct preconditioner *p = &system->preconditioner;
+    for (size_t f = 0; f < s->frames; f++) {
+        const double(*a)[POSE_UNKNOWNS] = (const double(*)[POSE_UNKNOWNS])p->block[f];
+        double *b = z + POSE_UNKNOWNS * f;
+        memcpy(b, r + POSE_UNKNOWNS * f, POSE_UNKNOWNS * sizeof *b);
+        for (int i = 0; i < POSE_UNKNOWNS; i++) {
+            for (int k = 0; k < i; k++)
+                b[i] -= a[i][k] * b[k];
+            b[i] /= a[i][i];
+        }
+        for (int i = POSE_UNKNOWNS - 1; i >= 0; i--) {
+            for (int k = i + 1; k < POSE_UNKNOWNS; k++)
+                b[i] -= a[k][i] * b[k];
+            b[i] /= a[i][i];
+        }
+    }
+    for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
+        z[i] = r[i] / p->diagonal[i];
+    project(s, z);
+}
+
+/* Solves for s->x: the twists from 0, the offsets from what they are. */
+void pose_solve(struct pose_solver *s) {
+    size_t n = s->unknowns, twists = POSE_UNKNOWNS * s->frames;
+    double *r = mem_calloc(n, sizeof *r), *x = s->x;
+    struct twist_system twist = {.solver = s, .damping = mem_calloc(twists, sizeof *twist.damping)};
+    const struct conjugate_system system = {n, multiply, precondition, &twist};
+    preconditioner_init(&twist.preconditioner, s, twist.damping);
+    for (size_t t = 0; t < s->track_count; t++) {
+        double y[POSE_SIGHTS_MAX];
+        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++)
+            y[k] = -(double)s->sight[t * POSE_SIGHTS_MAX + k].value;
+        if (!pose_is_held_back(t))
+            scatter(s, t, y, r);
+    }
+    memset(x, 0, twists * sizeof *x);
+    for (size_t i = 0; i < twists; i++)
+        r[i] -= prior_of(&s->frame[i / POSE_UNKNOWNS]) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
+    project(s, r);
+    conjugate_residual(&system, x, r);
+    double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);
+    conjugate_solve(&system, CG_STEPS, goal, r, x);
+    preconditioner_release(&twist.preconditioner);
+    mem_free(twist.damping);
+    mem_free(r);
+}

@@ -1,0 +1,139 @@
+/* tracks.c -- see tracks.h. */
+#include "server/capture/tracks.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+#include "server/capture/choose.h"
+
+#define TRACKS_TOTAL 50000
+#define TRACKS_LEAST 150
+#define TRACKS_MOST 600
+#define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0 together */
+#define PYRAMID_MOST ((size_t)640 * 480)
+#define PLACES_PER_CELL 8
+#define LEAST_COSINE 0.2f
+#define DISTANCE_RATIO 1.7f
+/* Slope (logarithm per pixel) below which a place is not worth following. */
+#define LEAST_SLOPE 0.01f
+/* Radiance added before logarithms, as a share of the median. */
+#define FLOOR_SHARE 0.05f
+
+struct making {
+    struct tracks *tracks;
+    size_t pyramid_pixels;
+};
+
+static void make_pyramid(void *user, size_t t, int thread) {
+    (void)thread;
+    const struct making *m = user;
+    const struct views *views = m->tracks->views;
+    pyramid_make(&m->tracks->pyramid[t], &views->scene->photograph[views->train[t]], views->shows[t],
+                 m->pyramid_pixels, FLOOR_SHARE * views->median_radiance);
+}
+
+/* The place of strongest slope among a few random ones of a cell; false when none will do. */
+static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, size_t columns, size_t rows,
+                         float *x, float *y) {
+    const struct views *views = tracks->views;
+    const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
+    float best = LEAST_SLOPE;
+    *x = *y = 0.0f;
+    for (uint64_t k = 0; k < PLACES_PER_CELL; k++) {
+        uint64_t bits = rng_key(t, cell, k);
+        float px = ((float)(cell % columns) + rng_to_float((uint32_t)bits)) / (float)columns;
+        float py = ((float)(cell / columns) + rng_to_float((uint32_t)(bits >> 32))) / (float)rows;
+        px *= (float)camera->width;
+        py *= (float)camera->height;
+        float value, g[2];
+        if (!pyramid_gradient(&tracks->pyramid[t], 1, px, py, &value, g))
+            continue;
+        float slope = sqrtf(g[0] * g[0] + g[1] * g[1]);
+        if (slope > best) {
+            best = slope;
+            *x = px;
+            *y = py;
+        }
+    }
+    return best > LEAST_SLOPE;
+}
+
+/* From the point to where the ray through (x, y) meets the surface's plane. */
+static vec3 to_pixel(const struct camera *camera, float x, float y, vec3 point, vec3 normal) {
+    vec3 direction, origin = camera_origin(camera);
+    if (!camera_direction(camera, x, y, &direction))
+        return (vec3){0, 0, 0};
+    float distance = vec3_dot(vec3_sub(point, origin), normal) / vec3_dot(direction, normal);
+    return vec3_sub(vec3_mad(origin, distance, direction), point);
+}
+
+static bool make_track(const struct views *views, size_t t, float x, float y, uint32_t key,
+                       struct track *track) {
+    const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
+    vec3 direction, origin = camera_origin(camera);
+    struct accel_hit hit;
+    if (!camera_direction(camera, x, y, &direction) ||
+        !accel_intersect(views->accel, origin, direction, 0.0f, INFINITY, &hit))
+        return false;
+    vec3 normal = vec3_normalize(mesh_cross(&views->scene->mesh, hit.triangle));
+    if (-vec3_dot(normal, direction) < LEAST_COSINE)
+        return false;
+    *track = (struct track){.x = x, .y = y, .point = vec3_mad(origin, hit.distance_m, direction)};
+    track->right = to_pixel(camera, x + 1.0f, y, track->point, normal);
+    track->down = to_pixel(camera, x, y + 1.0f, track->point, normal);
+    uint32_t frames = (uint32_t)views->train_count;
+    for (uint32_t i = 0; i < frames && track->other_count < TRACK_OTHERS; i++) {
+        uint32_t other = choose_permute(i, frames, key);
+        struct view view;
+        vec3 to = vec3_sub(camera_origin(&views->scene->photograph[views->train[other]].camera),
+                           track->point);
+        float distance = vec3_length(to);
+        if (other != t && distance < DISTANCE_RATIO * hit.distance_m &&
+            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > LEAST_COSINE * distance &&
+            views_sees(views, other, track->point, normal, &view))
+            track->other[track->other_count++] = other;
+    }
+    return track->other_count >= 2;
+}
+
+static void make_tracks(void *user, size_t t, int thread) {
+    (void)thread;
+    const struct making *m = user;
+    struct tracks *tracks = m->tracks;
+    const struct views *views = tracks->views;
+    const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
+    double aspect = (double)camera->width / (double)camera->height;
+    size_t columns = (size_t)fmax(1.0, sqrt((double)tracks->capacity * aspect));
+    size_t rows = tracks->capacity / columns;
+    rows = rows < 1 ? 1 : rows;
+    for (size_t cell = 0; cell < columns * rows && tracks->count[t] < tracks->capacity; cell++) {
+        float x, y;
+        uint32_t key = (uint32_t)rng_key(t, cell, PLACES_PER_CELL);
+        if (choose_place(tracks, t, cell, columns, rows, &x, &y) &&
+            make_track(views, t, x, y, key, &tracks->track[t * tracks->capacity + tracks->count[t]]))
+            tracks->count[t]++;
+    }
+}
+
+void tracks_make(struct tracks *t, const struct views *views, struct parallel *pool) {
+    size_t frames = views->train_count, each = TRACKS_TOTAL / (frames + 1);
+    *t = (struct tracks){.views = views};
+    t->capacity = each < TRACKS_LEAST ? TRACKS_LEAST : each > TRACKS_MOST ? TRACKS_MOST : each;
+    t->pyramid = mem_calloc(frames + 1, sizeof *t->pyramid);
+    t->count = mem_calloc(frames + 1, sizeof *t->count);
+    t->track = mem_array(frames * t->capacity + 1, sizeof *t->track);
+    size_t pixels = PYRAMID_TOTAL / (frames + 1);
+    struct making making = {t, pixels < PYRAMID_MOST ? pixels : PYRAMID_MOST};
+    parallel_for(pool, frames, make_pyramid, &making);
+    parallel_for(pool, frames, make_tracks, &making);
+}
+
+void tracks_release(struct tracks *t) {
+    for (size_t i = 0; t->pyramid && i < t->views->train_count; i++)
+        pyramid_release(&t->pyramid[i]);
+    mem_free(t->pyramid);
+    mem_free(t->count);
+    mem_free(t->track);
+    *t = (struct tracks){0};
+}

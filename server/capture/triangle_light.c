@@ -1,0 +1,94 @@
+/* triangle_light.c -- see triangle_light.h. */
+#include "server/capture/triangle_light.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/capture/censored.h"
+#include "server/render/sampler.h"
+
+#define LOOKS_PER_POINT 6
+#define MOST_POINTS 8
+#define PIXELS_PER_POINT 16.0f /* larger triangles are asked at several places */
+#define BRIGHTER_LOOKS 0.7f    /* share of the looks that show at least what is taken for shown */
+#define KEY_POINTS 29          /* keeps these random numbers apart from others of the triangle */
+
+struct measure_job {
+    const struct views *views;
+    struct triangle_light *light;
+};
+
+/* The looks at one triangle. */
+struct looks {
+    struct censored value[MOST_POINTS * LOOKS_PER_POINT];
+    size_t count;
+    float pixels; /* sum over them of what the whole triangle fills */
+};
+
+/* The i-th place: the middle, then others evenly spread. */
+static vec3 place(const struct mesh *mesh, uint32_t triangle, uint32_t i) {
+    if (i == 0)
+        return mesh_point(mesh, triangle, 1.0f / 3.0f, 1.0f / 3.0f);
+    vec2 u = sampler_pair(sampler_key(KEY_POINTS, triangle, 0), i, 0);
+    float root = sqrtf(u.x);
+    return mesh_point(mesh, triangle, root * (1.0f - u.y), root * u.y);
+}
+
+static void look_at_point(const struct views *views, uint32_t triangle, vec3 point, vec3 cross,
+                          struct looks *looks) {
+    struct view view[LOOKS_PER_POINT];
+    float area = 0.5f * vec3_length(cross);
+    size_t seen = views_pick(views, point, vec3_normalize(cross), triangle, LOOKS_PER_POINT, view);
+    for (size_t k = 0; k < seen; k++) {
+        const struct photograph *photo = &views->scene->photograph[views->train[view[k].train]];
+        struct photograph_sample s;
+        if (!views_clean(views, &view[k]) || !photograph_sample(photo, view[k].x, view[k].y, &s))
+            continue;
+        bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
+        looks->value[looks->count++] = (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
+        looks->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;
+    }
+}
+
+static void measure(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct measure_job *job = user;
+    const struct mesh *mesh = &job->views->scene->mesh;
+    uint32_t triangle = (uint32_t)index, points = 1;
+    vec3 cross = mesh_cross(mesh, triangle);
+    struct looks looks = {.count = 0};
+    for (uint32_t i = 0; i < points; i++) {
+        look_at_point(job->views, triangle, place(mesh, triangle, i), cross, &looks);
+        float pixels = looks.count > 0 ? looks.pixels / (float)looks.count : 0.0f;
+        if (i == 0)
+            points = (uint32_t)clampf(pixels / PIXELS_PER_POINT, 1.0f, MOST_POINTS);
+    }
+    struct triangle_light *light = job->light;
+    light->shown[triangle] = light->mean[triangle] = -1.0f;
+    light->pixels[triangle] = 0.0f;
+    if (looks.count == 0)
+        return;
+    float sum = 0.0f;
+    bool is_bound;
+    for (size_t i = 0; i < looks.count; i++)
+        sum += looks.value[i].value;
+    light->mean[triangle] = sum / (float)looks.count;
+    light->shown[triangle] = censored_quantile(looks.value, looks.count, 1.0f - BRIGHTER_LOOKS, &is_bound);
+    light->pixels[triangle] = looks.pixels / (float)looks.count;
+}
+
+void triangle_light_measure(struct triangle_light *light, const struct views *views, struct parallel *pool) {
+    size_t count = views->scene->mesh.triangle_count;
+    light->shown = mem_array(count, sizeof *light->shown);
+    light->mean = mem_array(count, sizeof *light->mean);
+    light->pixels = mem_array(count, sizeof *light->pixels);
+    struct measure_job job = {views, light};
+    parallel_for(pool, count, measure, &job);
+}
+
+void triangle_light_release(struct triangle_light *light) {
+    mem_free(light->shown);
+    mem_free(light->mean);
+    mem_free(light->pixels);
+    *light = (struct triangle_light){0};
+}

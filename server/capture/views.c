@@ -1,0 +1,320 @@
+/* views.c -- see views.h. */
+#include "server/capture/views.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "common/rng.h"
+#include "server/capture/choose.h"
+
+/* Nearest cosine to grazing at which a photograph is still asked. */
+#define MIN_COSINE 0.1f
+/* A corner's hit may leave the plane of another's by this many pixel footprints, plus a
+ * relative slack for rounding, before the pixel counts as a depth edge. */
+#define EDGE_FOOTPRINTS 3.0f
+#define EDGE_RELATIVE 0.002f
+/* Corners of a pixel that mixes surfaces lie no further apart where those meet. */
+#define SEAM_FOOTPRINTS 10.0f
+
+/* Surfaces that meet at an edge sharper than this (cosine between normals) are lit differently. */
+#define CREASE_COSINE 0.8f
+
+/* How far from a look-up near an edge it is asked how bright the light is that may have got into it, and
+ * how many times brighter than the look-up it must be to make a difference. */
+#define MIXING_PIXELS 2.0f
+#define MIXING_FREE 2.0f
+#define MOST_MIXING 1000.0f
+#define DARKEST 1e-3f /* shown radiance, as a share of the median */
+
+#define NO_SURFACE UINT32_MAX
+
+struct corner {
+    vec3 point;
+    vec3 normal;
+    float distance_m;
+    uint32_t segment; /* or NO_SURFACE */
+};
+
+struct edge_job {
+    struct views *views;
+    uint32_t train;
+};
+
+static bool hits_centre(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
+    vec3 direction;
+    return !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
+           accel_occluded(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY);
+}
+
+static struct corner trace_corner(const struct edge_job *job, const struct camera *camera,
+                                  uint32_t x, uint32_t y) {
+    struct corner corner = {.segment = NO_SURFACE};
+    vec3 direction;
+    struct accel_hit hit;
+    vec3 origin = camera_origin(camera);
+    if (!camera_direction(camera, (float)x, (float)y, &direction) ||
+        !accel_intersect(job->views->accel, origin, direction, 0.0f, INFINITY, &hit))
+        return corner;
+    corner.point = vec3_mad(origin, hit.distance_m, direction);
+    corner.normal = vec3_normalize(mesh_cross(&job->views->scene->mesh, hit.triangle));
+    corner.distance_m = hit.distance_m;
+    corner.segment = job->views->segments->of_triangle[hit.triangle];
+    return corner;
+}
+
+static bool differ(const struct corner *a, const struct corner *b, float focal) {
+    if (a->segment != b->segment)
+        return true;
+    if (a->segment == NO_SURFACE)
+        return false;
+    if (vec3_dot(a->normal, b->normal) < CREASE_COSINE)
+        return true;
+    vec3 between = vec3_sub(b->point, a->point);
+    float slack = a->distance_m * (EDGE_FOOTPRINTS / focal + EDGE_RELATIVE);
+    return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
+}
+
+/* Whether the difference of two corners, if there is any, is only that two surfaces meet. */
+static bool meet(const struct corner *a, const struct corner *b, float focal) {
+    if (a->segment == NO_SURFACE || b->segment == NO_SURFACE)
+        return a->segment == b->segment;
+    return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
+}
+
+/* A byte that tells most segments from most others. */
+static uint8_t owner_mark(uint32_t segment) {
+    return (uint8_t)(rng_mix32(segment) >> 24);
+}
+
+/* One row of pixels; the corners of a row are traced twice, which a parallel loop over rows
+ * makes simpler than sharing them. */
+static void mark_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct edge_job *job = user;
+    const struct photograph *photo = &job->views->scene->photograph[job->views->train[job->train]];
+    const struct camera *camera = &photo->camera;
+    uint8_t *out = job->views->shows[job->train] + row * camera->width;
+    uint8_t *owner = job->views->owner[job->train] + row * camera->width;
+    uint32_t y = (uint32_t)row;
+    struct corner left_top = trace_corner(job, camera, 0, y);
+    struct corner left_low = trace_corner(job, camera, 0, y + 1);
+    for (uint32_t x = 0; x < camera->width; x++) {
+        struct corner top = trace_corner(job, camera, x + 1, y);
+        struct corner low = trace_corner(job, camera, x + 1, y + 1);
+        bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
+                     differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
+        bool seam = mixed && meet(&left_top, &top, camera->fx) && meet(&left_top, &left_low, camera->fx) &&
+                    meet(&left_top, &low, camera->fx) && meet(&top, &left_low, camera->fx);
+        out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
+        owner[x] = owner_mark(low.segment);
+        /* What is thinner than a pixel may hide between the corners. */
+        if (!mixed && low.segment == NO_SURFACE)
+            out[x] = hits_centre(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
+        left_top = top;
+        left_low = low;
+    }
+}
+
+/* Gives each pixel beside one of class `of` at least class of - 1. */
+static void spread_class(uint8_t *edge, long width, long height, uint8_t of) {
+    for (long y = 0; y < height; y++) {
+        for (long x = 0; x < width; x++) {
+            if (edge[y * width + x] != of)
+                continue;
+            for (long j = y > 0 ? y - 1 : 0; j <= y + 1 && j < height; j++) {
+                for (long i = x > 0 ? x - 1 : 0; i <= x + 1 && i < width; i++) {
+                    uint8_t *beside = &edge[j * width + i];
+                    *beside = *beside < of - 1 ? (uint8_t)(of - 1) : *beside;
+                }
+            }
+        }
+    }
+}
+
+static void make_edges(uint8_t *edge, const uint8_t *shows, uint32_t width, uint32_t height) {
+    for (size_t i = 0; i < (size_t)width * height; i++)
+        edge[i] = shows[i] == VIEWS_MIXED || shows[i] == VIEWS_SEAM ? VIEWS_EDGE : 0;
+    for (uint8_t of = VIEWS_EDGE; of > 1; of--)
+        spread_class(edge, (long)width, (long)height, of);
+}
+
+void views_update_median(struct views *v) {
+    const size_t per_photo = 4096; /* an even sample */
+    float *value = mem_array(v->train_count * per_photo + 1, sizeof *value);
+    size_t count = 0;
+    for (size_t t = 0; t < v->train_count; t++) {
+        const struct photograph *photo = &v->scene->photograph[v->train[t]];
+        uint32_t w = photo->camera.width, h = photo->camera.height;
+        for (size_t i = 0; i < per_photo; i++) {
+            uint64_t bits = rng_key(t, i, 0);
+            float x = (float)rng_below((uint32_t)bits, w) + 0.5f;
+            float y = (float)rng_below((uint32_t)(bits >> 32), h) + 0.5f;
+            struct photograph_sample sample;
+            if (photograph_sample(photo, x, y, &sample))
+                value[count++] = rgb_mean(sample.radiance);
+        }
+    }
+    float median = quantile(value, count, 0.5);
+    v->median_radiance = median > 0.0f ? median : 1.0f;
+    mem_free(value);
+}
+
+void views_update_edges(struct views *v, uint32_t train, struct parallel *pool) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    struct edge_job job = {.views = v, .train = train};
+    parallel_for(pool, camera->height, mark_row, &job);
+    make_edges(v->edge[train], v->shows[train], camera->width, camera->height);
+}
+
+void views_update_segments(struct views *v, const struct accel *accel, struct parallel *pool) {
+    v->accel = accel;
+    for (uint32_t t = 0; t < v->train_count; t++)
+        views_update_edges(v, t, pool);
+}
+
+void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
+                const struct accel *accel, struct parallel *pool) {
+    *v = (struct views){.scene = scene, .segments = segments, .accel = accel};
+    v->train = mem_array(scene->photograph_count, sizeof *v->train);
+    v->shows = mem_array(scene->photograph_count, sizeof *v->shows);
+    v->edge = mem_array(scene->photograph_count, sizeof *v->edge);
+    v->owner = mem_array(scene->photograph_count, sizeof *v->owner);
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        if (!scene->photograph[i].is_test)
+            v->train[v->train_count++] = (uint32_t)i;
+    }
+    for (uint32_t t = 0; t < v->train_count; t++) {
+        const struct camera *camera = &scene->photograph[v->train[t]].camera;
+        v->shows[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        v->edge[t] = mem_array((size_t)camera->height * camera->width, 1);
+        v->owner[t] = mem_calloc((size_t)camera->height * camera->width, 1);
+        views_update_edges(v, t, pool);
+    }
+    views_update_median(v);
+}
+
+void views_release(struct views *v) {
+    for (size_t t = 0; t < v->train_count; t++) {
+        mem_free(v->shows[t]);
+        mem_free(v->edge[t]);
+        mem_free(v->owner[t]);
+    }
+    mem_free(v->shows);
+    mem_free(v->edge);
+    mem_free(v->owner);
+    mem_free(v->train);
+    *v = (struct views){0};
+}
+
+vec3 views_direction(const struct views *v, uint32_t train, vec3 point) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    return vec3_normalize(vec3_sub(camera_origin(camera), point));
+}
+
+/* As views_sees, but for the visibility ray. */
+static bool faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+    const struct photograph *photo = &v->scene->photograph[v->train[train]];
+    const struct camera *camera = &photo->camera;
+    vec3 to_camera = vec3_sub(camera_origin(camera), point);
+    float squared = vec3_dot(to_camera, to_camera);
+    float distance = sqrtf(squared);
+    float cosine = vec3_dot(to_camera, normal);
+    float depth_m;
+    if (!(cosine > MIN_COSINE * distance) ||
+        !camera_project(camera, point, &view->x, &view->y, &depth_m))
+        return false;
+    view->train = train;
+    view->weight = cosine / (squared * distance) * photograph_trust(photo);
+    return true;
+}
+
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+    if (!faces(v, train, point, normal, view))
+        return false;
+    vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
+    float distance = vec3_length(to_camera);
+    vec3 direction = vec3_scale(to_camera, 1.0f / distance);
+    return !accel_occluded(v->accel, accel_offset(point, normal, direction), direction, 0.0f, distance);
+}
+
+int views_edge(const struct views *v, const struct view *view, uint32_t triangle) {
+    const struct camera *camera = &v->scene->photograph[v->train[view->train]].camera;
+    const uint8_t *edge = v->edge[view->train], *owner = v->owner[view->train];
+    uint8_t own = owner_mark(v->segments->of_triangle[triangle]);
+    long x0 = (long)floorf(view->x - 0.5f), y0 = (long)floorf(view->y - 0.5f);
+    int nearest = 0;
+    for (long y = y0; y < y0 + 2; y++) {
+        for (long x = x0; x < x0 + 2; x++) {
+            if (x < 0 || y < 0 || x >= (long)camera->width || y >= (long)camera->height)
+                continue;
+            size_t at = (size_t)(y * (long)camera->width + x);
+            int here = owner[at] == own ? edge[at] : VIEWS_EDGE;
+            nearest = here > nearest ? here : nearest;
+        }
+    }
+    return nearest;
+}
+
+float views_trust(const struct views *v, const struct view *view, uint32_t triangle) {
+    static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f};
+    return trust[views_edge(v, view, triangle)];
+}
+
+float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown) {
+    static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
+    int edge = views_edge(v, view, triangle);
+    if (edge == 0)
+        return 0.0f;
+    float own = fmaxf(rgb_mean(shown), DARKEST * v->median_radiance);
+    struct photograph_ring ring =
+        photograph_ring(&v->scene->photograph[v->train[view->train]], view->x, view->y, MIXING_PIXELS);
+    float times = fmaxf(fmaxf(ring.brightest, own) / own * (1.0f / MIXING_FREE), 1.0f);
+    return fminf(variance[edge] * times * times, MOST_MIXING);
+}
+
+/* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show
+ * `wanted`. */
+static bool all_show(const struct views *v, uint32_t train, float x, float y, int margin, uint8_t wanted) {
+    const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
+    const uint8_t *shows = v->shows[train];
+    long x0 = (long)floorf(x - 0.5f), y0 = (long)floorf(y - 0.5f);
+    for (long row = y0 - margin; row <= y0 + 1 + margin; row++) {
+        for (long column = x0 - margin; column <= x0 + 1 + margin; column++) {
+            if (column >= 0 && row >= 0 && column < (long)camera->width && row < (long)camera->height &&
+                shows[row * (long)camera->width + column] != wanted)
+                return false;
+        }
+    }
+    return true;
+}
+
+bool views_clean(const struct views *v, const struct view *view) {
+    return all_show(v, view->train, view->x, view->y, 0, VIEWS_SURFACE);
+}
+
+bool views_open(const struct views *v, uint32_t train, float x, float y, int margin) {
+    return all_show(v, train, x, y, margin, VIEWS_OPEN);
+}
+
+size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, size_t max,
+                  struct view *view) {
+    struct view unclean[VIEWS_PICK_MAX];
+    size_t count = 0, unclean_count = 0;
+    uint32_t cameras = (uint32_t)v->train_count;
+    for (uint32_t i = 0; i < cameras && count < max; i++) {
+        struct view seen;
+        if (!views_sees(v, choose_permute(i, cameras, key), point, normal, &seen))
+            continue;
+        if (views_clean(v, &seen))
+            view[count++] = seen;
+        else if (unclean_count < max)
+            unclean[unclean_count++] = seen;
+    }
+    if (count > 0)
+        return count;
+    for (size_t i = 0; i < unclean_count; i++)
+        view[i] = unclean[i];
+    return unclean_count;
+}

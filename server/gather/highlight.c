@@ -1,0 +1,79 @@
+/* highlight.c -- see highlight.h. */
+#include "server/gather/highlight.h"
+
+#include <assert.h>
+#include <string.h>
+
+#include "server/render/bsdf.h"
+#include "server/render/light.h"
+#include "server/render/sampler.h"
+
+enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
+
+static vec3 to_local(const vec3 frame[3], vec3 d) {
+    return vec3_make(vec3_dot(frame[0], d), vec3_dot(frame[1], d), vec3_dot(frame[2], d));
+}
+
+static vec3 to_world(const vec3 frame[3], vec3 d) {
+    return vec3_mad(vec3_mad(vec3_scale(frame[0], d.x), d.y, frame[1]), d.z, frame[2]);
+}
+
+/* A sampler and evaluator of the specular lobe alone. */
+static struct bsdf lobe_of(float roughness) {
+    struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, 1.0f, 1.0f);
+    b.specular_chance = 1.0f;
+    return b;
+}
+
+/* Adds one direction of arriving light to all levels. */
+static void add(struct highlight *h, const struct highlight_levels *levels, const struct bsdf *lobe,
+                const float *eta, vec3 wo, vec3 wi, rgb light, float samples_a_level, float light_density) {
+    float lobe_value[HIGHLIGHT_ROUGHNESSES], density = light_density, cos_d = 0.0f;
+    for (size_t k = 0; k < levels->roughness_count; k++) {
+        struct bsdf_ggx t = bsdf_ggx(lobe[k].alpha, wo, wi);
+        float over_o = 1.0f / (wo.z + t.root_o);
+        cos_d = t.cos_d;
+        lobe_value[k] = t.d * wi.z * over_o / (wi.z + t.root_i);
+        density += samples_a_level * 0.5f * t.d * over_o;
+    }
+    for (size_t m = 0; m < levels->specular_count; m++) {
+        float f = bsdf_fresnel(cos_d, eta[m]) / density;
+        for (size_t k = 0; k < levels->roughness_count; k++)
+            h->radiance[k][m] = rgb_mad(h->radiance[k][m], f * lobe_value[k], light);
+    }
+}
+
+void highlight_gather(struct highlight *h, struct incident *in, const struct light_field *field,
+                      const struct surface_point *at, vec3 wo_world,
+                      const struct highlight_levels *levels, uint32_t key, size_t samples,
+                      size_t light_samples) {
+    assert(samples + light_samples <= INCIDENT_CHUNK);
+    memset(h, 0, sizeof *h);
+    vec3 frame[3];
+    frame[2] = at->shading;
+    vec3_frame(at->shading, &frame[0], &frame[1]);
+    vec3 wo = to_local(frame, wo_world);
+    if (!(wo.z > 1e-3f))
+        return;
+    if (!lights_any(field->world->lights))
+        light_samples = 0;
+    struct bsdf lobe[HIGHLIGHT_ROUGHNESSES];
+    float eta[HIGHLIGHT_SPECULARS];
+    size_t levels_used = levels->roughness_count;
+    for (size_t k = 0; k < levels_used; k++)
+        lobe[k] = lobe_of(levels->roughness[k]);
+    for (size_t m = 0; m < levels->specular_count; m++)
+        eta[m] = bsdf_eta(levels->specular[m]);
+    for (size_t i = 0; i < samples; i++) {
+        vec2 u = sampler_pair(key, (uint32_t)(i / levels_used), PAIR_HALF + (uint32_t)(i % levels_used));
+        in->direction[i] = to_world(frame, bsdf_sample(&lobe[i % levels_used], wo, 0.0f, u.x, u.y));
+    }
+    incident_trace(in, field, at, samples);
+    incident_sample_lights(in, field, at, key, 0, samples, light_samples);
+    for (size_t i = 0; i < samples + light_samples; i++) {
+        vec3 wi = to_local(frame, in->direction[i]);
+        if (wi.z > 0.0f && !rgb_is_black(in->radiance[i]))
+            add(h, levels, lobe, eta, wo, wi, in->radiance[i], (float)samples / (float)levels_used,
+                (float)light_samples * in->light_pdf[i]);
+    }
+}

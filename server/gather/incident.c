@@ -1,0 +1,179 @@
+/* incident.c -- see incident.h. */
+#include "server/gather/incident.h"
+
+#include <assert.h>
+#include <string.h>
+
+#include "server/render/bsdf.h"
+#include "server/render/light.h"
+#include "server/render/sampler.h"
+#include "server/scene/rgb_half.h"
+
+enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT };
+
+/* What the field shows at a hit, and the density of the light sampler there. */
+static rgb look_at(const struct light_field *field, const struct accel_hit *hit, vec3 direction,
+                   float *light_pdf) {
+    const struct world *world = field->world;
+    const struct world_triangle *t = &world->triangle[hit->triangle];
+    float facing = -vec3_dot(t->normal, direction);
+    *light_pdf = 0.0f;
+    if (!(facing > 0.0f))
+        return rgb_gray(0.0f); /* backs are not photographed */
+    if (world->lights->area_density[t->segment] > 0.0f) {
+        *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, facing);
+        return world->materials->emission[t->segment];
+    }
+    float b0 = 1.0f - hit->b1 - hit->b2;
+    float x = b0 * t->corner[0].x + hit->b1 * t->corner[1].x + hit->b2 * t->corner[2].x;
+    float y = b0 * t->corner[0].y + hit->b1 * t->corner[1].y + hit->b2 * t->corner[2].y;
+    uint32_t width = world->atlas->width, height = world->atlas->height;
+    uint32_t column = x > 0.0f ? (uint32_t)x : 0, row = y > 0.0f ? (uint32_t)y : 0;
+    column = column < width ? column : width - 1;
+    row = row < height ? row : height - 1;
+    return rgb_from_half(field->radiance[(size_t)row * width + column]);
+}
+
+void incident_trace(struct incident *in, const struct light_field *field,
+                    const struct surface_point *at, size_t count) {
+    const struct world *world = field->world;
+    for (size_t i = 0; i < count; i++)
+        in->ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, in->direction[i]), 0.0f,
+                                        in->direction[i], INFINITY};
+    accel_intersect_many(world->accel, count, in->ray, in->hit);
+    for (size_t i = 0; i < count; i++) {
+        if (in->hit[i].triangle == ACCEL_NONE) {
+            in->radiance[i] = lights_environment(world->lights, in->direction[i]);
+            in->light_pdf[i] = lights_pdf_environment(world->lights, in->direction[i]);
+        } else {
+            in->radiance[i] = look_at(field, &in->hit[i], in->direction[i], &in->light_pdf[i]);
+        }
+    }
+}
+
+void incident_sample_lights(struct incident *in, const struct light_field *field,
+                            const struct surface_point *at, uint32_t key, uint32_t first_sample,
+                            size_t from, size_t count) {
+    const struct world *world = field->world;
+    for (size_t i = 0; i < count; i++) {
+        uint32_t sample = first_sample + (uint32_t)i;
+        vec2 pick = sampler_pair(key, sample, PAIR_PICK), place = sampler_pair(key, sample, PAIR_LIGHT);
+        struct light_sample light = {.pdf = 0.0f};
+        lights_sample(world->lights, at->position, pick.x, place.x, place.y, &light);
+        bool any = light.pdf > 0.0f;
+        in->direction[from + i] = any ? light.direction : at->normal;
+        in->light_pdf[from + i] = light.pdf;
+        in->radiance[from + i] = any ? light.radiance : rgb_gray(0.0f);
+        vec3 origin = accel_offset(at->position, at->normal, in->direction[from + i]);
+        float far_m = any ? light.distance_m : 0.0f;
+        vec3 direction = in->direction[from + i];
+        if (any && light.segment != LIGHT_ENVIRONMENT) {
+            vec3 on = accel_offset(light.point, light.normal, vec3_neg(direction));
+            vec3 ray = vec3_sub(on, origin);
+            far_m = vec3_length(ray);
+            direction = vec3_scale(ray, 1.0f / fmaxf(far_m, 1e-20f));
+        }
+        in->ray[i] = (struct accel_ray){origin, 0.0f, direction, far_m};
+    }
+    accel_occluded_many(world->accel, count, in->ray, in->occluded);
+    for (size_t i = 0; i < count; i++) {
+        if (in->occluded[i])
+            in->radiance[from + i] = rgb_gray(0.0f);
+    }
+}
+
+/* The weights of the moments for light from w at cosine c. */
+static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
+    float f = c * bsdf_schlick(c);
+    const float value[IRRADIANCE_MOMENTS] = {
+        c,          c * w.x,       c * w.y,       c * w.z,       f,             f * w.x,       f * w.y,
+        f * w.z,    f * w.x * w.x, f * w.y * w.y, f * w.z * w.z, f * w.x * w.y, f * w.x * w.z, f * w.y * w.z};
+    memcpy(basis, value, sizeof value);
+}
+
+vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
+    vec2 circle = bsdf_circle(u.x);
+    float r = sqrtf(u.y);
+    vec3 d = vec3_scale(frame[2], sqrtf(fmaxf(0.0f, 1.0f - u.y)));
+    d = vec3_mad(d, r * circle.x, frame[0]);
+    return vec3_mad(d, r * circle.y, frame[1]);
+}
+
+void irradiance_gather(struct irradiance *irradiance, struct incident *in,
+                       const struct light_field *field, const struct surface_point *at, uint32_t key,
+                       size_t samples) {
+    const size_t ways_a_chunk = INCIDENT_CHUNK * 2 / 3;
+    vec3 frame[3];
+    frame[2] = at->shading;
+    vec3_frame(at->shading, &frame[0], &frame[1]);
+    size_t light_samples = lights_any(field->world->lights) ? samples / 2 : 0;
+    double sum[IRRADIANCE_MOMENTS][3] = {{0}};
+    rgb noise = {0.0f, 0.0f, 0.0f};
+    size_t lights_done = 0;
+    for (size_t done = 0; done < samples; done += ways_a_chunk) {
+        size_t ways = samples - done < ways_a_chunk ? samples - done : ways_a_chunk;
+        size_t lit = light_samples * (done + ways) / samples - lights_done;
+        for (size_t i = 0; i < ways; i++)
+            in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
+        incident_trace(in, field, at, ways);
+        incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
+        float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
+        for (size_t i = 0; i < ways + lit; i++) {
+            float c = vec3_dot(in->direction[i], at->shading);
+            if (!(c > 0.0f))
+                continue;
+            float density = (float)samples * c * (1.0f / BSDF_PI) + (float)light_samples * in->light_pdf[i];
+            float basis[IRRADIANCE_MOMENTS];
+            moment_basis(in->direction[i], c, basis);
+            rgb l = rgb_scale(in->radiance[i], 1.0f / density);
+            bool early = i < ways ? done + i < samples / 2 : lights_done + i - ways < light_samples / 2;
+            noise = rgb_mad(noise, early ? c : -c, l);
+            for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+                chunk[m][0] += basis[m] * l.r;
+                chunk[m][1] += basis[m] * l.g;
+                chunk[m][2] += basis[m] * l.b;
+            }
+        }
+        for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
+            for (int c = 0; c < 3; c++)
+                sum[m][c] += (double)chunk[m][c];
+        lights_done += lit;
+    }
+    irradiance->noise = noise;
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
+        for (int c = 0; c < 3; c++)
+            irradiance->moment[m][c] = (float)sum[m][c];
+}
+
+void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux) {
+    float basis[IRRADIANCE_MOMENTS], c = vec3_dot(direction, shading);
+    if (!(c > 0.0f))
+        return;
+    moment_basis(direction, c, basis);
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+        irradiance->moment[m][0] += basis[m] * flux.r;
+        irradiance->moment[m][1] += basis[m] * flux.g;
+        irradiance->moment[m][2] += basis[m] * flux.b;
+    }
+}
+
+/* bsdf_diffuse written out by powers of F(wi) and m = wi . wo: with cos_d^2 = (1 + m) / 2, its
+ * rr is roughness (1 + m). */
+rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo) {
+    const float(*q)[3] = irradiance->moment;
+    float fo = bsdf_schlick(fmaxf(vec3_dot(shading, wo), 0.0f)), r = roughness;
+    float lambert = 1.0f - 0.5f * fo;
+    /* Factors of 1 and m without F(wi), then of 1, m and m^2 with it. */
+    float one = lambert + r * fo, m1 = r * fo;
+    float f0 = -0.5f * lambert + r * (1.0f - fo) + r * r * fo;
+    float f1 = r * (1.0f - fo) + 2.0f * r * r * fo, f2 = r * r * fo;
+    float out[3];
+    for (int c = 0; c < 3; c++) {
+        float m = q[1][c] * wo.x + q[2][c] * wo.y + q[3][c] * wo.z;
+        float fm = q[5][c] * wo.x + q[6][c] * wo.y + q[7][c] * wo.z;
+        float fmm = q[8][c] * wo.x * wo.x + q[9][c] * wo.y * wo.y + q[10][c] * wo.z * wo.z +
+                    2.0f * (q[11][c] * wo.x * wo.y + q[12][c] * wo.x * wo.z + q[13][c] * wo.y * wo.z);
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * m + f0 * q[4][c] + f1 * fm + f2 * fmm) * (1.0f / BSDF_PI));
+    }
+    return rgb_make(out[0], out[1], out[2]);
+}

@@ -1,0 +1,60 @@
+/* probes.h -- points of the surface at which arriving light is gathered, and between them.
+ *
+ * Light changes slowly where textures do not, so it is gathered with many rays at few points: one
+ * for every chart in every square block of the atlas. Between them it is interpolated within a
+ * chart, from the nine blocks around, by distance in the atlas and likeness of the normals.
+ * Probes that no photograph sees (under a vase) do not speak for texels that one does. */
+#ifndef UNBAKE_GATHER_PROBES_H
+#define UNBAKE_GATHER_PROBES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "common/parallel.h"
+#include "server/capture/fuse.h"
+#include "server/gather/incident.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+#include "server/scene/mesh.h"
+
+struct probe {
+    uint32_t texel, chart;
+    bool seen;    /* a photograph sees the texel */
+    vec3 shading; /* unit, interpolated normal there */
+    struct irradiance light;
+};
+
+struct probes {
+    uint32_t spacing;        /* texels a side of a block */
+    uint32_t columns, rows;  /* of blocks */
+    size_t count;
+    struct probe *probe;     /* [count] by block, row by row; owned */
+    uint32_t *first;         /* [columns * rows + 1] first probe of a block; owned */
+};
+
+/* The probes that speak for a texel; weights sum to 1. */
+#define PROBES_AROUND 9
+struct probe_mix {
+    size_t count; /* at least 1 for a valid texel */
+    uint32_t probe[PROBES_AROUND];
+    float weight[PROBES_AROUND];
+};
+
+/* Chooses the places; light is 0. */
+void probes_init(struct probes *p, uint32_t spacing, const struct mesh *mesh, const struct atlas *atlas,
+                 const struct inverse_uv *inverse, const struct fused *fused);
+void probes_release(struct probes *p);
+
+/* Gathers the light at probes [first, first + count) with `samples` directions each. */
+void probes_gather(struct probes *p, const struct light_field *field, const struct mesh *mesh,
+                   const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed,
+                   size_t samples, size_t first, size_t count, struct parallel *pool);
+
+/* The mix for a valid texel, whose piece of surface `at` is. */
+void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,
+                uint32_t texel, const struct surface_point *at, struct probe_mix *mix);
+/* *out: what arrives there, the sum of the probes' light by their weights. */
+void probes_irradiance(const struct probes *p, const struct probe_mix *mix, struct irradiance *out);
+
+#endif
