@@ -33,6 +33,7 @@ struct faults {
     atomic_bool for_good; /* all later ones fail, too */
     atomic_int error;    /* errno of operations, or FAULTS_KILL, FAULTS_HOLD */
     atomic_int armed;    /* so many times */
+    atomic_bool is_told; /* whoever is held up has been told to stop */
     atomic_long failed;  /* so many have */
     char what[16];       /* the call that did, with preload/calls.c */
     /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
@@ -121,6 +122,7 @@ static inline void faults_arm(struct faults *f, int roles, long n, int error, bo
     atomic_store(&f->failed, 0);
     atomic_store(&f->error, error);
     atomic_store(&f->for_good, for_good);
+    atomic_store(&f->is_told, false);
     atomic_store(&f->fail_at, n);
     atomic_store(&f->roles, roles);
     atomic_fetch_add(&f->armed, 1);

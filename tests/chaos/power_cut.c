@@ -6,6 +6,7 @@
  * code: the database is whole, every checkpoint opens and holds what was saved last, and all that was
  * acknowledged before that moment is so (promises.h). */
 #include <fts.h>
+#include <sys/stat.h>
 
 #include "tests/chaos/daemon.h"
 #include "tests/chaos/promises.h"
@@ -114,6 +115,15 @@ static void parts_begin(struct parts *u, long number, size_t length) {
     buf_release(&body);
 }
 
+/* Until so many are in the upload's file. */
+static void await_bytes(const char *id, size_t count) {
+    struct stat info = {0};
+    char *path = mem_printf("%s/uploads/%s", daemon_.data, id);
+    for (int i = 0; stat(path, &info) != 0 || (size_t)info.st_size < count; i++, usleep(20000))
+        must(i < 3000, "half of a part does not come", &(struct buf){0});
+    mem_free(path);
+}
+
 /* Sends up to `length` bytes more; cut off in the middle, where that is asked for. */
 static void parts_send(struct parts *u, size_t length, bool is_checked, bool is_cut_off) {
     struct buf body;
@@ -137,7 +147,7 @@ static void parts_send(struct parts *u, size_t length, bool is_checked, bool is_
                             length, fields);
         http_send(fd, head, (size_t)used);
         http_send(fd, bytes, length / 2);
-        usleep(50000);
+        await_bytes(u->id, u->sent + length / 2);
         close(fd);
     } else {
         int status = http_ask(daemon_.port, "PATCH", path, fields, bytes, length, &body);
@@ -190,7 +200,7 @@ static void live_once(const char *archive) {
     daemon_scene(&daemon_, archive, scene);
     mark("scene %s 0 ready", scene);
     /* Its worker is held up at its first operation until the others are in their places, and then in a
-     * checkpoint until it is told to pause: however fast it is, it is not done before. */
+     * checkpoint until it has been told to stop: however fast it is, it is not done before. */
     faults_arm(faults, FAULTS_WORKER, 1, FAULTS_HOLD, true);
     long long long_one = submit("runs", 120), waits = submit("waits", 3), goes = submit("goes", 3);
     parts_begin(&first, 1, 200000);
@@ -205,9 +215,13 @@ static void live_once(const char *archive) {
     act(goes, "DELETE", "", "{}");
     parts_send(&second, PIECE, false, false);
     faults_arm(faults, FAULTS_WORKER, HELD_AT, FAULTS_HOLD, true);
-    for (int i = 0; i < 10; i++, usleep(20000))
+    for (int i = 0; i < 10 || atomic_load(&faults->failed) == 0; i++, usleep(20000)) {
         look(long_one, "succeeded");
+        must(i < 3000, "a worker does not come to a checkpoint", &(struct buf){0});
+    }
     act(long_one, "POST", "/pause", "{}");
+    for (int i = 0; !atomic_load(&faults->is_told); i++, usleep(20000))
+        must(i < 3000, "a worker is not told to stop", &(struct buf){0});
     faults_lift(faults);
     await(long_one, "paused");
     act(waits, "POST", "/resume", "{}");

@@ -100,6 +100,15 @@ static bool find_fd(int fd, uint64_t *inode) {
 
 /* --- failing, logging ---------------------------------------------------------------------------- */
 
+/* Until it is armed once more. A worker that is told to stop looks for the signal between its iterations. */
+static void hold(int armed) {
+    for (; atomic_load(&faults->armed) == armed; nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL)) {
+        sigset_t pending;
+        if (sigpending(&pending) == 0 && sigismember(&pending, SIGTERM) == 1)
+            atomic_store(&faults->is_told, true);
+    }
+}
+
 static bool fails(void) {
     int armed = faults ? atomic_load(&faults->armed) : 0;
     if (!faults_strikes(faults, faults_count(faults, role)))
@@ -108,8 +117,7 @@ static bool fails(void) {
     if (error == FAULTS_KILL)
         kill(getpid(), SIGKILL);
     if (error == FAULTS_HOLD) {
-        while (atomic_load(&faults->armed) == armed)
-            nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+        hold(armed);
         return false;
     }
     errno = error;
