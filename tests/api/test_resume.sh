@@ -1,7 +1,8 @@
 #!/bin/bash
 # One job, done in peace on two threads, on one thread, and interrupted again and again (its
 # worker killed with SIGKILL, the daemon with it, the daemon stopped) while it goes on from its
-# checkpoints: the same textures, byte for byte. UNBAKE_KILLS sets how often (5).
+# checkpoints: the same textures, byte for byte. However fast a worker is, it is interrupted before its end: after three
+# quarters of what an undisturbed one does to files it is held up. UNBAKE_KILLS sets how often (5).
 set -u
 build=$1
 kills=${UNBAKE_KILLS:-5}
@@ -20,14 +21,15 @@ clean_up() {
 }
 trap clean_up EXIT
 
-# start NAME THREADS: a daemon on the data folder $dir/NAME; its URL goes to UNBAKE_SERVER.
+hold() { "$build/tests/chaos/hold" "$dir/faults" "$@"; }
+# start NAME THREADS INTERVAL: a daemon on the data folder $dir/NAME; its URL goes to UNBAKE_SERVER.
 start() {
     rm -f "$dir/port"
-    "$build/unbaked" --data "$dir/$1" --listen 127.0.0.1:0 --port-file "$dir/port" \
-        --set "threads=$2" --set max_attempts=100 --set checkpoint_interval_sec=0.2 \
+    UNBAKE_FAULTS=$dir/faults ASAN_OPTIONS=verify_asan_link_order=0 LD_PRELOAD=$library "$build/unbaked" --data "$dir/$1" --listen 127.0.0.1:0 --port-file "$dir/port" \
+        --set "threads=$2" --set max_attempts=100 --set "checkpoint_interval_sec=$3" \
         --set min_free_mib=0 >>"$dir/$1.log" 2>&1 &
     daemon=$!
-    for _ in $(seq 500); do
+    for _ in $(seq 3000); do
         [ -s "$dir/port" ] && break
         sleep 0.02
     done
@@ -40,7 +42,7 @@ stop() {
 }
 submit() {
     "$build/unbake" submit "$dir/room" --set texture_size=128 --set iterations=60 \
-        --set texels_per_iteration=2048 --set coarse_levels=1 --set report_samples=4 >/dev/null 2>&1 ||
+        --set texels_per_iteration=2048 --set coarse_levels=1 --set report_samples=4 --set preview_interval_sec=60 >/dev/null 2>&1 ||
         fail "submit"
 }
 # textures NAME: the hashes of what the job left.
@@ -56,25 +58,31 @@ state() {
     "$build/unbake" show 1 2>/dev/null | awk '$1 == "state" { print $2 }'
 }
 
+library=$(realpath "$build/tests/chaos/preload/files.so") || exit 1
 "$build/unbaked" demo-room "$dir/room" --frames 8 --test-frames 1 --spp 4 --test-spp 4 \
     --width 64 --height 48 >"$dir/room.log" 2>&1 || fail "the demo room"
 
 for threads in 2 1; do
-    start "peace$threads" "$threads"
+    hold new "$dir/peace$threads" || fail "hold"
+    start "peace$threads" "$threads" 3600
     submit
     "$build/unbake" watch 1 >/dev/null || fail "the undisturbed job on $threads threads"
     stop
+    most=$(($(hold count) * 3 / 4))
     textures "peace$threads" >"$dir/peace$threads.sums"
 done
 cmp -s "$dir/peace1.sums" "$dir/peace2.sums" || fail "one and two threads differ"
 
 RANDOM=11
-start war 2
+hold new "$dir/war" || fail "hold"
+hold at "$most"
+start war 2 0.2
 submit
 for ((i = 0; i < kills; i++)); do
-    # Every other time there is something new to go on from; else at any moment.
+    # First, and every other time where that is possible, there is something new to go on from; else at any moment.
     before=$(checkpoints)
     while ((i % 2 == 0)) && [ "$(checkpoints)" -le "$before" ] && [ "$(state)" != succeeded ]; do
+        ((i > 0)) && hold is && break
         sleep 0.05
     done
     sleep "0.$((RANDOM % 40 + 10))"
@@ -82,23 +90,28 @@ for ((i = 0; i < kills; i++)); do
                   END { print p }' "$dir/war.log")
     # The kernel kills the daemon's children with it: "both" is the daemon.
     if ((i % 3 == 2)); then
+        hold go # a stop is no kill: it saves, and ends
         stop
-        start war 1
+        hold at "$most"
+        start war 1 0.2
     elif ((i % 3 == 1)) && [ -n "$worker" ] && grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null; then
+        hold at "$most" # of the next one
         kill -KILL "$worker"
     else
         kill -KILL "$daemon"
         wait "$daemon" 2>/dev/null
-        [ -n "$worker" ] && for _ in $(seq 500); do
+        [ -n "$worker" ] && for _ in $(seq 6000); do
             grep -qa "$dir/war" "/proc/$worker/cmdline" 2>/dev/null || break
             sleep 0.01
         done
         grep -qa "$dir/war" "/proc/${worker:-none}/cmdline" 2>/dev/null &&
             fail "worker $worker outlived its daemon"
-        start war 2
+        hold at "$most"
+        start war 2 0.2
     fi
     [ "$(state)" = succeeded ] && break
 done
+hold go
 "$build/unbake" watch 1 >/dev/null || fail "the disturbed job"
 curl -s -H 'Accept: application/x-ndjson' "$UNBAKE_SERVER/v1/jobs/1/events?after=0" >"$dir/events.log"
 grep -q "resumed at iteration" "$dir/events.log" || fail "it never went on from a checkpoint"
