@@ -5,6 +5,7 @@
 # run STATUS ARGUMENT...   runs the client and checks its exit status; sets $out, $err
 # has TEXT PART            PART must be in TEXT
 # job_is JOB STATE
+# interrupt PID            Ctrl-C, once the client is ready for it; its exit status is $?
 # make_room DIR [FRAMES]
 # shellcheck shell=bash disable=SC2034
 . tests/api/lib.sh "$@"
@@ -39,6 +40,13 @@ has() { [[ $1 == *"$2"* ]] || fail "\"$2\" is not in: $1"; }
 
 job_is() {
     [ "$("$build/unbake" show "$1" --json | jq -r .state)" = "$2" ]
+}
+
+blocks_int() { (($(awk '$1 == "SigBlk:" { print "0x" $2 }' "/proc/$1/status") & 2)); } # it reads it from a descriptor
+interrupt() {
+    wait_for 60 blocks_int "$1"
+    kill -INT "$1"
+    wait "$1"
 }
 
 # A cube of 4 m seen from its middle, in flat grey photographs.

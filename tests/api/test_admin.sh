@@ -141,19 +141,19 @@ if command -v openssl >/dev/null; then
         -o "$work/body" -w '%{http_code}' "$url/v1/scenes" >"$work/out" 2>/dev/null
     equal "$(cat "$work/out")" 413 "a refusal in the middle of a body"
     echo broken >"$work/key.pem"; kill -HUP "$daemon_pid"
-    wait_for 10 grep -q 'the old certificate stays' "$work/log"
+    wait_for 60 grep -q 'the old certificate stays' "$work/log"
     call GET /healthz --cacert "$work/first.pem"; expect 200 "after a bad reload"
     certificate second; kill -HUP "$daemon_pid"
     chmod 644 "$work/key.pem"
     doctor 0 'warn +tls .*everybody here can read the key' --data "$data" --set min_free_mib=1 \
         --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem"
-    wait_for 10 grep -q 'certificate was read again' "$work/log"
+    wait_for 60 grep -q 'certificate was read again' "$work/log"
     call GET /healthz --cacert "$work/cert.pem"; expect 200 "the new certificate"
     call GET /healthz --cacert "$work/first.pem"; equal "$status" 000 "the old certificate, after a reload"
     unbaked doctor --data "$data" --set min_free_mib=1 --set tls_certificate="$work/cert.pem" --set tls_key="$work/first.pem" \
         >"$work/out" && fail "doctor takes a certificate for a key"
     curl -sN -m 60 --cacert "$work/cert.pem" "$url/v1/events" >"$work/stream" & background=$!
-    wait_for 20 grep -q keepalive "$work/stream"
+    wait_for 60 grep -q keepalive "$work/stream"
     stop_daemon # with the stream open
     equal "$daemon_status" 0 "exit status with TLS"
     wait "$background"

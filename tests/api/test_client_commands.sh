@@ -87,6 +87,7 @@ run 0 retry 1 --from refine -q
 run 0 watch 1
 run 4 retry 1 --from lunch
 run 0 pause "$("$build/unbake" submit --scene "${scene:0:10}" $long -q)" -q
+wait_for 60 job_is last paused # its worker, if it has one by now, has ended
 run 0 edit last --priority 7 --label a=b --name 'new name' --first --json
 so '.priority == 7 and .labels == {"a": "b"} and .name == "new name"'
 run 0 scenes keep "${scene:0:10}" --keep-days 1
@@ -201,6 +202,7 @@ run 3 show "$job"
 
 run 0 list --json --limit 2
 so 'length == 2 and .[0].id > .[1].id'
+run 0 watch 2
 run 0 list --state succeeded --json
 so 'length == 4 and all(.[]; .state == "succeeded")'
 run 0 list
@@ -278,9 +280,7 @@ daemon_end TERM
 daemon_start
 truncate -s 4G "$work/larger.tar"
 env --default-signal=INT "$build/unbake" submit "$work/larger.tar" >/dev/null 2>"$work/interrupted" &
-sleep 0.5
-kill -INT $!
-wait $!
+interrupt $!
 equal $? 130
 has "$(cat "$work/interrupted")" "no job was queued"
 run 0 scenes --json

@@ -48,7 +48,7 @@ run 0 submit --scene "$(unset out; run 0 show 1 --json; jq -r .scene <<<"$out")"
 UNBAKE_TOKEN=$vic run 0 show 2
 # A watch under way ends when its token is revoked.
 "$build/unbake" watch 2 --retry 20 >"$work/watch" 2>&1 & background=$!
-wait_for 20 test -s "$work/watch"
+wait_for 60 test -s "$work/watch"
 "$build/unbaked" token revoke alice --data "$data" >/dev/null 2>&1
 wait "$background"; equal $? 4 "exit status of a watch whose token was revoked: $(tail -n 2 "$work/watch")"
 background=

@@ -35,12 +35,10 @@ wait_for 60 lines $((before + 3))
 # Ctrl-C ends the watching, not the job.
 env --default-signal=INT "$build/unbake" watch 1 >/dev/null 2>"$work/interrupted" &
 third=$!
-sleep 0.5
-kill -INT "$third"
-wait "$third"
+interrupt "$third"
 equal $? 130
 has "$(cat "$work/interrupted")" "job 1 goes on"
-job_is 1 running || fail "the job does not go on"
+wait_for 60 job_is 1 running || fail "the job does not go on"
 
 run 0 cancel 1
 wait "$watcher"

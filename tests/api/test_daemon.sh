@@ -72,13 +72,16 @@ done
 # --- stopping with streams open, and with an upload under way ---
 head -c 100000 /dev/urandom >"$work/junk"
 call POST /v1/scenes -T "$work/junk"; scene=$(field .id)
-call POST /v1/jobs -H 'Content-Type: application/json' -d "{\"scene\":\"$scene\"}"
 background=
 for i in $(seq 20); do
-    curl -sN -m 60 "$url/v1/jobs/${job:-1}/events" >"$work/stream$i" 2>/dev/null & background="$background $!"
+    curl -sN -m 60 "$url/v1/events" >"$work/stream$i" 2>/dev/null & background="$background $!"
 done
-curl -s -m 60 --limit-rate 2k -T "$work/junk" -X POST "$url/v1/scenes" >/dev/null 2>&1 & upload=$!
-sleep 0.5
+head -c 100000 /dev/urandom >"$work/more"
+curl -s -m 60 --limit-rate 2k -T "$work/more" -X POST "$url/v1/scenes" >/dev/null 2>&1 & upload=$!
+streams_are_open() { curl -s "$url/metrics" | grep -qx 'unbaked_event_streams 20'; }
+wait_for 60 streams_are_open
+has_upload() { [ -n "$(ls -A "$data/uploads")" ]; }
+wait_for 60 has_upload
 stop_daemon
 kill "$upload" # it would go on waiting for its rate
 equal "$daemon_status" 0 "exit status after SIGTERM"

@@ -10,7 +10,7 @@ run 0 submit "$work/room" --set texture_size=64 --set iterations=300 --set texel
 run 1 submit "$work/room" --set segmentation=given --watch -q # it has no object_id: the input is at fault
 call GET /v1/jobs/4242; call POST /nothing -d '{}'; call DELETE /v1/jobs; call GET "/v1/jobs?x=1"
 curl -sN -m 60 "$url/v1/events" >"$work/stream" & background=$!
-wait_for 20 sh -c "curl -s $url/metrics | grep -q '^unbaked_event_streams 1$'"
+wait_for 60 sh -c "curl -s $url/metrics | grep -q '^unbaked_event_streams 1$'"
 call GET /metrics; expect 200
 case $(header content-type) in "text/plain; version=0.0.4"*) ;; *) fail "Content-Type is $(header content-type)" ;; esac
 cp "$work/body" "$work/first"

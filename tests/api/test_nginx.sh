@@ -28,7 +28,7 @@ start_nginx() {
     "$nginx" -p "$work/nginx" -c "$work/nginx/conf" 2>"$work/nginx/errors" &
     nginx_pid=$!
     background=$nginx_pid
-    for _ in $(seq 100); do
+    for _ in $(seq 1200); do
         kill -0 "$nginx_pid" 2>/dev/null || return 1
         curl -s --cacert "$work/cert.pem" "https://$front/healthz" >/dev/null && return 0
         sleep 0.05
@@ -52,7 +52,7 @@ head -c 3000000 /dev/urandom >"$work/junk"
 (head -c 1500000 "$work/junk"; while [ ! -e "$work/go" ]; do sleep 0.05; done; tail -c 1500000 "$work/junk") |
     curl -s -m 60 --cacert "$work/cert.pem" -H "@$work/token" -X POST -T - -o "$work/reply" "$url/v1/scenes" & sender=$!
 has_bytes() { [ "$(find "$data/uploads" -type f -size +1000k | wc -l)" -gt 0 ]; }
-wait_for 20 has_bytes || fail "the upload is held back"
+wait_for 60 has_bytes || fail "the upload is held back"
 equal "$(find "$work/nginx" -type f -size +100k)" "" "kept by nginx"
 touch "$work/go"
 wait "$sender"
@@ -72,7 +72,7 @@ export UNBAKE_SERVER=$url UNBAKE_CA=$work/cert.pem UNBAKE_TOKEN=$token
 run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64
 run 0 list -q --json
 job=$(jq -r '.[0].id' <<<"$out")
-curl -sN -m 60 --cacert "$work/cert.pem" -H "@$work/token" "$url/v1/jobs/$job/events" >"$work/stream" & stream=$!
+curl -sN -m 600 --cacert "$work/cert.pem" -H "@$work/token" "$url/v1/jobs/$job/events" >"$work/stream" & stream=$!
 wait_for 60 grep -q '^event: preview' "$work/stream"
 kill -0 "$stream" 2>/dev/null || fail "the events came when the stream had ended"
 run 0 get "$job" 'preview/*' -o "$work/textures" -q

@@ -81,10 +81,13 @@ run 0 uploads rm "${upload##*/}" --dry-run --json; so '.bytes >= 1000000'
 daemon_end TERM || fail "the daemon did not end with 0"
 
 # --- by the configuration: jobs after their end, scenes after their last use, uploads after their last byte ---
-daemon_start --set collect_interval_sec=0.2 --set job_keep_days=0.00001 --set scene_keep_days=0.00002 \
-    --set upload_keep_hours=0.0003
+# The job is made before: between the scene and its job there would be a second or two only.
+daemon_start
 run 0 submit "$work/room" $long -q
 job=$out
+daemon_end TERM || fail "the daemon did not end with 0"
+daemon_start --set collect_interval_sec=0.2 --set job_keep_days=0.00001 --set scene_keep_days=0.00002 \
+    --set upload_keep_hours=0.0003
 wait_for 60 job_is "$job" running
 wait_for 60 gone "$upload"
 [ -z "$(ls -A "$data/uploads")" ] || fail "the expired upload's file is there"
@@ -121,9 +124,10 @@ if [ "$(id -u)" -eq 0 ] && mkdir "$work/disk" && mount -t tmpfs -o size=90m none
     has "$out" "the disk is nearly full: less than 30 MiB are free"
     rm "$work/disk/filler"
     wait_for 60 job_is "$first" running
-    field_is "/v1/jobs/$second" .reason null || fail "the waiting job still names the disk"
+    wait_for 60 field_is "/v1/jobs/$second" .reason null || fail "the waiting job still names the disk"
     call GET /readyz; expect 200
     run 0 cancel "$first" "$second"
+    wait_for 60 job_is "$second" cancelled # the first had gone, perhaps, and it ran
 
     # --- a disk that is full: what is not needed can be removed all the same ---
     wait_for 60 job_is "$first" cancelled

@@ -48,13 +48,13 @@ ln -s "$real/unbake" "$work/bin/unbake"
 build=$work/bin
 make_room "$work/room"
 daemon_start
-grep -qx READY=1 "$work/notified" || wait_for 10 grep -qx READY=1 "$work/notified" || fail "no READY=1: $(cat "$work/notified")"
+grep -qx READY=1 "$work/notified" || wait_for 60 grep -qx READY=1 "$work/notified" || fail "no READY=1: $(cat "$work/notified")"
 run 0 submit "$work/room" --set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1 --watch
 run 0 logs last
 has "$out" "sandbox: no network, no new programs, only the job's folder is writable"
 token=$("$real/unbaked" token add alice --data "$data" 2>/dev/null)
 UNBAKE_TOKEN=$token run 0 list
-wait_for 20 grep -qx WATCHDOG=1 "$work/notified" || fail "the watchdog is not fed"
+wait_for 60 grep -qx WATCHDOG=1 "$work/notified" || fail "the watchdog is not fed"
 daemon_end TERM
 equal $? 0 "exit status"
 equal "$(tail -n 1 "$work/notified")" STOPPING=1 "what it said last"

@@ -8,7 +8,7 @@ secret=a-secret-of-sixteen-bytes
 receive() {
     : >"$work/hook"
     "$build/tests/api/hook" "$secret" "$@" >"$work/hook" & background=$!
-    wait_for 20 test -s "$work/hook"
+    wait_for 60 test -s "$work/hook"
     hook=http://127.0.0.1:$(head -n 1 "$work/hook")
 }
 told() { sed 1d "$work/hook"; }
@@ -32,7 +32,7 @@ equal "$(jq -r .webhook <<<"$out")" "$hook/here?x=1"
 # A receiver that is away, and a daemon that ends meanwhile.
 kill "$background"; wait "$background" 2>/dev/null
 UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --webhook "$hook" --watch -q
-wait_for 20 grep -q 'its webhook cannot be called: cannot reach' "$work/log"
+wait_for 60 grep -q 'its webhook cannot be called: cannot reach' "$work/log"
 daemon_end KILL
 port_of_hook=${hook##*:}
 "$build/tests/api/hook" "$secret" >/dev/null & # takes another port: nobody is at the old one
