@@ -216,6 +216,16 @@ static void check_reconnects(struct rig *rig) {
     CHECK_THAT(metrics == STORM_EVENTS, "%d of %d events, %d connections", metrics, STORM_EVENTS, connections);
 }
 
+/* Streams that the clients have closed count until the daemon has seen that. */
+static void await_no_streams(const struct rig *rig) {
+    for (bool is_none = false; !is_none; usleep(5000)) {
+        struct buf reply;
+        CHECK(rig_get(rig, "/metrics", "", &reply) == 200);
+        is_none = strstr(buf_text(&reply), "\nunbaked_event_streams 0\n") != NULL;
+        buf_release(&reply);
+    }
+}
+
 static double cpu_seconds(void) {
     struct rusage use;
     getrusage(RUSAGE_SELF, &use);
@@ -231,6 +241,7 @@ static void check_many(struct rig *rig) {
     int fds[COUNT];
     struct buf replies[COUNT], refusal;
     struct error err;
+    await_no_streams(rig);
     for (int i = 0; i < COUNT; i++) {
         buf_init(&replies[i], 1 << 20);
         fds[i] = open_stream(rig, i == 0 ? doomed : job, "", "");

@@ -26,7 +26,7 @@ struct client {
     int index;
     long next; /* number of the next thing that it makes */
     struct made made[KEPT];
-    long acknowledged;
+    atomic_long acknowledged;
     unsigned random;
 };
 
@@ -177,6 +177,13 @@ static void *read_events(void *user) {
     return NULL;
 }
 
+static long count_acknowledged(void) {
+    long sum = 0;
+    for (int i = 0; i <= SUBMITTERS; i++)
+        sum += atomic_load(&client[i].acknowledged);
+    return sum;
+}
+
 /* --- the checks ------------------------------------------------------------------------------ */
 
 static void check_integrity(void) {
@@ -258,6 +265,9 @@ int main(int argc, char **argv) {
         pthread_create(&reader, NULL, read_events, NULL);
         for (int i = 0; i <= SUBMITTERS; i++)
             pthread_create(&client[i].thread, NULL, load, &client[i]);
+        /* Not before something was acknowledged in this life, however slow the machine is. */
+        for (long before = count_acknowledged(); count_acknowledged() < before + 2; usleep(1000))
+            continue;
         random = random * 1664525u + 1013904223u;
         usleep(5000 + (random >> 8) % (kill_count % 8 ? 120000 : 500000));
         daemon_signal(&daemon_, SIGKILL);
@@ -284,8 +294,7 @@ int main(int argc, char **argv) {
     daemon_signal(&daemon_, SIGTERM);
     pthread_join(reader, NULL);
     check_whole();
-    for (int i = 0; i <= SUBMITTERS; i++)
-        acknowledged += client[i].acknowledged;
+    acknowledged = count_acknowledged();
     double median = percentile(ready, (size_t)kills, 0.5);
     printf("%ld kills, %ld acknowledged changes, events up to %lld; ready again after %.3f s (median), %.3f s (99 %%), "
            "%.3f s (worst)\n", kills, acknowledged, last_event, median, percentile(ready, (size_t)kills, 0.99),

@@ -78,8 +78,11 @@ static inline bool worker_hear(int fd, const char *part, double seconds) {
         text[length] = '\0';
         if (strstr(text, part))
             return true;
-        if (length > sizeof text / 2)
-            length = 0;
+        if (length > sizeof text / 2) { /* a part may have begun */
+            size_t kept = strlen(part);
+            memmove(text, text + length - kept, kept + 1);
+            length = kept;
+        }
     }
 }
 

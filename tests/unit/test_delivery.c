@@ -114,7 +114,7 @@ static bool end_once(bool is_sql, long n, bool stays) {
     log_forget();
     OK(start(&d, &err));
     strike(is_sql, n, stays);
-    for (int i = 0; i < 5000 && !d.has_ended && d.id; i++, usleep(1000))
+    for (int i = 0; i < 60000 && !d.has_ended && d.id; i++, usleep(1000))
         delivery_listen(&d, store);
     if (d.id)
         delivery_listen(&d, store);
