@@ -271,7 +271,7 @@ int main(void) {
     d.settings[1] = "low_disk_mib=0";
     d.settings[2] = "log_level=warning";
     /* libmicrohttpd 0.9.75 overlooks that a client has gone, until this: */
-    d.settings[3] = getenv("UNBAKE_LONG") ? "idle_timeout_sec=10" : "idle_timeout_sec=3";
+    d.settings[3] = getenv("UNBAKE_LONG") ? "idle_timeout_sec=10" : "idle_timeout_sec=6";
     daemon_start(&d);
     proxy_start(&p, &d, 0.75 * (double)bytes);
     make_rooms(&d, 1, count, bytes);
