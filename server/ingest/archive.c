@@ -34,6 +34,7 @@ struct unpacking {
     const struct archive_limits *limits;
     uint64_t packed_bytes, written_bytes, entry_count, file_count;
     int dir_fd;
+    int fd;      /* of the archive; -1 where there is none, or zlib has it */
     char *block; /* [BLOCK_BYTES] */
     gzFile gzip; /* NULL: libarchive reads the file itself */
     char *gzip_block;
@@ -47,17 +48,15 @@ static enum status library_error(struct unpacking *u, const char *entry) {
     int number = archive_errno(u->archive);
     if (number == ENOMEM || errno == ENOMEM)
         mem_exhausted("libarchive");
-    const char *text = archive_error_string(u->archive);
+    const char *said = archive_error_string(u->archive), *text = said ? said : "unknown fault";
     enum status status = number == EIO || number == EACCES || errno == EIO ? STATUS_IO : STATUS_INPUT;
     if (entry)
-        return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry,
-                         text ? text : "unknown fault");
+        return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry, text);
     if (u->entry_count == 0)
         return error_set(u->err, status,
                          "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s", u->name,
-                         text ? text : "unknown fault");
-    return error_set(u->err, status, "%s is damaged or cut off: %s", u->name,
-                     text ? text : "unknown fault");
+                         text);
+    return error_set(u->err, status, "%s is damaged or cut off: %s", u->name, text);
 }
 
 static la_ssize_t read_gzip(struct archive *a, void *user, const void **block) {
@@ -87,19 +86,15 @@ static enum status finish_gzip(struct unpacking *u) {
     return got < 0 ? library_error(u, NULL) : STATUS_OK;
 }
 
-/* Opens `path` through zlib if it begins as gzip does. */
-static bool open_gzip(struct unpacking *u, const char *path) {
+/* Takes the file to zlib if it begins as gzip does. */
+static bool open_gzip(struct unpacking *u) {
     unsigned char magic[2] = {0, 0};
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0)
+    if (pread(u->fd, magic, 2, 0) != 2 || magic[0] != 0x1f || magic[1] != 0x8b)
         return false;
-    if (pread(fd, magic, 2, 0) != 2 || magic[0] != 0x1f || magic[1] != 0x8b) {
-        close(fd);
-        return false;
-    }
-    u->gzip = gzdopen(fd, "rb");
+    u->gzip = gzdopen(u->fd, "rb");
     if (!u->gzip)
         mem_exhausted("zlib");
+    u->fd = -1;
     u->gzip_block = mem_alloc(BLOCK_BYTES);
     return true;
 }
@@ -117,17 +112,20 @@ static int open_stream(struct unpacking *u) {
 static enum status open_archive(struct unpacking *u, const char *path) {
     struct archive *a = u->archive;
     struct stat info;
-    if (stat(path, &info) != 0)
+    u->fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (u->fd < 0 || fstat(u->fd, &info) != 0)
         return error_set_errno(u->err, errno, "cannot open %s", u->name);
     u->packed_bytes = (uint64_t)info.st_size;
     if (archive_read_support_format_zip(a) != ARCHIVE_OK ||
         archive_read_support_format_tar(a) != ARCHIVE_OK ||
-        archive_read_support_filter_zstd(a) != ARCHIVE_OK)
+        archive_read_support_filter_zstd(a) != ARCHIVE_OK) {
+        if (archive_errno(a) == ENOMEM)
+            mem_exhausted("libarchive");
         return error_set(u->err, STATUS_INTERNAL, "libarchive lacks zip, tar or zstd: %s",
                          archive_error_string(a));
+    }
     errno = 0;
-    int result = open_gzip(u, path) ? open_stream(u)
-                                    : archive_read_open_filename(a, path, BLOCK_BYTES);
+    int result = open_gzip(u) ? open_stream(u) : archive_read_open_fd(a, u->fd, BLOCK_BYTES);
     if (result != ARCHIVE_OK)
         return library_error(u, NULL);
     return STATUS_OK;
@@ -300,9 +298,14 @@ enum status archive_unpack(const char *path, const char *name, const char *dir,
                            const struct archive_limits *limits, struct error *err) {
     if (mkdir(dir, 0750) != 0)
         return error_set_errno(err, errno, "cannot create folder %s", dir);
+    int dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (dir_fd < 0) {
+        enum status status = error_set_errno(err, errno, "cannot open folder %s", dir);
+        file_remove_tree(dir, NULL);
+        return status;
+    }
     struct unpacking u = {.archive = archive_read_new(), .entry = archive_entry_new(), .name = name, .limits = limits, .err = err,
-                          .dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC),
-                          .block = mem_alloc(BLOCK_BYTES)};
+                          .dir_fd = dir_fd, .fd = -1, .block = mem_alloc(BLOCK_BYTES)};
     /* libarchive turns names into the locale's characters and loses those it cannot; the "C"
      * locale of a daemon has none but ASCII. For this thread, for this call. */
     if (!u.archive || !u.entry)
@@ -312,11 +315,7 @@ enum status archive_unpack(const char *path, const char *name, const char *dir,
         previous = uselocale(utf8);
     else if (errno == ENOMEM)
         mem_exhausted("libc");
-    enum status status;
-    if (u.dir_fd < 0)
-        status = error_set_errno(err, errno, "cannot open folder %s", dir);
-    else
-        status = open_archive(&u, path);
+    enum status status = open_archive(&u, path);
     if (status == STATUS_OK)
         status = unpack_all(&u);
     archive_read_free(u.archive);
@@ -327,10 +326,11 @@ enum status archive_unpack(const char *path, const char *name, const char *dir,
     }
     if (u.gzip)
         gzclose_r(u.gzip);
+    if (u.fd >= 0)
+        close(u.fd);
     mem_free(u.gzip_block);
     mem_free(u.block);
-    if (u.dir_fd >= 0)
-        close(u.dir_fd);
+    close(u.dir_fd);
     if (status != STATUS_OK)
         file_remove_tree(dir, NULL);
     return status;
