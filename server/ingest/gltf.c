@@ -161,9 +161,6 @@ static enum status add_primitive(struct reader *r, const cJSON *object, const ch
         return status;
     size_t count = p.is_indexed ? p.indices.count : p.position.count;
     size_t triangles = mode == TRIANGLES ? count / 3 : count < 3 ? 0 : count - 2;
-    if (triangles > r->faces->limit - r->mesh->triangle_count)
-        return error_set(r->err, STATUS_LIMIT, "%s has more than %zu triangles, the limit", r->file.name,
-                         r->faces->limit);
     affine_cofactors(t, p.turn);
     p.mirrored = t->m[0][0] * p.turn[0][0] + t->m[0][1] * p.turn[0][1] + t->m[0][2] * p.turn[0][2] < 0.0;
     size_t most = count < p.position.count ? count : p.position.count;

@@ -11,6 +11,8 @@
 
 #define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
 #define NONE UINT32_MAX
+/* Below it there are fewer points than NONE, as each takes a line of 8 bytes, "v 0 0 0". */
+#define MAX_BYTES ((size_t)8 * (NONE - 1))
 
 struct points {
     vec3 *at; /* owned */
@@ -99,8 +101,6 @@ static enum status read_vec3(struct reader *r, struct points *points) {
         points->capacity = points->capacity ? 2 * points->capacity : 1024;
         points->at = mem_realloc_array(points->at, points->capacity, sizeof *points->at);
     }
-    if (points->count == NONE - 1)
-        return error_set(r->err, STATUS_LIMIT, "%s has more vertices than fit", r->name);
     points->at[points->count++] = (vec3){value[0], value[1], value[2]};
     return STATUS_OK;
 }
@@ -235,6 +235,8 @@ static enum status check_whole(const struct reader *r) {
 enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
                       struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
+    if (size > MAX_BYTES)
+        return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
     struct reader *r = mem_calloc(1, sizeof *r);
     *r = (struct reader){.name = name, .data = data, .size = size, .next_line = 1, .err = err};
     r->faces = faces_new(mesh, name, triangle_limit, true);

@@ -339,8 +339,9 @@ static bool read_top(struct context *c, struct transforms *t) {
         problem(c, "expected an object with an array \"frames\"");
         return false;
     }
-    if (cJSON_GetArraySize(frames) > TRANSFORMS_MAX_FRAMES) {
-        problem(c, "too many frames");
+    int count = cJSON_GetArraySize(frames);
+    if (count > TRANSFORMS_MAX_FRAMES) {
+        problem(c, "there are %d frames; %d are the limit", count, TRANSFORMS_MAX_FRAMES);
         return false;
     }
     t->mesh = path(c, c->root, "mesh");

@@ -116,6 +116,9 @@ static void test_refused(void) {
         {"1\n", "line 1: there is no camera model"},
         {"x PINHOLE 640 480 1 1 1 1\n", "not a number"},
         {"-1 PINHOLE 640 480 1 1 1 1\n", "no id"},
+        {"4294967295 PINHOLE 640 480 1 1 1 1\n", "no id"},
+        {"1.5 PINHOLE 640 480 1 1 1 1\n", "line 1: there is a number that is no id"},
+        {"nan PINHOLE 640 480 1 1 1 1\n", "no id"},
         {"\n# x\n1 PINHOLE 640 480 500 510 320\n", "line 3: there are fewer values"},
         {"1 PINHOLE 640 480 500 510 320 two\n", "not a number"},
         {"1 PINHOLE 640 480 500 nan 320 2\n", "camera 1 has a parameter that is not finite"},
@@ -126,6 +129,8 @@ static void test_refused(void) {
     static const char *const bad_images[][2] = {
         {"1 1 0 0 0 0 0 0 7\n\n", "line 1: there is no name"},
         {"1 1 0 0 0 0 0\n\n", "line 1: there are fewer"},
+        {"0.5 1 0 0 0 0 0 0 7 a.png\n\n", "line 1: there is a number that is no id"},
+        {"1 1 0 0 0 0 0 0 -7 a.png\n\n", "line 1: there is a number that is no id"},
         {"1 1 0 0 0 0 0 zero 7 a.png\n\n", "line 1: there is a value"},
     };
     static const char *const problems[][2] = {
@@ -167,6 +172,39 @@ static void test_refused(void) {
     colmap_cameras_free(c);
 }
 
+/* One more than may be, in each of the kinds of file. */
+static void test_many(void) {
+    struct findings f = {.problems = cJSON_CreateArray()};
+    struct transforms t;
+    struct error err;
+    struct buf cameras, text, binary;
+    buf_init(&cameras, 1 << 22);
+    buf_init(&text, 1 << 22);
+    buf_init(&binary, 1 << 22);
+    put(&binary, TRANSFORMS_MAX_FRAMES + 1, 8);
+    for (uint64_t i = 0; i <= TRANSFORMS_MAX_FRAMES; i++) {
+        buf_printf(&cameras, "%d SIMPLE_PINHOLE 4 4 5 2 2\n", (int)i);
+        buf_printf(&text, "1 1 0 0 0 0 0 0 7 a.png\n\n");
+        put(&binary, 1, 4), put_doubles(&binary, (double[]){1, 0, 0, 0, 0, 0, 0}, 7), put(&binary, 7, 4);
+        buf_append(&binary, "a.png", 6), put(&binary, 0, 8);
+    }
+    CHECK(!colmap_cameras_parse(cameras.data, cameras.length, "cameras.txt", false, &err) && err.status == STATUS_INPUT);
+    CHECK_STRING(err.message, "cameras.txt has more than 20000 cameras");
+    struct colmap_cameras *c = cameras_of(CAMERAS, &err);
+    CHECK(colmap_images_parse(text.data, text.length, "images.txt", false, c, "", &t, &f, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "images.txt has more than 20000 images");
+    transforms_release(&t);
+    CHECK(colmap_images_parse(binary.data, binary.length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
+    CHECK_STRING(err.message, "images.bin has more than 20000 images");
+    transforms_release(&t);
+    colmap_cameras_free(c);
+    buf_release(&binary);
+    buf_release(&text);
+    buf_release(&cameras);
+    cJSON_Delete(f.problems);
+    findings_release(&f);
+}
+
 /* Which files are taken, and that photographs are looked for in images/. */
 static void test_folder(void) {
     char dir[] = "/tmp/unbake-colmap-XXXXXX";
@@ -203,6 +241,7 @@ static void test_folder(void) {
 int main(void) {
     test_both();
     test_refused();
+    test_many();
     test_folder();
     return check_result();
 }

@@ -29,6 +29,11 @@ static const uint8_t bytes[6] = {5, 4, 3, 2, 1, 0};
 #define NODE "\"nodes\":[{\"mesh\":0}]"
 #define WHOLE(mesh, nodes) "{" TABLES mesh "," nodes "}"
 
+/* One point, and a triangle of the accessors and the view. */
+#define POINTS(count) "{\"bufferView\":0,\"componentType\":5126,\"count\":" #count ",\"type\":\"VEC3\"}"
+#define WITH(view, accessors, primitive)                                                           \
+    "{" ASSET "," BUFFER ",\"bufferViews\":[" view "],\"accessors\":[" accessors "]," MESH(primitive) "," NODE "}"
+
 static void put_word(struct buf *out, uint32_t value) {
     buf_append(out, &value, 4);
 }
@@ -216,6 +221,32 @@ static const struct {
     {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"byteLength\":72}]," ACCESSORS "," MESH(BARE) "," NODE "}", "no buffer"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"data:x;base64,!!\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", "base64"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"../a.bin\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", ".."},
+    {"{" ASSET ",\"extensionsRequired\":[3]}", "requires the extension (not a name)"},
+    {WHOLE(MESH(BARE), "\"nodes\":[{\"mesh\":0,\"translation\":[1,2,3,4]}]"), "nodes[0].translation is not 3 numbers"},
+    {WHOLE(MESH(BARE), "\"nodes\":[{\"mesh\":0,\"rotation\":[0,0,0]}]"), "nodes[0].rotation is not 4 numbers"},
+    {WHOLE(MESH("{\"attributes\":{\"POSITION\":0,\"NORMAL\":9}}"), NODE), "primitives[0].NORMAL is none of the 4 accessors"},
+    {WITH("{\"buffer\":0,\"byteLength\":144}", POINTS(6) "," POINTS(5),
+          "{\"attributes\":{\"POSITION\":0,\"NORMAL\":1}}"), "meshes[0].primitives[0] has 6 positions and 5 normals"},
+    {WITH("{\"buffer\":0,\"byteLength\":144}",
+          POINTS(6) ",{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"SCALAR\"}",
+          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"), "the indices of meshes[0].primitives[0] are not unsigned integers"},
+    {WITH("{\"buffer\":0,\"byteLength\":144}", /* a float as an index, as its bits say */
+          POINTS(6) ",{\"bufferView\":0,\"componentType\":5125,\"count\":6,\"type\":\"SCALAR\"}",
+          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"), "refers to vertex 1065353216, but there are 6"},
+    {WITH("{\"buffer\":0,\"byteLength\":4}", POINTS(1), BARE), "promises 1 elements, but its bufferView holds 0"},
+    {WITH("{\"buffer\":0,\"byteOffset\":0.5,\"byteLength\":144}", POINTS(6), BARE), "bufferViews[0].byteOffset is not a whole"},
+    {WITH("{\"buffer\":0}", POINTS(6), BARE), "bufferViews[0].byteLength is not a whole number from 0"},
+    {WITH("{\"buffer\":1,\"byteLength\":144}", POINTS(6), BARE), "bufferViews[0].buffer is none of the 1 buffers"},
+    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"byteOffset\":-1,\"componentType\":5126,\"count\":6,"
+     "\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}", "accessors[0].byteOffset is not a whole number from 0"},
+    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":1,\"count\":6,\"type\":\"VEC3\"}],"
+     MESH(BARE) "," NODE "}", "accessors[0].componentType is not a whole number from 5120 to 5126"},
+    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":2,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}],"
+     MESH(BARE) "," NODE "}", "accessors[0].bufferView is none of the 2 bufferViews"},
+    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6}],"
+     MESH(BARE) "," NODE "}", "accessors[0] is of type none, wanted is VEC3"},
+    {"{" ASSET ",\"buffers\":[{\"uri\":\"data:x\"},{}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}",
+     "buffers[0] is a data: URI that is not base64"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"a.bin\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", "is not in it"},
 };
 
@@ -252,6 +283,17 @@ static void test_container(void) {
     buf_release(&file);
 }
 
+/* JSON that is too large is not read. */
+static void test_large(void) {
+    size_t size = ((size_t)64 << 20) + 1;
+    char *json = mem_calloc(size, 1);
+    struct mesh mesh;
+    struct error err;
+    CHECK(gltf_parse(json, size, "room.gltf", NULL, 1000, &mesh, NULL, &err) == STATUS_LIMIT);
+    CHECK_STRING(err.message, "room.gltf: its JSON is larger than 67108864 bytes");
+    mem_free(json);
+}
+
 static void test_depth(void) {
     struct buf json;
     struct mesh mesh;
@@ -272,6 +314,7 @@ int main(void) {
     test_buffers();
     test_refused();
     test_container();
+    test_large();
     test_depth();
     return check_result();
 }

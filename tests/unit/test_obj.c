@@ -108,6 +108,22 @@ static void test_limits(void) {
     CHECK(obj_read("/dev/null", "room.obj", 9, &mesh, NULL, &err) == STATUS_INPUT);
 }
 
+/* More than its points can be counted in: all of it is a hole but the beginning. */
+static void test_large(void) {
+    char path[] = "/tmp/unbake-test-obj-XXXXXX";
+    struct mesh mesh;
+    struct error err = {.message = ""};
+    int fd = mkstemp(path);
+    CHECK(fd >= 0 && write(fd, SQUARE, sizeof SQUARE) > 0);
+    if (ftruncate(fd, (off_t)1 << 35) != 0)
+        printf("no file of 32 GiB here, not even of holes\n");
+    else
+        CHECK_THAT(obj_read(path, "room.obj", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
+                   strcmp(err.message, "room.obj is larger than 34359738352 bytes") == 0, "%s", err.message);
+    close(fd);
+    unlink(path);
+}
+
 /* Files of other programs, where they are here. */
 static void test_others(void) {
     static const struct {
@@ -158,6 +174,7 @@ int main(void) {
     test_objects();
     test_refused();
     test_limits();
+    test_large();
     test_others();
     test_intern();
     return check_result();

@@ -192,6 +192,30 @@ static void test_polygons(void) {
     polygon_triangulate(line, 5, t); /* without area: must end */
 }
 
+/* More than the limit, and more than can be counted: a hole after the header. */
+static void test_large(void) {
+    static const char header[] = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty char x\nproperty "
+                                 "char y\nproperty char z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    static const char faces[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+                                "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+                                "3 0 1 2\n3 0 2 1\n";
+    char path[] = "/tmp/unbake-test-ply-XXXXXX";
+    struct mesh mesh;
+    struct error err = {.message = ""};
+    CHECK(ply_parse(faces, sizeof faces - 1, "mesh.ply", 1, &mesh, NULL, &err) == STATUS_LIMIT);
+    CHECK_STRING(err.message, "mesh.ply has 2 faces, more than the limit of 1");
+    CHECK(!mesh.position && !mesh.index);
+    int fd = mkstemp(path);
+    CHECK(fd >= 0 && write(fd, header, sizeof header - 1) > 0);
+    if (ftruncate(fd, (off_t)13 << 30) != 0)
+        printf("no file of 13 GiB here, not even of holes\n");
+    else
+        CHECK_THAT(ply_read(path, "mesh.ply", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
+                   strcmp(err.message, "mesh.ply has 4294967295 vertices, more than fit") == 0, "%s", err.message);
+    close(fd);
+    unlink(path);
+}
+
 /* Other projects' files. */
 static void test_vectors(void) {
     static const struct {
@@ -240,6 +264,7 @@ int main(void) {
     test_binary();
     test_refusals();
     test_polygons();
+    test_large();
     test_vectors();
     return check_result();
 }
