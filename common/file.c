@@ -268,7 +268,7 @@ enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err
 
 bool file_is_in(const char *dir, const char *name) {
     char *path = file_join(dir, name);
-    bool found = access(path, F_OK) == 0;
+    bool found = access(path, F_OK) == 0 || (errno != ENOENT && errno != ENOTDIR && errno != ENAMETOOLONG);
     mem_free(path);
     return found;
 }

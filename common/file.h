@@ -46,7 +46,8 @@ enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, s
 /* Bytes free to an unprivileged process on the file system of `path`. */
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err);
 
-/* Whether there is something of that name in the folder. */
+/* Whether there is something of that name in the folder. Where that cannot be known there is: whoever opens it is told
+ * why not. */
 bool file_is_in(const char *dir, const char *name);
 
 /* "a" + "b" -> "a/b"; the caller's (mem_free). */

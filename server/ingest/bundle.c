@@ -1,6 +1,8 @@
 /* bundle.c -- see bundle.h. */
 #include "server/ingest/bundle.h"
 
+#include <assert.h>
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -49,30 +51,23 @@ static enum status list_folder(const char *dir, char ***names, size_t *count, st
     return status;
 }
 
-static bool is_folder(const char *path) {
-    struct stat info;
-    return lstat(path, &info) == 0 && S_ISDIR(info.st_mode);
-}
-
 /* The bundle's own folder: `dir`, or the single folder in it; the caller's. */
 static enum status find_root(const char *dir, char **root, struct error *err) {
     char **names;
     size_t count;
+    struct stat info;
     enum status status = list_folder(dir, &names, &count, err);
     *root = NULL;
     if (status != STATUS_OK)
         return status;
-    if (count == 1) {
-        *root = file_join(dir, names[0]);
-        if (!is_folder(*root)) {
-            mem_free(*root);
-            *root = NULL;
-        }
-    }
-    if (!*root)
-        *root = mem_strdup(dir);
+    char *inner = count == 1 ? file_join(dir, names[0]) : NULL;
+    if (inner && lstat(inner, &info) != 0)
+        status = error_set_errno(err, errno, "cannot look at %s", inner);
+    else
+        *root = mem_strdup(inner && S_ISDIR(info.st_mode) ? inner : dir);
+    mem_free(inner);
     file_free_names(names, count);
-    return STATUS_OK;
+    return status;
 }
 
 /* --- transforms -------------------------------------------------------------------------- */
@@ -80,45 +75,53 @@ static enum status find_root(const char *dir, char **root, struct error *err) {
 static enum status load_transforms(const char *root, const char *name, struct transforms *t,
                                    struct findings *f, struct error *err) {
     struct buf text;
+    struct stat info;
     buf_init(&text, TRANSFORMS_MAX_BYTES);
     char *path = file_join(root, name);
     cJSON *tree = NULL;
     struct error own;
-    *t = (struct transforms){0};
-    enum status status = file_read(path, &text, &own);
-    if (status == STATUS_NOT_FOUND) {
-        error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor poses "
-                  "of another kind", name);
-        error_hint(&own, "nerfstudio and instant-ngp write one; COLMAP, ScanNet and NICE-SLAM's Replica are "
-                   "read, too");
-    } else if (status == STATUS_LIMIT) {
-        error_set(&own, STATUS_INPUT, "%s is larger than %zu bytes", name, TRANSFORMS_MAX_BYTES);
-    } else if (status == STATUS_OK) {
+    enum status status;
+    if (stat(path, &info) != 0)
+        status = error_set_errno(&own, errno, "cannot look at %s", name);
+    else if (S_ISDIR(info.st_mode))
+        status = error_set(&own, STATUS_INPUT, "%s is a folder", name);
+    else if (info.st_size > TRANSFORMS_MAX_BYTES)
+        status = error_set(&own, STATUS_LIMIT, "%s is larger than %zu bytes", name, (size_t)TRANSFORMS_MAX_BYTES);
+    else
+        status = file_read(path, &text, &own);
+    if (status == STATUS_OK)
         status = json_parse(buf_text(&text), text.length, name, &tree, &own);
-    }
     if (status == STATUS_OK)
         transforms_read(tree, name, t, f);
-    else if (status == STATUS_NOT_FOUND || status == STATUS_LIMIT || status == STATUS_INPUT)
-        findings_error(f, name, &own);
-    else if (err)
-        *err = own;
-    bool failed = status != STATUS_OK && own.status != STATUS_INPUT;
+    else
+        status = findings_settle(f, name, status, &own, err);
     cJSON_Delete(tree);
     mem_free(path);
     buf_release(&text);
-    return failed ? status : STATUS_OK;
+    return status;
+}
+
+static void tell_no_cameras(const char *name, struct findings *f) {
+    struct error own;
+    error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor poses of another kind", name);
+    error_hint(&own, "nerfstudio and instant-ngp write one; COLMAP, ScanNet and NICE-SLAM's Replica are read, too");
+    findings_error(f, name, &own);
 }
 
 /* Where transforms.json is not there and poses of another kind are, those take its place: *name
  * becomes their name. */
 static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
                                 struct error *err) {
-    if (file_is_in(root, *name) || strcmp(*name, BUNDLE_TRANSFORMS) != 0)
+    *t = (struct transforms){0};
+    if (file_is_in(root, *name))
         return load_transforms(root, *name, t, f, err);
-    char *colmap = colmap_find(root);
-    const char *trajectory = trajectory_find(root);
-    if (!colmap && !trajectory)
-        return load_transforms(root, *name, t, f, err);
+    bool is_default = strcmp(*name, BUNDLE_TRANSFORMS) == 0;
+    char *colmap = is_default ? colmap_find(root) : NULL;
+    const char *trajectory = is_default ? trajectory_find(root) : NULL;
+    if (!colmap && !trajectory) {
+        tell_no_cameras(*name, f);
+        return STATUS_OK;
+    }
     mem_free(*name);
     *name = colmap ? colmap : mem_strdup(trajectory);
     return colmap ? colmap_read(root, colmap, t, f, err) : trajectory_read(root, trajectory, t, f, err);
@@ -126,11 +129,11 @@ static enum status load_cameras(const char *root, char **name, struct transforms
 
 /* --- mesh -------------------------------------------------------------------------------- */
 
-static bool has_faces(const char *root, const char *name) {
+static enum status look_for_faces(const char *root, const char *name, bool *has, struct error *err) {
     char *path = file_join(root, name);
-    bool has = mesh_file_has_faces(path, name);
+    enum status status = mesh_file_has_faces(path, name, has, err);
     mem_free(path);
-    return has;
+    return status;
 }
 
 /* What the files at the top are, as far as a mesh is looked for. */
@@ -143,22 +146,27 @@ struct candidates {
 };
 
 /* Of PLY files, or of those of the other formats that are read. */
-static void find_candidates(struct candidates *c, const char *root, bool ply) {
+static enum status find_candidates(struct candidates *c, const char *root, bool ply, struct error *err) {
     static const char *const unknown[] = {"stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
     for (size_t i = 0; i < c->count; i++) {
+        bool has_faces;
         const char *extension = path_extension(c->name[i]);
         for (size_t k = 0; k < sizeof unknown / sizeof *unknown; k++)
             if (strcasecmp(extension, unknown[k]) == 0)
                 c->unknown = c->name[i];
         if (!mesh_file_is_known(c->name[i]) || (strcasecmp(extension, "ply") == 0) != ply)
             continue;
-        if (!has_faces(root, c->name[i]))
+        enum status status = look_for_faces(root, c->name[i], &has_faces, err);
+        if (status != STATUS_OK)
+            return status;
+        if (!has_faces)
             c->point_cloud_count++;
         else if (!c->first)
             c->first = c->name[i];
         else if (!c->second)
             c->second = c->name[i];
     }
+    return STATUS_OK;
 }
 
 /* The only PLY with faces at the top; where there is none, the only mesh of another format. NULL with
@@ -167,11 +175,14 @@ static enum status search_mesh(const char *root, char **found, struct findings *
     struct candidates c = {0};
     struct error two;
     enum status status = list_folder(root, &c.name, &c.count, err);
-    if (status != STATUS_OK)
+    if (status == STATUS_OK)
+        status = find_candidates(&c, root, true, err);
+    if (status == STATUS_OK && !c.first)
+        status = find_candidates(&c, root, false, err);
+    if (status != STATUS_OK) {
+        file_free_names(c.name, c.count);
         return status;
-    find_candidates(&c, root, true);
-    if (!c.first)
-        find_candidates(&c, root, false);
+    }
     if (c.second) {
         error_set(&two, STATUS_INPUT, "two meshes: %s and %s", c.first, c.second);
         error_hint(&two, "leave one, or name it in transforms.json as \"mesh\"");
@@ -196,12 +207,16 @@ static enum status find_mesh(const char *root, const char *transforms_name, cons
     *found = NULL;
     if (t->mesh || t->point_cloud) {
         const char *name = t->mesh ? t->mesh : t->point_cloud;
-        if (file_is_in(root, name) && (t->mesh || has_faces(root, name))) {
-            *found = mem_strdup(name);
+        bool is_there = file_is_in(root, name), is_mesh = t->mesh != NULL;
+        if (t->mesh && !is_there) {
+            findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
             return STATUS_OK;
         }
-        if (t->mesh) {
-            findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
+        enum status status = is_mesh || !is_there ? STATUS_OK : look_for_faces(root, name, &is_mesh, err);
+        if (status != STATUS_OK)
+            return status;
+        if (is_mesh) {
+            *found = mem_strdup(name);
             return STATUS_OK;
         }
     }
@@ -218,15 +233,8 @@ static enum status load_mesh(const char *root, const char *name, uint64_t triang
     mem_free(path);
     if (status == STATUS_OK)
         status = mesh_check(&scene->mesh, name, &scene->mesh_report, &own);
-    if (status == STATUS_INPUT || status == STATUS_LIMIT) {
-        findings_error(f, name, &own);
-        return STATUS_OK;
-    }
-    if (status != STATUS_OK) {
-        if (err)
-            *err = own;
-        return status;
-    }
+    if (status != STATUS_OK)
+        return findings_settle(f, name, status, &own, err);
     if (report.small_count > 0)
         findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name,
                          report.small_count);
@@ -284,11 +292,10 @@ static enum status sum_up(const struct findings *f, struct error *err) {
         cJSON_AddItemToArray(f->problems, more);
         mem_free(text);
     }
-    const char *gap = file && *file ? ": " : "";
+    assert(file && reason); /* add_problem has given it both */
     if (f->problem_count == 1)
-        return error_set(err, STATUS_INPUT, "%s%s%s", file ? file : "", gap, reason ? reason : "");
-    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s%s%s", f->problem_count,
-                     file ? file : "", gap, reason ? reason : "");
+        return error_set(err, STATUS_INPUT, "%s: %s", file, reason);
+    return error_set(err, STATUS_INPUT, "%zu problems; the first: %s: %s", f->problem_count, file, reason);
 }
 
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
@@ -299,9 +306,10 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
     char *root = NULL, *mesh = NULL, *name = NULL;
     *scene = (struct scene){0};
     enum status status = path_clean(transforms ? transforms : BUNDLE_TRANSFORMS, &name, err);
-    if (status != STATUS_OK)
-        return status;
-    status = find_root(dir, &root, err);
+    if (status == STATUS_OK && name[0] == '\0')
+        status = error_set(err, STATUS_INPUT, "\"%s\" is no name of a file", transforms);
+    if (status == STATUS_OK)
+        status = find_root(dir, &root, err);
     if (status != STATUS_OK) {
         mem_free(name);
         return status;

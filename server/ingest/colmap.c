@@ -163,18 +163,6 @@ char *colmap_find(const char *root) {
     return NULL;
 }
 
-/* Faults of the user's become problems. */
-static enum status settle(enum status status, const char *name, const struct error *own, struct findings *f,
-                          struct error *err) {
-    if (status == STATUS_INPUT || status == STATUS_LIMIT || status == STATUS_NOT_FOUND) {
-        findings_error(f, name, own);
-        return STATUS_OK;
-    }
-    if (status != STATUS_OK && err)
-        *err = *own;
-    return status;
-}
-
 enum status colmap_read(const char *root, const char *images, struct transforms *t, struct findings *f,
                         struct error *err) {
     const char *base = path_base(images);
@@ -193,7 +181,7 @@ enum status colmap_read(const char *root, const char *images, struct transforms 
     }
     mapping_close(&file);
     mem_free(path);
-    enum status result = settle(status, cameras, &own, f, err);
+    enum status result = findings_settle(f, cameras, status, &own, err);
     if (found) {
         path = file_join(root, images);
         status = mapping_open(&file, path, images, "a file of images", &own);
@@ -201,7 +189,7 @@ enum status colmap_read(const char *root, const char *images, struct transforms 
             status = colmap_images_parse(file.data, file.size, images, binary, found, prefix, t, f, &own);
         mapping_close(&file);
         mem_free(path);
-        result = settle(status, images, &own, f, err);
+        result = findings_settle(f, images, status, &own, err);
     }
     colmap_cameras_free(found);
     mem_free(cameras);

@@ -47,6 +47,19 @@ void findings_error(struct findings *f, const char *file, const struct error *er
     add_problem(f, file, err->message, err->hint);
 }
 
+enum status findings_settle(struct findings *f, const char *file, enum status status, const struct error *own,
+                            struct error *err) {
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    if (status == STATUS_INPUT || status == STATUS_LIMIT) {
+        findings_error(f, file, own);
+        return STATUS_OK;
+    }
+    if (err)
+        *err = *own;
+    return status;
+}
+
 void findings_warning(struct findings *f, const char *format, ...) {
     if (f->warning_count++ >= FINDINGS_MAX)
         return;

@@ -21,6 +21,10 @@ void findings_problem(struct findings *f, const char *file, const char *format, 
     __attribute__((format(printf, 3, 4)));
 /* The message of an error, with its hint. */
 void findings_error(struct findings *f, const char *file, const struct error *err);
+/* A reader's status and error: faults of the bundle become a problem, and STATUS_OK; others become *err, which may be
+ * NULL. */
+enum status findings_settle(struct findings *f, const char *file, enum status status, const struct error *own,
+                            struct error *err);
 void findings_warning(struct findings *f, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 

@@ -103,12 +103,11 @@ static enum status open_file_buffer(struct gltf_file *g, struct gltf_buffer *b, 
     enum status status = path_clean(text, &clean, err);
     if (status == STATUS_OK && !g->folder)
         status = error_set(err, STATUS_INPUT, "%s: its buffer %s is not in it", g->name, uri);
+    if (status == STATUS_OK && !file_is_in(g->folder, clean))
+        status = error_set(err, STATUS_INPUT, "%s names the buffer %s, which is not in the bundle", g->name, clean);
     if (status == STATUS_OK) {
         char *path = file_join(g->folder, clean);
         status = mapping_open(&b->file, path, clean, "a buffer", err);
-        if (status == STATUS_NOT_FOUND)
-            status = error_set(err, STATUS_INPUT, "%s names the buffer %s, which is not in the bundle", g->name,
-                               clean);
         mem_free(path);
     }
     b->data = b->file.data;

@@ -40,10 +40,13 @@ enum status mesh_file_read(const char *path, const char *name, size_t triangle_l
     return (read ? read : ply_read)(path, name, triangle_limit, mesh, report, err);
 }
 
-bool mesh_file_has_faces(const char *path, const char *name) {
+enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err) {
     uint64_t count = 0;
     mesh_reader *read = reader_of(name);
+    *has = true;
     if (read && read != ply_read)
-        return true;
-    return ply_count_faces(path, name, &count, NULL) != STATUS_OK || count > 0;
+        return STATUS_OK;
+    enum status status = ply_count_faces(path, name, &count, err);
+    *has = status != STATUS_OK || count > 0;
+    return status == STATUS_INPUT ? STATUS_OK : status;
 }

@@ -18,8 +18,8 @@ bool mesh_file_is_known(const char *name);
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err);
 
-/* False for what is only a point cloud. What cannot be told before all of it is read, or not read at
- * all, counts as a mesh, so that reading it says what is wrong. */
-bool mesh_file_has_faces(const char *path, const char *name);
+/* *has: false for what is only a point cloud. What cannot be told before all of it is read, or is damaged, counts as a
+ * mesh, so that reading it says what is wrong. Fails only where the disk does. */
+enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err);
 
 #endif

@@ -142,6 +142,8 @@ static void mask_by_alpha(const struct image *image, struct photograph *photo) {
 static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo,
                              struct error *err) {
     struct image image;
+    if (!file_is_in(l->dir, name))
+        return error_set(err, STATUS_INPUT, "the mask is not in the bundle");
     char *path = file_join(l->dir, name);
     enum status status = image_probe(path, &image, NULL, err);
     if (status != STATUS_OK)
@@ -308,7 +310,7 @@ static enum status collect(struct loading *l, const char *name, struct findings 
         if (o->status == STATUS_OK)
             continue;
         make_relative(&o->err, l->dir);
-        if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT || o->status == STATUS_NOT_FOUND) {
+        if (o->status == STATUS_INPUT || o->status == STATUS_LIMIT) {
             findings_error(f, o->mask_failed ? frame->mask : l->path[i], &o->err);
         } else if (status == STATUS_OK) {
             status = o->status;

@@ -20,12 +20,9 @@
 #define PIXEL_CENTRE 0.5
 
 const char *trajectory_find(const char *root) {
-    static const char *const kinds[][2] = {{TRAJECTORY, PARAMETERS}, {POSES, INTRINSIC}};
-    for (size_t i = 0; i < 2; i++) {
-        if (file_is_in(root, kinds[i][0]) && file_is_in(root, kinds[i][1]))
-            return kinds[i][0];
-    }
-    return NULL;
+    if (file_is_in(root, TRAJECTORY) && file_is_in(root, PARAMETERS))
+        return TRAJECTORY;
+    return file_is_in(root, POSES "/.") && file_is_in(root, INTRINSIC) ? POSES : NULL;
 }
 
 /* --- matrices ------------------------------------------------------------------------------- */
@@ -174,9 +171,9 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* The numbers N of the files N.txt in the folder, ascending; the caller's. */
+/* The numbers N of the files N.txt in the folder, as ScanNet writes them, without zeros before; ascending, the caller's. */
 static enum status list_poses(const char *root, long **number, size_t *count, struct error *err) {
-    char *path = file_join(root, POSES), **names, *end;
+    char *path = file_join(root, POSES), **names;
     size_t name_count;
     *number = NULL;
     *count = 0;
@@ -186,8 +183,10 @@ static enum status list_poses(const char *root, long **number, size_t *count, st
         return status;
     *number = mem_calloc(name_count + 1, sizeof **number);
     for (size_t i = 0; i < name_count; i++) {
-        long value = strtol(names[i], &end, 10);
-        if (end != names[i] && strcmp(end, ".txt") == 0 && value >= 0)
+        char name[32];
+        long value = strtol(names[i], NULL, 10);
+        snprintf(name, sizeof name, "%ld.txt", value);
+        if (value >= 0 && strcmp(names[i], name) == 0)
             (*number)[(*count)++] = value;
     }
     file_free_names(names, name_count);
@@ -216,15 +215,11 @@ static enum status read_scannet(const char *root, struct transforms *t, struct f
     for (size_t i = 0; i < count && status == STATUS_OK; i++) {
         struct error own;
         char *name = mem_printf(POSES "/%ld.txt", number[i]);
-        enum status read = read_matrix_file(root, name, m, &own);
-        if (read == STATUS_OK)
+        status = read_matrix_file(root, name, m, &own);
+        if (status == STATUS_OK)
             add_frame(t, m, &lens, mem_printf("color/%ld", number[i]), name, "the pose", f, &lost_count);
-        else if (read == STATUS_INPUT || read == STATUS_NOT_FOUND)
-            findings_error(f, name, &own);
         else
-            status = read;
-        if (status != STATUS_OK && err)
-            *err = own;
+            status = findings_settle(f, name, status, &own, err);
         mem_free(name);
     }
     warn_of_lost(POSES, lost_count, f);
@@ -238,11 +233,5 @@ enum status trajectory_read(const char *root, const char *found, struct transfor
     *t = (struct transforms){0};
     bool is_replica = strcmp(found, TRAJECTORY) == 0;
     enum status status = is_replica ? read_replica(root, t, f, &own) : read_scannet(root, t, f, &own);
-    if (status == STATUS_INPUT || status == STATUS_LIMIT || status == STATUS_NOT_FOUND) {
-        findings_error(f, found, &own);
-        return STATUS_OK;
-    }
-    if (status != STATUS_OK && err)
-        *err = own;
-    return status;
+    return findings_settle(f, found, status, &own, err);
 }

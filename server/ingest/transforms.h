@@ -17,7 +17,7 @@
 #include "server/scene/camera.h"
 
 #define TRANSFORMS_MAX_FRAMES 20000
-#define TRANSFORMS_MAX_BYTES ((size_t)256 << 20)
+#define TRANSFORMS_MAX_BYTES (256 << 20)
 
 struct lens {
     enum camera_model model;

@@ -245,7 +245,7 @@ static const struct bad bad_bundles[] = {
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"split\":\"dev\"}"), NULL, NULL, "transforms.json", "split must be"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"exposure\":-1}"), NULL, NULL, "transforms.json", "exposure is -1"},
     {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE ",\"mask_path\":\"m.png\"}," FRAME("b.png") "," FRAME("c.exr") "]}",
-     NULL, NULL, "m.png", "cannot open m.png"},
+     NULL, NULL, "m.png", "the mask is not in the bundle"},
     {"{" LENS ",\"test_filenames\":[\"a.exr\",\"b.png\",\"c.exr\"],\"frames\":[" THREE "]}", NULL, NULL,
      "transforms.json", "held out"},
     {NULL, "b.png", "\x89PNG\r\n\x1a\n and then nothing", "b.png", "PNG"},

@@ -1,6 +1,7 @@
 /* Poses as text: NICE-SLAM's Replica and ScanNet. */
 #include "server/ingest/trajectory.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include "common/file.h"
@@ -10,7 +11,7 @@
 #define POSE "1 0 0 0.5  0 0 -1 1.5  0 1 0 -2.5  0 0 0 1"
 #define LOST "-inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf -inf"
 
-static char dir[] = "/tmp/unbake-trajectory-XXXXXX";
+static char dir[64]; /* in memory where possible: there are many files */
 
 static void put(const char *name, const char *text) {
     char *path = file_join(dir, name);
@@ -86,6 +87,13 @@ static void test_replica(void) {
     refused("line 2");
     put("traj.txt", "1 0 0 0 0 0 0 0 0 0 1 0 0 0 0 1\n");
     refused("line 1: ");
+    struct buf many;
+    buf_init(&many, 1 << 22);
+    for (int i = 0; i <= TRANSFORMS_MAX_FRAMES; i++)
+        buf_puts(&many, POSE "\n");
+    put("traj.txt", buf_text(&many));
+    refused("\"traj.txt\",\"reason\":\"has more than 20000 poses\"");
+    buf_release(&many);
     put("cam_params.json", "{\"camera\":{\"w\":1200,\"h\":680,\"fx\":600,\"cx\":599.5,\"cy\":339.5}}");
     refused("no fy");
     put("cam_params.json", "{\"camera\":{\"w\":\"wide\"}}");
@@ -120,11 +128,32 @@ static void test_scannet(void) {
     refused("\"pose/3.txt\",\"reason\":\"expected the 16 numbers");
     put("pose/3.txt", "2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1");
     refused("pose/3.txt");
+    char *large = mem_calloc(65538, 1);
+    memset(large, ' ', 65537);
+    put("pose/3.txt", large);
+    refused("\"pose/3.txt\",\"reason\":\"is larger than 65536 bytes\"");
+    mem_free(large);
+    put("pose/007.txt", POSE); /* no name of ScanNet's */
+    put("pose/3.txt", LOST);
+    text = read_it(&t, &warnings);
+    CHECK_STRING(text, "[]");
+    CHECK(t.frame_count == 2);
+    transforms_release(&t);
+    mem_free(text);
+    for (int i = 0; i <= TRANSFORMS_MAX_FRAMES; i++) {
+        char *path = mem_printf("%s/pose/%d.txt", dir, i);
+        int fd = open(path, O_WRONLY | O_CREAT, 0600);
+        CHECK(fd >= 0);
+        close(fd);
+        mem_free(path);
+    }
+    refused("\"pose\",\"reason\":\"has more than 20000 poses\"");
     put("intrinsic/intrinsic_color.txt", "");
     refused("intrinsic/intrinsic_color.txt");
 }
 
 int main(void) {
+    snprintf(dir, sizeof dir, "%s/unbake-trajectory-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
     CHECK(mkdtemp(dir) != NULL);
     test_replica();
     test_scannet();
