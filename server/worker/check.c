@@ -24,15 +24,15 @@ static enum status flush(const char *dir, struct error *err) {
     return status;
 }
 
+static const char *text_of(const cJSON *problem, const char *key) {
+    const char *text = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(problem, key));
+    return text ? text : "";
+}
+
 static void tell_problems(struct progress *progress, const cJSON *problems) {
     const cJSON *problem;
-    cJSON_ArrayForEach(problem, problems) {
-        const char *file, *reason, *hint;
-        if (json_string(problem, "file", "a problem", "", &file, NULL) == STATUS_OK &&
-            json_string(problem, "reason", "a problem", "", &reason, NULL) == STATUS_OK &&
-            json_string(problem, "hint", "a problem", "", &hint, NULL) == STATUS_OK)
-            progress_problem(progress, file, reason, hint);
-    }
+    cJSON_ArrayForEach(problem, problems)
+        progress_problem(progress, text_of(problem, "file"), text_of(problem, "reason"), text_of(problem, "hint"));
 }
 
 enum status task_check(const struct order *order, struct progress *progress, struct error *err) {
