@@ -11,6 +11,8 @@ run 1 submit "$work/room" --set segmentation=given --watch -q # it has no object
 call GET /v1/jobs/4242; call POST /nothing -d '{}'; call DELETE /v1/jobs; call GET "/v1/jobs?x=1"
 curl -sN -m 60 "$url/v1/events" >"$work/stream" & background=$!
 wait_for 60 sh -c "curl -s $url/metrics | grep -q '^unbaked_event_streams 1$'"
+# An attempt is counted when its end has been told.
+wait_for 60 sh -c "curl -s $url/metrics | grep -q '^unbaked_attempts_ended_total{reason=\"input\"} 1$'"
 call GET /metrics; expect 200
 case $(header content-type) in "text/plain; version=0.0.4"*) ;; *) fail "Content-Type is $(header content-type)" ;; esac
 cp "$work/body" "$work/first"

@@ -69,7 +69,7 @@ over PATCH "/v1/uploads/${part##*/}" -H 'Tus-Resumable: 1.0.0' -H 'Upload-Offset
 # --- events: each comes when it happens; the client ---
 make_room "$work/room"
 export UNBAKE_SERVER=$url UNBAKE_CA=$work/cert.pem UNBAKE_TOKEN=$token
-run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64
+run 0 submit "$work/room" --set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64
 run 0 list -q --json
 job=$(jq -r '.[0].id' <<<"$out")
 curl -sN -m 600 --cacert "$work/cert.pem" -H "@$work/token" "$url/v1/jobs/$job/events" >"$work/stream" & stream=$!

@@ -2,7 +2,7 @@
 # What is kept for how long: expiry in every listing, pins, dry runs, the collector; and a disk that
 # is nearly full, or full.
 . tests/api/client.sh "$@"
-long="--set texture_size=64 --set iterations=1000000 --set texels_per_iteration=64"
+long="--set texture_size=64 --set iterations=1000000000 --set texels_per_iteration=64"
 quick="--set texture_size=64 --set iterations=3 --set texels_per_iteration=256 --set report_samples=1"
 tus='Tus-Resumable: 1.0.0'
 
