@@ -177,6 +177,8 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     field_print(c, "started", member_text(job, "started_at"));
     field_print(c, "finished", member_text(job, "finished_at"));
     field_print(c, "expires", keeping_time(job));
+    keeping_disk(left, job);
+    field_print(c, "on disk", left);
     print_outputs(c, outputs);
 }
 

@@ -42,6 +42,13 @@ void keeping_text(char out[16], const cJSON *thing) {
         format_duration(out, fmax(at - (double)time(NULL), 0.0));
 }
 
+void keeping_disk(char out[16], const cJSON *thing) {
+    double bytes = member_number(thing, "disk_bytes", -1.0);
+    *out = '\0';
+    if (bytes >= 0.0)
+        format_bytes(out, bytes);
+}
+
 void keeping_sentence(char out[40], const cJSON *thing) {
     char left[16];
     keeping_text(left, thing);

@@ -1,4 +1,4 @@
-/* keeping.h -- how long the server keeps things, as options and columns. */
+/* keeping.h -- how long the server keeps things and what they take, as options and columns. */
 #ifndef UNBAKE_CLIENT_KEEPING_H
 #define UNBAKE_CLIENT_KEEPING_H
 
@@ -17,6 +17,8 @@ enum status keeping_describe(const struct options *o, cJSON *body, struct error 
 void keeping_text(char out[16], const cJSON *thing);
 /* The same in full: "never: pinned", or the time; borrowed. */
 const char *keeping_time(const cJSON *thing);
+/* What a job or scene takes of the server's disk ("1.5 GiB"), or "" where that is not known. */
+void keeping_disk(char out[16], const cJSON *thing);
 /* "kept for good", "removed in 3d04h", or "". */
 void keeping_sentence(char out[40], const cJSON *thing);
 

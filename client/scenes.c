@@ -57,6 +57,8 @@ static void print_scene(struct client *c, const cJSON *scene) {
     field_print(c, "owner", member_text(scene, "owner"));
     field_print(c, "state", member_text(scene, "state"));
     field_print(c, "size", size);
+    keeping_disk(size, scene);
+    field_print(c, "on disk", size);
     field_print(c, "created", member_text(scene, "created_at"));
     field_print(c, "expires", keeping_time(scene));
     cJSON_ArrayForEach(fact, cJSON_GetObjectItemCaseSensitive(scene, "facts")) {

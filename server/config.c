@@ -41,7 +41,7 @@ static const struct option table[] = {
     INT(user_queue_limit, "jobs", 0, 1000000, "100",
         "Jobs of one user that may wait; more are refused with 429. 0: no limit."),
     INT(user_max_mib, "MiB", 0, 1073741824, "0",
-        "Scenes and outputs that one user may keep; more is refused with 507. 0: no limit."),
+        "What one user may take of the disk: scenes, jobs, unfinished uploads; more is refused with 507. 0: no limit."),
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),
     REAL(checkpoint_interval_sec, "s", 0.1, 86400, "60",
          "Time between a job's checkpoints; up to five times as long on a slow disk."),

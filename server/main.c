@@ -103,6 +103,7 @@ static struct scheduler_config scheduler_options(const struct config *c) {
         .max_running = (int)c->max_running,
         .user_max_running = (int)c->user_max_running,
         .thread_count = (int)c->threads,
+        .user_max_bytes = (uint64_t)c->user_max_mib << 20,
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,
         .stop_grace_sec = c->stop_grace_sec,

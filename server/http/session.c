@@ -1,4 +1,4 @@
-/* session.c -- /v1/session: the web page's token, kept in a cookie that no script can read. */
+/* session.c -- /v1/session: who asks, and what he keeps; the web page's token, in a cookie that no script can read. */
 #include <string.h>
 
 #include "server/http/auth.h"
@@ -7,16 +7,25 @@
 
 #define COOKIE_AGE_SEC (30 * 24 * 3600)
 
-static struct response *describe(const struct api *api, const struct caller *caller) {
+static struct response *describe(const struct api *api, const struct request *r, const struct caller *caller) {
+    uint64_t kept, limit = api->config.user_max_bytes;
+    struct error err;
+    if (store_user_bytes(api->store, caller->user_id, NULL, 0, &kept, &err) != STATUS_OK)
+        return problem_from(r, &err);
     cJSON *value = cJSON_CreateObject();
     json_add_string(value, "user", *caller->name ? caller->name : NULL);
     json_add_string(value, "role", role_name(caller->role));
     json_add_bool(value, "open", auth_is_open(api));
+    json_add_int(value, "kept_bytes", (int64_t)kept);
+    if (limit > 0 && caller->user_id != 0)
+        json_add_int(value, "kept_bytes_max", (int64_t)limit);
+    else
+        json_add(value, "kept_bytes_max", cJSON_CreateNull());
     return response_json(200, value);
 }
 
 struct response *session_get(struct api *api, struct request *r) {
-    return describe(api, &r->caller);
+    return describe(api, r, &r->caller);
 }
 
 /* Over TLS, ours or (as it says) a proxy's, the cookie stays there. */
@@ -49,8 +58,9 @@ struct response *session_add(struct api *api, struct request *r) {
     if (!reply && status != STATUS_OK)
         reply = problem_from(r, &err);
     if (!reply) {
-        reply = describe(api, &caller);
-        set_cookie(api, r, reply, token, COOKIE_AGE_SEC);
+        reply = describe(api, r, &caller);
+        if (reply->status == 200)
+            set_cookie(api, r, reply, token, COOKIE_AGE_SEC);
     }
     cJSON_Delete(body);
     return reply;

@@ -12,7 +12,6 @@
 #include "common/mem.h"
 #include "server/http/problem.h"
 
-#define MIB 1048576.0
 #define RESERVE_BYTES ((uint64_t)16 << 20)
 #define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
 
@@ -86,17 +85,9 @@ struct response *space_check_room(struct api *api, const struct request *r, uint
 
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes) {
     struct error err;
-    uint64_t kept, limit = api->config.user_max_bytes;
-    if (limit == 0 || r->caller.user_id == 0)
-        return NULL;
-    if (store_user_bytes(api->store, r->caller.user_id, but_scene, &kept, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    if (kept < limit && bytes <= limit - kept)
-        return NULL;
-    char detail[256];
-    int used = snprintf(detail, sizeof detail, "your scenes and outputs take %.1f of the %.1f MiB that a user may keep",
-                        (double)kept / MIB, (double)limit / MIB);
-    if (bytes > 0)
-        snprintf(detail + used, sizeof detail - (size_t)used, ", and %.1f MiB more are wanted", (double)bytes / MIB);
-    return problem_full(r, 507, detail, "delete jobs or scenes that you do not need", NULL);
+    const struct share share = {api->config.user_max_bytes, r->caller.user_id, but_scene, 0};
+    enum status status = store_share_check(api->store, &share, bytes, &err);
+    if (status == STATUS_LIMIT)
+        return problem_full(r, 507, err.message, err.hint, NULL);
+    return status == STATUS_OK ? NULL : problem_from(r, &err);
 }

@@ -36,6 +36,13 @@ static const char *or_null(const char *text) {
     return text && *text ? text : NULL;
 }
 
+static void add_disk_bytes(cJSON *object, int64_t bytes) {
+    if (bytes >= 0)
+        json_add_int(object, "disk_bytes", bytes);
+    else
+        json_add(object, "disk_bytes", cJSON_CreateNull());
+}
+
 cJSON *view_job(const struct job *job) {
     cJSON *v = cJSON_CreateObject();
     json_add_int(v, "id", job->id);
@@ -64,6 +71,7 @@ cJSON *view_job(const struct job *job) {
         json_add_number(v, "eta_sec", job->eta_sec);
     else
         json_add(v, "eta_sec", cJSON_CreateNull());
+    add_disk_bytes(v, job->disk_bytes);
     json_add_string(v, "reason", or_null(job->reason));
     json_add_string(v, "hint", or_null(job->hint));
     json_add_string(v, "webhook", or_null(job->webhook));
@@ -88,6 +96,7 @@ cJSON *view_scene(const struct scene_row *row) {
     json_add_string(v, "owner", or_null(row->owner));
     json_add_string(v, "state", scene_state_name(row->state));
     json_add_int(v, "bytes", (int64_t)row->bytes);
+    add_disk_bytes(v, row->disk_bytes);
     add_time(v, "created_at", row->created_ms);
     json_add_bool(v, "pinned", row->is_pinned);
     add_time(v, "expires_at", row->expires_ms);

@@ -121,6 +121,9 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
     case STATUS_NO_SPACE:
         return store_job_block(store, job_id, number, why->message,
                                "Free some space, then resume the job.", err);
+    case STATUS_LIMIT:
+        return store_job_block(store, job_id, number, why->message,
+                               "Delete jobs or scenes that you do not need, then resume the job.", err);
     default: { /* the machine is at fault: it costs the job nothing, but must not be hurried */
         enum status status = store_job_stop(store, job_id, number, why->message, err);
         if (status == STATUS_OK && err)
@@ -157,6 +160,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         a->oom_kills = memory_oom_kills();
         status = check_scene(store, job.scene_id, &why);
     }
+    if (status == STATUS_OK) /* what it has written itself does not stop a job that has begun */
+        status = store_share_check(store, &(struct share){config->user_max_bytes, job.owner_id, NULL, job_id}, 0, &why);
     if (status == STATUS_OK)
         status = restart(a, store, &job, &why);
     if (status == STATUS_OK)
@@ -179,7 +184,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
                                 const char *scene_id, int thread_count, struct error *err) {
     struct error why = {0};
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = scene_dir(config, scene_id), .problems = cJSON_CreateArray()};
+                          .dir = scene_dir(config, scene_id), .user_max_bytes = config->user_max_bytes, .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);

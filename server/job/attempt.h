@@ -26,6 +26,7 @@ struct attempt {
     double charged_sec;           /* CPU time that was entered for that user */
     int number;                   /* fences what is entered for the job */
     char scene_id[SCENE_ID_SIZE];
+    uint64_t user_max_bytes;      /* as scheduler_config has it, for the check of a scene */
     char *dir;
     struct worker worker;
     int wait_status;              /* when ended */

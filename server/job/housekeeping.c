@@ -11,6 +11,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/job/measure.h"
 
 enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
     /* The journal first: what is left of the two is looked for by the other's name, and a journal must not meet a
@@ -79,6 +80,16 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
     }
 }
 
+/* Whatever ends it half way, the next start measures what is left. Where not even that can be entered, the disk may be
+ * full: all the more it goes. */
+static enum status drop_checkpoint(struct store *store, int64_t id, const char *folder, struct error *err) {
+    const struct disk_use unknown = {.job_id = id, .bytes = -1};
+    if (store_disk_enter(store, &unknown, 1, err) != STATUS_OK)
+        log_warning("job %lld: %s", (long long)id, err->message);
+    enum status status = housekeeping_drop_checkpoint(folder, err);
+    return status == STATUS_OK ? measure_job(store, id, folder, err) : status;
+}
+
 /* A job in doubt keeps what it has. */
 static bool is_old(struct store *store, int64_t id, int64_t before_ms) {
     struct job job;
@@ -101,7 +112,7 @@ static void drop_old_checkpoints(const struct scheduler_config *config, struct s
         int64_t id = strtoll(names[i], NULL, 10);
         char *folder = file_join(jobs, names[i]), *file = file_join(folder, "checkpoint.db");
         if (id > 0 && access(file, F_OK) == 0 && is_old(store, id, before_ms) &&
-            housekeeping_drop_checkpoint(folder, &err) != STATUS_OK)
+            drop_checkpoint(store, id, folder, &err) != STATUS_OK)
             log_warning("job %lld: %s", (long long)id, err.message);
         mem_free(file);
         mem_free(folder);

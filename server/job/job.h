@@ -71,6 +71,7 @@ struct job {
     int memory_step;           /* how often its working set was made smaller; see job/memory.h */
     bool is_pinned;
     int64_t expires_ms;        /* Unix time as of now, 0: never; see store/retention.h */
+    int64_t disk_bytes;        /* that its folder takes, as of the end of its last attempt; -1: not known */
     double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
     char *webhook;             /* the URL that is told of its states; "": none */

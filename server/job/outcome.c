@@ -11,6 +11,7 @@
 #include "common/mem.h"
 #include "server/job/hearing.h"
 #include "server/job/housekeeping.h"
+#include "server/job/measure.h"
 #include "server/job/memory.h"
 #include "server/worker/progress.h"
 
@@ -159,29 +160,57 @@ static void remove_unpacked(const struct attempt *a) {
     mem_free(files);
 }
 
+static void add_problem(struct attempt *a, const char *reason, const char *hint) {
+    cJSON *problem = cJSON_CreateObject();
+    json_add_string(problem, "file", "");
+    json_add_string(problem, "reason", reason);
+    if (hint)
+        json_add_string(problem, "hint", hint);
+    cJSON_AddItemToArray(a->problems, problem);
+}
+
+/* Enters what a good scene takes of the disk. More than its owners may keep is a problem of the scene. */
+static enum status settle_size(struct attempt *a, struct store *store, struct error *err) {
+    struct error why = {0};
+    struct disk_use use = {.bytes = measure_folder(a->dir)};
+    memcpy(use.scene_id, a->scene_id, sizeof use.scene_id);
+    enum status status = use.bytes < 0 ? STATUS_OK
+                                       : store_share_check_scene(store, a->scene_id, (uint64_t)use.bytes,
+                                                                 a->user_max_bytes, &why);
+    if (status == STATUS_OK)
+        return store_disk_enter(store, &use, 1, err);
+    if (status != STATUS_LIMIT)
+        return error_set(err, status, "%s", why.message);
+    error_prefix(&why, "unpacked, it is too large");
+    log_info("scene %.12s: %s", a->scene_id, why.message);
+    add_problem(a, why.message, "Delete jobs or scenes that you do not need, then send it again.");
+    return STATUS_OK;
+}
+
+static bool is_good(const struct attempt *a, const struct verdict *v) {
+    return v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts;
+}
+
 static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v,
                                 struct error *err) {
     if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
         return STATUS_OK;
+    enum status status = is_good(a, v) ? settle_size(a, store, err) : STATUS_OK;
+    if (status != STATUS_OK)
+        return status;
     char *text;
-    enum status status;
-    if (v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts) {
+    if (is_good(a, v)) {
         text = json_text(a->facts);
         status = store_scene_ready(store, a->scene_id, text, err);
     } else {
         bool waits = v->outcome == OUTCOME_BLOCKED; /* the content is not at fault */
         remove_unpacked(a);
-        if (waits || cJSON_GetArraySize(a->problems) == 0) {
-            cJSON *problem = cJSON_CreateObject();
-            json_add_string(problem, "file", "");
-            json_add_string(problem, "reason",
-                            a->killed           ? "its check took too long"
-                            : v->reason[0] != 0 ? v->reason
-                                                : "its check ended without a result");
-            if (waits)
-                json_add_string(problem, "hint", "It is checked again when there is more room.");
-            cJSON_AddItemToArray(a->problems, problem);
-        }
+        if (waits || cJSON_GetArraySize(a->problems) == 0)
+            add_problem(a,
+                        a->killed           ? "its check took too long"
+                        : v->reason[0] != 0 ? v->reason
+                                            : "its check ended without a result",
+                        waits ? "It is checked again when there is more room." : NULL);
         text = json_text(a->problems);
         status = waits ? store_scene_postpone(store, a->scene_id, text, err)
                        : store_scene_reject(store, a->scene_id, text, err);
@@ -201,6 +230,8 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct figure
     housekeeping_drop_scraps(a->dir);
     judge(a, &verdict);
     enum status status = hearing_make_up(a, store, err);
+    if (status == STATUS_OK && a->job_id)
+        status = measure_job(store, a->job_id, a->dir, err);
     if (status == STATUS_OK)
         status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, &verdict, err);
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */

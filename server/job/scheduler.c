@@ -26,6 +26,7 @@
 #include "server/job/disk.h"
 #include "server/job/hearing.h"
 #include "server/job/housekeeping.h"
+#include "server/job/measure.h"
 #include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
@@ -404,6 +405,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         return status;
     if (requeued)
         log_info("%zu jobs that ran when the daemon ended are queued again", requeued);
+    measure_unknown(&s->config, s->store);
     for (;;) {
         bool stopping = atomic_load(&s->stopping);
         s->must_retry = false;

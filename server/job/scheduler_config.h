@@ -11,6 +11,7 @@ struct scheduler_config {
     int max_running;                /* jobs at once */
     int user_max_running;           /* of them, of one user; 0: all */
     int thread_count;               /* shared between running jobs; 0: all processors */
+    uint64_t user_max_bytes;        /* that one user keeps; 0: no limit */
     uint64_t worker_memory_bytes;   /* 0: no limit */
     double checkpoint_interval_sec;
     double stop_grace_sec;          /* SIGTERM to SIGKILL */

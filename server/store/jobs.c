@@ -12,7 +12,7 @@
     " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
     " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
     " restart_from, memory_step, pinned, " JOB_EXPIRES ","                                  \
-    " (SELECT url FROM webhooks WHERE job_id = jobs.id)"
+    " (SELECT url FROM webhooks WHERE job_id = jobs.id), disk_bytes"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -43,6 +43,7 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .is_pinned = sqlite3_column_int(stmt, 25) != 0,
         .expires_ms = sqlite3_column_int64(stmt, 26),
         .webhook = sql_dup(stmt, 27),
+        .disk_bytes = sqlite3_column_int64(stmt, 28),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }
@@ -118,7 +119,7 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
         status = sql_run(&store->sql, err,
                          "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
                          " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
-                         " shared, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?,"
+                         " shared, disk_bytes, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0,"
                          "                       (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
                          "ttttnnittin", job->scene_id, job->name, job->labels, job->settings,
                          job->priority, job->max_attempts, store_now_ms(), key,

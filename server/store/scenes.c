@@ -18,7 +18,7 @@
 #define COLUMNS                                                                                \
     "id, name, state, bytes, created_ms, problems, facts, (SELECT users.name FROM scene_owners" \
     " JOIN users ON users.id = user_id WHERE scene_id = scenes.id"                             \
-    " ORDER BY scene_owners.created_ms, user_id LIMIT 1), pinned, " SCENE_EXPIRES
+    " ORDER BY scene_owners.created_ms, user_id LIMIT 1), pinned, " SCENE_EXPIRES ", disk_bytes"
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                            \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"   \
@@ -35,6 +35,7 @@ static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
         .owner = sql_dup(stmt, 7),
         .is_pinned = sqlite3_column_int(stmt, 8) != 0,
         .expires_ms = sqlite3_column_int64(stmt, 9),
+        .disk_bytes = sqlite3_column_int64(stmt, 10),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
 }
@@ -106,8 +107,9 @@ static enum status conclude(struct store *store, const char *id, enum scene_stat
                            scene_state_name((enum scene_state)state));
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
-                         "UPDATE scenes SET state = ?, problems = ?, facts = ? WHERE id = ?",
-                         "nttt", (int)to, problems, facts, id);
+                         "UPDATE scenes SET state = ?1, problems = ?2, facts = ?3,"
+                         " disk_bytes = iif(?1 = ?5, disk_bytes, -1) WHERE id = ?4",
+                         "ntttn", (int)to, problems, facts, id, (int)SCENE_READY);
     return store_end(store, status, 0, err);
 }
 

@@ -175,6 +175,13 @@ static const char step_9[] =
     "ALTER TABLE uploads ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
     "ALTER TABLE uploads ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
 
+/* What the folders of scenes and jobs take of the disk; -1: not known. */
+static const char step_10[] =
+    "ALTER TABLE scenes ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
+    "ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
+    "DROP INDEX jobs_by_owner;"
+    "CREATE INDEX jobs_by_owner ON jobs (owner_id, state, disk_bytes);";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
-                                    step_6, step_7, step_8, step_9};
+                                    step_6, step_7, step_8, step_9, step_10};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -60,6 +60,7 @@ struct scene_row {
     char *owner;            /* the first user who sent it; "" for nobody */
     enum scene_state state;
     uint64_t bytes;         /* of the archive */
+    int64_t disk_bytes;     /* that its folder takes; -1: not known */
     int64_t created_ms;
     char *problems;         /* JSON array text: [{"file","reason"}]; "[]" if none */
     char *facts;            /* JSON object text: what the check found; "{}" before */
@@ -73,6 +74,7 @@ void scene_row_release(struct scene_row *row);
  * was rejected or waits for room is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err);
+/* What it takes of the disk was entered before. */
 enum status store_scene_ready(struct store *store, const char *id, const char *facts,
                               struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *problems,
@@ -153,10 +155,6 @@ enum status store_job_next(struct store *store, int user_max_running, int64_t *i
 /* Charges CPU time to a user; thread-safe, as all is. */
 enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec,
                             struct error *err);
-/* What a user keeps: scenes but for `but_scene` (NULL: all), outputs, and uploads that are under way with
- * their whole length. */
-enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, uint64_t *bytes,
-                             struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
                               enum job_wanted *wanted, size_t *count, struct error *err);
@@ -198,8 +196,40 @@ enum status store_job_block(struct store *store, int64_t id, int attempt, const 
 enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
                               const char *hint, struct error *err);
 /* At start: whatever claims to run is queued again (or paused, cancelled, as was wished). It does
- * not count as a failed attempt: the job is not at fault when the daemon or the machine dies. */
+ * not count as a failed attempt: the job is not at fault when the daemon or the machine dies. What such a job takes
+ * of the disk is not known then. */
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
+
+/* --- what users keep --------------------------------------------------------------------- */
+
+/* What a user keeps, but for one scene (NULL) and one job (0): the folders of scenes and jobs as store_disk_enter has
+ * them, of a scene at least its archive; of a job that runs at least its outputs; uploads that are under way with
+ * their whole length. A scene of several users counts for each of them. */
+enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, int64_t but_job,
+                             uint64_t *bytes, struct error *err);
+struct share {
+    uint64_t limit_bytes;  /* 0: no limit */
+    int64_t user_id;       /* 0: nobody, who has no limit */
+    const char *but_scene; /* as above */
+    int64_t but_job;
+};
+/* STATUS_LIMIT, with a sentence for that user, unless he may keep `more` bytes besides what he does. */
+enum status store_share_check(struct store *store, const struct share *share, uint64_t more, struct error *err);
+/* The same for a scene that takes `bytes` in all: unless one of its owners may keep it. */
+enum status store_share_check_scene(struct store *store, const char *id, uint64_t bytes, uint64_t limit_bytes,
+                                    struct error *err);
+
+/* What the folder of a job or (job_id 0) a scene takes of the disk. */
+struct disk_use {
+    int64_t job_id;
+    char scene_id[SCENE_ID_SIZE];
+    int64_t bytes; /* -1: not known */
+};
+/* Enters it; what is gone is skipped. */
+enum status store_disk_enter(struct store *store, const struct disk_use *list, size_t count, struct error *err);
+/* Those of which it is not known, ready scenes first, but for the first `skip`. list[limit] out. */
+enum status store_disk_unknown(struct store *store, size_t skip, size_t limit, struct disk_use *list, size_t *count,
+                               struct error *err);
 
 /* --- events, outputs --------------------------------------------------------------------- */
 

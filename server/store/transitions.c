@@ -367,6 +367,8 @@ static enum status requeue_one(struct store *store, int64_t *id, struct error *e
     if (status != STATUS_OK || *id == 0)
         return status;
     status = look(store, *id, &now, err);
+    if (status == STATUS_OK)
+        status = sql_run(&store->sql, err, "UPDATE jobs SET disk_bytes = -1 WHERE id = ?", "i", *id);
     return status == STATUS_OK ? move(store, &now, JOB_QUEUED, "the daemon was restarted", "", err) : status;
 }
 

@@ -1,4 +1,4 @@
-/* turns.c -- whose turn it is: the next job to start, what users have used, what they keep.
+/* turns.c -- whose turn it is: the next job to start, what users have used.
  *
  * Between users the one with the least recent CPU time goes first, a second of which counts half
  * after HALF_LIFE_SEC. What is stored is w = log2 of the sum over all charges of
@@ -72,23 +72,5 @@ enum status store_queue_check(struct store *store, int64_t owner_id, const struc
     if (status == STATUS_OK && (uint64_t)queued >= limits->one_user)
         status = error_set(err, STATUS_LIMIT, "%lld of your jobs are queued already, the limit is %zu",
                            (long long)queued, limits->one_user);
-    return status;
-}
-
-enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, uint64_t *bytes,
-                             struct error *err) {
-    int64_t sum = 0;
-    store_lock(store);
-    enum status status =
-        sql_int(&store->sql, 0, &sum, err,
-                "SELECT (SELECT ifnull(sum(bytes), 0) FROM scenes"
-                "         JOIN scene_owners ON scene_id = id WHERE user_id = ?1 AND id <> ?2)"
-                "     + (SELECT ifnull(sum(outputs.bytes), 0) FROM outputs"
-                "         JOIN jobs ON jobs.id = job_id WHERE owner_id = ?1)"
-                "     + (SELECT ifnull(sum(length), 0) FROM uploads"
-                "         WHERE owner_id = ?1 AND scene_id = '')",
-                "it", user_id, but_scene ? but_scene : "");
-    store_unlock(store);
-    *bytes = (uint64_t)sum;
     return status;
 }

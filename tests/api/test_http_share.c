@@ -103,6 +103,28 @@ static void test_streams(struct rig *rig, const char *one, const char *other) {
         close(fd[i]);
 }
 
+/* What a job was found to have left counts, and its owner is told. */
+static void test_disk(struct rig *rig, const char *token) {
+    const struct disk_use use = {.job_id = 1, .bytes = 5 << 20};
+    struct buf reply;
+    struct error err;
+    rig_must(store_disk_enter(rig->store, &use, 1, &err), &err, "disk");
+    rig->api->config.user_max_bytes = 5 << 20;
+    CHECK(send_as(rig, token, "GET /v1/session HTTP/1.1", 0, &reply) == 200);
+    CHECK_THAT(strstr(buf_text(&reply), "\"kept_bytes\":5857280,\"kept_bytes_max\":5242880"), "%s", buf_text(&reply));
+    buf_release(&reply);
+    CHECK(send_as(rig, token, "GET /v1/jobs/1 HTTP/1.1", 0, &reply) == 200);
+    CHECK(strstr(buf_text(&reply), "\"disk_bytes\":5242880"));
+    buf_release(&reply);
+    CHECK(send_as(rig, token, "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json", 76, &reply) == 507);
+    CHECK(strstr(buf_text(&reply), "your scenes and jobs take 5.6 of the 5.0 MiB that a user may keep"));
+    buf_release(&reply);
+    rig->api->config.user_max_bytes = 0;
+    CHECK(send_as(rig, token, "GET /v1/session HTTP/1.1", 0, &reply) == 200);
+    CHECK(strstr(buf_text(&reply), "\"kept_bytes_max\":null"));
+    buf_release(&reply);
+}
+
 int main(void) {
     struct rig rig;
     struct error err;
@@ -150,9 +172,7 @@ int main(void) {
         buf_release(&reply);
     }
     test_back_into_the_queue(&rig, bob);
-    rig.api->config.user_max_bytes = 1000;
-    CHECK(send_as(&rig, bob, submit, 76, &reply) == 507);
-    buf_release(&reply);
+    test_disk(&rig, bob);
     rig_stop(&rig);
     return check_result();
 }

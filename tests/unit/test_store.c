@@ -323,6 +323,15 @@ static void run_sql(const char *dir, const char *sql) {
     mem_free(path);
 }
 
+/* What a database of the first schema did not know yet. */
+static void check_migrated(struct store *store) {
+    struct disk_use unknown[4];
+    size_t count;
+    OK(store_disk_unknown(store, 0, 4, unknown, &count, &err));
+    CHECK(count == 2 && unknown[0].job_id == 0 && unknown[0].scene_id[0] && unknown[1].job_id == 7);
+    CHECK(unknown[0].bytes == -1 && unknown[1].bytes == -1);
+}
+
 static void test_opening(void) {
     char *dir = fresh_dir();
     struct store *store, *second;
@@ -356,6 +365,7 @@ static void test_opening(void) {
     struct replay replay = {0};
     OK(store_event_list(store, 7, 0, 10, replay_one, &replay, &err));
     CHECK(replay.count == 2 && replay.last == 42);
+    check_migrated(store);
     store_close(store);
     drop_dir(dir);
 

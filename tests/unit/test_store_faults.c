@@ -109,7 +109,21 @@ static enum status revoke_name(void) {
 }
 static enum status user_bytes(void) {
     uint64_t bytes;
-    return store_user_bytes(store, alice.user_id, NULL, &bytes, &err);
+    return store_user_bytes(store, alice.user_id, NULL, 0, &bytes, &err);
+}
+
+static enum status check_share(void) {
+    return store_share_check(store, &(struct share){.limit_bytes = 1 << 20, .user_id = alice.user_id}, 10, &err);
+}
+static enum status check_scene_share(void) { return store_share_check_scene(store, SCENE_A, 10, 1 << 20, &err); }
+static enum status enter_disk(void) {
+    const struct disk_use list[] = {{.job_id = job, .bytes = 10}, {.scene_id = SCENE_A, .bytes = 10}};
+    return store_disk_enter(store, list, 2, &err);
+}
+static enum status unknown_disk(void) {
+    struct disk_use list[4];
+    size_t count;
+    return store_disk_unknown(store, 0, 4, list, &count, &err);
 }
 
 static enum status submit(void) {
@@ -335,10 +349,10 @@ static const struct step {
     STEP(probe), STEP(has_files), STEP(look_for_users), STEP(add_token), STEP(find_token), STEP(valid_token), STEP(list_tokens),
     STEP(keep), STEP(add_scene), STEP(add_other_scene), STEP(next_unchecked), STEP(postpone), STEP(check_again), STEP(reject),
     STEP(add_scene), STEP(ready), STEP(other_ready), STEP(get_scene), STEP(find_scene), STEP(list_scenes), STEP(patch_scene),
-    STEP(access_scene), STEP(user_bytes), STEP(would_delete_scene),
+    STEP(access_scene), STEP(user_bytes), STEP(check_share), STEP(check_scene_share), STEP(would_delete_scene),
     STEP(add_upload), STEP(add_other_upload), STEP(get_upload), STEP(list_uploads), STEP(begin_upload), STEP(advance_upload),
     STEP(finish_upload), STEP(keep_upload), STEP(delete_upload), STEP(list_expired), STEP(expire_upload),
-    STEP(submit), STEP(submit), STEP(submit_second), STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first),
+    STEP(submit), STEP(submit), STEP(submit_second), STEP(unknown_disk), STEP(enter_disk), STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first),
     STEP(place_last), STEP(place_before), STEP(count), STEP(next_job), STEP(pause_job), STEP(resume_job), STEPS(explain),
     STEPS(explain_no_more),
     STEP(start_job), STEP(progress), STEP(progress), STEPS(many_events), STEP(put_output), STEP(get_output), STEP(list_outputs),

@@ -118,10 +118,10 @@ static void test_ten_users(void) {
 /* Scenes and outputs; `job` is the third user's. */
 static void test_bytes(int64_t job) {
     uint64_t bytes;
-    OK(store_user_bytes(store, 0, NULL, &bytes, &err));
+    OK(store_user_bytes(store, 0, NULL, 0, &bytes, &err));
     CHECK(bytes == 10);
     OK(store_output_put(store, job, 1, EVENT_OUTPUT, "a.exr", 1000, SCENE_A, "x/y", &err));
-    OK(store_user_bytes(store, 3, NULL, &bytes, &err));
+    OK(store_user_bytes(store, 3, NULL, 0, &bytes, &err));
     CHECK_THAT(bytes == 1000, "%llu bytes", (unsigned long long)bytes);
 }
 
