@@ -210,8 +210,9 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
 
 void attempt_charge(struct attempt *a, struct store *store, struct figures *figures) {
     double used = supervisor_cpu_sec(&a->worker), more = used - a->charged_sec;
-    if (!a->job_id || !(more > 0.0) || store_usage_add(store, a->owner_id, more, NULL) != STATUS_OK)
+    if (!a->job_id || !(more > 0.0))
         return;
+    (void)store_usage_add(store, a->owner_id, more, NULL); /* keeps what it cannot enter */
     atomic_fetch_add(&figures->cpu_ms, (unsigned long long)(more * 1e3));
     a->charged_sec = used;
 }

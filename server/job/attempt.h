@@ -57,8 +57,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
                                 const char *scene_id, int thread_count, struct error *err);
 
-/* Enters the CPU time since the last call for the job's owner. A failure is no harm: the next call
- * makes up for it. */
+/* Enters the CPU time since the last call for the job's owner. Where the store fails, it keeps it and enters
+ * it later. */
 void attempt_charge(struct attempt *a, struct store *store, struct figures *figures);
 
 void attempt_empty(struct attempt *a); /* forgets all of it */

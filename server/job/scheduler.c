@@ -138,6 +138,7 @@ static void charge_all(struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++)
         if (s->slot[i].phase == ATTEMPT_ALIVE)
             attempt_charge(&s->slot[i], s->store, &s->figures);
+    (void)store_usage_pay(s->store, NULL); /* what attempts that have ended could not enter */
 }
 
 static void start_jobs(struct scheduler *s) {
@@ -425,6 +426,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
         follow_wishes(s);
         wait_for_something(s, keep_deadlines(s));
     }
+    (void)store_usage_pay(s->store, NULL);
     /* What was under way is sent again by the next start. */
     for (size_t i = 0; i < DELIVERIES; i++)
         delivery_stop(&s->delivery[i], s->store);

@@ -13,6 +13,11 @@ struct store {
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
     size_t events_per_job; /* kept */
+    struct unpaid {        /* CPU time that could not be entered; see turns.c */
+        int64_t owner_id;
+        double weight;
+    } *unpaid;             /* [unpaid_count], one a user; owned */
+    size_t unpaid_count;
     atomic_bool has_users;
 };
 

@@ -88,6 +88,7 @@ void store_close(struct store *store) {
         return;
     sql_close(&store->sql);
     pthread_mutex_destroy(&store->mutex);
+    mem_free(store->unpaid);
     mem_free(store);
 }
 

@@ -152,9 +152,11 @@ enum status store_job_delete(struct store *store, int64_t id, struct error *err)
  * user's jobs the one of highest priority, then the first in turn. */
 enum status store_job_next(struct store *store, int user_max_running, int64_t *id,
                            struct error *err);
-/* Charges CPU time to a user; thread-safe, as all is. */
+/* Charges CPU time to a user. Where that fails it is kept in memory; store_usage_pay, and the next charge of anybody,
+ * enters it. */
 enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec,
                             struct error *err);
+enum status store_usage_pay(struct store *store, struct error *err);
 /* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
                               enum job_wanted *wanted, size_t *count, struct error *err);

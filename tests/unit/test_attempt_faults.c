@@ -6,6 +6,7 @@
 
 #include "server/job/hearing.h"
 #include "server/job/outcome.h"
+#include "server/store/internal.h"
 #include "server/worker/progress.h"
 #include "tests/unit/fault_rig.h"
 
@@ -245,6 +246,30 @@ static void check_left_behind(void) {
     CHECK(store_job_get(store, id, &job, &err) == STATUS_NOT_FOUND);
 }
 
+/* What an attempt took of the processors is its owner's also where that could not be entered when it ended, which is no
+ * reason to put off its outcome. */
+static bool has_usage(int64_t owner) {
+    int64_t found = 0;
+    OK(sql_int(&store->sql, 0, &found, &err, "SELECT 1 FROM usage WHERE owner_id = ?", "i", owner));
+    return found;
+}
+
+static void check_charge(void) {
+    struct attempt a = {0};
+    struct job_new new = {.scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3,
+                          .owner_id = 5};
+    int64_t id;
+    bool replayed;
+    OK(store_job_add(store, &new, 100000, &id, &replayed, &err));
+    OK(attempt_start_job(&a, &config, store, &figures, id, 1, &err));
+    hear_to_the_end(&a);
+    strike_sql("usage", 1, true);
+    OK(outcome_settle(&a, store, &figures, &err));
+    CHECK(lift() && state_of(id) == JOB_SUCCEEDED && !has_usage(5));
+    OK(store_usage_pay(store, &err));
+    CHECK(has_usage(5));
+}
+
 /* What was unpacked of a rejected scene stays where it cannot be removed, and the log says so. */
 static void check_unpacked(void) {
     struct attempt a = {0};
@@ -282,6 +307,7 @@ int main(int argc, char **argv) {
     check_restart();
     check_left_behind();
     check_unpacked();
+    check_charge();
     rig_stop();
     printf("%ld calls failed\n", strikes);
     return check_result();

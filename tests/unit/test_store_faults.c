@@ -192,6 +192,12 @@ static enum status reconcile(void) {
     size_t requeued;
     return store_reconcile(store, &requeued, &err);
 }
+static enum status pay(void) {
+    store->unpaid = mem_realloc_array(store->unpaid, 1, sizeof *store->unpaid);
+    store->unpaid[0] = (struct unpaid){alice.user_id, 100.0};
+    store->unpaid_count = 1;
+    return store_usage_pay(store, &err);
+}
 static enum status charge(void) { return store_usage_add(store, alice.user_id, 3.0, &err); }
 
 static enum status progress(void) {
@@ -357,7 +363,7 @@ static const struct step {
     STEPS(explain_no_more),
     STEP(start_job), STEP(progress), STEP(progress), STEPS(many_events), STEP(put_output), STEP(get_output), STEP(list_outputs),
     STEP(list_events), STEP(page_of_job), STEP(page_of_all), STEP(page_of_mine), STEP(last_event_of_job),
-    STEP(last_event_of_all), STEP(newest_event), STEP(running_jobs), STEP(charge), STEP(charge), STEP(next_message),
+    STEP(last_event_of_all), STEP(newest_event), STEP(running_jobs), STEP(charge), STEP(charge), STEP(pay), STEP(next_message),
     STEP(put_off), STEP(wait_for_message), STEP(delivered),
     STEP(crash_job), STEP(start_job), STEP(stop_job), STEP(start_job), STEP(block_job), STEP(resume_job), STEP(start_job),
     STEP(pause_job), STEP(resume_job), STEPS(reconcile), STEP(start_job), STEP(fail_job), STEP(retry_job), STEP(start_job),

@@ -1,4 +1,5 @@
 /* test_turns.c -- whose turn it is between users, and their limits. */
+#include "tests/sql_faults.h"
 #include "tests/unit/store_rig.h"
 
 static struct store *store;
@@ -39,6 +40,35 @@ static void test_least_used(void) {
     OK(store_usage_add(store, 3, 0.0, &err));
     OK(store_usage_add(store, 3, -5.0, &err));
     CHECK(owner_next(0) == 3);
+}
+
+/* CPU time that could not be entered, again and again, is entered with the next charge of anybody, or by itself. */
+static void test_unpaid(void) {
+    char *dir = fresh_dir();
+    struct store *other = store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    CHECK(job_of(1, 0) > 0 && job_of(2, 0) > 0);
+    OK(store_usage_pay(store, &err)); /* nothing is owed */
+    for (long n = 1; n <= 3; n++) {
+        static const char *const statements[] = {"BEGIN", "SELECT weight FROM usage", "COMMIT"};
+        sql_faults_arm_only(statements[n - 1], 1, false);
+        CHECK(store_usage_add(store, 1, 100.0, &err) != STATUS_OK && sql_faults_lift());
+    }
+    CHECK(owner_next(0) == 1);
+    OK(store_usage_add(store, 2, 250.0, &err)); /* less than 3 times 100 */
+    CHECK(owner_next(0) == 2);
+    sql_faults_arm_only("INSERT OR REPLACE INTO usage", 1, false);
+    CHECK(store_usage_add(store, 2, 100.0, &err) != STATUS_OK && sql_faults_lift());
+    CHECK(owner_next(0) == 2);
+    OK(store_usage_pay(store, &err));
+    CHECK(owner_next(0) == 1);
+    OK(store_usage_pay(store, &err)); /* it is entered once */
+    OK(store_usage_add(store, 1, 100.0, &err));
+    CHECK(owner_next(0) == 2);
+    store_close(store);
+    drop_dir(dir);
+    store = other;
 }
 
 /* What runs already counts against the limit of running jobs, the user's own only. Returns a job of user 3
@@ -135,6 +165,7 @@ int main(void) {
     test_ten_users();
     test_uploads();
     test_bytes(running);
+    test_unpaid();
     store_close(store);
     drop_dir(dir);
     return check_result();
