@@ -3,46 +3,56 @@
  * SQLite's online backup, read through the store's one connection, a few pages at a time: other
  * callers get their turns in between, and what they write meanwhile goes into the copy too
  * (https://sqlite.org/backup.html), so that it is the database as of its last page. */
-#include "common/file.h"
+#include <errno.h>
+
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
 #define PAGES_AT_ONCE 1024
 
-/* SQLite's word for it is enough: the copy is a file of its own, and nothing else is touched. */
-static enum status failed(sqlite3 *to, const char *path, struct error *err) {
-    int code = sqlite3_errcode(to) & 0xff;
-    return error_set(err, code == SQLITE_FULL ? STATUS_NO_SPACE : STATUS_IO,
-                     "cannot copy the database to %s: %s", path, sqlite3_errmsg(to));
+/* `number` is the errno of the call that failed. */
+static enum status failed(sqlite3 *to, int code, int number, const char *path, struct error *err) {
+    if (!sql_is_full(code, number))
+        return error_set(err, STATUS_IO, "cannot copy the database to %s: %s", path, sqlite3_errmsg(to));
+    error_set(err, STATUS_NO_SPACE, "cannot copy the database to %s: the disk is full", path);
+    return error_hint(err, "Free some space on the disk that holds the file.");
 }
 
+/* SQLITE_DONE, or how it failed, with errno. */
 static int copy_pages(struct store *store, sqlite3 *to) {
     store_lock(store);
     sqlite3_backup *backup = sqlite3_backup_init(to, "main", store->sql.db, "main");
     store_unlock(store);
     if (!backup)
         return SQLITE_ERROR;
-    int code;
+    int code, number;
     do {
         store_lock(store);
+        errno = 0;
         code = sqlite3_backup_step(backup, PAGES_AT_ONCE);
+        number = errno;
         store_unlock(store);
     } while (code == SQLITE_OK);
     store_lock(store);
     sqlite3_backup_finish(backup);
     store_unlock(store);
+    errno = number;
     return code;
 }
 
 enum status store_backup(struct store *store, const char *path, struct error *err) {
     sqlite3 *to = NULL;
     enum status status = STATUS_OK;
+    errno = 0;
     int code = sqlite3_open_v2(path, &to, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, NULL);
     if (code == SQLITE_OK)
         code = copy_pages(store, to);
-    /* One plain file: without this it would ask for a write-ahead log beside it. */
-    if (code != SQLITE_DONE || sqlite3_exec(to, "PRAGMA journal_mode=DELETE", NULL, NULL, NULL) != SQLITE_OK)
-        status = failed(to, path, err);
+    if (code == SQLITE_DONE) { /* One plain file: without this it would ask for a write-ahead log beside it. */
+        errno = 0;
+        code = sqlite3_exec(to, "PRAGMA journal_mode=DELETE", NULL, NULL, NULL);
+    }
+    if (code != SQLITE_OK)
+        status = failed(to, code, errno, path, err);
     sqlite3_close(to);
     struct sql copy;
     if (status == STATUS_OK)

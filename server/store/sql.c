@@ -37,20 +37,23 @@ static void set_allocator(void) {
     sqlite3_config(SQLITE_CONFIG_MALLOC, &ours);
 }
 
-/* Turns an SQLite result into ours. A full disk hides behind IOERR where a sync or ftruncate fails and
- * behind CANTOPEN where a journal cannot be made, so the last errno decides. (sqlite3_system_errno does
- * not have that of a statement that fails in sqlite3_step; its VFS knows errno alone, too.) Callers
- * set errno to 0 before. */
+bool sql_is_full(int code, int number) {
+    bool is_full = number == ENOSPC || number == EDQUOT || number == EFBIG;
+    code &= 0xff;
+    return code == SQLITE_FULL || (is_full && (code == SQLITE_IOERR || code == SQLITE_CANTOPEN));
+}
+
+/* Turns an SQLite result into ours. (sqlite3_system_errno does not have the errno of a statement that fails in
+ * sqlite3_step; its VFS knows errno alone, too.) Callers set errno to 0 before. */
 static enum status fail(struct sql *sql, int code, const char *doing, struct error *err) {
     int os = errno;
-    bool is_full = os == ENOSPC || os == EDQUOT || os == EFBIG;
     const char *why = sql->db ? sqlite3_errmsg(sql->db) : sqlite3_errstr(code);
-    if (is_full && ((code & 0xff) == SQLITE_IOERR || (code & 0xff) == SQLITE_CANTOPEN))
-        code = SQLITE_FULL;
-    switch (code & 0xff) {
-    case SQLITE_FULL:
-        error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path, strerror(is_full ? os : ENOSPC));
+    if (sql_is_full(code, os)) {
+        error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path,
+                  strerror(os == EDQUOT || os == EFBIG ? os : ENOSPC));
         return error_hint(err, "Free some space on the disk that holds the file.");
+    }
+    switch (code & 0xff) {
     case SQLITE_IOERR:
         return error_set(err, STATUS_IO, "%s: cannot %s: %s (%s)", sql->path, doing, why,
                          os ? strerror(os) : "no errno");

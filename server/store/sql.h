@@ -62,6 +62,10 @@ enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct er
 enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err,
                     const char *text, const char *types, ...);
 
+/* Whether SQLite's result and the errno of that moment tell of a full disk, which hides behind IOERR where a write,
+ * sync or ftruncate fails and behind CANTOPEN where a file cannot be made. */
+bool sql_is_full(int code, int number);
+
 /* Rows changed by the last statement. */
 int64_t sql_changes(const struct sql *sql);
 /* A text column: borrowed until the next step, never NULL; sql_dup: a copy of the caller's. */

@@ -1,8 +1,11 @@
 /* test_backup.c -- a copy of the database while others write it: whole, openable, and holding
  * everything that was acknowledged before it began. */
 #include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
+#include <sys/resource.h>
 
+#include "tests/sql_faults.h"
 #include "tests/unit/store_rig.h"
 
 #define JOBS_BEFORE 50
@@ -36,6 +39,37 @@ static int64_t count_jobs(struct store *store) {
     struct store_counts counts;
     OK(store_count(store, &counts, &err));
     return counts.jobs_by_state[JOB_QUEUED];
+}
+
+/* Files of more than 32 KiB cannot be written, so SQLite tells of a failed write, not of a full disk. */
+static void test_full_disk(struct store *store, const char *path) {
+    struct rlimit before, small;
+    CHECK(getrlimit(RLIMIT_FSIZE, &before) == 0);
+    small = before;
+    small.rlim_cur = 32768;
+    signal(SIGXFSZ, SIG_IGN);
+    CHECK(setrlimit(RLIMIT_FSIZE, &small) == 0);
+    IS(store_backup(store, path, &err), STATUS_NO_SPACE);
+    CHECK(setrlimit(RLIMIT_FSIZE, &before) == 0);
+    CHECK_THAT(strstr(err.message, path) && strstr(err.message, "disk is full") && *err.hint, "%s", err.message);
+    CHECK(unlink(path) == 0);
+    OK(store_backup(store, path, &err));
+    CHECK(unlink(path) == 0);
+}
+
+/* As the library itself cannot be made to fail: the call that opens the copy, copies pages, makes it one file. */
+static void test_calls(struct store *store, const char *path) {
+    static const long calls[] = {1, 3, 4};
+    for (size_t i = 0; i < 3; i++)
+        for (size_t fault = 0; fault < SQL_FAULTS; fault++) {
+            sql_faults_arm(calls[i]);
+            sql_fault = &sql_faults[fault];
+            enum status status = store_backup(store, path, &err);
+            CHECK(sql_faults_lift());
+            CHECK_THAT(status == (sql_faults[fault].status == STATUS_NO_SPACE ? STATUS_NO_SPACE : STATUS_IO),
+                       "call %ld, fault %zu: %s", calls[i], fault, status_name(status));
+            unlink(path);
+        }
 }
 
 int main(void) {
@@ -72,6 +106,10 @@ int main(void) {
                (long long)copied, (long long)before, (long long)after);
     OK(store_token_find(copy, token, &who, &err)); /* who could come in before can after a restore */
     store_close(copy);
+    mem_free(path);
+    path = file_join(to, "second.db");
+    test_full_disk(shared.store, path);
+    test_calls(shared.store, path);
     store_close(shared.store);
     mem_free(path);
     mem_free(nowhere);
