@@ -113,18 +113,7 @@ int64_t auth_job_id(struct api *api, const struct request *r, enum access needed
 
 enum status auth_find_scene(struct api *api, const struct request *r, const char *id,
                             struct scene_row *row, struct error *err) {
-    enum access access;
-    enum status status;
-    if (!field_is_sha256(id))
-        return store_scene_find(api->store, &r->caller, id, row, err);
-    status = store_scene_get(api->store, id, row, err);
-    if (status == STATUS_OK)
-        status = store_scene_access(api->store, &r->caller, id, &access, err);
-    if (status == STATUS_OK && access == ACCESS_NONE)
-        status = error_set(err, STATUS_NOT_FOUND, "there is no scene %s", id);
-    if (status != STATUS_OK)
-        scene_row_release(row);
-    return status;
+    return store_scene_find(api->store, &r->caller, id, row, err);
 }
 
 bool auth_scene(struct api *api, const struct request *r, enum access needed, struct scene_row *row,

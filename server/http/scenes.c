@@ -85,7 +85,7 @@ struct response *scenes_add(struct api *api, struct request *r) {
     if (refusal)
         return refusal;
     if (status == STATUS_OK)
-        status = store_scene_get(api->store, id, &row, &err);
+        status = store_scene_find(api->store, &r->caller, id, &row, &err);
     if (status != STATUS_OK)
         return problem_from(r, &err);
     scheduler_wake(api->scheduler);
@@ -118,7 +118,7 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
         cJSON_Delete(params);
 }
 
-/* As whom a change is made: see store_scene_patch. */
+/* As whom it is removed: see store_scene_delete. */
 static int64_t owner_of(const struct request *r) {
     return r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id;
 }
@@ -138,7 +138,7 @@ struct response *scenes_patch(struct api *api, struct request *r) {
         reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and look again", NULL);
     if (!reply)
         read_patch(r, &body, &name, &keeping, &reply);
-    if (!reply && store_scene_patch(api->store, row.id, owner_of(r), name, &keeping, &err) != STATUS_OK)
+    if (!reply && store_scene_patch(api->store, &r->caller, row.id, name, &keeping, &err) != STATUS_OK)
         reply = problem_from(r, &err);
     char id[SCENE_ID_SIZE];
     memcpy(id, row.id, sizeof id);
@@ -146,7 +146,7 @@ struct response *scenes_patch(struct api *api, struct request *r) {
     cJSON_Delete(body);
     if (reply)
         return reply;
-    if (store_scene_get(api->store, id, &row, &err) != STATUS_OK)
+    if (store_scene_find(api->store, &r->caller, id, &row, &err) != STATUS_OK)
         return problem_from(r, &err);
     scene_tag(&row, tag);
     reply = response_json(200, view_scene(&row));

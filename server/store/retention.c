@@ -30,7 +30,8 @@ enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit
         &store->sql, &stmt, err,
         "SELECT * FROM (SELECT 0 AS kind, id, name, " UPLOAD_EXPIRES " AS expires FROM uploads"
         " UNION ALL SELECT 1, id, name, " JOB_EXPIRES " FROM jobs"
-        " UNION ALL SELECT 2, id, name, " SCENE_EXPIRES " FROM scenes)"
+        " UNION ALL SELECT 2, id, ifnull((SELECT name FROM scene_owners WHERE scene_id = scenes.id"
+        "  ORDER BY created_ms, user_id LIMIT 1), ''), " SCENE_EXPIRES " FROM scenes)"
         " WHERE expires BETWEEN 1 AND ? ORDER BY kind, expires LIMIT ?",
         "ii", now_ms, (int64_t)limit);
     bool row = status == STATUS_OK;

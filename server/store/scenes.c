@@ -15,14 +15,24 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define COLUMNS                                                                                \
-    "id, name, state, bytes, created_ms, problems, facts, (SELECT users.name FROM scene_owners" \
-    " JOIN users ON users.id = user_id WHERE scene_id = scenes.id"                             \
-    " ORDER BY scene_owners.created_ms, user_id LIMIT 1), pinned, " SCENE_EXPIRES ", disk_bytes"
+/* The owner whose name for the scene user ?2 sees: that user himself, else the first who shares it with him or, where he
+ * sees all (?1), the first who sent it. */
+#define SHOWN_OWNER                                                                                        \
+    "(SELECT user_id FROM scene_owners AS o WHERE scene_id = scenes.id AND (?1 OR user_id = ?2 OR EXISTS" \
+    " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1))"   \
+    " ORDER BY user_id = ?2 DESC, created_ms, user_id LIMIT 1)"
+#define SCENES                                                                                             \
+    "scenes LEFT JOIN scene_owners AS shown ON shown.scene_id = scenes.id AND shown.user_id = " SHOWN_OWNER \
+    " LEFT JOIN users ON users.id = shown.user_id"
+/* One who shared it and gave it up leaves it without a name for its readers. */
+#define COLUMNS                                                                                            \
+    "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, scenes.created_ms, problems,"  \
+    " facts, users.name, pinned, " SCENE_EXPIRES ", disk_bytes"
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                            \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"   \
     " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1))"
+#define NOT_A_USER ((int64_t)-1)
 
 static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
     *row = (struct scene_row){
@@ -75,18 +85,18 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
     status = state_of(store, id, &state, err);
     if (status == STATUS_OK && state < 0)
         status = sql_run(&store->sql, err,
-                         "INSERT INTO scenes (id, name, state, bytes, created_ms)"
-                         " VALUES (?, ?, ?, ?, ?)",
-                         "ttnii", id, name, (int)SCENE_CHECKING, (int64_t)bytes, store_now_ms());
+                         "INSERT INTO scenes (id, state, bytes, created_ms)"
+                         " VALUES (?, ?, ?, ?)",
+                         "tnii", id, (int)SCENE_CHECKING, (int64_t)bytes, store_now_ms());
     else if (status == STATUS_OK && (state == SCENE_REJECTED || state == SCENE_CHECKING))
         status = sql_run(&store->sql, err,
                          "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
                          (int)SCENE_CHECKING, id);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
-                         "INSERT INTO scene_owners (scene_id, user_id, created_ms)"
-                         " VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
-                         "tii", id, owner_id, store_now_ms());
+                         "INSERT INTO scene_owners (scene_id, user_id, created_ms, name)"
+                         " VALUES (?, ?, ?, ?) ON CONFLICT DO NOTHING",
+                         "tiit", id, owner_id, store_now_ms(), name);
     status = store_end(store, status, 0, err);
     *existed = status == STATUS_OK && state >= 0;
     return status;
@@ -145,7 +155,8 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
     *row = (struct scene_row){0};
     store_lock(store);
     enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT " COLUMNS " FROM scenes WHERE id = ?", "t", id);
+                                   "SELECT " COLUMNS " FROM " SCENES " WHERE scenes.id = ?3", "nit", 1,
+                                   NOT_A_USER, id);
     if (found) {
         fill(row, stmt);
         sqlite3_reset(stmt);
@@ -156,6 +167,10 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
 
 static bool sees_all(const struct caller *who) {
     return !who || who->role == ROLE_ADMIN;
+}
+
+static int64_t user_of(const struct caller *who) {
+    return who ? who->user_id : NOT_A_USER;
 }
 
 enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix,
@@ -170,10 +185,10 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
     store_lock(store);
     /* 'g' follows every hex digit. */
     enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT " COLUMNS " FROM scenes"
-                                   " WHERE id >= ?3 AND id < ?3 || 'g' AND " IS_READABLE
+                                   "SELECT " COLUMNS " FROM " SCENES
+                                   " WHERE scenes.id >= ?3 AND scenes.id < ?3 || 'g' AND " IS_READABLE
                                    " LIMIT 2",
-                                   "nit", (int)sees_all(who), who ? who->user_id : 0, prefix);
+                                   "nit", (int)sees_all(who), user_of(who), prefix);
     if (found) {
         fill(row, stmt);
         status = sql_step(&store->sql, stmt, &another, err);
@@ -202,10 +217,10 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
     sqlite3_stmt *stmt;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT " COLUMNS " FROM scenes"
-                                   " WHERE (created_ms, id) < (?3, ?4) AND " IS_READABLE
-                                   " ORDER BY created_ms DESC, id DESC LIMIT ?5",
-                                   "niiti", (int)sees_all(who), who ? who->user_id : 0,
+                                   "SELECT " COLUMNS " FROM " SCENES
+                                   " WHERE (scenes.created_ms, scenes.id) < (?3, ?4) AND " IS_READABLE
+                                   " ORDER BY scenes.created_ms DESC, scenes.id DESC LIMIT ?5",
+                                   "niiti", (int)sees_all(who), user_of(who),
                                    (int64_t)before_ms, before_id, (int64_t)limit + 1);
     bool row = status == STATUS_OK;
     while (row && *count <= limit) {
@@ -237,24 +252,28 @@ static enum status is_others_too(struct store *store, const char *id, int64_t ow
                                   owner_id);
 }
 
-enum status store_scene_patch(struct store *store, const char *id, int64_t owner_id, const char *name,
+enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
                               const struct keeping *keeping, struct error *err) {
     int64_t others = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
     if (keeping->pin == KEEP_PIN_OFF || keeping->sets_expiry)
-        status = is_others_too(store, id, owner_id, &others, err);
+        status = is_others_too(store, id, sees_all(who) ? NOT_A_USER : who->user_id, &others, err);
     if (others) {
         error_set(err, STATUS_CONFLICT, "others keep scene %s, too: its end is not one user's to set", id);
         status = error_hint(err, "It can be pinned; DELETE gives up your share of it alone.");
     }
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "UPDATE scenes SET " KEEPING_SET ", name = ifnull(?4, name) WHERE id = ?5",
-                         "nnitt", (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, name, id);
+        status = sql_run(&store->sql, err, "UPDATE scenes SET " KEEPING_SET " WHERE id = ?4", "nnit", (int)keeping->pin,
+                         (int)keeping->sets_expiry, keeping->expires_ms, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
+    if (status == STATUS_OK && name)
+        status = sql_run(&store->sql, err,
+                         "UPDATE scene_owners SET name = ?3 FROM scenes WHERE scenes.id = ?4 AND scene_id = ?4"
+                         " AND user_id = " SHOWN_OWNER,
+                         "nitt", (int)sees_all(who), user_of(who), name, id);
     return store_end(store, status, 0, err);
 }
 

@@ -182,6 +182,13 @@ static const char step_10[] =
     "DROP INDEX jobs_by_owner;"
     "CREATE INDEX jobs_by_owner ON jobs (owner_id, state, disk_bytes);";
 
+/* A scene has a name for each of its owners. */
+static const char step_11[] =
+    "ALTER TABLE scene_owners ADD COLUMN name TEXT NOT NULL DEFAULT '';"
+    "UPDATE scene_owners SET name = (SELECT name FROM scenes WHERE id = scene_id);"
+    "ALTER TABLE scenes DROP COLUMN name;";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
-                                    step_6, step_7, step_8, step_9, step_10};
+                                    step_6, step_7, step_8, step_9, step_10,
+                                    step_11};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -56,8 +56,9 @@ struct count_limits {
 
 struct scene_row {
     char id[SCENE_ID_SIZE];
-    char *name;
-    char *owner;            /* the first user who sent it; "" for nobody */
+    char *name;             /* as its owner below calls it; the beginning of the id where there is none */
+    char *owner;            /* whoever asks, if he has sent it; else who shares it with him; for who sees all, the first
+                             * who sent it. "" for nobody */
     enum scene_state state;
     uint64_t bytes;         /* of the archive */
     int64_t disk_bytes;     /* that its folder takes; -1: not known */
@@ -70,8 +71,8 @@ struct scene_row {
 void scene_row_release(struct scene_row *row);
 
 /* A complete, durable upload by user owner_id: the row starts in `checking`. Content that is there
- * already is no error: *existed is set, the user owns it too, and nothing else changes, but one that
- * was rejected or waits for room is checked again. */
+ * already is no error: *existed is set, the user owns it too, by that name (one who did keeps his), and nothing
+ * else changes, but one that was rejected or waits for room is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err);
 /* What it takes of the disk was entered before. */
@@ -79,9 +80,10 @@ enum status store_scene_ready(struct store *store, const char *id, const char *f
                               struct error *err);
 enum status store_scene_reject(struct store *store, const char *id, const char *problems,
                                struct error *err);
+/* As who sees all and owns nothing. */
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
                             struct error *err);
-/* The row whose id begins with `prefix` (4 to 64 hex digits) among those that `who` (NULL: all)
+/* The row whose id is or begins with `prefix` (4 to 64 hex digits) among those that `who` (NULL: all)
  * may read; STATUS_CONFLICT when several do. */
 enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix,
                              struct scene_row *row, struct error *err);
@@ -90,9 +92,9 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
                              size_t limit, struct scene_row *rows, size_t *count,
                              char next_cursor[128], struct error *err);
-/* NULL leaves the name. As user owner_id (-1: an admin): STATUS_CONFLICT when others own it, too, and could
- * lose it by this. */
-enum status store_scene_patch(struct store *store, const char *id, int64_t owner_id, const char *name,
+/* NULL leaves the name, which is changed for the owner that `who` sees. STATUS_CONFLICT when others own it, too, and
+ * could lose it by this; not for an admin. */
+enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
                               const struct keeping *keeping, struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a

@@ -330,6 +330,10 @@ static void check_migrated(struct store *store) {
     OK(store_disk_unknown(store, 0, 4, unknown, &count, &err));
     CHECK(count == 2 && unknown[0].job_id == 0 && unknown[0].scene_id[0] && unknown[1].job_id == 7);
     CHECK(unknown[0].bytes == -1 && unknown[1].bytes == -1);
+    struct scene_row scene;
+    OK(store_scene_get(store, SCENE_A, &scene, &err));
+    CHECK_STRING(scene.name, "room");
+    scene_row_release(&scene);
 }
 
 static void test_opening(void) {

@@ -64,7 +64,7 @@ static enum status list_scenes(void) {
     return status;
 }
 static enum status patch_scene(void) {
-    return store_scene_patch(store, SCENE_A, alice.user_id, "named", &(struct keeping){.sets_expiry = true, .expires_ms = 1}, &err);
+    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct keeping){.sets_expiry = true, .expires_ms = 1}, &err);
 }
 static enum status access_scene(void) {
     enum access access;
@@ -455,7 +455,7 @@ static void check_refusals(void) {
     IS(store_event_add(store, 77, 1, EVENT_LOG, "{}", &err), STATUS_NOT_FOUND);
     IS(store_event_list(store, 77, 0, 9, no_event, NULL, &err), STATUS_OK);
     IS(store_scene_ready(store, SCENE_C, "{}", &err), STATUS_NOT_FOUND);
-    IS(store_scene_patch(store, SCENE_C, -1, "x", &(struct keeping){0}, &err), STATUS_NOT_FOUND);
+    IS(store_scene_patch(store, NULL, SCENE_C, "x", &(struct keeping){0}, &err), STATUS_NOT_FOUND);
     IS(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err), STATUS_NOT_FOUND);
     IS(store_scene_list(store, NULL, "yesterday", 1, scenes, &count, cursor, &err), STATUS_INPUT);
     IS(store_upload_list(store, NULL, "", "yesterday", 1, &row, &count, cursor, &err), STATUS_INPUT);

@@ -121,6 +121,81 @@ static int64_t add_own_job(struct store *store, const char *scene, int64_t owner
     return id;
 }
 
+/* What `who` is told that the scene is called, and whose it is; "-": nothing at all. */
+static void check_name(struct store *store, const struct caller *who, const char *name, const char *owner) {
+    struct scene_row row, rows[10];
+    size_t count;
+    char next[128];
+    if (store_scene_find(store, who, SCENE_A, &row, &err) != STATUS_OK) {
+        CHECK(name[0] == '-' && err.status == STATUS_NOT_FOUND);
+        return;
+    }
+    CHECK_STRING(row.name, name);
+    CHECK_STRING(row.owner, owner);
+    scene_row_release(&row);
+    OK(store_scene_list(store, who, "", 10, rows, &count, next, &err));
+    CHECK(count == 1); /* once, however many own it */
+    for (size_t i = 0; i < count; i++) {
+        CHECK_STRING(rows[i].name, name);
+        CHECK_STRING(rows[i].owner, owner);
+        scene_row_release(&rows[i]);
+    }
+}
+
+/* Each owner of a scene calls it as he likes, and learns neither how others call it nor who they are. */
+static void test_names(void) {
+    static const char *const users[] = {"alice", "bob", "carol", "dora"};
+    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    struct caller who[4], *alice = &who[0], *bob = &who[1], *carol = &who[2], *dora = &who[3];
+    const struct caller admin = {.role = ROLE_ADMIN};
+    const struct keeping as_is = {0};
+    struct store *store;
+    int64_t id;
+    bool existed, is_gone;
+    OK(store_open(&store, dir, &err));
+    for (int i = 0; i < 4; i++) {
+        OK(store_token_add(store, users[i], ROLE_USER, token, &id, &err));
+        OK(store_token_find(store, token, &who[i], &err));
+    }
+    OK(store_scene_add(store, SCENE_A, "secret of alice", 1, alice->user_id, &existed, &err));
+    OK(store_scene_add(store, SCENE_A, "kitchen", 1, bob->user_id, &existed, &err));
+    OK(store_scene_add(store, SCENE_A, "hall", 1, carol->user_id, &existed, &err));
+    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    check_name(store, alice, "secret of alice", "alice");
+    check_name(store, bob, "kitchen", "bob");
+    check_name(store, carol, "hall", "carol");
+    check_name(store, dora, "-", "");
+    check_name(store, &admin, "secret of alice", "alice");
+    check_name(store, NULL, "secret of alice", "alice");
+
+    OK(store_scene_patch(store, bob, SCENE_A, "his kitchen", &as_is, &err));
+    OK(store_scene_patch(store, &admin, SCENE_A, "hers", &as_is, &err));
+    check_name(store, alice, "hers", "alice");
+    check_name(store, bob, "his kitchen", "bob");
+    check_name(store, carol, "hall", "carol");
+
+    /* Who may read it by a shared job is told what the one calls it who shares it; its other owners still their own. */
+    int64_t shared = add_own_job(store, SCENE_A, bob->user_id, "key");
+    OK(store_job_patch(store, shared, -1, &(struct job_patch){.priority = INT_MIN, .shared = 1}, &err));
+    check_name(store, dora, "his kitchen", "bob");
+    check_name(store, carol, "hall", "carol");
+    OK(store_scene_add(store, SCENE_A, "of nobody", 1, 0, &existed, &err));
+    check_name(store, &admin, "of nobody", "");
+    OK(store_scene_delete(store, SCENE_A, 0, false, &is_gone, &err));
+    check_name(store, NULL, "hers", "alice");
+
+    /* The first who sent it goes, and so does one who shared it. */
+    OK(store_scene_delete(store, SCENE_A, alice->user_id, false, &is_gone, &err));
+    check_name(store, alice, "his kitchen", "bob"); /* shared with her, too */
+    check_name(store, NULL, "his kitchen", "bob");
+    OK(store_job_cancel(store, shared, &err));
+    OK(store_scene_delete(store, SCENE_A, bob->user_id, false, &is_gone, &err));
+    check_name(store, dora, "aaaaaaaaaaaa", "");
+    check_name(store, carol, "hall", "carol");
+    store_close(store);
+    drop_dir(dir);
+}
+
 static void test_lists(void) {
     char *dir = fresh_dir(), token[TOKEN_SIZE];
     struct store *store;
@@ -172,15 +247,15 @@ static void test_lists(void) {
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
     CHECK(existed && scenes_seen(store, &bob) == 2);
     const struct keeping past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
-    OK(store_scene_patch(store, SCENE_A, alice.user_id, "mine", &pin, &err));
-    IS(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &loose, &err), STATUS_CONFLICT);
-    IS(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &past, &err), STATUS_CONFLICT);
-    OK(store_scene_patch(store, SCENE_A, -1, NULL, &loose, &err));
+    OK(store_scene_patch(store, &alice, SCENE_A, "mine", &pin, &err));
+    IS(store_scene_patch(store, &bob, SCENE_A, NULL, &loose, &err), STATUS_CONFLICT);
+    IS(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err), STATUS_CONFLICT);
+    OK(store_scene_patch(store, &admin, SCENE_A, NULL, &loose, &err));
     IS(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, first, &err));
     OK(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err));
     CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
-    OK(store_scene_patch(store, SCENE_A, bob.user_id, NULL, &past, &err)); /* it is his alone now */
+    OK(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err)); /* it is his alone now */
     IS(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, second, &err));
     OK(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err));
@@ -193,5 +268,6 @@ int main(void) {
     test_equal();
     test_tokens();
     test_lists();
+    test_names();
     return check_result();
 }
