@@ -40,6 +40,8 @@ static const struct option table[] = {
     INT(user_max_running, "jobs", 0, 64, "0", "Jobs of one user that run at the same time. 0: no limit."),
     INT(user_queue_limit, "jobs", 0, 1000000, "100",
         "Jobs of one user that may wait; more are refused with 429. 0: no limit."),
+    INT(user_max_jobs, "jobs", 0, 1000000, "0",
+        "Jobs that one user may keep, with those that have ended; more are refused with 507. 0: no limit."),
     INT(user_max_mib, "MiB", 0, 1073741824, "0",
         "What one user may take of the disk: scenes, jobs, unfinished uploads; more is refused with 507. 0: no limit."),
     INT(worker_memory_mib, "MiB", 0, 16777216, "0", "Memory that a job may use. 0: no limit."),

@@ -121,6 +121,7 @@ static struct api_config api_options(const struct config *c, const struct api_li
         .max_attempts = (int)c->max_attempts,
         .queue_limit = (size_t)c->queue_limit,
         .user_queue_limit = (size_t)c->user_queue_limit,
+        .user_max_jobs = (size_t)c->user_max_jobs,
         .user_max_bytes = (uint64_t)c->user_max_mib << 20,
         .max_upload_bytes = (uint64_t)c->max_upload_mib << 20,
         .min_free_bytes = (uint64_t)c->min_free_mib << 20,

@@ -26,6 +26,7 @@ struct api_config {
     int max_attempts;
     size_t queue_limit;        /* queued jobs */
     size_t user_queue_limit;   /* of them, of one user; 0: no limit */
+    size_t user_max_jobs;      /* that one user keeps; 0: no limit */
     uint64_t user_max_bytes;   /* that one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
     uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */

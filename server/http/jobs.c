@@ -138,6 +138,7 @@ static struct response *add_job(struct api *api, const struct request *r, const 
         .priority = w->priority == INT_MIN ? 0 : w->priority,
         .max_attempts = api->config.max_attempts,
         .user_queue_limit = api->config.user_queue_limit,
+        .user_max_jobs = api->config.user_max_jobs,
         .webhook_url = w->webhook_url,
         .webhook_secret = w->webhook_secret,
         .idempotency_key = request_field(r, "Idempotency-Key"),

@@ -80,6 +80,27 @@ static enum status find_replay(struct store *store, const struct job_new *job, c
     return error_hint(err, "Use a new key for a new request.");
 }
 
+/* Whether the job's owner may keep one more. What has ended is not removed for it: its results may be all that is left
+ * of days of work. */
+static enum status check_kept(struct store *store, const struct job_new *job, struct error *err) {
+    int64_t kept = 0, oldest = 0;
+    if (job->user_max_jobs == 0 || job->owner_id == 0)
+        return STATUS_OK;
+    enum status status = sql_int(&store->sql, 0, &kept, err, "SELECT count(*) FROM jobs WHERE owner_id = ?", "i",
+                                 job->owner_id);
+    if (status != STATUS_OK || (uint64_t)kept < job->user_max_jobs)
+        return status;
+    status = sql_int(&store->sql, 0, &oldest, err,
+                     "SELECT min(id) FROM jobs WHERE owner_id = ? AND state >= ? AND pinned = 0", "in", job->owner_id,
+                     (int)JOB_SUCCEEDED);
+    if (status != STATUS_OK)
+        return status;
+    error_set(err, STATUS_NO_SPACE, "you keep %lld jobs, and a user may keep %zu", (long long)kept, job->user_max_jobs);
+    return oldest ? error_hint(err, "delete jobs that you do not need; the oldest that has ended is %lld",
+                               (long long)oldest)
+                  : error_hint(err, "delete jobs that you do not need");
+}
+
 /* Whether one more job may join the queue for this scene. */
 static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit,
                              struct error *err) {
@@ -95,7 +116,9 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
         return error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
                           job->scene_id, job->scene_id);
     }
-    return store_queue_check(store, job->owner_id, &(struct count_limits){queue_limit, job->user_queue_limit}, err);
+    status = check_kept(store, job, err);
+    const struct count_limits limits = {queue_limit, job->user_queue_limit};
+    return status == STATUS_OK ? store_queue_check(store, job->owner_id, &limits, err) : status;
 }
 
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,

@@ -119,12 +119,13 @@ struct job_new {
     bool is_shared;
     int priority, max_attempts;
     size_t user_queue_limit;     /* queued jobs of its owner; 0: no limit */
+    size_t user_max_jobs;        /* all jobs of its owner; 0: no limit */
     const char *webhook_url, *webhook_secret; /* NULL: none */
     const char *idempotency_key; /* NULL: none */
     const char *request_sha256;  /* of the request, compared when the key is known */
 };
-/* queue_limit: STATUS_LIMIT when that many jobs are queued, by all or by its owner (who is somebody). With a known key: the earlier job's
- * id and *replayed; STATUS_CONFLICT when the request differs. The scene may still be in
+/* queue_limit: STATUS_LIMIT when that many jobs are queued, by all or by its owner (who is somebody);
+ * STATUS_NO_SPACE when its owner keeps as many as may be. With a known key: the earlier job's id and *replayed; STATUS_CONFLICT when the request differs. The scene may still be in
  * `checking`; STATUS_CONFLICT when it is rejected, STATUS_NOT_FOUND when there is none. */
 enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
                           int64_t *id, bool *replayed, struct error *err);

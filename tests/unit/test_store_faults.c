@@ -128,7 +128,7 @@ static enum status unknown_disk(void) {
 
 static enum status submit(void) {
     struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .owner_id = alice.user_id,
-                          .max_attempts = 9, .user_queue_limit = 9, .webhook_url = "http://x/", .webhook_secret = "s",
+                          .max_attempts = 9, .user_queue_limit = 9, .user_max_jobs = 9, .webhook_url = "http://x/", .webhook_secret = "s",
                           .idempotency_key = "key", .request_sha256 = "hash"};
     bool replayed;
     return store_job_add(store, &new, 9, &job, &replayed, &err);

@@ -1,4 +1,6 @@
 /* test_turns.c -- whose turn it is between users, and their limits. */
+#include <limits.h>
+
 #include "tests/sql_faults.h"
 #include "tests/unit/store_rig.h"
 
@@ -96,6 +98,47 @@ static void test_full_queue(void) {
     CHECK(owner_next(1) == 0); /* nobody has used nothing */
 }
 
+/* Jobs that have ended count, others' do not; what is known by its key is there already; nobody has no limit. */
+static void test_kept(void) {
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 2,
+                          .owner_id = 31, .user_max_jobs = 3, .idempotency_key = "first", .request_sha256 = "x"};
+    char hint[64];
+    int64_t ids[3], id, others;
+    bool replayed;
+    for (int i = 0; i < 3; i++) {
+        OK(store_job_add(store, &new, 1000, &ids[i], &replayed, &err));
+        new.idempotency_key = NULL;
+    }
+    IS(store_job_add(store, &new, 1000, &id, &replayed, &err), STATUS_NO_SPACE);
+    CHECK_STRING(err.message, "you keep 3 jobs, and a user may keep 3");
+    CHECK_STRING(err.hint, "delete jobs that you do not need");
+    for (int i = 0; i < 3; i++)
+        OK(store_job_cancel(store, ids[i], &err));
+    OK(store_job_patch(store, ids[0], -1, &(struct job_patch){.priority = INT_MIN, .shared = -1, .keeping.pin = KEEP_PIN_ON},
+                       &err));
+    IS(store_job_add(store, &new, 1000, &id, &replayed, &err), STATUS_NO_SPACE);
+    snprintf(hint, sizeof hint, "the oldest that has ended is %lld", (long long)ids[1]);
+    CHECK_THAT(strstr(err.hint, hint), "%s", err.hint);
+    new.idempotency_key = "first";
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    CHECK(replayed && id == ids[0]);
+    OK(store_job_retry(store, ids[2], 3, NULL, NULL, &err)); /* one that is kept anyway */
+    new.idempotency_key = NULL;
+    new.owner_id = 32;
+    OK(store_job_add(store, &new, 1000, &others, &replayed, &err));
+    new.owner_id = 0;
+    for (int i = 0; i < 4; i++) {
+        OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+        OK(store_job_delete(store, id, &err));
+    }
+    new.owner_id = 31;
+    OK(store_job_delete(store, ids[1], &err));
+    OK(store_job_add(store, &new, 1000, &ids[1], &replayed, &err));
+    for (int i = 0; i < 3; i++)
+        OK(store_job_delete(store, ids[i], &err));
+    OK(store_job_delete(store, others, &err));
+}
+
 static enum status upload_of(int64_t user, int number) {
     struct upload_row row = {.owner_id = user, .name = (char *)"room", .metadata = (char *)"", .length = 10};
     const struct count_limits limits = {.all = 4, .one_user = 2};
@@ -164,6 +207,7 @@ int main(void) {
     test_full_queue();
     test_ten_users();
     test_uploads();
+    test_kept();
     test_bytes(running);
     test_unpaid();
     store_close(store);
