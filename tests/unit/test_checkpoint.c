@@ -5,6 +5,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sqlite3.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -213,6 +214,49 @@ static void test_damage(const char *path) {
 }
 
 /* The limit on a file's size stands for a full disk. In a child: it is the process's. */
+/* The tiles are as they were said to be, but not as many, or not those, that were saved together. */
+static void test_digest(const char *path) {
+    char note[512];
+    sqlite3 *db;
+    save_iteration(path, 7);
+    CHECK(sqlite3_open(path, &db) == SQLITE_OK);
+    CHECK(sqlite3_exec(db, "UPDATE newest SET digest = digest + 1", NULL, NULL, NULL) == SQLITE_OK);
+    sqlite3_close(db);
+    CHECK(load_from(path, note) == -1);
+    CHECK_THAT(strstr(note, "cannot be used") && strstr(note, "the digest of its tiles does not match"), "%s", note);
+}
+
+/* Between opening and loading the disk changes what is in the middle of each page, where there are tiles. */
+static void test_read_twice(const char *path) {
+    char note[512], byte;
+    struct checkpoint *c;
+    struct state_array array[ARRAYS];
+    bool found;
+    long iteration;
+    state_init(array);
+    save_iteration(path, 7);
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    CHECK_THAT(!note[0], "%s", note);
+    pid_t child = fork(); /* to close the file here would drop SQLite's locks */
+    if (child == 0) {
+        int fd = open(path, O_RDWR | O_CLOEXEC);
+        for (off_t at = 30000; pread(fd, &byte, 1, at) == 1; at += 65536) {
+            byte ^= 1;
+            if (pwrite(fd, &byte, 1, at) != 1)
+                _exit(1);
+        }
+        _exit(0);
+    }
+    int status;
+    CHECK(waitpid(child, &status, 0) == child && status == 0);
+    IS(checkpoint_load(c, array, ARRAYS, &found, &iteration, &err), STATUS_IO);
+    CHECK_THAT(!found && strstr(err.message, "a tile read twice differs"), "%s", err.message);
+    checkpoint_close(c);
+    state_release(array);
+    CHECK(load_from(path, note) == -1);
+    CHECK_THAT(strstr(note, "cannot be used"), "%s", note);
+}
+
 static void test_full_disk(const char *path) {
     char note[512];
     save_iteration(path, 7);
@@ -305,6 +349,8 @@ int main(void) {
     test_hash();
     test_round_trip(path);
     test_damage(path);
+    test_digest(path);
+    test_read_twice(path);
     test_full_disk(path);
     test_kill(path);
     OK(file_remove_tree(dir, &err));
