@@ -42,9 +42,14 @@ job_is() {
     [ "$("$build/unbake" show "$1" --json | jq -r .state)" = "$2" ]
 }
 
-blocks_int() { (($(awk '$1 == "SigBlk:" { print "0x" $2 }' "/proc/$1/status") & 2)); } # it reads it from a descriptor
+# It is the client by now, not the shell that started it, and reads Ctrl-C from a descriptor.
+is_ready_for_int() {
+    local mask
+    mask=$(awk '$1 == "Name:" { name = $2 } $1 == "SigBlk:" { print name == "unbake" ? "0x" $2 : 0 }' "/proc/$1/status")
+    ((mask & 2))
+}
 interrupt() {
-    wait_for 60 blocks_int "$1"
+    wait_for 60 is_ready_for_int "$1"
     kill -INT "$1"
     wait "$1"
 }
