@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/capture/orient.h"
+#include "server/capture/shown.h"
 #include "server/capture/views.h"
 #include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/emitters.h"
@@ -100,12 +101,14 @@ static void add_prepare_figures(const struct run *run) {
     json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
 }
 
-/* All that follows from the segments. */
-static enum status map_surface(struct reconstruction *r, struct error *err) {
+/* All that follows from the segments. density[triangle_count] says how much of the texture each part should
+ * have (atlas_make_uneven), or is NULL. */
+static enum status map_surface(struct reconstruction *r, const float *density, struct error *err) {
     const struct mesh *mesh = &r->scene->mesh;
-    enum status status = atlas_make(&r->atlas, mesh, &r->segments,
-                                    (uint32_t)settings_number(r->settings, "texture_size"),
-                                    (float)settings_number(r->settings, "texels_per_metre"), err);
+    uint32_t size = (uint32_t)settings_number(r->settings, "texture_size");
+    float texels_per_metre = (float)settings_number(r->settings, "texels_per_metre");
+    enum status status = density ? atlas_make_uneven(&r->atlas, mesh, &r->segments, size, density, err)
+                                 : atlas_make(&r->atlas, mesh, &r->segments, size, texels_per_metre, err);
     if (status != STATUS_OK)
         return status;
     inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
@@ -147,18 +150,28 @@ static void report_split(const struct run *run, const struct split *split) {
         run->hooks->log(run->hooks->user, line);
 }
 
-/* Splits off what shines, and makes anew what followed from the segments. */
-static enum status split_shining(struct run *run, struct error *err) {
-    struct reconstruction *r = run->r;
+/* Splits off what shines; true when anything was. */
+static bool split_shining(struct run *run) {
     struct split split;
-    split_segments(&split, r, &run->views);
+    split_segments(&split, run->r, &run->views);
     report_split(run, &split);
     bool any = split.part_count > 0;
     split_release(&split);
-    if (!any)
+    return any;
+}
+
+/* Maps the surface anew, now that it is known what shines and what is seen. */
+static enum status remap_surface(struct run *run, bool has_split, struct error *err) {
+    struct reconstruction *r = run->r;
+    bool even = settings_number(r->settings, "texels_per_metre") > 0.0;
+    if (even && !has_split)
         return STATUS_OK;
+    float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
+    if (density)
+        shown_density(&run->views, &r->atlas, r->pool, density);
     forget_surface(r);
-    enum status status = map_surface(r, err);
+    enum status status = map_surface(r, density, err);
+    mem_free(density);
     if (status != STATUS_OK)
         return status;
     views_update_segments(&run->views, r->world.accel, r->pool);
@@ -186,14 +199,14 @@ static enum status prepare(struct run *run, struct error *err) {
         return status;
     estimate_normals(run);
     make_segments(r);
-    status = map_surface(r, err);
+    status = map_surface(r, NULL, err);
     if (status != STATUS_OK)
         return status;
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
     calibrate(r, &run->views, run->hooks);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
-    status = split_shining(run, err);
+    status = remap_surface(run, split_shining(run), err);
     add_prepare_figures(run);
     return status;
 }

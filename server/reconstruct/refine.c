@@ -71,7 +71,7 @@ struct optimiser *refine_new(struct reconstruction *r, const struct views *views
     struct optimiser *o = optimiser_new(r, views, hooks, false, &method, f);
     *f = (struct refine){.o = o};
     matcher_init(&f->matcher, &r->materials.base_color, &r->inverse, &r->segments, r->atlas.chart_of_triangle,
-                 &o->emission, (int)settings_number(r->settings, "coarse_levels"));
+                 &o->emission, (int)settings_number(r->settings, "refine_levels"));
     f->look = mem_calloc(o->pass.chunk_count * o->pass.look_capacity, sizeof *f->look);
     f->d_emission = mem_array(r->segments.count, sizeof *f->d_emission);
     f->emission_rate = (float)settings_number(r->settings, "emission_rate");

@@ -2,7 +2,7 @@
  *
  * Solve takes light from where one ray meets a surface that photographs show; refine follows whole
  * paths. It looks at texels as listing1 does (pass.h), but walks no path backwards: of base colour,
- * windows of 2^coarse_levels texels a side keep their detail and move by the ratio of what was shown
+ * windows of 2^refine_levels texels a side keep their detail and move by the ratio of what was shown
  * to what was rendered, against a prior for what was solved (match.h); the emitters move by what is
  * seen of them (emission.h); roughness and specular stay. */
 #ifndef UNBAKE_RECONSTRUCT_REFINE_H

@@ -249,13 +249,34 @@ static double size_for(size_t count) {
     return exp2(ceil(log2(sqrt(cells))));
 }
 
+/* Shrinks each chart by the greatest density of its triangles: what is drawn at one density from then on. */
+static void shrink_charts(struct charts *charts, const float *density) {
+    charts->flat_area = 0.0;
+    for (size_t c = 0; c < charts->count; c++) {
+        float most = 0.0f;
+        for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++)
+            most = fmaxf(most, density[charts->triangle[i]]);
+        charts->extent[c] = vec2_scale(charts->extent[c], most);
+        for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++) {
+            vec2 *corner = charts->corner[charts->triangle[i]];
+            for (int k = 0; k < 3; k++)
+                corner[k] = vec2_scale(corner[k], most);
+            vec2 a = vec2_sub(corner[1], corner[0]), b = vec2_sub(corner[2], corner[0]);
+            charts->flat_area += 0.5 * fabs((double)a.x * (double)b.y - (double)a.y * (double)b.x);
+        }
+    }
+}
+
+/* `density` may be NULL. */
 static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
-                                const struct segments *segments, uint32_t size,
+                                const struct segments *segments, uint32_t size, const float *density_of,
                                 struct error *err) {
     struct charts charts;
     struct grid grid = grid_of(size);
     float texel_m = (float)sqrt(mesh_area(mesh) / TEXEL_FILL) / (float)size;
     charts_make(&charts, mesh, segments, texel_m);
+    if (density_of)
+        shrink_charts(&charts, density_of);
     struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
     double density = search_density(&drawing, &charts, &grid);
     enum status status = STATUS_OK;
@@ -310,10 +331,15 @@ enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struc
                              (double)texels_per_metre);
         return make_at_density(atlas, mesh, segments, texels_per_metre, err);
     }
+    return atlas_make_uneven(atlas, mesh, segments, size, NULL, err);
+}
+
+enum status atlas_make_uneven(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
+                              uint32_t size, const float *density, struct error *err) {
     if (size == 0 || size > ATLAS_MAX_SIZE)
         return error_set(err, STATUS_INPUT, "texture size: %u is not within 1 to %d", size,
                          ATLAS_MAX_SIZE);
-    return make_at_size(atlas, mesh, segments, size, err);
+    return make_at_size(atlas, mesh, segments, size, density, err);
 }
 
 void atlas_release(struct atlas *atlas) {

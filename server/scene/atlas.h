@@ -1,7 +1,7 @@
 /* atlas.h -- a one-to-one map from the mesh's triangles into a rectangle of texels.
  *
- * Charts are connected, nearly planar sets of triangles of one segment, projected at one
- * density (texels per metre) and packed with a gap. Atlas coordinates are in texels, x to the
+ * Charts are connected, nearly planar sets of triangles of one segment, projected each at one
+ * density (texels per metre), the same for all unless told otherwise, and packed with a gap. Atlas coordinates are in texels, x to the
  * right and y down from the image's top left corner; texel (i, j) covers [i, i+1) x [j, j+1).
  * They are whole multiples of 1 / COVERAGE_UNITS (coverage.h), so it is exact which texels are
  * covered. A chart is projected along one direction: a triangle that leans keeps at least
@@ -23,7 +23,7 @@
 
 struct atlas {
     uint32_t width, height;      /* texels */
-    float texels_per_metre;
+    float texels_per_metre;      /* the greatest density of a chart */
     size_t chart_count;
     uint32_t *chart_of_triangle; /* [triangle_count]; owned */
     vec2 (*corner)[3];           /* [triangle_count] atlas coordinates of the corners, texels; owned */
@@ -35,6 +35,10 @@ struct atlas {
  * ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). Deterministic. */
 enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
                        uint32_t size, float texels_per_metre, struct error *err);
+/* As with a size, but a chart gets only the greatest of density[triangle_count], in (0, 1], of its triangles as its
+ * part of that greatest density. */
+enum status atlas_make_uneven(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
+                              uint32_t size, const float *density, struct error *err);
 void atlas_release(struct atlas *atlas);
 
 /* Atlas coordinates of the point with barycentrics (1 - b1 - b2, b1, b2) on a triangle. */

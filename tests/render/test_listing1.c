@@ -133,7 +133,7 @@ int main(void) {
     make_scene(&scene, pool);
     parallel_free(pool);
     test_same_bytes(&scene, true, "{\"texture_size\":64,\"iterations\":30,\"report_samples\":2,"
-                                  "\"gather_samples\":64,\"texels_per_iteration\":256,\"coarse_levels\":3}");
+                                  "\"gather_samples\":64,\"texels_per_iteration\":256}");
     test_same_bytes(&scene, false, "{\"texture_size\":64,\"iterations\":30,\"report_samples\":2,"
                                    "\"method\":\"listing1\",\"texels_per_iteration\":256,\"coarse_levels\":3}");
     test_stop_in_solve(&scene);

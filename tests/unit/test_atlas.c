@@ -291,7 +291,48 @@ static void test_fragments(void) {
     mesh_release(&mesh);
 }
 
+static double texel_area(const struct atlas *atlas, size_t t) {
+    const vec2 *c = atlas->corner[t];
+    vec2 a = vec2_sub(c[1], c[0]), b = vec2_sub(c[2], c[0]);
+    return 0.5 * fabs((double)a.x * (double)b.y - (double)a.y * (double)b.x);
+}
+
+/* A chart gets the density of its densest triangle; what the others give up is the first one's. */
+static void test_uneven(void) {
+    struct mesh mesh = room_grid(2, 1, flat, NULL), two = room_new(12, 8);
+    struct segments segments;
+    struct atlas even, uneven;
+    struct error err = {0};
+    for (size_t i = 0; i < 12; i++) { /* two of it, one above the other */
+        two.position[i] = mesh.position[i % 6];
+        two.position[i].z += i < 6 ? 0.0f : 5.0f;
+    }
+    for (size_t t = 0; t < 8; t++)
+        for (size_t c = 0; c < 3; c++)
+            two.index[t][c] = mesh.index[t % 4][c] + (t < 4 ? 0 : 6);
+    const float density[8] = {1.0f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f};
+    room_one_segment(&segments, &two);
+    CHECK(atlas_make(&even, &two, &segments, 512, 0.0f, &err) == STATUS_OK);
+    CHECK(atlas_make_uneven(&uneven, &two, &segments, 512, density, &err) == STATUS_OK);
+    CHECK(even.chart_count == 2 && uneven.chart_count == 2);
+    size_t covered;
+    uint32_t *map = chart_map(&uneven, 8, &covered);
+    check_padding(&uneven, map);
+    CHECK_NEAR(texel_area(&uneven, 0) / texel_area(&uneven, 3), 1.0, 0.02);
+    CHECK_NEAR(texel_area(&uneven, 0) / texel_area(&uneven, 4), 16.0, 0.5);
+    CHECK_NEAR(texel_area(&even, 0) / texel_area(&even, 4), 1.0, 0.02);
+    CHECK(uneven.texels_per_metre > 1.2f * even.texels_per_metre);
+    CHECK_NEAR(sqrt(texel_area(&uneven, 0) / 1.5), uneven.texels_per_metre, 1.0);
+    mem_free(map);
+    atlas_release(&even);
+    atlas_release(&uneven);
+    segments_release(&segments);
+    mesh_release(&two);
+    mesh_release(&mesh);
+}
+
 int main(void) {
+    test_uneven();
     test_shape(flat, 1, 1, 1);
     test_shape(ramp, 400, 3, 8);
     test_shape(sphere, 60, 30, 24);
