@@ -47,8 +47,9 @@ int64_t store_now_ms(void); /* Unix time */
 #define SCENE_EXPIRES                                                                          \
     "(CASE WHEN pinned = 1 OR state = 1 OR EXISTS (SELECT 1 FROM jobs WHERE"                   \
     " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"    \
-    " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms, ifnull((SELECT"         \
-    " max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
+    " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms,"                        \
+    " ifnull((SELECT max(created_ms) FROM scene_owners WHERE scene_id = scenes.id), 0),"       \
+    " ifnull((SELECT max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
 #define UPLOAD_EXPIRES                                                                         \
     "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                         \
     " ELSE updated_ms + (SELECT upload_ms FROM retention) END)"

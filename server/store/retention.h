@@ -3,7 +3,7 @@
  * 1. A job that has not ended, and a scene that is being checked or that such a job uses, is kept
  *    whatever its times say; what is pinned is kept for good.
  * 2. Otherwise the time that was set for the very thing counts; failing that, the configuration's:
- *    a job is kept from its end on, a scene from its upload or the end of its last job on, an upload
+ *    a job is kept from its end on, a scene from its last owner's upload or the end of its last job on, an upload
  *    from its last byte on.
  * 3. What is listed as expired may be pinned or used the next moment: store_expired_delete looks
  *    again, in the transaction that deletes.

@@ -1,5 +1,6 @@
 /* test_store_content.c -- what state.db holds besides jobs: scenes, events, outputs. */
 #include <math.h>
+#include <sqlite3.h>
 
 #include "common/protocol.h"
 #include "tests/unit/store_rig.h"
@@ -92,6 +93,35 @@ static void test_share(void) {
     IS(store_scene_delete(store, SCENE_A, who[1].user_id, false, &is_gone, &err), STATUS_CONFLICT);
     CHECK_THAT(strstr(err.message, "being checked") && !is_gone, "%s", err.message);
     store_close(store);
+    drop_dir(dir);
+}
+
+/* A scene is kept as long after its last owner has sent it as after the first. */
+static void test_sent_again(void) {
+    char *dir = fresh_dir(), *path = file_join(dir, "state.db");
+    struct store *store;
+    struct scene_row row;
+    sqlite3 *db;
+    bool existed;
+    OK(store_open(&store, dir, &err));
+    OK(store_keep(store, 1000, 0, 1000, &err));
+    OK(store_scene_add(store, SCENE_A, "one", 10, 1, &existed, &err));
+    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    store_close(store);
+    CHECK(sqlite3_open(path, &db) == SQLITE_OK);
+    CHECK(sqlite3_exec(db, "UPDATE scenes SET created_ms = 5000; UPDATE scene_owners SET created_ms = 5000", NULL, NULL,
+                       NULL) == SQLITE_OK);
+    sqlite3_close(db);
+    OK(store_open(&store, dir, &err));
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(row.expires_ms == 6000);
+    scene_row_release(&row);
+    OK(store_scene_add(store, SCENE_A, "two", 10, 2, &existed, &err));
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK(existed && row.created_ms == 5000 && row.expires_ms > 1600000000000);
+    scene_row_release(&row);
+    store_close(store);
+    mem_free(path);
     drop_dir(dir);
 }
 
@@ -226,6 +256,7 @@ static void test_outbox(void) {
 int main(void) {
     test_scenes();
     test_share();
+    test_sent_again();
     test_events();
     test_outbox();
     return check_result();
