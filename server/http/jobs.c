@@ -368,7 +368,8 @@ static enum status read_settings(const struct job *job, cJSON **given, struct se
     return err->status = STATUS_CORRUPT; /* they were checked when the job was made */
 }
 
-/* The job's settings with its limit, of iterations or of time, put off by what the body says;
+/* The job's settings with its limit, of iterations or of time, put off by what the body says (and all of that time
+ * used);
  * NULL, and *refusal, where that makes no sense. The caller's (mem_free). */
 static char *longer_settings(const struct request *r, const struct job *job, struct response **refusal) {
     struct error err;
@@ -393,6 +394,11 @@ static char *longer_settings(const struct request *r, const struct job *job, str
         double sum = settings_number(&full, limit) + more;
         cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
         json_add_number(settings, limit, sum);
+        if (strcmp(limit, "time_limit_sec") == 0) { /* it may have ended before its time */
+            cJSON_DeleteItemFromObjectCaseSensitive(settings, "refine_looks");
+            if (settings_is(&full, "method", "solve"))
+                json_add_number(settings, "refine_looks", 0);
+        }
         if (cJSON_GetArraySize(params) == 0)
             settings_apply(&full, settings, params, NULL);
         if (cJSON_GetArraySize(params) > 0) {

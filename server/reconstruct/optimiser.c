@@ -69,6 +69,8 @@ static double fraction_done(const struct optimiser *o) {
     double fraction = o->iteration_limit
                           ? (double)o->counters.iteration / (double)o->iteration_limit
                           : o->counters.elapsed_sec / o->time_limit_sec;
+    if (!o->iteration_limit && o->method->done)
+        fraction = fmax(fraction, o->method->done(o->self));
     return fraction < 1.0 ? fraction : 1.0;
 }
 
@@ -146,6 +148,7 @@ static enum status loop(struct optimiser *o, struct error *err) {
         double loss = iterate(o, fraction);
         double end = clock_sec();
         o->counters.elapsed_sec += end - begin;
+        o->counters.iterate_sec += end - begin;
         if (end - told > TELL_SEC || fraction_done(o) >= 1.0) {
             told = end;
             tell(o, loss);
@@ -165,6 +168,7 @@ static enum status loop(struct optimiser *o, struct error *err) {
                 return status;
         }
     }
+    o->counters.elapsed_sec = fmax(o->counters.elapsed_sec, o->time_limit_sec); /* extended, it goes on for that long */
     return optimiser_save(o, err);
 }
 
@@ -189,7 +193,7 @@ static void report(const struct optimiser *o) {
     json_add_int(figures, "rays_this_attempt", (int64_t)rays);
     json_add_int(figures, "non_finite_samples_dropped_this_attempt", (int64_t)dropped);
     json_add_number(figures, "paths_per_second",
-                    c->elapsed_sec > 0.0 ? (double)c->path_count / c->elapsed_sec : 0.0);
+                    c->iterate_sec > 0.0 ? (double)c->path_count / c->iterate_sec : 0.0);
     json_add_number(figures, "paths_per_texel",
                     (double)c->path_count / (double)o->r->inverse.valid_count);
     cJSON *series = cJSON_AddObjectToObject(o->r->report, "series");

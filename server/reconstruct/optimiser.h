@@ -28,13 +28,16 @@ struct optimiser_method {
     void (*iterate)(void *self, double fraction);
     /* The arrays that are kept were just filled from a checkpoint. */
     void (*resumed)(void *self);
+    /* What part of its work is done, in [0, 1], for a run by time that may end before; NULL: it never does. */
+    double (*done)(const void *self);
     void (*free)(void *self);
 };
 
 /* What a checkpoint holds of the run itself. */
 struct optimiser_counters {
     uint64_t iteration, path_count;
-    double elapsed_sec; /* of the time limit, over all attempts */
+    double elapsed_sec; /* of the time limit, over all attempts; all of it when the run is over */
+    double iterate_sec; /* that iterations took */
     double planned;     /* iterations or seconds that the curve is drawn over */
     double curve_sum[OPTIMISER_CURVE_POINTS], curve_count[OPTIMISER_CURVE_POINTS]; /* of mean losses */
 };

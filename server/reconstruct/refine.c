@@ -1,8 +1,13 @@
 /* refine.c -- see refine.h. */
 #include "server/reconstruct/refine.h"
 
+#include <math.h>
+
 #include "common/mem.h"
 #include "server/reconstruct/match.h"
+
+/* Windows of base colour that lie across the texture. */
+#define WINDOWS_ACROSS 64
 
 /* What a look tells of base colour. */
 struct look_match {
@@ -63,7 +68,24 @@ static void release(void *self) {
     mem_free(f);
 }
 
-static const struct optimiser_method method = {iterate, resumed, release};
+/* Part of the looks that windows are to have, in the mean. */
+static double done(const void *self) {
+    const struct refine *f = self;
+    double wanted = settings_number(f->o->r->settings, "refine_looks");
+    double windows = ceil(ldexp((double)f->o->r->inverse.valid_count, -2 * f->matcher.level));
+    double looks = (double)f->o->counters.path_count / settings_number(f->o->r->settings, "samples_per_camera");
+    return wanted > 0.0 ? looks / (wanted * windows) : 0.0;
+}
+
+static const struct optimiser_method method = {iterate, resumed, done, release};
+
+/* Windows are 2^level texels a side. */
+static int level_of(const struct texture *t) {
+    int level = 0;
+    while ((t->width > t->height ? t->width : t->height) >> (level + 1) >= WINDOWS_ACROSS)
+        level++;
+    return level;
+}
 
 struct optimiser *refine_new(struct reconstruction *r, const struct views *views,
                              const struct reconstruct_hooks *hooks) {
@@ -71,7 +93,7 @@ struct optimiser *refine_new(struct reconstruction *r, const struct views *views
     struct optimiser *o = optimiser_new(r, views, hooks, false, &method, f);
     *f = (struct refine){.o = o};
     matcher_init(&f->matcher, &r->materials.base_color, &r->inverse, &r->segments, r->atlas.chart_of_triangle,
-                 &o->emission, (int)settings_number(r->settings, "refine_levels"));
+                 &o->emission, level_of(&r->materials.base_color));
     f->look = mem_calloc(o->pass.chunk_count * o->pass.look_capacity, sizeof *f->look);
     f->d_emission = mem_array(r->segments.count, sizeof *f->d_emission);
     f->emission_rate = (float)settings_number(r->settings, "emission_rate");

@@ -2,9 +2,12 @@
  *
  * Solve takes light from where one ray meets a surface that photographs show; refine follows whole
  * paths. It looks at texels as listing1 does (pass.h), but walks no path backwards: of base colour,
- * windows of 2^refine_levels texels a side keep their detail and move by the ratio of what was shown
+ * windows of a 64th of the texture's side keep their detail and move by the ratio of what was shown
  * to what was rendered, against a prior for what was solved (match.h); the emitters move by what is
- * seen of them (emission.h); roughness and specular stay. */
+ * seen of them (emission.h); roughness and specular stay.
+ *
+ * It ends before its time when windows had enough looks (setting refine_looks): from then on what moves them is no
+ * longer noise nor what solve left but the faults of renders and photographs themselves, and base colour gets worse. */
 #ifndef UNBAKE_RECONSTRUCT_REFINE_H
 #define UNBAKE_RECONSTRUCT_REFINE_H
 

@@ -137,7 +137,7 @@ for bad in '{}' '[]' '{"time_limit_sec":1,"iterations":1}'; do post "/v1/jobs/$j
 for bad in '{"time_limit_sec":0}' '{"time_limit_sec":"x"}' '{"time_limit_sec":1e9}' '{"iterations":5}'; do
     post "/v1/jobs/$job/extend" "$bad"; expect 422 "extend by $bad"
 done
-post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 202; equal "$(field .settings.time_limit_sec)" 660
+post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 202; equal "$(field .settings.time_limit_sec)" 660; equal "$(field .settings.refine_looks)" 0
 post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend of a queued job"
 move start "$job"; move succeed "$job" 6
 call DELETE "/v1/jobs/$job?dry_run=1"; expect 200; equal "$(field .files)" 1 files; [ "$(field .bytes)" -ge 20000 ] || fail "$(field .bytes) bytes"

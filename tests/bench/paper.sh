@@ -203,8 +203,7 @@ the published method,method=listing1
 published; any segment may emit,method=listing1 emitters=any
 published; one estimate instead of two,method=listing1 estimates=one
 published; pixels instead of texels,method=listing1 choose=pixels
-refined texel by texel,refine_levels=0
-refined in windows of 32 texels,refine_levels=5
+refined to the end of the time,refine_looks=0
 exposures and gains as given,calibrate=false
 one photograph a visit,cameras_per_texel=1
 paths of 8 segments,max_depth=8

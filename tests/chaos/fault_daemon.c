@@ -95,7 +95,7 @@ static bool submit(const char *name, int iterations, char path[40]) {
     struct buf body;
     char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
                             "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
-                            "\"refine_levels\":1,\"report_samples\":1}}", scene, name, iterations);
+                            "\"report_samples\":1}}", scene, name, iterations);
     bool made = ask_json(201, "POST", "/v1/jobs", json, &body);
     if (made)
         snprintf(path, 40, "/v1/jobs/%lld", strtoll(buf_text(&body) + 6, NULL, 10));

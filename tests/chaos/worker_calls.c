@@ -5,7 +5,7 @@
 #include "tests/chaos/worker.h"
 
 #define SETTINGS                                                                                                \
-    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,\"refine_levels\":1,"                         \
+    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                         \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
 static char binary[512], library[PATH_MAX], log_path[128], dir[128];

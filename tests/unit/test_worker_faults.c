@@ -25,7 +25,7 @@ static struct error err;
 #define FRAME(name) "{\"file_path\":\"" name "\",\"transform_matrix\":[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,1]]}"
 #define MESH "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
 #define SETTINGS                                                                                                    \
-    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,\"refine_levels\":1,"                         \
+    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                             \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
 static char dir[64]; /* in memory where possible: much is made sure to be on disk */
