@@ -67,6 +67,32 @@ static void test_stop_in_solve(struct scene *scene) {
     settings_release(&s);
 }
 
+static double refine_figure(const struct reconstruction *r, const char *name) {
+    return cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(r->report, "refine"), name));
+}
+
+/* A run by time ends when windows (of one texel here) had the looks asked for; extended, it goes on from there. */
+static void test_ends_early(struct scene *scene) {
+    struct settings s = shell_settings("{\"texture_size\":64,\"time_limit_sec\":100000,\"refine_looks\":3,"
+                                      "\"report_samples\":2,\"gather_samples\":64,\"texels_per_iteration\":512}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_OK);
+    double looks = refine_figure(&r, "paths") / 16.0, wanted = 3.0 * (double)r.inverse.valid_count;
+    double iterations = refine_figure(&r, "iterations");
+    CHECK_THAT(looks >= wanted && looks < wanted + 2.0 * 512.0, "%g looks, not %g", looks, wanted);
+    reconstruct_release(&r);
+    settings_release(&s);
+    s = shell_settings("{\"texture_size\":64,\"time_limit_sec\":100000.1,\"refine_looks\":0,"
+                       "\"report_samples\":2,\"gather_samples\":64,\"texels_per_iteration\":512}");
+    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_OK);
+    CHECK_THAT(refine_figure(&r, "iterations") > iterations, "%g iterations, then %g", iterations,
+               refine_figure(&r, "iterations"));
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
 #define INSIDE_OUT 2 /* a wall as a careless model would have it */
 
 static void turn_inside_out(struct mesh *mesh, int64_t object) {
@@ -137,6 +163,7 @@ int main(void) {
     test_same_bytes(&scene, false, "{\"texture_size\":64,\"iterations\":30,\"report_samples\":2,"
                                    "\"method\":\"listing1\",\"texels_per_iteration\":256,\"coarse_levels\":3}");
     test_stop_in_solve(&scene);
+    test_ends_early(&scene);
     test_recovers(&scene);
     scene_release(&scene);
     return check_result();
