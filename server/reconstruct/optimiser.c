@@ -125,15 +125,23 @@ static double iterate(struct optimiser *o, double fraction) {
     return loss;
 }
 
+/* Seconds that iterations will still take, after the first. */
+static double seconds_left(const struct optimiser *o) {
+    const struct optimiser_counters *c = &o->counters;
+    double done = o->iteration_limit ? (double)c->iteration / (double)o->iteration_limit
+                  : o->method->done  ? o->method->done(o->self)
+                                     : 0.0;
+    double by_work = done > 0.0 ? fmax(c->iterate_sec * (1.0 / done - 1.0), 0.0) : INFINITY;
+    return o->iteration_limit ? by_work : fmin(by_work, fmax(o->time_limit_sec - c->elapsed_sec, 0.0));
+}
+
 /* How far it is, after an iteration of this loss. */
 static void tell(const struct optimiser *o, double loss) {
     const struct reconstruct_hooks *hooks = o->hooks;
     long iteration = (long)o->counters.iteration;
-    double fraction = fraction_done(o);
-    double left = fraction > 0.0 ? o->counters.elapsed_sec * (1.0 / fraction - 1.0) : -1.0;
     uint64_t rays, dropped;
     pass_ray_counts(&o->pass, &rays, &dropped);
-    hooks->progress(hooks->user, "refine", fraction, 1.0, left);
+    hooks->progress(hooks->user, "refine", fraction_done(o), 1.0, seconds_left(o));
     hooks->metric(hooks->user, "loss", iteration, loss);
     hooks->metric(hooks->user, "rays", iteration, (double)rays); /* of this attempt */
 }
