@@ -144,7 +144,8 @@ static void add_arrived(double sum[4], rgb white) {
     sum[3] += 1.0;
 }
 
-/* Fills `arrived`: the mean over a segment's texels of what a white surface there would send out. */
+/* Fills `arrived`: the mean over a segment's texels that are seen of what a white surface there would send out. Of a
+ * lamp thinner than a pixel none is seen clean: all of them count. */
 static void average_arrived(const struct solve *s) {
     const struct reconstruction *r = s->r;
     struct arrived *sum = mem_calloc(r->segments.count, sizeof *sum);
@@ -152,7 +153,8 @@ static void average_arrived(const struct solve *s) {
         uint32_t texel = r->inverse.valid[i];
         size_t segment = reconstruction_segment(r, texel);
         rgb white;
-        if (!(r->fused.count[texel] > 0.0f) || !divide_white(&s->divide, texel, &white))
+        bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].mixed;
+        if (!is_seen || !divide_white(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
         if (rgb_mean(fused_radiance(&r->fused, texel)) > AS_BRIGHT * rgb_mean(r->evidence[segment].shown))

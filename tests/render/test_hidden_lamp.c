@@ -1,5 +1,5 @@
 /* lamp_find.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
- * was photographed nothing else is taken for one. The same for any number of threads. */
+ * was photographed, be it thinner than a pixel, nothing else is taken for one. The same for any number of threads. */
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/reconstruction.h"
 #include "tests/check.h"
@@ -74,10 +74,31 @@ static void test_none_hidden(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* A strip of a twentieth of a metre, less than a pixel of most photographs: all that shows it shows the ceiling, too. */
+static void test_thin(struct parallel *pool) {
+    struct scene scene = {0};
+    make_mesh(&scene.mesh);
+    for (size_t i = 0; i < 4; i++) {
+        vec3 *corner = &scene.mesh.position[4 * LAMP + i];
+        *corner = (vec3){corner->x > 2.0f ? 3.5f : 0.5f, corner->y, corner->z > 1.5f ? 1.525f : 1.475f};
+    }
+    photograph_mesh(&scene, rgb_scale(lamp_radiance, 6.0f), NULL, look_anywhere, pool);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++) {
+        bool is_lamp = r.segments.id[s] == LAMP;
+        CHECK_THAT(r.is_emitter[s] == is_lamp && !r.evidence[s].hidden, "segment %zu", s);
+        CHECK(!is_lamp || r.evidence[s].mixed);
+    }
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_hidden(pool);
     test_none_hidden(pool);
+    test_thin(pool);
     parallel_free(pool);
     return check_result();
 }
