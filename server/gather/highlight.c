@@ -68,7 +68,7 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
         vec2 u = sampler_pair(key, (uint32_t)(i / levels_used), PAIR_HALF + (uint32_t)(i % levels_used));
         in->direction[i] = to_world(frame, bsdf_sample(&lobe[i % levels_used], wo, 0.0f, u.x, u.y));
     }
-    incident_trace(in, field, at, samples);
+    incident_trace(in, field, at, key, 0, samples);
     incident_sample_lights(in, field, at, key, 0, samples, light_samples);
     for (size_t i = 0; i < samples + light_samples; i++) {
         vec3 wi = to_local(frame, in->direction[i]);

@@ -2,6 +2,7 @@
 #include "server/gather/incident.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 #include "server/render/bsdf.h"
@@ -9,21 +10,12 @@
 #include "server/render/sampler.h"
 #include "server/scene/rgb_half.h"
 
-enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT };
+enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT, PAIR_BACK = 32 };
+#define BACKS 4 /* met one after the other before a ray is given up */
 
-/* What the field shows at a hit, and the density of the light sampler there. */
-static rgb look_at(const struct light_field *field, const struct accel_hit *hit, vec3 direction,
-                   float *light_pdf) {
-    const struct world *world = field->world;
+/* The texel at a hit. */
+static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
     const struct world_triangle *t = &world->triangle[hit->triangle];
-    float facing = -vec3_dot(t->normal, direction);
-    *light_pdf = 0.0f;
-    if (!(facing > 0.0f))
-        return rgb_gray(0.0f); /* backs are not photographed */
-    if (world->lights->area_density[t->segment] > 0.0f) {
-        *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, facing);
-        return world->materials->emission[t->segment];
-    }
     float b0 = 1.0f - hit->b1 - hit->b2;
     float x = b0 * t->corner[0].x + hit->b1 * t->corner[1].x + hit->b2 * t->corner[2].x;
     float y = b0 * t->corner[0].y + hit->b1 * t->corner[1].y + hit->b2 * t->corner[2].y;
@@ -31,23 +23,82 @@ static rgb look_at(const struct light_field *field, const struct accel_hit *hit,
     uint32_t column = x > 0.0f ? (uint32_t)x : 0, row = y > 0.0f ? (uint32_t)y : 0;
     column = column < width ? column : width - 1;
     row = row < height ? row : height - 1;
-    return rgb_from_half(field->radiance[(size_t)row * width + column]);
+    return (size_t)row * width + column;
+}
+
+/* What the field shows at a hit of a front, and the density of the light sampler there. */
+static rgb look_at(const struct light_field *field, const struct accel_hit *hit, float facing, float *light_pdf) {
+    const struct world *world = field->world;
+    const struct world_triangle *t = &world->triangle[hit->triangle];
+    *light_pdf = 0.0f;
+    if (world->lights->area_density[t->segment] > 0.0f) {
+        *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, facing);
+        return world->materials->emission[t->segment];
+    }
+    return rgb_from_half(field->radiance[texel_at(world, hit)]);
+}
+
+/* The ray that goes on from a back, by its cosine. */
+static struct accel_ray ray_behind(const struct world_triangle *t, const struct accel_ray *ray, float distance_m,
+                                   vec2 u) {
+    vec3 frame[3] = {[2] = vec3_neg(t->normal)};
+    vec3_frame(frame[2], &frame[0], &frame[1]);
+    vec3 p = vec3_mad(ray->origin, distance_m, ray->direction);
+    p = vec3_mad(p, t->plane - vec3_dot(t->normal, p), t->normal);
+    vec3 direction = incident_cosine_direction(frame, u);
+    return (struct accel_ray){accel_offset(p, frame[2], direction), 0.0f, direction, INFINITY};
+}
+
+/* Takes what rays 0..count found, ray k being that of back[k]; those that met a back go on, from the first places of
+ * in->ray and in->back. Returns how many. The densities are those of the light sampler at back[k].index. */
+static size_t take_hits(struct incident *in, const struct light_field *field, size_t count, uint32_t key,
+                        uint32_t first_sample, uint32_t backs) {
+    const struct world *world = field->world;
+    size_t going = 0;
+    for (size_t k = 0; k < count; k++) {
+        struct accel_ray ray = in->ray[k];
+        struct accel_hit hit = in->hit[k];
+        struct incident_back from = in->back[k];
+        float light_pdf;
+        rgb found;
+        if (hit.triangle == ACCEL_NONE) {
+            found = lights_environment(world->lights, ray.direction);
+            light_pdf = lights_pdf_environment(world->lights, ray.direction);
+        } else {
+            const struct world_triangle *t = &world->triangle[hit.triangle];
+            float facing = -vec3_dot(t->normal, ray.direction);
+            if (!(facing > 0.0f)) {
+                const float *base = world->materials->base_color.texel[texel_at(world, &hit)];
+                vec2 u = sampler_pair(key, first_sample + from.index, PAIR_BACK + backs);
+                in->ray[going] = ray_behind(t, &ray, hit.distance_m, u);
+                in->back[going++] = (struct incident_back){
+                    from.index, rgb_mul(from.weight, rgb_make(base[0], base[1], base[2]))};
+                continue;
+            }
+            found = look_at(field, &hit, facing, &light_pdf);
+        }
+        in->radiance[from.index] = rgb_mul(from.weight, found);
+        if (backs == 0) {
+            in->light_pdf[from.index] = light_pdf;
+            in->leaves[from.index] = hit.triangle == ACCEL_NONE;
+        }
+    }
+    return going;
 }
 
 void incident_trace(struct incident *in, const struct light_field *field,
-                    const struct surface_point *at, size_t count) {
-    const struct world *world = field->world;
-    for (size_t i = 0; i < count; i++)
+                    const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count) {
+    for (size_t i = 0; i < count; i++) {
         in->ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, in->direction[i]), 0.0f,
                                         in->direction[i], INFINITY};
-    accel_intersect_many(world->accel, count, in->ray, in->hit);
-    for (size_t i = 0; i < count; i++) {
-        if (in->hit[i].triangle == ACCEL_NONE) {
-            in->radiance[i] = lights_environment(world->lights, in->direction[i]);
-            in->light_pdf[i] = lights_pdf_environment(world->lights, in->direction[i]);
-        } else {
-            in->radiance[i] = look_at(field, &in->hit[i], in->direction[i], &in->light_pdf[i]);
-        }
+        in->back[i] = (struct incident_back){(uint32_t)i, rgb_gray(1.0f)};
+        in->radiance[i] = rgb_gray(0.0f);
+        in->light_pdf[i] = 0.0f;
+        in->leaves[i] = false;
+    }
+    for (uint32_t backs = 0; backs <= BACKS && count > 0; backs++) {
+        accel_intersect_many(field->world->accel, count, in->ray, in->hit);
+        count = take_hits(in, field, count, key, first_sample, backs);
     }
 }
 
@@ -115,7 +166,7 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
         size_t lit = light_samples * (done + ways) / samples - lights_done;
         for (size_t i = 0; i < ways; i++)
             in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
-        incident_trace(in, field, at, ways);
+        incident_trace(in, field, at, key, (uint32_t)done, ways);
         incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
         float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
         for (size_t i = 0; i < ways + lit; i++) {

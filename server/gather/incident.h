@@ -2,12 +2,15 @@
  *
  * A ray that leaves the point meets another surface, and what that surface sends back was
  * photographed: no path needs to go on, and no material need be known (Wu et al. 2023, Li et
- * al. 2023). Surfaces are taken to send the same in all directions here. Light from emitters and
+ * al. 2023). Surfaces are taken to send the same in all directions here. The back of a surface is
+ * in no photograph (a wall without thickness has one): it has the front's base colour, and the ray
+ * goes on from there. Light from emitters and
  * from the environment is sampled as such as well; the two ways are combined by the balance
  * heuristic (Veach 1997). */
 #ifndef UNBAKE_GATHER_INCIDENT_H
 #define UNBAKE_GATHER_INCIDENT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -28,17 +31,23 @@ struct incident {
     vec3 direction[INCIDENT_CHUNK]; /* unit, world */
     rgb radiance[INCIDENT_CHUNK];
     float light_pdf[INCIDENT_CHUNK]; /* by solid angle, with which the light sampler picks it */
+    bool leaves[INCIDENT_CHUNK];     /* it meets no surface */
     struct accel_ray ray[INCIDENT_CHUNK];
     struct accel_hit hit[INCIDENT_CHUNK];
+    struct incident_back {
+        uint32_t index; /* of the direction */
+        rgb weight;     /* of what the ray that goes on finds */
+    } back[INCIDENT_CHUNK]; /* directions in which a back was met */
     uint8_t occluded[INCIDENT_CHUNK];
 };
 
 /* A direction about frame[2], distributed by its cosine, from u in [0, 1)^2. */
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u);
 
-/* Fills radiance and light_pdf for direction[0..count). */
+/* Fills radiance, light_pdf and leaves for direction[0..count), whose random numbers are those of `key`, samples
+ * first_sample and up. */
 void incident_trace(struct incident *in, const struct light_field *field,
-                    const struct surface_point *at, size_t count);
+                    const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count);
 
 /* Appends `count` samples of the lights behind the `from` that are there: all three arrays. The
  * numbers are those of `key`, samples first_sample and up. */

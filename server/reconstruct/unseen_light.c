@@ -43,10 +43,10 @@ static void look_around(void *user, size_t index, int thread) {
     vec3_frame(at.shading, &frame[0], &frame[1]);
     for (uint32_t i = 0; i < WAYS; i++)
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-    incident_trace(in, field, &at, WAYS);
+    incident_trace(in, field, &at, key, 0, WAYS);
     for (size_t i = 0; i < WAYS; i++) {
         bool has_map = r->environment.map.pixel != NULL;
-        if (in->hit[i].triangle != ACCEL_NONE || (has_map && environment_is_seen(&r->environment, in->direction[i])))
+        if (!in->leaves[i] || (has_map && environment_is_seen(&r->environment, in->direction[i])))
             continue;
         p->filled += rgb_mean(in->radiance[i]) / WAYS;
         p->unseen += 1.0f / WAYS;
