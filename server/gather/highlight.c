@@ -2,6 +2,7 @@
 #include "server/gather/highlight.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 #include "server/render/bsdf.h"
@@ -9,6 +10,8 @@
 #include "server/render/sampler.h"
 
 enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
+#define ALBEDO_SAMPLES 1024 /* .5 % */
+#define KEY_ALBEDO 11
 
 static vec3 to_local(const vec3 frame[3], vec3 d) {
     return vec3_make(vec3_dot(frame[0], d), vec3_dot(frame[1], d), vec3_dot(frame[2], d));
@@ -76,4 +79,20 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
             add(h, levels, lobe, eta, wo, wi, in->radiance[i], (float)samples / (float)levels_used,
                 (float)light_samples * in->light_pdf[i]);
     }
+}
+
+float highlight_albedo(float roughness, float specular) {
+    struct bsdf lobe = lobe_of(roughness);
+    float eta = bsdf_eta(specular), sum = 0.0f;
+    uint32_t key = sampler_key(KEY_ALBEDO, 0, 0);
+    for (uint32_t i = 0; i < ALBEDO_SAMPLES && specular > 0.0f; i++) {
+        vec2 at = sampler_pair(key, i, 0), u = sampler_pair(key, i, 1);
+        vec3 wo = {sqrtf(at.x), 0.0f, sqrtf(1.0f - at.x)};
+        vec3 wi = bsdf_sample(&lobe, wo, 0.0f, u.x, u.y);
+        if (!(wi.z > 0.0f))
+            continue;
+        struct bsdf_ggx t = bsdf_ggx(lobe.alpha, wo, wi);
+        sum += bsdf_fresnel(t.cos_d, eta) * 2.0f * wi.z / (wi.z + t.root_i);
+    }
+    return sum * (1.0f / ALBEDO_SAMPLES);
 }

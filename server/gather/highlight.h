@@ -32,4 +32,7 @@ void highlight_gather(struct highlight *highlight, struct incident *scratch,
                       const struct highlight_levels *levels, uint32_t key, size_t samples,
                       size_t light_samples);
 
+/* The part that the lobe sends back of light that arrives evenly from everywhere. */
+float highlight_albedo(float roughness, float specular);
+
 #endif

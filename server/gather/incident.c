@@ -228,3 +228,24 @@ rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float 
     }
     return rgb_make(out[0], out[1], out[2]);
 }
+
+/* The terms of irradiance_diffuse under a viewer's density cos / pi, in which 1, wo, F(wo), F(wo) wo have means
+ * 1, 2/3 n, 1/21, 1/84 n, and F(wo) wo wo^T is 1/252 along n and 11/504 across it. */
+rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness) {
+    const float(*q)[3] = irradiance->moment;
+    const vec3 n = shading;
+    float r = roughness, off = r - 0.5f;
+    float one = 1.0f + off * (1.0f / 21.0f), m1 = r * (1.0f / 84.0f);
+    float f0 = off + off * off * (1.0f / 21.0f), f1 = r * (2.0f / 3.0f) + 2.0f * r * off * (1.0f / 84.0f);
+    float across = r * r * (11.0f / 504.0f), along = r * r * (1.0f / 252.0f);
+    float out[3];
+    for (int c = 0; c < 3; c++) {
+        float m = q[1][c] * n.x + q[2][c] * n.y + q[3][c] * n.z;
+        float fm = q[5][c] * n.x + q[6][c] * n.y + q[7][c] * n.z;
+        float fmm = q[8][c] * n.x * n.x + q[9][c] * n.y * n.y + q[10][c] * n.z * n.z +
+                    2.0f * (q[11][c] * n.x * n.y + q[12][c] * n.x * n.z + q[13][c] * n.y * n.z);
+        float f2 = across * (q[4][c] - fmm) + along * fmm;
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * m + f0 * q[4][c] + f1 * fm + f2) * (1.0f / BSDF_PI));
+    }
+    return rgb_make(out[0], out[1], out[2]);
+}

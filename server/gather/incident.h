@@ -76,4 +76,7 @@ void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction,
 /* Radiance that the diffuse lobe of a white surface sends towards unit `wo`. */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo);
 
+/* Its mean over viewers, by the cosine of where they are: radiosity over pi. */
+rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness);
+
 #endif

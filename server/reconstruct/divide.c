@@ -10,6 +10,7 @@
 #include "server/capture/robust.h"
 #include "server/gather/highlight.h"
 #include "server/reconstruct/color_prior.h"
+#include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 #include "server/scene/rgb_half.h"
 #include "server/scene/surface.h"
@@ -35,9 +36,8 @@
 /* A base colour of which a look says more than this is not one. */
 #define MOST 4.0f
 /* Variance of base colour by light of others at which what photographs show of a texel counts as much as
- * what its base colour reflects, and the share of the former from which it is taken as it is. */
+ * what is to be expected there. */
 #define MIXING_TOLD 0.01f
-#define MOSTLY_KNOWN 0.9f
 
 /* What is gathered of one texel. */
 struct texel_looks {
@@ -238,16 +238,49 @@ static void keep_noise(struct divide *d, const struct color_prior *prior) {
     }
 }
 
-/* Replaces what photographs tell of the light that a texel sends out by what its base colour reflects, as
- * far as they may have told of other surfaces: beside a window a thin frame would else shine like it. */
-static void send_out(const struct divide *d, uint32_t texel, uint16_t radiance[3]) {
+struct sending {
+    const struct divide *divide;
+    const float *gloss_albedo; /* [segment_count] */
+    uint16_t (*radiance)[3];
+};
+
+/* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors
+ * aslant and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
+ * expected there: beside a window a thin frame would else shine like it. */
+static void send_out(const struct sending *job, uint32_t texel) {
+    const struct divide *d = job->divide;
     const struct measured *m = &d->measured[texel];
-    float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
-    rgb white;
-    if (known > MOSTLY_KNOWN || d->r->is_emitter[reconstruction_segment(d->r, texel)] || !divide_white(d, texel, &white))
+    uint32_t segment = reconstruction_segment(d->r, texel);
+    struct surface_point at;
+    struct irradiance light;
+    if (d->r->is_emitter[segment] || !light_at(d, texel, &at, &light))
         return;
-    rgb reflected = rgb_mul(texel_color(d->r, texel), white);
-    rgb_to_half(radiance, rgb_mad(rgb_scale(reflected, 1.0f - known), known, fused_radiance(&d->r->fused, texel)));
+    float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
+    rgb measured = rgb_clamp(measured_value(m), 0.0f, MOST), expected = texel_color(d->r, texel);
+    rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
+    rgb white = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
+    const float *arrived = light.moment[0];
+    rgb gloss = rgb_scale(rgb_make(arrived[0], arrived[1], arrived[2]), job->gloss_albedo[segment] * (1.0f / BSDF_PI));
+    rgb_to_half(job->radiance[texel], rgb_add(rgb_mul(base, white), gloss));
+}
+
+static void send_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct sending *job = user;
+    const struct inverse_uv *inverse = &job->divide->r->inverse;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
+    for (size_t i = begin; i < end; i++)
+        send_out(job, inverse->valid[i]);
+}
+
+static void send_all(const struct divide *d, uint16_t (*radiance)[3]) {
+    const struct reconstruction *r = d->r;
+    float *gloss_albedo = mem_array(r->segments.count, sizeof *gloss_albedo);
+    for (size_t i = 0; i < r->segments.count; i++)
+        gloss_albedo[i] = highlight_albedo(r->materials.roughness[i], r->materials.specular[i]);
+    struct sending job = {d, gloss_albedo, radiance};
+    parallel_for(r->pool, (r->inverse.valid_count + CHUNK - 1) / CHUNK, send_chunk, &job);
+    mem_free(gloss_albedo);
 }
 
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
@@ -261,6 +294,5 @@ void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     else
         keep_noise(d, prior);
     mem_free(prior);
-    for (size_t i = 0; i < r->inverse.valid_count; i++)
-        send_out(d, r->inverse.valid[i], radiance[r->inverse.valid[i]]);
+    send_all(d, radiance);
 }

@@ -13,6 +13,9 @@
  * solved light of a block by 2 %: (.33 / .02)^2. */
 #define PRIOR_LOOKS 256.0f
 
+/* Logarithm of the factor by which looks at a block move together, at most. */
+#define MOST_MOVED 0.1f
+
 struct match match_look(const struct photograph_sample *reference, const rgb *radiance,
                         int sample_count, rgb expected, float median_radiance) {
     float shown[3] = {0}, rendered[3] = {0}, clip[3] = {0};
@@ -50,28 +53,32 @@ void matcher_init(struct matcher *m, struct texture *base_color, const struct in
                   const struct emission *emission, int level) {
     *m = (struct matcher){.base_color = base_color, .inverse = inverse, .segments = segments,
                           .chart_of_triangle = chart_of_triangle, .emission = emission, .level = level};
-    m->look_count = mem_calloc(blocks_count(base_color, level), sizeof *m->look_count);
+    m->block = mem_calloc(blocks_count(base_color, level), sizeof *m->block);
 }
 
 void matcher_release(struct matcher *m) {
-    mem_free(m->look_count);
+    mem_free(m->block);
     *m = (struct matcher){0};
 }
 
 size_t matcher_bytes(const struct matcher *m) {
-    return blocks_count(m->base_color, m->level) * sizeof *m->look_count;
+    return blocks_count(m->base_color, m->level) * sizeof *m->block;
 }
 
 void matcher_step(struct matcher *m, uint32_t texel, const struct match *match, float trust) {
     struct texture *texture = m->base_color;
     const uint32_t *triangle = m->inverse->triangle;
-    float *look_count = &m->look_count[blocks_at(texture, texel, m->level)];
+    struct matcher_block *block = &m->block[blocks_at(texture, texel, m->level)];
     float slowdown = emission_slowdown(m->emission, m->segments->of_triangle[triangle[texel]]);
-    float step = slowdown * trust / (*look_count + PRIOR_LOOKS);
-    *look_count += 1.0f;
+    float step = slowdown * trust / (block->look_count + PRIOR_LOOKS);
+    block->look_count += 1.0f;
     float factor[3];
-    for (int c = 0; c < 3; c++)
-        factor[c] = (1.0f + step * (match->shown[c] - 1.0f)) / (1.0f + step * (match->rendered[c] - 1.0f));
+    for (int c = 0; c < 3; c++) {
+        float off = (1.0f + step * (match->shown[c] - 1.0f)) / (1.0f + step * (match->rendered[c] - 1.0f));
+        float moved = clampf(block->moved[c] + logf(off), -MOST_MOVED, MOST_MOVED);
+        factor[c] = expf(moved - block->moved[c]);
+        block->moved[c] = moved;
+    }
     uint32_t chart = m->chart_of_triangle[triangle[texel]];
     size_t column = texel % texture->width, row = texel / texture->width;
     size_t half = ((size_t)1 << m->level) / 2;

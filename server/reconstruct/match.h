@@ -33,25 +33,29 @@ struct match match_look(const struct photograph_sample *reference, const rgb *ra
                         int sample_count, rgb expected, float median_radiance);
 
 struct matcher {
-    struct texture *base_color;        /* borrowed, as all but look_count */
+    struct texture *base_color;        /* borrowed, as all but block */
     const struct inverse_uv *inverse;
     const struct segments *segments;
     const uint32_t *chart_of_triangle;
     const struct emission *emission;   /* tells emitters, which move slowly */
     int level;                         /* a window is 2^level texels a side */
-    float *look_count;                 /* [blocks of that level] looks so far; owned */
+    struct matcher_block {
+        float look_count; /* so far */
+        float moved[3];   /* logarithm of the factor by which these looks scaled, by channel */
+    } *block;             /* [blocks of that level]; owned */
 };
 
 void matcher_init(struct matcher *m, struct texture *base_color, const struct inverse_uv *inverse,
                   const struct segments *segments, const uint32_t *chart_of_triangle,
                   const struct emission *emission, int level);
 void matcher_release(struct matcher *m);
-size_t matcher_bytes(const struct matcher *m); /* of look_count */
+size_t matcher_bytes(const struct matcher *m); /* of block[] */
 
 /* One look at a valid texel: scales, by channel, all of its chart within half a window of it. The
  * step is 1 / (looks at its block so far + a prior, which is what the solved start is worth). The
  * prior keeps interreflection (all windows that scale together change the light as well) from
- * overshooting. `trust` in [0, 1] scales the step. */
+ * overshooting. Looks at a block together move by a tenth at most: what asks for more is not what solve left, but
+ * light that renders lack or have too much of. `trust` in [0, 1] scales the step. */
 void matcher_step(struct matcher *m, uint32_t texel, const struct match *match, float trust);
 
 #endif

@@ -97,7 +97,7 @@ struct optimiser *refine_new(struct reconstruction *r, const struct views *views
     f->look = mem_calloc(o->pass.chunk_count * o->pass.look_capacity, sizeof *f->look);
     f->d_emission = mem_array(r->segments.count, sizeof *f->d_emission);
     f->emission_rate = (float)settings_number(r->settings, "emission_rate");
-    optimiser_keep(o, "base_color.look_count", f->matcher.look_count, matcher_bytes(&f->matcher));
+    optimiser_keep(o, "base_color.moved", f->matcher.block, matcher_bytes(&f->matcher));
     return o;
 }
 

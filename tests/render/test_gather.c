@@ -4,6 +4,7 @@
  * standard errors of both sides. */
 #include "server/gather/highlight.h"
 #include "server/gather/incident.h"
+#include "server/render/bsdf.h"
 #include "server/render/path.h"
 #include "server/render/sampler.h"
 #include "tests/check.h"
@@ -24,10 +25,10 @@ struct fixture {
     struct surface_point at; /* on the floor */
 };
 
+/* Of f->mesh. */
 static void fixture_init(struct fixture *f) {
     struct error err = {0};
     f->pool = parallel_new(0);
-    make_mesh(&f->mesh);
     segments_from_object_id(&f->segments, &f->mesh);
     CHECK(atlas_make(&f->atlas, &f->mesh, &f->segments, 128, 0.0f, &err) == STATUS_OK);
     inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, f->pool);
@@ -67,10 +68,10 @@ static void light_walls(struct fixture *f) {
     world_update_lights(&f->world);
 }
 
-/* What the floor at f->at shows to a viewer in direction wo, by paths of one bounce. */
-static rgb trace(struct fixture *f, vec3 wo) {
-    struct path_batch *batch = path_batch_new(1024, 2);
-    struct path_settings settings = {.max_depth = 2, .roulette_depth = 32, .seed = 5};
+/* What the floor at f->at shows to a viewer in direction wo, by paths of one bounce or more. */
+static rgb trace_depth(struct fixture *f, vec3 wo, int max_depth) {
+    struct path_batch *batch = path_batch_new(1024, max_depth);
+    struct path_settings settings = {.max_depth = max_depth, .roulette_depth = 32, .seed = 5};
     rgb sum = {0, 0, 0};
     vec3 eye = vec3_mad(f->at.position, 0.3f, wo);
     for (uint32_t first = 0; first < PATHS; first += 1024) {
@@ -87,6 +88,10 @@ static rgb trace(struct fixture *f, vec3 wo) {
     }
     path_batch_free(batch);
     return rgb_sub(sum, f->materials.emission[0]);
+}
+
+static rgb trace(struct fixture *f, vec3 wo) {
+    return trace_depth(f, wo, 2);
 }
 
 static void check_close(rgb a, rgb b, float relative, const char *what, float parameter) {
@@ -123,6 +128,46 @@ static void test_diffuse(struct fixture *f) {
         }
     }
     mem_free(scratch);
+}
+
+/* The mean over viewers is that of many of them. */
+static void test_viewers(struct fixture *f) {
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance light;
+    vec3 frame[3] = {[2] = f->at.shading};
+    vec3_frame(frame[2], &frame[0], &frame[1]);
+    irradiance_gather(&light, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
+    for (float roughness = 0.0f; roughness <= 1.0f; roughness += 0.25f) {
+        rgb sum = rgb_gray(0.0f);
+        for (uint32_t i = 0; i < 4096; i++) {
+            vec3 wo = incident_cosine_direction(frame, sampler_pair(sampler_key(4, 0, 0), i, 0));
+            sum = rgb_mad(sum, 1.0f / 4096, irradiance_diffuse(&light, f->at.shading, roughness, wo));
+        }
+        check_close(irradiance_diffuse_mean(&light, f->at.shading, roughness), sum, 2e-3f, "viewers, roughness",
+                    roughness);
+    }
+    mem_free(scratch);
+}
+
+/* Under an even light: by a sum over directions of light, in place of the lobe's own ones. */
+static void test_albedo(void) {
+    for (float roughness = 0.5f; roughness <= 1.0f; roughness += 0.25f) {
+        double sum = 0.0;
+        const int count = 1 << 16;
+        for (int i = 0; i < count; i++) {
+            uint32_t key = sampler_key(8, 0, 0);
+            vec2 o = sampler_pair(key, (uint32_t)i, 0), d = sampler_pair(key, (uint32_t)i, 1);
+            vec2 around = bsdf_circle(d.x);
+            vec3 wo = {sqrtf(o.x), 0.0f, sqrtf(1.0f - o.x)};
+            vec3 wi = {sqrtf(d.y) * around.x, sqrtf(d.y) * around.y, sqrtf(1.0f - d.y)};
+            struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, 0.5f, wo.z);
+            if (wi.z > 1e-4f && wo.z > 1e-4f)
+                sum += (double)(bsdf_eval(&b, wo, wi).specular / wi.z * BSDF_PI);
+        }
+        CHECK_NEAR(highlight_albedo(roughness, 0.5f), sum / count, 0.03 * sum / count);
+    }
+    CHECK(highlight_albedo(0.5f, 0.0f) == 0.0f);
 }
 
 static void test_highlights(struct fixture *f) {
@@ -170,11 +215,46 @@ static void test_field(struct fixture *f) {
     mem_free(scratch);
 }
 
+/* A sheet that hangs over the floor with its front upwards: what its back sends down is about what the path tracer says,
+ * to whom it is not quite Lambertian. */
+static void test_back(void) {
+    struct fixture g = {0};
+    make_mesh(&g.mesh);
+    /* The lamp, turned to the ceiling, hangs low and shines no more; black walls do. */
+    vec3 *corner = &g.mesh.position[4 * LAMP];
+    corner[0] = (vec3){0.5f, 0.6f, 0.5f}, corner[1] = (vec3){0.5f, 0.6f, 2.0f};
+    corner[2] = (vec3){2.0f, 0.6f, 2.0f}, corner[3] = (vec3){2.0f, 0.6f, 0.5f};
+    fixture_init(&g);
+    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0}, {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
+                                               {0.1f, 0.1f, 2}, {0.3f, 0.3f, 0.3f}, {0, 0, 0}};
+    for (int o = 0; o < OBJECTS; o++)
+        g.materials.emission[o] = wall_radiance[o];
+    world_update_lights(&g.world);
+    set_floor(&g, 0.8f, 0.5f, 0.0f);
+    for (size_t i = 0; i < g.inverse.valid_count; i++) {
+        uint32_t texel = g.inverse.valid[i], object = g.segments.of_triangle[g.inverse.triangle[texel]];
+        if (object != 0 && object != LAMP)
+            memset(g.materials.base_color.texel[texel], 0, 3 * sizeof(float));
+    }
+    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance};
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance light;
+    irradiance_gather(&light, scratch, &field, &g.at, sampler_key(1, 2, 3), GATHERED);
+    rgb gathered = rgb_scale(irradiance_diffuse(&light, g.at.shading, 0.5f, viewer(0.7f)), 0.8f);
+    check_close(gathered, trace_depth(&g, viewer(0.7f), 3), 0.05f, "under a back", 0.0f);
+    mem_free(scratch);
+    fixture_release(&g);
+}
+
 int main(void) {
     struct fixture f = {0};
+    make_mesh(&f.mesh);
     fixture_init(&f);
     light_walls(&f);
     test_diffuse(&f);
+    test_viewers(&f);
+    test_albedo();
+    test_back();
     test_highlights(&f);
     test_field(&f);
     fixture_release(&f);

@@ -1,6 +1,8 @@
 /* match.h: what a look tells as a ratio, and the window that moves by it. */
 #include "server/reconstruct/match.h"
 
+#include <math.h>
+
 #include "common/rng.h"
 #include "tests/check.h"
 #include "tests/unit/surface.h"
@@ -22,16 +24,35 @@ static void test_step(void) {
         struct match match;
         for (int c = 0; c < 3; c++) {
             float light = 0.8f * (0.5f + rng_to_float((uint32_t)rng_key(1, (uint64_t)look, (uint64_t)c)));
-            match.shown[c] = 1.0f; /* relative to a radiance of 0.48 */
-            match.rendered[c] = red[c] * light / 0.48f;
+            match.shown[c] = 1.0f; /* relative to a radiance of 0.432 */
+            match.rendered[c] = red[c] * light / 0.432f;
         }
         matcher_step(&matcher, 0, &match, 1.0f);
     }
     for (int c = 0; c < 3; c++)
-        CHECK_NEAR(m.base_color.texel[0][c], 0.6, 0.02);
+        CHECK_NEAR(m.base_color.texel[0][c], 0.54, 0.02);
     CHECK_NEAR(m.base_color.texel[1][0] / m.base_color.texel[0][0], 0.5, 1e-4);
     CHECK_NEAR(m.base_color.texel[2 * SIDE + 2][1], m.base_color.texel[0][1], 1e-6);
     CHECK(m.base_color.texel[3][0] == 0.5f && m.base_color.texel[3 * SIDE][0] == 0.5f);
+    matcher_release(&matcher);
+    emission_release(&e);
+    materials_release(&m);
+}
+
+/* However long looks ask for more, they move base colour by a tenth. */
+static void test_bound(void) {
+    const struct match match = {.shown = {3, 1, 0.2f}, .rendered = {1, 1, 1}, .trust = 1.0f};
+    struct materials m;
+    struct emission e;
+    struct matcher matcher;
+    materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
+    emission_init(&e, &m);
+    matcher_init(&matcher, &m.base_color, &inverse, &segments, chart_of_triangle, &e, 2);
+    for (int look = 0; look < 1000; look++)
+        matcher_step(&matcher, 0, &match, 1.0f);
+    CHECK_NEAR(m.base_color.texel[0][0], 0.5 * exp(0.1), 1e-4);
+    CHECK_NEAR(m.base_color.texel[0][1], 0.5, 1e-4);
+    CHECK_NEAR(m.base_color.texel[0][2], 0.5 * exp(-0.1), 1e-4);
     matcher_release(&matcher);
     emission_release(&e);
     materials_release(&m);
@@ -74,6 +95,7 @@ static void test_look(void) {
 int main(void) {
     make_surface();
     test_step();
+    test_bound();
     test_window();
     test_look();
     return check_result();
