@@ -208,6 +208,19 @@ void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction,
     }
 }
 
+/* The moments of a channel along d: of m = w . d, F m and F m^2. */
+struct along {
+    float m, fm, fmm;
+};
+
+static struct along along(const float (*q)[3], vec3 d, int c) {
+    return (struct along){
+        q[1][c] * d.x + q[2][c] * d.y + q[3][c] * d.z,
+        q[5][c] * d.x + q[6][c] * d.y + q[7][c] * d.z,
+        q[8][c] * d.x * d.x + q[9][c] * d.y * d.y + q[10][c] * d.z * d.z +
+            2.0f * (q[11][c] * d.x * d.y + q[12][c] * d.x * d.z + q[13][c] * d.y * d.z)};
+}
+
 /* bsdf_diffuse written out by powers of F(wi) and m = wi . wo: with cos_d^2 = (1 + m) / 2, its
  * rr is roughness (1 + m). */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo) {
@@ -220,11 +233,8 @@ rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float 
     float f1 = r * (1.0f - fo) + 2.0f * r * r * fo, f2 = r * r * fo;
     float out[3];
     for (int c = 0; c < 3; c++) {
-        float m = q[1][c] * wo.x + q[2][c] * wo.y + q[3][c] * wo.z;
-        float fm = q[5][c] * wo.x + q[6][c] * wo.y + q[7][c] * wo.z;
-        float fmm = q[8][c] * wo.x * wo.x + q[9][c] * wo.y * wo.y + q[10][c] * wo.z * wo.z +
-                    2.0f * (q[11][c] * wo.x * wo.y + q[12][c] * wo.x * wo.z + q[13][c] * wo.y * wo.z);
-        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * m + f0 * q[4][c] + f1 * fm + f2 * fmm) * (1.0f / BSDF_PI));
+        struct along a = along(q, wo, c);
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * a.m + f0 * q[4][c] + f1 * a.fm + f2 * a.fmm) * (1.0f / BSDF_PI));
     }
     return rgb_make(out[0], out[1], out[2]);
 }
@@ -237,15 +247,12 @@ rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, f
     float r = roughness, off = r - 0.5f;
     float one = 1.0f + off * (1.0f / 21.0f), m1 = r * (1.0f / 84.0f);
     float f0 = off + off * off * (1.0f / 21.0f), f1 = r * (2.0f / 3.0f) + 2.0f * r * off * (1.0f / 84.0f);
-    float across = r * r * (11.0f / 504.0f), along = r * r * (1.0f / 252.0f);
+    float sideways = r * r * (11.0f / 504.0f), upwards = r * r * (1.0f / 252.0f);
     float out[3];
     for (int c = 0; c < 3; c++) {
-        float m = q[1][c] * n.x + q[2][c] * n.y + q[3][c] * n.z;
-        float fm = q[5][c] * n.x + q[6][c] * n.y + q[7][c] * n.z;
-        float fmm = q[8][c] * n.x * n.x + q[9][c] * n.y * n.y + q[10][c] * n.z * n.z +
-                    2.0f * (q[11][c] * n.x * n.y + q[12][c] * n.x * n.z + q[13][c] * n.y * n.z);
-        float f2 = across * (q[4][c] - fmm) + along * fmm;
-        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * m + f0 * q[4][c] + f1 * fm + f2) * (1.0f / BSDF_PI));
+        struct along a = along(q, n, c);
+        float f2 = sideways * (q[4][c] - a.fmm) + upwards * a.fmm;
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * a.m + f0 * q[4][c] + f1 * a.fm + f2) * (1.0f / BSDF_PI));
     }
     return rgb_make(out[0], out[1], out[2]);
 }

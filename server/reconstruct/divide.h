@@ -39,8 +39,8 @@ bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
 /* The same for all texels that were measured, to white, [height][width]; 0 where it is too dark to divide by. */
 void divide_white_all(const struct divide *d, uint16_t (*white)[3]);
 
-/* After all texels: writes r->materials.base_color, and to radiance, [height][width], what those send out
- * that no photograph sees, or none sees cleanly. */
+/* After all texels: writes r->materials.base_color, and to radiance, [height][width], what texels of all but emitters
+ * send out in the mean over viewers. */
 void divide_finish(struct divide *d, uint16_t (*radiance)[3]);
 
 #endif
