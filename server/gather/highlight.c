@@ -10,7 +10,7 @@
 #include "server/render/sampler.h"
 
 enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
-#define ALBEDO_SAMPLES 1024 /* .5 % */
+#define ALBEDO_SAMPLES 1024 /* a viewer and a direction each */
 #define KEY_ALBEDO 11
 
 static vec3 to_local(const vec3 frame[3], vec3 d) {

@@ -11,7 +11,7 @@
 #include "server/scene/rgb_half.h"
 
 enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT, PAIR_BACK = 32 };
-#define BACKS 4 /* met one after the other before a ray is given up */
+#define BACKS 4 /* one after the other that a ray goes on from */
 
 /* The texel at a hit. */
 static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
