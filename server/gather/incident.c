@@ -12,6 +12,9 @@
 
 enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT, PAIR_BACK = 32 };
 #define BACKS 4 /* one after the other that a ray goes on from */
+/* A place is inside a body when all of so many rays meet a back, asked a few at a time. */
+#define ENCLOSED_RAYS 32
+#define ENCLOSED_STEP 4
 
 /* The texel at a hit. */
 static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
@@ -150,6 +153,26 @@ vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     return vec3_mad(d, r * circle.y, frame[1]);
 }
 
+/* Whether a place is inside a body, where no light comes and from where none gets out. Going on from back to back there
+ * costs many rays, and what is once taken for light among them never fades. */
+static bool is_enclosed(struct incident *in, const struct light_field *field, const struct surface_point *at,
+                        const vec3 frame[3], uint32_t key) {
+    const struct world *world = field->world;
+    for (uint32_t first = 0; first < ENCLOSED_RAYS; first += ENCLOSED_STEP) {
+        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
+            vec3 direction = incident_cosine_direction(frame, sampler_pair(key, first + i, PAIR_WAY));
+            in->ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
+        }
+        accel_intersect_many(world->accel, ENCLOSED_STEP, in->ray, in->hit);
+        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
+            uint32_t met = in->hit[i].triangle;
+            if (met == ACCEL_NONE || vec3_dot(world->triangle[met].normal, in->ray[i].direction) < 0.0f)
+                return false;
+        }
+    }
+    return true;
+}
+
 void irradiance_gather(struct irradiance *irradiance, struct incident *in,
                        const struct light_field *field, const struct surface_point *at, uint32_t key,
                        size_t samples) {
@@ -157,6 +180,10 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
     vec3 frame[3];
     frame[2] = at->shading;
     vec3_frame(at->shading, &frame[0], &frame[1]);
+    if (is_enclosed(in, field, at, frame, key)) {
+        *irradiance = (struct irradiance){0};
+        return;
+    }
     size_t light_samples = lights_any(field->world->lights) ? samples / 2 : 0;
     double sum[IRRADIANCE_MOMENTS][3] = {{0}};
     rgb noise = {0.0f, 0.0f, 0.0f};

@@ -65,7 +65,8 @@ struct irradiance {
     rgb noise; /* a draw of the error of moment[0]: half the difference of what two halves of the samples tell */
 };
 
-/* Gathers from `samples` cosine-distributed directions and half as many light samples. */
+/* Gathers from `samples` cosine-distributed directions and half as many light samples. Nothing arrives inside a body,
+ * where every ray meets a back. */
 void irradiance_gather(struct irradiance *irradiance, struct incident *scratch,
                        const struct light_field *field, const struct surface_point *at, uint32_t key,
                        size_t samples);

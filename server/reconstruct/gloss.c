@@ -13,6 +13,9 @@
  * median of the room. */
 #define SCALE_RELATIVE 0.06f
 #define SCALE_MEDIAN 0.005f
+/* The light that arrives may be found too weak by so much. Held to 1, the base colour of something white could then not
+ * explain what is seen, and highlights that are not there would. */
+#define MOST_BASE_COLOR 1.25f
 /* Light and base colour are off by about this part of the misfit, which adds to the standard error of what one
  * candidate's is beyond another's. */
 #define MISFIT_FLOOR 0.01
@@ -85,7 +88,7 @@ static float misfit_channel(const struct gloss_point *p, size_t k, size_t m, int
             over += weight[i] * white[i] * shown[i];
             under += weight[i] * white[i] * white[i];
         }
-        float base = clampf(over / under, 0.0f, 1.0f);
+        float base = clampf(over / under, 0.0f, MOST_BASE_COLOR);
         misfit = 0.0f;
         for (size_t i = 0; i < p->count; i++) {
             float e = (shown[i] - base * white[i]) / scale, influence = 1.0f / (1.0f + e * e);

@@ -246,6 +246,34 @@ static void test_back(void) {
     fixture_release(&g);
 }
 
+/* The room turned inside out around its floor, which is then inside a body: whatever is said of the floor itself,
+ * nothing arrives there. */
+static void test_inside(void) {
+    struct fixture g = {0};
+    make_mesh(&g.mesh);
+    for (size_t t = 0; t < g.mesh.triangle_count; t++) {
+        uint32_t *corner = g.mesh.index[t], first = corner[1];
+        if (g.mesh.object_id[t] == 0)
+            continue;
+        corner[1] = corner[2];
+        corner[2] = first;
+    }
+    fixture_init(&g);
+    g.materials.emission[LAMP] = rgb_gray(0.0f);
+    world_update_lights(&g.world);
+    set_floor(&g, 0.9f, 1.0f, 0.0f);
+    for (size_t i = 0; i < g.inverse.valid_count; i++)
+        for (int c = 0; c < 3; c++)
+            g.radiance[g.inverse.valid[i]][c] = image_half_from_float(3.0f);
+    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance};
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance light;
+    irradiance_gather(&light, scratch, &field, &g.at, sampler_key(1, 2, 3), GATHERED);
+    CHECK(rgb_is_black(irradiance_diffuse(&light, g.at.shading, 1.0f, viewer(0.7f))));
+    mem_free(scratch);
+    fixture_release(&g);
+}
+
 int main(void) {
     struct fixture f = {0};
     make_mesh(&f.mesh);
@@ -255,6 +283,7 @@ int main(void) {
     test_viewers(&f);
     test_albedo();
     test_back();
+    test_inside();
     test_highlights(&f);
     test_field(&f);
     fixture_release(&f);
