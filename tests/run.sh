@@ -1,12 +1,11 @@
 #!/bin/bash
 # run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
-# NAME in their names. One line a test; a failing test's output follows its line. Last:
-# "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
+# NAME in their names, TEST_LANES (2) at a time. One line a test; a failing test's output follows its line.
+# Last: "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
 # their names; of several builds these run only what is worth its time there.
 set -u
 only=$1
 shift
-passed=0 failed=0 skipped=0
 
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
@@ -17,22 +16,34 @@ slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit
 gradient/test_path render/test_calibrate_light render/test_calibrate_poses render/test_gloss render/test_split
 api/test_resume chaos/test_clock chaos/test_power_cut chaos/test_disk_faults chaos/test_memory_faults $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 
+# One test: prints its line in one piece and adds its outcome to $outcomes.
 run_one() {
     local name=$1
     shift
-    local log=$logs/${name//\//_}.log start=$SECONDS code
+    local log=$logs/${name//\//_}.log start=$SECONDS code text
     timeout "${TEST_TIMEOUT:-600}" "$@" >"$log" 2>&1 </dev/null
     code=$?
     local took=$((SECONDS - start))
     case $code in
-    0) passed=$((passed + 1)); printf 'ok    %-40s %4d s\n' "$name" "$took" ;;
-    77) skipped=$((skipped + 1)); printf 'skip  %-40s %s\n' "$name" "$(tail -n 1 "$log")" ;;
-    *) failed=$((failed + 1)); printf 'FAIL  %-40s %4d s, exit %d\n' "$name" "$took" "$code"
-       tail -n 40 "$log" | sed 's/^/      /' ;;
+    0) printf -v text 'ok    %-40s %4d s\n' "$name" "$took" ;;
+    77) printf -v text 'skip  %-40s %s\n' "$name" "$(tail -n 1 "$log")" ;;
+    *) printf -v text 'FAIL  %-40s %4d s, exit %d\n%s\n' "$name" "$took" "$code" "$(tail -n 40 "$log" | sed 's/^/      /')" ;;
     esac
+    printf '%s' "$text"
+    echo "${text%% *}" >>"$outcomes"
 }
 
-[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; run_one includes tests/includes.sh; }
+# Two at a time: many a test waits for a daemon more than it computes.
+start_one() {
+    [ "$(jobs -pr | wc -l)" -lt "${TEST_LANES:-2}" ] || wait -n
+    run_one "$@" &
+}
+
+count() { grep -c "^$1\$" "$outcomes"; }
+
+outcomes=$(mktemp)
+trap 'rm -f "$outcomes"' EXIT
+[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; start_one includes tests/includes.sh; }
 several=$(($# > 1))
 for build in "$@"; do
     export UNBAKE_BUILD=$build
@@ -52,15 +63,17 @@ for build in "$@"; do
         [[ -z $only || $name == *"$only"* ]] || continue
         [[ $several -eq 0 || " "${slow//$'\n'/ }" " != *" $name "* ]] || continue
         case $source in
-        *.c) run_one "$prefix$name" "$build/tests/$name" ;;
-        *.sh) run_one "$prefix$name" bash "$source" "$build" ;;
+        *.c) start_one "$prefix$name" "$build/tests/$name" ;;
+        *.sh) start_one "$prefix$name" bash "$source" "$build" ;;
         esac
     done
 done
 
-if [ $((passed + failed + skipped)) -eq 0 ]; then
+wait
+
+if [ ! -s "$outcomes" ]; then
     echo "no test is named like '$only'" >&2
     exit 2
 fi
-echo "$passed passed, $failed failed, $skipped skipped"
-[ "$failed" -eq 0 ]
+echo "$(count ok) passed, $(count FAIL) failed, $(count skip) skipped"
+[ "$(count FAIL)" -eq 0 ]

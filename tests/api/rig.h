@@ -54,9 +54,9 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
 static inline void rig_start_large(struct rig *rig, const struct guard_limits *limits, double keepalive_sec,
                                    unsigned connection_max, size_t stream_max) {
     memset(rig, 0, sizeof *rig);
-    snprintf(rig->dir, sizeof rig->dir, "/tmp/unbake-rig-XXXXXX");
+    snprintf(rig->dir, sizeof rig->dir, "%s/unbake-rig-XXXXXX", check_fast_dir());
     if (!mkdtemp(rig->dir))
-        CHECK_SKIP("cannot make a folder in /tmp");
+        CHECK_SKIP("cannot make a folder in %s", check_fast_dir());
     rig_open(rig, limits, keepalive_sec, connection_max, stream_max);
 }
 

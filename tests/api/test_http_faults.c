@@ -304,7 +304,7 @@ static bool start_once(bool is_sql, long n) {
 static long strike_start(void) {
     struct scheduler_config work = {.data_dir = rig.dir, .worker_binary = "/bin/false", .max_running = 1};
     long calls = 0;
-    snprintf(rig.dir, sizeof rig.dir, "/tmp/unbake-rig-XXXXXX");
+    snprintf(rig.dir, sizeof rig.dir, "%s/unbake-rig-XXXXXX", check_fast_dir());
     CHECK(mkdtemp(rig.dir) != NULL);
     rig_must(store_open(&rig.store, rig.dir, &err), &err, "store_open");
     rig_must(scheduler_new(&rig.scheduler, &work, rig.store, &err), &err, "scheduler_new");

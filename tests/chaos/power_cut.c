@@ -334,7 +334,7 @@ int main(int argc, char **argv) {
     cut_read(&c, log_path, daemon_.data);
     /* Where there is memory to do it in: millions of small files, none of which must survive. */
     char folder[64], *copy, *print = fingerprint();
-    snprintf(folder, sizeof folder, "%s/unbake-cut-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
+    snprintf(folder, sizeof folder, "%s/unbake-cut-XXXXXX", check_fast_dir());
     if (!print || !mkdtemp(folder))
         return 1;
     copy = file_join(folder, "data");

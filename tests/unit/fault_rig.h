@@ -19,7 +19,7 @@
 static struct error err;
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 
-static char dir[] = "/tmp/unbake-test-faults-XXXXXX";
+static char dir[64];
 static struct store *store;
 static const struct scheduler_config config = {.data_dir = dir, .worker_binary = "/proc/self/exe", .max_running = 1,
                                                .thread_count = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1,
@@ -103,6 +103,7 @@ static inline void rig_start(void) {
     faults_are_off = true;
     log_catch();
     log_set_level(LOG_WARNING);
+    snprintf(dir, sizeof dir, "%s/unbake-test-faults-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         exit(1);
     OK(store_open(&store, dir, &err));

@@ -211,7 +211,7 @@ static inline void daemon_begin(struct daemon *d, int argc, char **argv) {
         _exit(worker(argv[2])); /* past the leak check: its roles do not tidy up */
     struct rlimit no_core = {0, 0};
     setrlimit(RLIMIT_CORE, &no_core);
-    *d = (struct daemon){.dir = mem_strdup("/tmp/unbake-test-scheduler-XXXXXX")};
+    *d = (struct daemon){.dir = mem_printf("%s/unbake-test-scheduler-XXXXXX", check_fast_dir())};
     if (!mkdtemp(d->dir))
         exit(1);
 }

@@ -18,7 +18,7 @@ static struct error err;
 #define IS(call, wanted) CHECK_THAT((call) == (wanted), "%s", err.message)
 
 static inline char *fresh_dir(void) {
-    char *dir = mem_strdup("/tmp/unbake-test-store-XXXXXX");
+    char *dir = mem_printf("%s/unbake-test-store-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         exit(1);
     return dir;

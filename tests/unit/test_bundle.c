@@ -517,8 +517,7 @@ static void test_real(const char *root, const char *room, const char *transforms
 }
 
 int main(void) {
-    snprintf(work, sizeof work, "%s/unbake-test-bundle-XXXXXX",
-             access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
+    snprintf(work, sizeof work, "%s/unbake-test-bundle-XXXXXX", check_fast_dir());
     CHECK(mkdtemp(work) != NULL);
     pool = parallel_new(2);
     test_good();

@@ -13,7 +13,7 @@ static struct error err;
 #define ARRAYS 3
 #define NAME "scene+settings"
 
-static char dir[] = "/tmp/unbake-test-checkpoint-XXXXXX", note[512];
+static char dir[64], note[512];
 static char *path;
 static long strikes, iteration; /* that was saved last */
 static uint32_t texture[CHECKPOINT_TILE_BYTES / 4 + 3], counter[2];
@@ -169,6 +169,7 @@ static bool clear_once(bool is_sql, long n, bool stays) {
 
 int main(void) {
     static bool (*const all[])(bool is_sql, long n, bool stays) = {open_once, replace_once, save_once, load_once, clear_once};
+    snprintf(dir, sizeof dir, "%s/unbake-test-checkpoint-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         return 1;
     path = file_join(dir, "checkpoint.db");

@@ -69,7 +69,7 @@ static int worker(const char *dir) {
 
 /* --- the daemon's side ------------------------------------------------------------------------------ */
 
-static char dir[] = "/tmp/unbake-test-scheduler-XXXXXX";
+static char dir[64];
 static struct store *store;
 static struct scheduler *scheduler;
 static atomic_int run_status; /* -1: it runs */
@@ -184,6 +184,7 @@ int main(int argc, char **argv) {
     if (argc == 3 && strcmp(argv[1], "worker") == 0)
         _exit(worker(argv[2]));
     pthread_t thread;
+    snprintf(dir, sizeof dir, "%s/unbake-test-scheduler-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         return 1;
     log_set_level(LOG_ERROR);

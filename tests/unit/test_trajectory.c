@@ -153,7 +153,7 @@ static void test_scannet(void) {
 }
 
 int main(void) {
-    snprintf(dir, sizeof dir, "%s/unbake-trajectory-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
+    snprintf(dir, sizeof dir, "%s/unbake-trajectory-XXXXXX", check_fast_dir());
     CHECK(mkdtemp(dir) != NULL);
     test_replica();
     test_scannet();

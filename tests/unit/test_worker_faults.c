@@ -189,7 +189,7 @@ static void check_folder(void) {
 
 int main(void) {
     faults_are_off = true;
-    snprintf(dir, sizeof dir, "%s/unbake-test-worker-XXXXXX", access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
+    snprintf(dir, sizeof dir, "%s/unbake-test-worker-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         return 1;
     scene = file_join(dir, "scene");
