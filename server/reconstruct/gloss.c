@@ -6,12 +6,12 @@
 #include "common/mem.h"
 #include "server/reconstruct/gloss_look.h"
 
-/* With fewer than these, pixels nearer to edges are taken as well. */
+/* With fewer than these, pixels nearer to edges are taken as well, then smaller patches. */
 #define POINTS_ENOUGH 32
 #define VIEWS_LEAST 3
 /* Misfit at which a look has a quarter of its influence: parts of the texel's radiance and of the
  * median of the room. */
-#define SCALE_RELATIVE 0.06f
+#define SCALE_RELATIVE 0.12f
 #define SCALE_MEDIAN 0.005f
 /* The light that arrives may be found too weak by so much. Held to 1, the base colour of something white could then not
  * explain what is seen, and highlights that are not there would. */
@@ -99,7 +99,8 @@ static float misfit_channel(const struct gloss_point *p, size_t k, size_t m, int
     return misfit;
 }
 
-static void take_misfits(struct evidence *e, float median) {
+static void take_misfits(const struct gloss_job *job, struct evidence *e) {
+    float median = job->looker.views->median_radiance;
     for (size_t i = 0; i < e->count; i++) {
         for (size_t k = 0; k < ROUGHNESSES; k++) {
             for (size_t m = 0; m < SPECULARS; m++) {
@@ -111,12 +112,26 @@ static void take_misfits(struct evidence *e, float median) {
     }
 }
 
-/* Looks at some texels of a segment and fills the evidence; false where fewer than two were seen so. */
-static bool look(const struct gloss_job *job, size_t segment, int edge, size_t least, int thread) {
+/* Looks at some texels of a segment; false where fewer than two were seen so. */
+static bool look(const struct gloss_job *job, size_t segment, struct gloss_way way, int thread) {
     struct evidence *e = &job->evidence[thread];
-    e->count = gloss_look_at(&job->looker, segment, edge, least, thread, e->point);
-    take_misfits(e, job->looker.views->median_radiance);
+    e->count = gloss_look_at(&job->looker, segment, way, thread, e->point);
     return e->count >= 2;
+}
+
+/* Looks ever closer until enough texels were seen; false where hardly any is. */
+static bool look_well(const struct gloss_job *job, size_t segment, int thread) {
+    struct gloss_way way = {gloss_widest_patch(&job->looker, segment), 0, VIEWS_LEAST};
+    for (;; way.patch = fmaxf(0.5f * way.patch, GLOSS_PATCH_LEAST)) {
+        bool seen = false;
+        for (way.edge = 0; way.edge < VIEWS_EDGE; way.edge++) {
+            seen = look(job, segment, way, thread);
+            if (job->evidence[thread].count >= POINTS_ENOUGH)
+                return true;
+        }
+        if (way.patch <= GLOSS_PATCH_LEAST)
+            return seen;
+    }
 }
 
 /* Sum of a candidate's misfits; more where its specular is uncommon. */
@@ -204,8 +219,9 @@ static void set_gloss(struct materials *materials, size_t segment, double roughn
 static bool is_too_dark(const struct gloss_job *job, size_t segment, int thread) {
     struct candidate guess = {0, 0};
     double part, errors;
-    if (!look(job, segment, VIEWS_EDGE, 1, thread))
+    if (!look(job, segment, (struct gloss_way){GLOSS_PATCH_LEAST, VIEWS_EDGE, 1}, thread))
         return false;
+    take_misfits(job, &job->evidence[thread]);
     while (gloss_levels.roughness[guess.k] < UNKNOWN_ROUGHNESS)
         guess.k++;
     while (specular_of[guess.m] < UNKNOWN_SPECULAR)
@@ -247,18 +263,16 @@ static double matt_prior_of(const struct gloss_looker *l, size_t segment) {
 static void fit_segment(void *user, size_t segment, int thread) {
     const struct gloss_job *job = user;
     const struct reconstruction *r = job->looker.r;
-    const struct evidence *e = &job->evidence[thread];
-    bool seen = false;
+    struct evidence *e = &job->evidence[thread];
     set_gloss(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
     if (r->is_emitter[segment])
         return; /* its own light hides it */
-    for (int edge = 0; edge < VIEWS_EDGE && !(seen && e->count >= POINTS_ENOUGH); edge++)
-        seen = look(job, segment, edge, VIEWS_LEAST, thread);
-    if (!seen) {
+    if (!look_well(job, segment, thread)) {
         if (is_too_dark(job, segment, thread))
             set_gloss(job->materials, segment, 1.0, 0.0);
         return;
     }
+    take_misfits(job, e);
     struct candidate best = best_of(e);
     struct belief belief = believe(e, best, matt_prior_of(&job->looker, segment));
     if (belief.matt > SURELY_MATT)

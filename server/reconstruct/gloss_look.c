@@ -18,9 +18,9 @@
 #define SAMPLES_A_LEVEL 1
 #define LIGHT_SAMPLES 5
 #define KEY_GLOSS 17 /* keeps these random numbers apart from others of the texel */
-/* Photographs are read at PATCH x PATCH places over this many texels. */
-#define PATCH 5
-#define PATCH_TEXELS 8
+#define PATCH 5 /* places a side at which photographs are read */
+#define PATCHES_A_SIDE 14.0 /* for which a segment, were it square, must have room */
+#define PATCH_WIDEST 24.0   /* texels, or this part of a texture of 2048 texels a side where it is larger */
 #define PATCH_COSINE 0.8f /* between its normals and that in its middle */
 #define FACING 0.1f       /* cosine at which all of it must face a photograph */
 
@@ -39,7 +39,7 @@ struct patch {
 };
 
 /* Points of the surface around a texel, of its chart and not too unlike in their normals. */
-static void patch_around(const struct gloss_looker *l, uint32_t texel, struct patch *patch) {
+static void patch_around(const struct gloss_looker *l, uint32_t texel, float side, struct patch *patch) {
     const struct reconstruction *r = l->r;
     struct surface_point at;
     patch->count = 0;
@@ -51,7 +51,7 @@ static void patch_around(const struct gloss_looker *l, uint32_t texel, struct pa
         struct surface_point p;
         struct probe_mix mix;
         float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
-        float x = x0 + PATCH_TEXELS * dx, y = y0 + PATCH_TEXELS * dy;
+        float x = x0 + side * dx, y = y0 + side * dy;
         if (!surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x, y, &p) ||
             r->atlas.chart_of_triangle[p.triangle] != chart || vec3_dot(p.shading, at.shading) < PATCH_COSINE)
             continue;
@@ -105,22 +105,22 @@ static void predict(const struct gloss_looker *l, const struct patch *patch, uin
     }
 }
 
-static bool look_at_texel(const struct gloss_looker *l, uint32_t texel, int edge, size_t least,
+static bool look_at_texel(const struct gloss_looker *l, uint32_t texel, struct gloss_way way,
                           struct incident *scratch, struct gloss_point *point) {
     struct patch patch;
     struct view view[VIEWS_ASKED];
     size_t shown_count = 0;
     point->count = 0;
-    patch_around(l, texel, &patch);
+    patch_around(l, texel, way.patch, &patch);
     if (patch.count == 0)
         return false;
     const struct surface_point *middle = &patch.at[patch.count / 2];
     size_t seen = views_pick(l->views, middle->position, middle->normal, texel, VIEWS_ASKED, view);
     for (size_t i = 0; i < seen && shown_count < GLOSS_VIEWS; i++) {
-        if (patch_shown(l->views, &view[i], &patch, edge, &point->look[shown_count].shown))
+        if (patch_shown(l->views, &view[i], &patch, way.edge, &point->look[shown_count].shown))
             view[shown_count++] = view[i];
     }
-    if (shown_count < least)
+    if (shown_count < way.least)
         return false;
     for (size_t i = 0; i < shown_count; i++)
         predict(l, &patch, texel, view[i].train, scratch, &point->look[i]);
@@ -134,7 +134,14 @@ static size_t points_of(const struct gloss_looker *l, size_t segment) {
     return points < POINTS_LEAST ? POINTS_LEAST : points > GLOSS_POINTS_MOST ? GLOSS_POINTS_MOST : points;
 }
 
-size_t gloss_look_at(const struct gloss_looker *l, size_t segment, int edge, size_t least, int thread,
+float gloss_widest_patch(const struct gloss_looker *l, size_t segment) {
+    const struct atlas *atlas = &l->r->atlas;
+    double texture = (double)(atlas->width > atlas->height ? atlas->width : atlas->height);
+    double side = sqrt((double)(l->texels.first[segment + 1] - l->texels.first[segment])) / PATCHES_A_SIDE;
+    return fmaxf(GLOSS_PATCH_LEAST, (float)fmin(side, PATCH_WIDEST * fmax(1.0, texture / 2048.0)));
+}
+
+size_t gloss_look_at(const struct gloss_looker *l, size_t segment, struct gloss_way way, int thread,
                      struct gloss_point *point) {
     size_t points = points_of(l, segment);
     uint32_t texels = l->texels.first[segment + 1] - l->texels.first[segment];
@@ -145,7 +152,7 @@ size_t gloss_look_at(const struct gloss_looker *l, size_t segment, int edge, siz
     for (size_t i = 0; i < tries && count < points; i++) {
         /* Spread evenly over the segment wherever the sequence is cut off. */
         size_t at = all ? i : rng_below(sampler_reverse((uint32_t)i), texels);
-        count += look_at_texel(l, texel[at], edge, least, &l->scratch[thread], &point[count]);
+        count += look_at_texel(l, texel[at], way, &l->scratch[thread], &point[count]);
     }
     return count;
 }

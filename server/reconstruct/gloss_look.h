@@ -1,7 +1,7 @@
 /* gloss_look.h -- what photographs show of a few places of a segment, and what each material would send there.
  *
- * A photograph is read at several places around a texel, which takes out its noise; their base colour may
- * differ, it is the same in all photographs. The diffuse lobe and the highlight of every candidate
+ * A photograph is read at several places around a texel, which takes out its noise, the more the wider they lie; their
+ * base colour may differ, it is the same in all photographs. The diffuse lobe and the highlight of every candidate
  * roughness and specular are gathered at the same places: they may be curved. */
 #ifndef UNBAKE_RECONSTRUCT_GLOSS_LOOK_H
 #define UNBAKE_RECONSTRUCT_GLOSS_LOOK_H
@@ -17,6 +17,7 @@
 
 #define GLOSS_VIEWS 10        /* photographs of a texel, at most */
 #define GLOSS_POINTS_MOST 256 /* texels of a segment, at most */
+#define GLOSS_PATCH_LEAST 8.0f /* texels a side of what is looked at around a texel, at least */
 
 /* Roughness and specular of the candidates. */
 extern const struct highlight_levels gloss_levels;
@@ -47,9 +48,18 @@ void gloss_looker_init(struct gloss_looker *l, const struct reconstruction *r, c
                        const struct probes *probes, const struct light_field *field);
 void gloss_looker_release(struct gloss_looker *l);
 
-/* Fills point[GLOSS_POINTS_MOST] with texels of a segment that at least `least` photographs show in pixels of
- * no greater class than `edge` (views.h); returns their number. */
-size_t gloss_look_at(const struct gloss_looker *l, size_t segment, int edge, size_t least, int thread,
+/* How closely a segment is looked at. */
+struct gloss_way {
+    float patch;  /* texels a side of what is looked at around a texel */
+    int edge;     /* greatest class of the pixels (views.h) */
+    size_t least; /* photographs that must show a texel */
+};
+
+/* The widest patch, within reason, of which a segment has room for many. */
+float gloss_widest_patch(const struct gloss_looker *l, size_t segment);
+
+/* Fills point[GLOSS_POINTS_MOST] with texels of a segment; returns their number. */
+size_t gloss_look_at(const struct gloss_looker *l, size_t segment, struct gloss_way way, int thread,
                      struct gloss_point *point);
 
 #endif

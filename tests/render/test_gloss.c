@@ -32,14 +32,14 @@ static void test_told(struct scene *scene) {
     float roughness[OBJECTS], specular[OBJECTS];
     solve(scene, roughness, specular);
     for (size_t i = 0; i < LAMP; i++) {
-        CHECK_NEAR(roughness[i], wall_roughness[i], 0.05);
+        CHECK_NEAR(roughness[i], wall_roughness[i], 0.06);
         CHECK_NEAR(specular[i], wall_specular[i], 0.1);
     }
 }
 
 /* Every pixel is off by up to NOISE of itself: of the floor it is not sure any more, and takes it for something in
  * between, glossier than the ceiling. */
-#define NOISE 0.6f
+#define NOISE 0.9f
 
 static void test_hardly_told(struct scene *scene) {
     float roughness[OBJECTS], specular[OBJECTS];
