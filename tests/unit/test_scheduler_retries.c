@@ -89,7 +89,8 @@ static void test_postponed(struct daemon *d) {
     mem_free(room);
 }
 
-/* Jobs that run by the store alone go on, without the loss of an attempt, whichever call of SQLite fails meanwhile. */
+/* Jobs that run by the store alone go on, without the loss of an attempt, whichever call of SQLite fails meanwhile. One
+ * that has been queued again and finds the disk full when it starts is paused, and goes on when its user says so. */
 static void test_orphans(struct daemon *d) {
     daemon_start(d, 1, "/proc/self/exe");
     let_go_on(d, 3);
@@ -112,6 +113,8 @@ static void test_orphans(struct daemon *d) {
             usleep(WAIT_US);
             job_release(&job);
             OK(store_job_get(d->store, id, &job, &err));
+            if (job.state == JOB_PAUSED && atomic_load(&sql_fault)->status == STATUS_NO_SPACE)
+                OK(store_job_resume(d->store, id, NULL, &err));
         }
         CHECK_THAT(job.state == JOB_SUCCEEDED && job.attempts_left == 2, "call %ld: %s, %d attempts are left", n,
                    job_state_name(job.state), job.attempts_left);
