@@ -241,6 +241,7 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct cens
     double angle = row_angle(e, row);
     g->seen[row].angle += angle;
     g->seen[row].saturated += is_bound ? angle : 0.0;
+    e->is_bound[at] = is_bound;
 }
 
 static void gather_row(void *user, size_t row, int thread) {
@@ -298,6 +299,8 @@ static void make_images(struct environment *e, uint32_t width) {
     static const char *const confidence_channels[] = {"count", "spread"};
     image_init_rgb(&e->map, width, width / 2);
     image_init(&e->confidence, width, width / 2, 2, confidence_channels);
+    e->brightened = rgb_gray(1.0f);
+    e->is_bound = mem_calloc((size_t)width * (width / 2), sizeof *e->is_bound);
 }
 
 bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
@@ -338,23 +341,44 @@ void environment_make_unseen(struct environment *e) {
     make_images(e, ENVIRONMENT_MIN_WIDTH);
 }
 
-bool environment_is_seen(const struct environment *e, vec3 direction) {
+/* The cell of the map in which a direction lies. */
+static size_t cell_of(const struct environment *e, vec3 direction) {
     uint32_t width = e->map.width, height = e->map.height;
     double phi = atan2((double)direction.x, (double)-direction.z);
     double theta = acos(fmin(fmax((double)direction.y, -1.0), 1.0));
     double column = (phi < 0.0 ? phi + 2.0 * PI : phi) / (2.0 * PI) * (double)width;
     double row = theta / PI * (double)(height - 1) + 0.5;
     size_t x = (size_t)column < width ? (size_t)column : width - 1;
-    return e->confidence.pixel[2 * ((size_t)row * width + x)] > 0.0f;
+    return (size_t)row * width + x;
+}
+
+bool environment_is_seen(const struct environment *e, vec3 direction) {
+    return e->confidence.pixel[2 * cell_of(e, direction)] > 0.0f;
+}
+
+bool environment_is_told(const struct environment *e, vec3 direction) {
+    size_t cell = cell_of(e, direction);
+    return e->confidence.pixel[2 * cell] > 0.0f && !(e->is_bound && e->is_bound[cell]);
 }
 
 vec3 environment_direction(const struct environment *e, size_t column, size_t row) {
     return cell_at(&e->map, column, row).centre;
 }
 
+void environment_brighten(struct environment *e, rgb factor) {
+    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
+        for (size_t c = 0; c < 3 && e->is_bound[i]; c++)
+            e->map.pixel[3 * i + c] *= (&factor.r)[c];
+    }
+    e->brightened = rgb_mul(e->brightened, factor);
+    fill_sphere(&e->map, &e->confidence);
+    environment_update_figures(e);
+}
+
 void environment_release(struct environment *e) {
     image_release(&e->map);
     image_release(&e->confidence);
+    mem_free(e->is_bound);
     *e = (struct environment){0};
 }
 

@@ -28,6 +28,9 @@ struct environment {
     struct image confidence; /* of the same size: `count` photographs that show the direction, 0 where
                               * it was filled in, and `spread`, the standard deviation of the logarithm
                               * of what they show; owned */
+    bool *is_bound;          /* [height][width] all of them saturate there: the map holds a lower bound; NULL after
+                              * sun_draw; owned */
+    rgb brightened;          /* factor by which that was made brighter since (lamps.h) */
     size_t photograph_count; /* that look out */
     double seen_share;       /* of the sphere */
     double saturated_share;  /* of what was seen: directions of which only a lower bound is known */
@@ -47,8 +50,14 @@ void environment_release(struct environment *e);
 /* Whether a photograph shows what is in a unit direction. */
 bool environment_is_seen(const struct environment *e, vec3 direction);
 
+/* Whether a photograph tells how bright it is there: shows it, and does not saturate. */
+bool environment_is_told(const struct environment *e, vec3 direction);
+
 /* Unit direction of the centre of a pixel of the map. */
 vec3 environment_direction(const struct environment *e, size_t column, size_t row);
+
+/* Makes what all photographs saturate at brighter, by channel, and fills in the rest from it. */
+void environment_brighten(struct environment *e, rgb factor);
 
 /* Takes the means anew, after what was filled in changed. */
 void environment_update_figures(struct environment *e);

@@ -103,6 +103,7 @@ static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
         return;
     job->f->count[texel] = (float)l.clean;
     job->f->spread[texel] = spread_of(&l);
+    job->f->is_bound[texel] = l.measured == 0;
     size_t count = l.measured > 0 ? l.measured : l.count;
     weigh_by_noise(job, &l, count);
     rgb mean = robust_mean(l.look, count, OUTLIER_SCALE);
@@ -127,6 +128,7 @@ void fuse(struct fused *f, const struct views *views, const struct noise *noise,
     f->radiance = mem_calloc_large(texels, sizeof *f->radiance);
     f->count = mem_calloc_large(texels, sizeof *f->count);
     f->spread = mem_calloc_large(texels, sizeof *f->spread);
+    f->is_bound = mem_calloc_large(texels, sizeof *f->is_bound);
     struct fuse_job job = {f, views, noise, atlas, inverse};
     parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, fuse_chunk, &job);
 }
@@ -135,5 +137,6 @@ void fused_release(struct fused *f) {
     mem_free(f->radiance);
     mem_free(f->count);
     mem_free(f->spread);
+    mem_free(f->is_bound);
     *f = (struct fused){0};
 }

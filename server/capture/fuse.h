@@ -7,6 +7,7 @@
 #ifndef UNBAKE_CAPTURE_FUSE_H
 #define UNBAKE_CAPTURE_FUSE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -21,6 +22,7 @@ struct fused {
     uint16_t (*radiance)[3]; /* [height][width] half precision; 0 where nothing was seen; owned */
     float *count;            /* [height][width] photographs that see the texel cleanly; owned */
     float *spread;           /* [height][width] standard deviation of the logarithm of what they show; owned */
+    bool *is_bound;          /* [height][width] all of them saturate there: radiance is a lower bound; owned */
 };
 
 void fuse(struct fused *f, const struct views *views, const struct noise *noise, const struct atlas *atlas,

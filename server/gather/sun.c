@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/mem.h"
 #include "server/render/bsdf.h"
 
 /* Where the first rays agree no more are asked. */
@@ -109,6 +110,8 @@ void sun_draw(const struct sun *sun, struct environment *e) {
     while (e->map.width < ENVIRONMENT_MAX_WIDTH && BSDF_PI / (float)e->map.height > sun->radius_rad) {
         refine_image(&e->map);
         refine_image(&e->confidence);
+        mem_free(e->is_bound);
+        e->is_bound = NULL;
     }
     /* Not narrower than a pixel, which it might slip through. */
     float radius = fmaxf(sun->radius_rad, BSDF_PI / (float)e->map.height);

@@ -73,8 +73,9 @@ static void add_value(struct channel_values *v, float radiance, bool saturated) 
 
 /* The median of what was measured; where nearly everything is saturated, the bound. (With cycling
  * exposures a lamp is measured by a third of the frames, a wall's highlight saturates in a few.) */
-static float median(struct channel_values *v) {
-    if ((float)v->count < MEASURED_PART * (float)(v->count + v->saturated_count))
+static float median(struct channel_values *v, bool *is_bound) {
+    *is_bound = (float)v->count < MEASURED_PART * (float)(v->count + v->saturated_count);
+    if (*is_bound)
         return v->bound;
     return quantile(v->value, v->count, 0.5);
 }
@@ -134,10 +135,15 @@ static void observe_segment(void *user, size_t segment, int thread) {
     bool is_own = told > 0 && (float)told >= OWN_PART * (float)(told + best->outshone_count);
     if (!is_own)
         best = &shown[0]; /* most often it is not what shines: nothing is known */
-    job->evidence[segment].seen = is_own;
-    job->evidence[segment].mixed = best == &shown[VIEWS_EDGE];
-    job->evidence[segment].shown =
-        rgb_make(median(&best->channel[0]), median(&best->channel[1]), median(&best->channel[2]));
+    struct emitter_evidence *e = &job->evidence[segment];
+    e->seen = is_own;
+    e->mixed = best == &shown[VIEWS_EDGE];
+    float value[3];
+    for (int c = 0; c < 3; c++)
+        value[c] = median(&best->channel[c], &e->bound[c]);
+    e->least = rgb_make(value[0], value[1], value[2]);
+    if (!e->unbound)
+        e->shown = e->least;
     mem_free(shown);
 }
 
@@ -153,7 +159,7 @@ void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
         rgb shown = evidence[i].shown;
-        bool shines = evidence[i].hidden || rgb_mean(shown) > BRIGHT * views->median_radiance;
+        bool shines = evidence[i].hidden || evidence[i].unbound || rgb_mean(shown) > BRIGHT * views->median_radiance;
         r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);

@@ -7,8 +7,7 @@
 
 #include "common/mem.h"
 #include "server/reconstruct/emitters.h"
-#include "server/reconstruct/missing_light.h"
-#include "server/reconstruct/segment_light.h"
+#include "server/reconstruct/lamps.h"
 #include "server/render/sampler.h"
 
 /* So many places of the room ask every segment that was not seen, and few points of it; all places ask the
@@ -16,10 +15,6 @@
 #define FEW_PLACES 2048
 #define FEW_POINTS 8
 #define LIKELIEST 16
-#define MOST_LAMPS 16
-#define ROUNDS 2 /* in which each lamp's radiance is fitted again, the others being known */
-/* What all is white to, for all one knows of the light by now: reflected light is read off few rays. */
-#define WHITEST 1.2f
 /* A small and very bright lamp is less likely than a larger one: what it explains counts so much less for each
  * power of ten by which it outshines the room. */
 #define UNLIKELY 0.2
@@ -50,41 +45,14 @@ struct candidate {
     double explained, brings; /* in places */
 };
 
-struct lamp {
-    uint32_t segment;
-    rgb radiance;
-    float *lit; /* [all.count] what a white surface at each place shows of a radiance of 1; owned */
-};
-
 struct search {
     struct reconstruction *r;
-    float median_radiance; /* of the room */
     bool is_open;          /* one looks out of it to where no photograph does */
-    struct segment_light light;
-    struct light_places all, few;
-    size_t candidate_count, lamp_count;
+    struct lamps lamps;    /* that were found; and all places */
+    struct light_places few;
+    size_t candidate_count;
     struct candidate *candidate; /* [candidate_count]; owned */
-    struct lamp lamp[MOST_LAMPS];
 };
-
-/* --- places ------------------------------------------------------------------------------------------------ */
-
-/* Places, lit by all that is known but the lamps of `s`. Dim ones count less: they are lit by what is known least. */
-static void survey_places(struct search *s, const struct views *views, const uint16_t (*radiance)[3]) {
-    struct survey survey;
-    survey_init(&survey, s->r, views, radiance, LIGHT_PLACES);
-    for (size_t i = 0; i < s->lamp_count; i++) {
-        const uint32_t *first = &s->light.texels.first[s->lamp[i].segment];
-        for (size_t k = first[0]; k < first[1]; k++)
-            memset(survey.radiance[s->light.texels.texel[k]], 0, sizeof *survey.radiance);
-    }
-    light_places_init(&s->all, &survey);
-    survey_release(&survey);
-    for (size_t i = 0; i < s->all.count; i++) {
-        struct light_place *p = &s->all.place[i];
-        p->weight = rgb_mean(p->shown) / (rgb_mean(p->shown) + s->median_radiance);
-    }
-}
 
 /* Whether rays leave the room in directions that no photograph shows. */
 static bool is_open(const struct search *s) {
@@ -104,14 +72,6 @@ static bool is_open(const struct search *s) {
     return (double)out > OPEN * OPEN_RAYS * (double)s->few.count;
 }
 
-/* Adds the light of a lamp that is `lit` in places. */
-static void shine(struct light_places *places, rgb radiance) {
-    for (size_t i = 0; i < places->count; i++) {
-        struct light_place *p = &places->place[i];
-        p->white = rgb_mad(p->white, p->lit, radiance);
-    }
-}
-
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
 static void find_candidates(struct search *s, const struct views *views) {
@@ -119,7 +79,7 @@ static void find_candidates(struct search *s, const struct views *views) {
     emitters_observe(r, views, r->evidence);
     s->candidate = mem_array(r->segments.count + 1, sizeof *s->candidate);
     for (size_t i = 0; i < r->segments.count; i++) {
-        if (!r->evidence[i].seen && s->light.texels.first[i + 1] > s->light.texels.first[i])
+        if (!r->evidence[i].seen && s->lamps.light.texels.first[i + 1] > s->lamps.light.texels.first[i])
             s->candidate[s->candidate_count++] = (struct candidate){.segment = (uint32_t)i};
     }
 }
@@ -134,9 +94,9 @@ static double brought(const struct light_places *places, float strength) {
 
 static void ask(const struct search *s, const struct missing_light *m, struct light_places *places,
                 struct candidate *c, size_t points) {
-    segment_light_places(&s->light, places, c->segment, points);
+    segment_light_places(&s->lamps.light, places, c->segment, points);
     c->strength = missing_light_strength(m, MISSING_MEAN, &c->explained);
-    c->explained /= 1.0 + UNLIKELY * fmax(log10((double)(c->strength / s->median_radiance)), 0.0);
+    c->explained /= 1.0 + UNLIKELY * fmax(log10((double)(c->strength / s->lamps.median_radiance)), 0.0);
     c->brings = brought(places, c->strength);
 }
 
@@ -148,145 +108,77 @@ static int by_explained(const void *a, const void *b) {
 }
 
 /* Of what the candidate lights most. */
-static bool puts_right(struct search *s, const struct missing_light *m, const struct candidate *c) {
-    segment_light_places(&s->light, &s->all, c->segment, SEGMENT_LIGHT_POINTS);
-    struct missing_share mainly = missing_light_share(m, c->strength, MAINLY);
+static bool puts_right(struct search *s, const struct candidate *c) {
+    segment_light_places(&s->lamps.light, &s->lamps.places, c->segment, SEGMENT_LIGHT_POINTS);
+    struct missing_share mainly = missing_light_share(&s->lamps.missing, c->strength, MAINLY);
     return mainly.count > MAINLY_PLACES && mainly.after < LEAVES * mainly.before;
 }
 
-static bool is_lamp(struct search *s, const struct missing_light *m, const struct candidate *c) {
-    double weight = 0.0, share = c->explained / fmax(missing_light_misfit(m), 1e-30);
-    for (size_t i = 0; i < s->all.count; i++)
-        weight += (double)s->all.place[i].weight;
+static bool is_lamp(struct search *s, const struct candidate *c) {
+    double weight = 0.0, share = c->explained / fmax(missing_light_misfit(&s->lamps.missing), 1e-30);
+    for (size_t i = 0; i < s->lamps.places.count; i++)
+        weight += (double)s->lamps.places.place[i].weight;
     if (!(c->brings > BRINGS * weight))
         return false;
     if (s->is_open)
         return share > EXPLAINS_OPEN;
-    return share > EXPLAINS || (share > EXPLAINS_ONE_OF_MANY && puts_right(s, m, c));
+    return share > EXPLAINS || (share > EXPLAINS_ONE_OF_MANY && puts_right(s, c));
 }
 
 /* Puts the segment that explains most in the first place; false where it is not enough. */
-static bool find_best(struct search *s, const struct missing_light *m) {
+static bool find_best(struct search *s) {
     struct missing_light few;
-    missing_light_init(&few, &s->few, WHITEST, false);
+    missing_light_init(&few, &s->few, LAMPS_WHITEST, false);
     for (size_t i = 0; i < s->candidate_count; i++)
         ask(s, &few, &s->few, &s->candidate[i], FEW_POINTS);
     missing_light_release(&few);
     qsort(s->candidate, s->candidate_count, sizeof *s->candidate, by_explained);
     size_t likeliest = s->candidate_count < LIKELIEST ? s->candidate_count : LIKELIEST;
     for (size_t i = 0; i < likeliest; i++)
-        ask(s, m, &s->all, &s->candidate[i], SEGMENT_LIGHT_POINTS);
+        ask(s, &s->lamps.missing, &s->lamps.places, &s->candidate[i], SEGMENT_LIGHT_POINTS);
     qsort(s->candidate, likeliest, sizeof *s->candidate, by_explained);
-    return likeliest > 0 && is_lamp(s, m, &s->candidate[0]);
+    return likeliest > 0 && is_lamp(s, &s->candidate[0]);
 }
 
 /* --- lamps ------------------------------------------------------------------------------------------------- */
 
-/* What the lamp lights, with the radiance that it has by now. */
-static void light_lamp(struct search *s, struct lamp *lamp) {
-    segment_light_places(&s->light, &s->all, lamp->segment, SEGMENT_LIGHT_POINTS);
-    lamp->lit = mem_array(s->all.count + 1, sizeof *lamp->lit);
-    for (size_t i = 0; i < s->all.count; i++)
-        lamp->lit[i] = s->all.place[i].lit;
-    shine(&s->all, lamp->radiance);
-}
-
-static void fit_lamp(struct search *s, const struct missing_light *m, struct lamp *lamp) {
-    for (size_t i = 0; i < s->all.count; i++)
-        s->all.place[i].lit = lamp->lit[i];
-    shine(&s->all, rgb_scale(lamp->radiance, -1.0f));
-    lamp->radiance = missing_light_color(m);
-    shine(&s->all, lamp->radiance);
-}
-
-/* Each in turn, the others being known. */
-static void fit_lamps(struct search *s, struct missing_light *m) {
-    missing_light_renew(m);
-    for (size_t i = 0; i < ROUNDS * s->lamp_count; i++)
-        fit_lamp(s, m, &s->lamp[i % s->lamp_count]);
-    missing_light_renew(m);
-}
-
 /* Makes a lamp of the first candidate. */
-static void add_lamp(struct search *s, struct missing_light *m) {
-    struct lamp *lamp = &s->lamp[s->lamp_count++];
-    *lamp = (struct lamp){.segment = s->candidate[0].segment};
+static void add_lamp(struct search *s) {
+    struct lamp *lamp = lamps_add(&s->lamps, s->candidate[0].segment, rgb_gray(0.0f));
     s->candidate[0] = s->candidate[--s->candidate_count];
-    light_lamp(s, lamp);
-    fit_lamp(s, m, lamp);
-    missing_light_renew(m);
-    segment_light_places(&s->light, &s->few, lamp->segment, SEGMENT_LIGHT_POINTS);
-    shine(&s->few, lamp->radiance);
+    lamps_fit_one(&s->lamps, lamp);
+    missing_light_renew(&s->lamps.missing);
+    segment_light_places(&s->lamps.light, &s->few, lamp->segment, SEGMENT_LIGHT_POINTS);
+    lamps_shine(&s->few, lamp->radiance);
 }
 
 static void look_for_lamps(struct search *s) {
-    struct missing_light m;
-    missing_light_init(&m, &s->all, WHITEST, false);
-    while (s->lamp_count < MOST_LAMPS && find_best(s, &m))
-        add_lamp(s, &m);
-    fit_lamps(s, &m);
-    missing_light_release(&m);
+    while (s->lamps.count < LAMPS_MOST && find_best(s))
+        add_lamp(s);
+    lamps_fit_all(&s->lamps, s->lamps.count);
 }
 
 /* --- the whole --------------------------------------------------------------------------------------------- */
 
-static void search_init(struct search *s, struct reconstruction *r, const struct views *views) {
-    *s = (struct search){.r = r, .median_radiance = views->median_radiance};
-    segment_light_init(&s->light, r);
-}
-
-/* Hands over what was found, too. */
-static void search_release(struct search *s) {
-    for (size_t i = 0; i < s->lamp_count; i++) {
-        struct emitter_evidence *e = &s->r->evidence[s->lamp[i].segment];
-        e->hidden = true;
-        e->shown = s->lamp[i].radiance;
-        mem_free(s->lamp[i].lit);
-    }
-    mem_free(s->candidate);
-    light_places_release(&s->few);
-    light_places_release(&s->all);
-    segment_light_release(&s->light);
-}
-
-static void report(const struct search *s) {
-    cJSON *list = cJSON_AddArrayToObject(s->r->report, "hidden_lamps");
-    for (size_t i = 0; i < s->lamp_count; i++)
-        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)s->r->segments.id[s->lamp[i].segment]));
+static void report(const struct lamps *l) {
+    cJSON *list = cJSON_AddArrayToObject(l->r->report, "hidden_lamps");
+    for (size_t i = 0; i < l->count; i++)
+        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)l->r->segments.id[l->lamp[i].segment]));
 }
 
 void lamp_find(struct reconstruction *r, const struct views *views) {
-    struct search s;
-    search_init(&s, r, views);
+    struct search s = {.r = r};
+    lamps_init(&s.lamps, r, views);
     find_candidates(&s, views);
     if (s.candidate_count > 0) {
-        survey_places(&s, views, NULL);
-        light_places_thin(&s.few, &s.all, FEW_PLACES);
+        lamps_survey(&s.lamps, views, NULL);
+        light_places_thin(&s.few, &s.lamps.places, FEW_PLACES);
         s.is_open = is_open(&s);
         look_for_lamps(&s);
     }
-    report(&s);
-    search_release(&s);
-}
-
-void lamp_fit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]) {
-    struct search s;
-    search_init(&s, r, views);
-    for (size_t i = 0; i < r->segments.count && s.lamp_count < MOST_LAMPS; i++) {
-        struct emitter_evidence *e = &r->evidence[i];
-        if (!e->hidden)
-            continue;
-        s.lamp[s.lamp_count++] = (struct lamp){.segment = (uint32_t)i, .radiance = e->shown};
-        *e = (struct emitter_evidence){0}; /* the survey is to go without them */
-    }
-    if (s.lamp_count > 0) {
-        struct missing_light m;
-        survey_places(&s, views, radiance);
-        for (size_t i = 0; i < s.lamp_count; i++)
-            light_lamp(&s, &s.lamp[i]);
-        missing_light_init(&m, &s.all, WHITEST, false);
-        fit_lamps(&s, &m);
-        missing_light_release(&m);
-    }
-    search_release(&s);
+    report(&s.lamps);
+    lamps_hand_over(&s.lamps, s.lamps.count);
+    mem_free(s.candidate);
+    light_places_release(&s.few);
+    lamps_release(&s.lamps);
 }

@@ -15,8 +15,4 @@
  * `hidden` for lamps that were found; the report says which ("hidden_lamps"). The same for any number of threads. */
 void lamp_find(struct reconstruction *r, const struct views *views);
 
-/* Fits the radiance of the lamps that were found again, with what texels send out, those too that no photograph
- * shows: radiance[height][width], half precision. The world is without emitters after it. */
-void lamp_fit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]);
-
 #endif

@@ -16,6 +16,7 @@
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/refine.h"
 #include "server/reconstruct/report.h"
+#include "server/reconstruct/saturated_light.h"
 #include "server/reconstruct/solve.h"
 #include "server/reconstruct/split.h"
 #include "server/reconstruct/sun_find.h"
@@ -229,6 +230,7 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
     noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
+    saturated_light_estimate(run->r, &run->views);
     lamp_find(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);

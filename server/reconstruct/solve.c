@@ -11,7 +11,7 @@
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
-#include "server/reconstruct/lamp_find.h"
+#include "server/reconstruct/lamps.h"
 
 #define PASSES 2
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
@@ -241,7 +241,7 @@ static bool solve_pass(struct solve *s, int pass) {
     if (pass == 0) {
         emitters_light_bright(s->r, s->views, s->r->evidence);
     } else {
-        lamp_fit(s->r, s->views, (const uint16_t(*)[3])s->radiance);
+        lamps_refit(s->r, s->views, (const uint16_t(*)[3])s->radiance);
         set_lights(s);
     }
     if (!gather(s, pass))

@@ -25,10 +25,13 @@ static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f
 #define EXPLAINS 0.7
 /* Where the best of the likeliest directions explains less than this part of that there is none. */
 #define HOPEFUL 0.25
+/* Nor does one make white paper brighter than this many times the room: 100,000 lux over 10. */
+#define BRIGHTEST 1e4f
 #define STEPS 24 /* to better directions, or to smaller steps */
 
 struct search {
     struct reconstruction *r;
+    float median_radiance; /* of the room */
     struct light_places places;
     struct missing_light missing;
     struct sun sun;        /* that is tried */
@@ -212,8 +215,10 @@ static void look_for_sun(struct search *s, double *explains) {
     bool is_disc = find_radius(s, &best);
     try_direction(s, best.direction);
     *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
-    s->sun.is_there = is_disc && count_lit(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS;
-    s->sun.irradiance = rgb_scale(missing_light_color(&s->missing), BSDF_PI);
+    rgb white = missing_light_color(&s->missing);
+    s->sun.is_there = is_disc && count_lit(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS &&
+                      rgb_mean(white) < BRIGHTEST * s->median_radiance;
+    s->sun.irradiance = rgb_scale(white, BSDF_PI);
 }
 
 static void report(const struct search *s, double explains) {
@@ -233,10 +238,10 @@ static void report(const struct search *s, double explains) {
 }
 
 void sun_find(struct reconstruction *r, const struct views *views) {
-    struct search s = {.r = r};
+    struct search s = {.r = r, .median_radiance = views->median_radiance};
     double explains = 0.0;
     struct survey survey;
-    survey_init(&survey, r, views, NULL, LIGHT_PLACES);
+    survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
     light_places_init(&s.places, &survey);
     survey_release(&survey);
     light_places_leave_out_lamps(&s.places);

@@ -32,39 +32,61 @@ static void fill_radiance(struct survey *s) {
     mem_free(sum);
 }
 
-/* A surface that photographs show and that is no lamp. */
-static bool tells(const struct reconstruction *r, uint32_t texel) {
-    return r->fused.count[texel] > 0.0f && rgb_is_black(r->materials.emission[reconstruction_segment(r, texel)]);
+/* Makes lights of what outshines the room. */
+static void light_bright(struct reconstruction *r, const struct views *views, const bool *without) {
+    struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
+    memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
+    emitters_observe(r, views, evidence);
+    for (size_t i = 0; i < r->segments.count && without; i++) {
+        if (without[i])
+            evidence[i] = (struct emitter_evidence){0};
+    }
+    emitters_light_bright(r, views, evidence);
+    mem_free(evidence);
 }
 
-static void choose_points(struct survey *s, size_t points) {
+static void leave_out(struct survey *s, const bool *without) {
+    const struct reconstruction *r = s->r;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        if (without[reconstruction_segment(r, texel)])
+            memset(s->radiance[texel], 0, sizeof s->radiance[texel]);
+    }
+}
+
+/* A surface that photographs show, and do not only tell how bright it is at least, and that is no lamp. */
+static bool tells(const struct reconstruction *r, const bool *without, uint32_t texel) {
+    uint32_t segment = reconstruction_segment(r, texel);
+    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && rgb_is_black(r->materials.emission[segment]) &&
+           !(without && without[segment]);
+}
+
+static void choose_points(struct survey *s, const bool *without, size_t points) {
     const struct reconstruction *r = s->r;
     size_t seen = 0, met = 0;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
-        seen += tells(r, r->inverse.valid[i]);
+        seen += tells(r, without, r->inverse.valid[i]);
     size_t wanted = seen < points ? seen : points;
     s->texel = mem_array(wanted + 1, sizeof *s->texel);
     for (size_t i = 0; i < r->inverse.valid_count && s->count < wanted; i++) {
         uint32_t texel = r->inverse.valid[i];
-        if (tells(r, texel) && met++ == s->count * seen / wanted)
+        if (tells(r, without, texel) && met++ == s->count * seen / wanted)
             s->texel[s->count++] = texel;
     }
 }
 
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
-                 const uint16_t (*radiance)[3], size_t points) {
+                 const uint16_t (*radiance)[3], const bool *without, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
     memcpy(s->radiance, radiance ? radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
     if (!radiance)
         fill_radiance(s);
+    if (without)
+        leave_out(s, without);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
-    struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
-    memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
-    emitters_observe(r, views, evidence);
-    emitters_light_bright(r, views, evidence);
-    mem_free(evidence);
-    choose_points(s, points);
+    light_bright(r, views, without);
+    choose_points(s, without, points);
     s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);
 }
 

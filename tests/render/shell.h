@@ -113,4 +113,19 @@ static inline void shell_solve(struct scene *scene, int threads, struct reconstr
     settings_release(&s);
 }
 
+/* Mean base colour that was found of an object. */
+static inline rgb shell_mean_color(const struct reconstruction *r, int64_t object) {
+    rgb sum = rgb_gray(0.0f);
+    float count = 0.0f;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        if (r->segments.id[reconstruction_segment(r, texel)] != object)
+            continue;
+        const float *c = r->materials.base_color.texel[texel];
+        sum = rgb_add(sum, rgb_make(c[0], c[1], c[2]));
+        count += 1.0f;
+    }
+    return rgb_scale(sum, 1.0f / count);
+}
+
 #endif

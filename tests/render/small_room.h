@@ -10,6 +10,7 @@
 #include "tests/check.h"
 
 #define OBJECTS 7 /* six walls and a lamp */
+#define FLOOR 0
 #define LAMP 6
 #define FRAMES 20
 #define WIDTH 48
@@ -49,12 +50,33 @@ static inline void make_mesh(struct mesh *m) {
     m->face = mem_array(2 * OBJECTS, sizeof *m->face);
     m->object_id = mem_array(2 * OBJECTS, sizeof *m->object_id);
     vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
-    add_quad(m, 0, (vec3){0, 0, 0}, z, x);
+    add_quad(m, FLOOR, (vec3){0, 0, 0}, z, x);
     add_quad(m, 1, (vec3){0, 3, 0}, x, z);
     add_quad(m, 2, (vec3){0, 0, 0}, y, z);
     add_quad(m, 3, (vec3){4, 0, 0}, z, y);
     add_quad(m, 4, (vec3){0, 0, 0}, x, y);
     add_quad(m, 5, (vec3){0, 0, 3}, y, x);
+    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
+}
+
+/* The same with a window of 2 x 1.5 m in the wall at z = 0. */
+static inline void make_mesh_with_window(struct mesh *m) {
+    size_t quads = OBJECTS + 3;
+    *m = (struct mesh){0};
+    m->position = mem_array(4 * quads, sizeof *m->position);
+    m->index = mem_array(2 * quads, sizeof *m->index);
+    m->face = mem_array(2 * quads, sizeof *m->face);
+    m->object_id = mem_array(2 * quads, sizeof *m->object_id);
+    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
+    add_quad(m, FLOOR, (vec3){0, 0, 0}, z, x);
+    add_quad(m, 1, (vec3){0, 3, 0}, x, z);
+    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
+    add_quad(m, 3, (vec3){4, 0, 0}, z, y);
+    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
+    add_quad(m, 4, (vec3){0, 0, 0}, x, (vec3){0, 1.25f, 0});
+    add_quad(m, 4, (vec3){0, 2.75f, 0}, x, (vec3){0, 0.25f, 0});
+    add_quad(m, 4, (vec3){0, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
+    add_quad(m, 4, (vec3){3, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
     add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
 }
 

@@ -5,7 +5,6 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define FLOOR 0
 #define CEILING 1
 #define SATIN 4
 

@@ -6,8 +6,6 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define FLOOR 0
-
 /* To the thread sanitizer, which takes minutes, further rooms are the same code again. */
 #ifdef __SANITIZE_THREAD__
 #define IS_BRIEF true
@@ -20,20 +18,6 @@ static vec3 look_down(int frame) {
     vec3 from = spread(frame, 0.4f);
     float angle = 2.4f * (float)frame;
     return (vec3){from.x + cosf(angle), from.y - 1.0f, from.z + sinf(angle)};
-}
-
-static rgb mean_color(const struct reconstruction *r, int64_t object) {
-    rgb sum = rgb_gray(0.0f);
-    float count = 0.0f;
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        if (r->segments.id[reconstruction_segment(r, texel)] != object)
-            continue;
-        const float *c = r->materials.base_color.texel[texel];
-        sum = rgb_add(sum, rgb_make(c[0], c[1], c[2]));
-        count += 1.0f;
-    }
-    return rgb_scale(sum, 1.0f / count);
 }
 
 static void test_hidden(struct parallel *pool) {
@@ -55,7 +39,7 @@ static void test_hidden(struct parallel *pool) {
         CHECK_NEAR(found[i].g, lamp_radiance.g, 0.2f * lamp_radiance.g);
         CHECK_NEAR(found[i].b, lamp_radiance.b, 0.2f * lamp_radiance.b);
         /* What the white ceiling sends down nobody can know. */
-        rgb color = mean_color(&r, FLOOR);
+        rgb color = shell_mean_color(&r, FLOOR);
         CHECK_NEAR(color.r, wall_color[FLOOR].r, 0.2f * wall_color[FLOOR].r);
         CHECK_NEAR(color.b, wall_color[FLOOR].b, 0.2f * wall_color[FLOOR].b);
         reconstruct_release(&r);

@@ -8,7 +8,6 @@
 
 #define COLUMNS 16 /* cells of a wall, of 0.25 m */
 #define ROWS 12
-#define FLOOR 0
 #define WHITE 1 /* the ceiling */
 #define WALL 4  /* what is looked at */
 #define BLACK 5 /* the wall across */

@@ -6,32 +6,10 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define FLOOR 0
 #define SKY_WIDTH 256
 #define SKY_HEIGHT 128
 #define SUN_ROW 23 /* 57 degrees above, towards -z: column 0 */
 #define SUN_RADIANCE 30000.0f
-
-/* The room of small_room.h with a window of 2 x 1.5 m in the wall at z = 0. */
-static void make_room(struct mesh *m) {
-    size_t quads = OBJECTS + 3;
-    *m = (struct mesh){0};
-    m->position = mem_array(4 * quads, sizeof *m->position);
-    m->index = mem_array(2 * quads, sizeof *m->index);
-    m->face = mem_array(2 * quads, sizeof *m->face);
-    m->object_id = mem_array(2 * quads, sizeof *m->object_id);
-    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
-    add_quad(m, FLOOR, (vec3){0, 0, 0}, z, x);
-    add_quad(m, 1, (vec3){0, 3, 0}, x, z);
-    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
-    add_quad(m, 3, (vec3){4, 0, 0}, z, y);
-    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
-    add_quad(m, 4, (vec3){0, 0, 0}, x, (vec3){0, 1.25f, 0});
-    add_quad(m, 4, (vec3){0, 2.75f, 0}, x, (vec3){0, 0.25f, 0});
-    add_quad(m, 4, (vec3){0, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
-    add_quad(m, 4, (vec3){3, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
-    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
-}
 
 static void make_sky(struct image *sky, float sun) {
     image_init_rgb(sky, SKY_WIDTH, SKY_HEIGHT);
@@ -86,7 +64,7 @@ static float irradiance_in_map(const struct environment *e, vec3 direction) {
 static void test_sun(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
-    make_room(&scene.mesh);
+    make_mesh_with_window(&scene.mesh);
     make_sky(&sky, SUN_RADIANCE);
     photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_anywhere, pool);
     vec3 truth = {0.0f, cosf(sun_theta()), -sinf(sun_theta())};
@@ -125,7 +103,7 @@ static vec3 look_away(int frame) {
 static void test_without_sky(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
-    make_room(&scene.mesh);
+    make_mesh_with_window(&scene.mesh);
     make_sky(&sky, SUN_RADIANCE);
     photograph_mesh(&scene, rgb_scale(lamp_radiance, 0.2f), &sky, look_away, pool);
     struct reconstruction r;
@@ -141,7 +119,7 @@ static void test_without_sky(struct parallel *pool) {
 static void test_no_sun(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
-    make_room(&scene.mesh);
+    make_mesh_with_window(&scene.mesh);
     make_sky(&sky, 0.5f);
     photograph_mesh(&scene, lamp_radiance, &sky, look_anywhere, pool);
     struct reconstruction r;

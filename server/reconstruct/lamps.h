@@ -1,0 +1,71 @@
+/* lamps.h -- lights whose radiance photographs do not tell, and how bright they must be by what they light.
+ *
+ * Places all over the room are lit by what is known, and by these lamps: those that no photograph shows
+ * (lamp_find.h), and those at which every photograph saturates (saturated_light.h). Each in turn, the others being as
+ * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). */
+#ifndef UNBAKE_RECONSTRUCT_LAMPS_H
+#define UNBAKE_RECONSTRUCT_LAMPS_H
+
+#include "server/capture/views.h"
+#include "server/reconstruct/missing_light.h"
+#include "server/reconstruct/reconstruction.h"
+#include "server/reconstruct/segment_light.h"
+
+#define LAMPS_MOST 16
+/* What all is white to, for all one knows of the light by now: reflected light is read off few rays. */
+#define LAMPS_WHITEST 1.2f
+/* In the place of a segment: the directions of the environment in which all photographs saturate, and those that none
+ * shows, which were filled in from them. Its radiance is a factor to what the map has. */
+#define LAMPS_SKY UINT32_MAX
+
+struct lamp {
+    uint32_t segment;
+    rgb radiance;
+    rgb least;    /* what photographs tell */
+    bool told[3]; /* by channel: it is no more than that */
+    float *lit;   /* [places.count] what a white surface at each place shows of a radiance of 1; owned */
+};
+
+struct lamps {
+    struct reconstruction *r; /* borrowed */
+    float median_radiance;    /* of the room */
+    struct segment_light light;
+    struct light_places places;
+    struct missing_light missing; /* of the places, as all lamps light them by now */
+    bool *without;                /* [segment_count] lamps that the survey goes without; owned */
+    size_t count;
+    struct lamp lamp[LAMPS_MOST];
+};
+
+void lamps_init(struct lamps *l, struct reconstruction *r, const struct views *views);
+void lamps_release(struct lamps *l);
+
+/* Adds a segment of which nothing is told; there must be room for it. After the survey only for what
+ * photographs do not show: it lights the places from then on. The pointer holds until lamps_release. */
+struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance);
+/* Adds a segment at which photographs saturate, r->evidence of which is known; the sky of which some do. */
+struct lamp *lamps_add_bound(struct lamps *l, uint32_t segment);
+struct lamp *lamps_add_sky(struct lamps *l);
+
+/* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less. */
+void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]);
+
+/* How much less odd places would be if it were brighter. */
+double lamps_explained(struct lamps *l, const struct lamp *lamp);
+
+/* Gives one lamp the radiance that explains most, no less than photographs tell; the first `count` in turn, twice. `missing` is
+ * to be renewed after the former. */
+void lamps_fit_one(struct lamps *l, struct lamp *lamp);
+void lamps_fit_all(struct lamps *l, size_t count);
+
+/* Makes r->evidence and r->environment of the first `count` what they are by now. */
+void lamps_hand_over(const struct lamps *l, size_t count);
+
+/* Fits all lamps again that were handed over before, with what texels send out, those too that no photograph shows:
+ * radiance[height][width], half precision. The world is without emitters after it. */
+void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]);
+
+/* Adds the light of a lamp that is `lit` in places. */
+void lamps_shine(struct light_places *places, rgb radiance);
+
+#endif

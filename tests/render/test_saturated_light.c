@@ -1,0 +1,113 @@
+/* saturated_light.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so is a sky;
+ * where some photograph measured them, what they light is not asked. The same for any number of threads. */
+#include "server/reconstruct/emitters.h"
+#include "server/reconstruct/reconstruction.h"
+#include "tests/check.h"
+#include "tests/render/shell.h"
+#include "tests/render/small_room.h"
+
+#define CLIP 1.5f
+#define SKY_RADIANCE 8.0f
+
+/* As a camera with so much room above its exposure has them. */
+static void saturate(struct scene *scene, float clip) {
+    for (size_t f = 0; f < scene->photograph_count; f++) {
+        struct photograph *photo = &scene->photograph[f];
+        photo->is_hdr = false;
+        photo->clip = clip;
+        for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+            for (size_t c = 0; c < 3; c++) {
+                float value = image_float_from_half(photo->pixel[i][c]);
+                photo->pixel[i][c] = image_half_from_float(fminf(value, clip));
+            }
+        }
+    }
+}
+
+static void check_floor(const struct reconstruction *r) {
+    rgb color = shell_mean_color(r, FLOOR);
+    CHECK_NEAR(color.r, wall_color[FLOOR].r, 0.1f * wall_color[FLOOR].r);
+    CHECK_NEAR(color.b, wall_color[FLOOR].b, 0.1f * wall_color[FLOOR].b);
+}
+
+static void test_lamp(struct parallel *pool) {
+    struct scene scene = {0};
+    make_scene(&scene, pool);
+    saturate(&scene, CLIP);
+    const int threads[] = {1, 3};
+    rgb found[2];
+    for (int i = 0; i < 2; i++) {
+        struct reconstruction r;
+        shell_solve(&scene, threads[i], &r);
+        for (size_t s = 0; s < r.segments.count; s++) {
+            bool is_lamp = r.segments.id[s] == LAMP;
+            CHECK_THAT(r.evidence[s].unbound == is_lamp && r.is_emitter[s] == is_lamp && !r.evidence[s].hidden,
+                       "segment %zu", s);
+            if (is_lamp)
+                found[i] = r.materials.emission[s];
+        }
+        CHECK_NEAR(found[i].r, lamp_radiance.r, 0.15f * lamp_radiance.r);
+        CHECK_NEAR(found[i].g, lamp_radiance.g, 0.15f * lamp_radiance.g);
+        CHECK_NEAR(found[i].b, lamp_radiance.b, 0.15f * lamp_radiance.b);
+        check_floor(&r);
+        reconstruct_release(&r);
+    }
+    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    scene_release(&scene);
+}
+
+/* Mean of the map where photographs look out. */
+static float seen_sky(const struct environment *e) {
+    float sum = 0.0f, count = 0.0f;
+    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
+        if (e->confidence.pixel[2 * i] == 0.0f)
+            continue;
+        sum += e->map.pixel[3 * i];
+        count += 1.0f;
+    }
+    return sum / count;
+}
+
+static void test_sky(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_mesh_with_window(&scene.mesh);
+    image_init_rgb(&sky, 64, 32);
+    for (size_t i = 0; i < 3 * 64 * 32; i++)
+        sky.pixel[i] = SKY_RADIANCE;
+    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_anywhere, pool);
+    saturate(&scene, CLIP);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    CHECK_NEAR(seen_sky(&r.environment), SKY_RADIANCE, 0.15f * SKY_RADIANCE);
+    for (size_t s = 0; s < r.segments.count; s++)
+        CHECK_THAT(!r.is_emitter[s], "segment %zu", s);
+    check_floor(&r);
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
+/* A third of the photographs is exposed for the lamp. */
+static void test_measured(struct parallel *pool) {
+    struct scene scene = {0};
+    make_scene(&scene, pool);
+    struct scene others = {.photograph = scene.photograph, .photograph_count = 2 * FRAMES / 3};
+    saturate(&others, CLIP);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++)
+        CHECK_THAT(!r.evidence[s].unbound && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(r.report, "saturated_light")) == 0);
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    test_lamp(pool);
+    test_sky(pool);
+    test_measured(pool);
+    parallel_free(pool);
+    return check_result();
+}
