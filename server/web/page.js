@@ -42,7 +42,11 @@ function element(name, text, attributes = {}) {
   return Object.assign(made, attributes);
 }
 
-const bytes = (n) => n < 1024 ? `${n} B` : n < 2 ** 20 ? `${(n / 1024).toFixed(0)} KiB` : `${(n / 2 ** 20).toFixed(1)} MiB`;
+const bytes = (n) =>
+  n < 1024 ? `${n} B`
+  : n < 2 ** 20 ? `${(n / 1024).toFixed(0)} KiB`
+  : n < 2 ** 30 ? `${(n / 2 ** 20).toFixed(1)} MiB`
+  : `${(n / 2 ** 30).toFixed(1)} GiB`;
 const duration = (s) => s < 90 ? `${Math.round(s)} s` : s < 5400 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
 
 // --- signing in -----------------------------------------------------------------------------
@@ -114,6 +118,7 @@ function follow() {
   stream = new EventSource("v1/events");
   for (const type of ["state", "progress"])
     stream.addEventListener(type, (event) => refresh(JSON.parse(event.data).job));
+  stream.addEventListener("state", updateWho);
   stream.addEventListener("metric", (event) => {
     const data = JSON.parse(event.data);
     if (data.job === chosen && data.series === "loss") addToCurve(data);
@@ -291,6 +296,20 @@ $("submit").addEventListener("submit", async (event) => {
   button.disabled = false;
 });
 
+// --- who ------------------------------------------------------------------------------------
+
+function showWho() {
+  const limit = me.kept_bytes_max ? ` of ${bytes(me.kept_bytes_max)}` : "";
+  const who = me.user ? `${me.user} (${me.role})` : "open to everybody who reaches it";
+  $("who").textContent = `${who}, keeps ${bytes(me.kept_bytes)}${limit}`;
+}
+
+// What is kept changes with every job.
+async function updateWho() {
+  me = (await get("v1/session").catch(() => null)) || me;
+  showWho();
+}
+
 // --- start ----------------------------------------------------------------------------------
 
 async function start() {
@@ -300,7 +319,7 @@ async function start() {
   $("work").hidden = false;
   $("sign-out").hidden = me.open;
   $("submit").hidden = me.role === "viewer";
-  $("who").textContent = me.user ? `${me.user} (${me.role})` : "open to everybody who reaches it";
+  showWho();
   await loadJobs();
   follow();
 }
