@@ -50,6 +50,17 @@ static void look_at_point(const struct views *views, uint32_t triangle, vec3 poi
     }
 }
 
+/* Of what was measured; of the bounds where nothing was. */
+static float mean_of(const struct looks *looks, bool *is_bound) {
+    float sum[2] = {0.0f, 0.0f}, count[2] = {0.0f, 0.0f};
+    for (size_t i = 0; i < looks->count; i++) {
+        sum[looks->value[i].is_bound] += looks->value[i].value;
+        count[looks->value[i].is_bound] += 1.0f;
+    }
+    *is_bound = count[false] == 0.0f;
+    return sum[*is_bound] / count[*is_bound];
+}
+
 static void measure(void *user, size_t index, int thread) {
     (void)thread;
     const struct measure_job *job = user;
@@ -68,11 +79,8 @@ static void measure(void *user, size_t index, int thread) {
     light->pixels[triangle] = 0.0f;
     if (looks.count == 0)
         return;
-    float sum = 0.0f;
     bool is_bound;
-    for (size_t i = 0; i < looks.count; i++)
-        sum += looks.value[i].value;
-    light->mean[triangle] = sum / (float)looks.count;
+    light->mean[triangle] = mean_of(&looks, &light->is_bound[triangle]);
     light->shown[triangle] = censored_quantile(looks.value, looks.count, 1.0f - BRIGHTER_LOOKS, &is_bound);
     light->pixels[triangle] = looks.pixels / (float)looks.count;
 }
@@ -82,6 +90,7 @@ void triangle_light_measure(struct triangle_light *light, const struct views *vi
     light->shown = mem_array(count, sizeof *light->shown);
     light->mean = mem_array(count, sizeof *light->mean);
     light->pixels = mem_array(count, sizeof *light->pixels);
+    light->is_bound = mem_calloc(count, sizeof *light->is_bound);
     struct measure_job job = {views, light};
     parallel_for(pool, count, measure, &job);
 }
@@ -90,5 +99,6 @@ void triangle_light_release(struct triangle_light *light) {
     mem_free(light->shown);
     mem_free(light->mean);
     mem_free(light->pixels);
+    mem_free(light->is_bound);
     *light = (struct triangle_light){0};
 }

@@ -5,6 +5,7 @@
 #ifndef UNBAKE_CAPTURE_TRIANGLE_LIGHT_H
 #define UNBAKE_CAPTURE_TRIANGLE_LIGHT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "common/parallel.h"
@@ -14,6 +15,7 @@ struct triangle_light {
     float *shown;  /* [triangle_count] radiance, mean of the channels, that most looks show at least: a highlight
                     * wanders with the camera, what shines itself does not; negative: no clean look; owned */
     float *mean;   /* [triangle_count] the mean of what looks show; negative as above; owned */
+    bool *is_bound; /* [triangle_count] all of them saturate: it is more; owned */
     float *pixels; /* [triangle_count] pixels that it fills in a photograph, about; owned */
 };
 

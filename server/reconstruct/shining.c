@@ -18,6 +18,9 @@
 #define KEY_PLACES 31      /* keep these random numbers apart from others of the triangle */
 #define KEY_WAYS 37
 #define KEY_SUN 41
+/* What saturates in all photographs may be so much brighter than they tell: who takes too much light for granted splits
+ * too little. */
+#define PERHAPS_BRIGHTER 16.0f
 /* The sun is looked for in so many directions; from the best ones on in steps that grow smaller. */
 #define SUN_WAYS 2048
 #define SUN_BEST 8
@@ -79,6 +82,8 @@ static void trace_ways(const struct shining *s, const struct shining_place *plac
 
 static float radiance_of(const struct shining *s, uint32_t triangle) {
     float mean = s->light->mean[triangle];
+    if (s->light->is_bound[triangle])
+        return PERHAPS_BRIGHTER * mean;
     return mean >= 0.0f ? mean : s->segment_mean[s->r->segments.of_triangle[triangle]];
 }
 
@@ -89,7 +94,10 @@ static bool is_seen(const struct shining *s, vec3 direction) {
 
 static float distant_radiance(const struct shining *s, vec3 direction) {
     float radiance = rgb_mean(lights_environment(s->r->world.lights, direction));
-    if (!s->has_unseen || is_seen(s, direction))
+    bool seen = is_seen(s, direction);
+    if (seen && !environment_is_told(&s->r->environment, direction))
+        return PERHAPS_BRIGHTER * radiance;
+    if (!s->has_unseen || seen)
         return radiance;
     struct unseen_corners c = unseen_corners(direction);
     double unseen = 0.0;
