@@ -160,13 +160,17 @@ void lamps_release(struct lamps *l) {
     *l = (struct lamps){0};
 }
 
+void lamps_brighten_sky(struct reconstruction *r, rgb factor) {
+    environment_brighten(&r->environment, factor);
+    world_set_environment(&r->world, &r->environment.map, r->pool);
+}
+
 void lamps_hand_over(const struct lamps *l, size_t count) {
     struct reconstruction *r = l->r;
     for (size_t i = 0; i < count; i++) {
         const struct lamp *lamp = &l->lamp[i];
         if (lamp->segment == LAMPS_SKY) {
-            environment_brighten(&r->environment, lamp->radiance);
-            world_set_environment(&r->world, &r->environment.map, r->pool);
+            lamps_brighten_sky(r, lamp->radiance);
             continue;
         }
         struct emitter_evidence *e = &r->evidence[lamp->segment];
@@ -194,6 +198,8 @@ void lamps_refit(struct reconstruction *r, const struct views *views, const uint
     if (l.count > 0) {
         lamps_survey(&l, views, radiance);
         lamps_fit_all(&l, l.count);
+        if (l.lamp[0].segment == LAMPS_SKY)
+            r->sky_factor = l.lamp[0].radiance;
     }
     lamps_hand_over(&l, l.count);
     lamps_release(&l);

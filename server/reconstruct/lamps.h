@@ -62,8 +62,11 @@ void lamps_fit_all(struct lamps *l, size_t count);
 void lamps_hand_over(const struct lamps *l, size_t count);
 
 /* Fits all lamps again that were handed over before, with what texels send out, those too that no photograph shows:
- * radiance[height][width], half precision. The world is without emitters after it. */
+ * radiance[height][width], half precision. The world is without emitters after it. What that does to the sky is
+ * r->sky_factor; lamps_brighten_sky does it. */
 void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]);
+
+void lamps_brighten_sky(struct reconstruction *r, rgb factor);
 
 /* Adds the light of a lamp that is `lit` in places. */
 void lamps_shine(struct light_places *places, rgb radiance);

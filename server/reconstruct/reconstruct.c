@@ -13,6 +13,7 @@
 #include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/lamp_find.h"
+#include "server/reconstruct/lamps.h"
 #include "server/reconstruct/listing1.h"
 #include "server/reconstruct/refine.h"
 #include "server/reconstruct/report.h"
@@ -262,6 +263,9 @@ static enum status run_resumable(struct run *run, struct error *err) {
     enum status status = optimiser_load(run->optimiser, &found, err);
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
+    bool was_solved = status == STATUS_OK && solves && found;
+    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f)
+        lamps_brighten_sky(run->r, run->r->sky_factor);
     if (run->r->sun.is_there) {
         sun_draw(&run->r->sun, &run->r->environment);
         light_by_environment(run->r);
@@ -281,7 +285,8 @@ static enum status report(struct run *run, struct error *err) {
 enum status reconstruct_run(struct scene *scene, const struct settings *settings,
                             struct parallel *pool, const struct reconstruct_hooks *hooks,
                             struct reconstruction *r, struct error *err) {
-    *r = (struct reconstruction){.scene = scene, .settings = settings, .pool = pool};
+    *r = (struct reconstruction){.scene = scene, .settings = settings, .pool = pool,
+                                  .sky_factor = rgb_gray(1.0f)};
     r->report = cJSON_CreateObject();
     json_add_string(r->report, "unbake_version", UNBAKE_VERSION);
     json_add_string(r->report, "ray_library", accel_library_version());

@@ -64,6 +64,7 @@ struct reconstruction {
     struct materials materials;
     struct world world;
     struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
+    rgb sky_factor;                  /* by which solve made saturated directions of it brighter still, or 1 */
     struct sun sun;                  /* that no photograph shows */
     double unseen_share;             /* of rays from surfaces: those that go where nothing is known */
     struct noise noise;              /* of the photographs' pixels */

@@ -103,10 +103,12 @@ static inline struct settings shell_settings(const char *json) {
     return s;
 }
 
+#define SHELL_SMALL \
+    "{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,\"texels_per_iteration\":64}"
+
 /* A small run from beginning to end, in which hardly anything is refined. */
 static inline void shell_solve(struct scene *scene, int threads, struct reconstruction *r) {
-    struct settings s = shell_settings("{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,"
-                                      "\"gather_samples\":64,\"texels_per_iteration\":64}");
+    struct settings s = shell_settings(SHELL_SMALL);
     struct shell shell = {.polls_until_stop = -1};
     CHECK(shell_run(scene, &s, threads, &shell, r) == STATUS_OK);
     shell_release(&shell);

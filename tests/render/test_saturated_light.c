@@ -68,6 +68,24 @@ static float seen_sky(const struct environment *e) {
     return sum / count;
 }
 
+/* The sky is fitted again in solve, which is not done again. */
+static void check_resumes(struct scene *scene, const struct reconstruction *whole) {
+    struct shell shell = {.polls_until_stop = 1, .spares_solve = true};
+    struct settings s = shell_settings(SHELL_SMALL);
+    struct reconstruction r;
+    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_CANCELLED && shell.has_checkpoint);
+    reconstruct_release(&r);
+    shell.polls_until_stop = -1;
+    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_OK);
+    size_t bytes = 3 * sizeof(float) * r.environment.map.width * r.environment.map.height;
+    CHECK(memcmp(r.environment.map.pixel, whole->environment.map.pixel, bytes) == 0);
+    CHECK(memcmp(r.materials.base_color.texel, whole->materials.base_color.texel,
+                 sizeof *r.materials.base_color.texel * r.atlas.width * r.atlas.height) == 0);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
 static void test_sky(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
@@ -83,6 +101,7 @@ static void test_sky(struct parallel *pool) {
     for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(!r.is_emitter[s], "segment %zu", s);
     check_floor(&r);
+    check_resumes(&scene, &r);
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);
