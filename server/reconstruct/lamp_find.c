@@ -3,12 +3,10 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "common/mem.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/lamps.h"
-#include "server/render/sampler.h"
 
 /* So many places of the room ask every segment that was not seen, and few points of it; all places ask the
  * likeliest of them. */
@@ -26,10 +24,7 @@
 /* Where one looks out of the room in so many directions that no photograph shows the sky may as well be what is
  * missing (unseen_light.h), and a lamp must explain more: staircase2's windows do .32 and .44, a lamp in the place of
  * the sky .23. */
-#define OPEN 0.02
 #define EXPLAINS_OPEN 0.28
-#define OPEN_RAYS 16 /* a place, of the few */
-#define KEY_LAMP 31  /* keeps these random numbers apart from others of the place */
 /* Or, one of several lamps, this share only, if nearly all of what it lights more than all others do is odd without it
  * and as usual with it: of so many places at least it leaves this part of what is odd at most (of kitchen's lamps
  * .17 to .26, of other segments .6 and more). */
@@ -53,24 +48,6 @@ struct search {
     size_t candidate_count;
     struct candidate *candidate; /* [candidate_count]; owned */
 };
-
-/* Whether rays leave the room in directions that no photograph shows. */
-static bool is_open(const struct search *s) {
-    const struct reconstruction *r = s->r;
-    size_t out = 0;
-    for (size_t i = 0; i < s->few.count; i++) {
-        const struct surface_point *at = &s->few.place[i].at;
-        vec3 frame[3] = {[2] = at->shading};
-        vec3_frame(at->shading, &frame[0], &frame[1]);
-        for (uint32_t k = 0; k < OPEN_RAYS; k++) {
-            vec3 d = incident_cosine_direction(frame, sampler_pair(sampler_key(KEY_LAMP, (uint32_t)i, 0), k, 0));
-            bool is_seen = r->environment.map.pixel && environment_is_seen(&r->environment, d);
-            vec3 from = accel_offset(at->position, at->normal, d);
-            out += !is_seen && !accel_occluded(r->world.accel, from, d, 0.0f, INFINITY);
-        }
-    }
-    return (double)out > OPEN * OPEN_RAYS * (double)s->few.count;
-}
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
@@ -173,7 +150,7 @@ void lamp_find(struct reconstruction *r, const struct views *views) {
     if (s.candidate_count > 0) {
         lamps_survey(&s.lamps, views, NULL);
         light_places_thin(&s.few, &s.lamps.places, FEW_PLACES);
-        s.is_open = is_open(&s);
+        s.is_open = lamps_is_open(&s.lamps);
         look_for_lamps(&s);
     }
     report(&s.lamps);

@@ -10,6 +10,11 @@
 #include "server/render/sampler.h"
 
 #define ROUNDS 2 /* in which each lamp's radiance is fitted again, the others being known */
+/* A room is open where one looks out of it in this share of directions in which no photograph does. */
+#define OPEN 0.02
+#define OPEN_PLACES 2048
+#define OPEN_RAYS 16 /* a place */
+#define KEY_OPEN 31
 #define SKY_RAYS 128 /* a place */
 #define KEY_SKY 37   /* keeps these random numbers apart from others of the place */
 /* Where what is known of the sky is taken away, this part of a place's light stays at least. */
@@ -107,6 +112,23 @@ void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*r
     missing_light_init(&l->missing, &l->places, LAMPS_WHITEST, false);
 }
 
+bool lamps_is_open(const struct lamps *l) {
+    const struct reconstruction *r = l->r;
+    size_t out = 0, wanted = l->places.count < OPEN_PLACES ? l->places.count : OPEN_PLACES;
+    for (size_t i = 0; i < wanted; i++) {
+        const struct surface_point *at = &l->places.place[i * l->places.count / wanted].at;
+        vec3 frame[3] = {[2] = at->shading};
+        vec3_frame(at->shading, &frame[0], &frame[1]);
+        for (uint32_t k = 0; k < OPEN_RAYS; k++) {
+            vec3 d = incident_cosine_direction(frame, sampler_pair(sampler_key(KEY_OPEN, (uint32_t)i, 0), k, 0));
+            bool is_seen = r->environment.map.pixel && environment_is_seen(&r->environment, d);
+            vec3 from = accel_offset(at->position, at->normal, d);
+            out += !is_seen && !accel_occluded(r->world.accel, from, d, 0.0f, INFINITY);
+        }
+    }
+    return (double)out > OPEN * OPEN_RAYS * (double)wanted;
+}
+
 /* --- how bright they are ----------------------------------------------------------------------------------- */
 
 static void take_lit(struct lamps *l, const struct lamp *lamp) {
@@ -128,11 +150,9 @@ void lamps_fit_one(struct lamps *l, struct lamp *lamp) {
     lamps_shine(&l->places, rgb_sub(lamp->radiance, lamp->least));
 }
 
-double lamps_explained(struct lamps *l, const struct lamp *lamp) {
-    double explained;
+float lamps_missing(struct lamps *l, const struct lamp *lamp, double *explained) {
     take_lit(l, lamp);
-    missing_light_strength(&l->missing, MISSING_MEAN, &explained);
-    return explained;
+    return missing_light_strength(&l->missing, MISSING_MEAN, explained);
 }
 
 void lamps_fit_all(struct lamps *l, size_t count) {

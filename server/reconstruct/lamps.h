@@ -50,8 +50,12 @@ struct lamp *lamps_add_sky(struct lamps *l);
 /* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less. */
 void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]);
 
-/* How much less odd places would be if it were brighter. */
-double lamps_explained(struct lamps *l, const struct lamp *lamp);
+/* Whether one looks out of the room from the places in directions that no photograph shows: the sky may as well be what
+ * is missing there (unseen_light.h). */
+bool lamps_is_open(const struct lamps *l);
+
+/* By how much it should be brighter, and how much less odd places would be then. */
+float lamps_missing(struct lamps *l, const struct lamp *lamp, double *explained);
 
 /* Gives one lamp the radiance that explains most, no less than photographs tell; the first `count` in turn, twice. `missing` is
  * to be renewed after the former. */

@@ -8,8 +8,16 @@
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/lamps.h"
 
-/* That a lamp is brighter than photographs tell must explain this share of what is odd in the room. */
+/* That a lamp is brighter than photographs tell must explain this share of what is odd in the room; more where one looks
+ * out of it to where no photograph does: one of staircase2's lamps does .12 there, a box in redkitchen, most of whose
+ * light is of that kind, .04. */
 #define EXPLAINS 0.01
+#define EXPLAINS_OPEN 0.08
+/* Nothing is so many times brighter than white paper in the same room. */
+#define TOO_BRIGHT 1000.0f
+/* The sky is asked for where this share of what is seen of it saturates: else what is unseen of it was not filled in
+ * from a bound, and is unseen_light.h's. */
+#define SKY_SATURATED 0.5
 
 /* A segment that saturates, and how much it sheds. */
 struct saturated {
@@ -46,15 +54,17 @@ static void add_segments(struct lamps *l) {
 }
 
 /* Puts the lamp that explains most into place `first`; false where it is not enough. */
-static bool find_best(struct lamps *l, size_t first) {
+static bool find_best(struct lamps *l, size_t first, double least_share) {
     double most = 0.0;
     size_t best = first;
     for (size_t i = first; i < l->count; i++) {
-        double explained = lamps_explained(l, &l->lamp[i]);
-        if (explained > most)
+        double explained;
+        float missing = lamps_missing(l, &l->lamp[i], &explained);
+        bool is_credible = missing < TOO_BRIGHT * rgb_mean(l->lamp[i].least);
+        if (is_credible && explained > most)
             most = explained, best = i;
     }
-    if (!(most > EXPLAINS * missing_light_misfit(&l->missing)))
+    if (!(most > least_share * missing_light_misfit(&l->missing)))
         return false;
     struct lamp lamp = l->lamp[best];
     l->lamp[best] = l->lamp[first];
@@ -65,7 +75,8 @@ static bool find_best(struct lamps *l, size_t first) {
 /* Makes lamps brighter, as many as explain something. Returns their number: they are the first ones. */
 static size_t brighten(struct lamps *l) {
     size_t count = 0;
-    while (count < l->count && find_best(l, count)) {
+    double least_share = lamps_is_open(l) ? EXPLAINS_OPEN : EXPLAINS;
+    while (count < l->count && find_best(l, count, least_share)) {
         lamps_fit_one(l, &l->lamp[count++]);
         missing_light_renew(&l->missing);
     }
@@ -89,7 +100,7 @@ void saturated_light_estimate(struct reconstruction *r, const struct views *view
     size_t brighter = 0;
     lamps_init(&lamps, r, views);
     emitters_observe(r, views, r->evidence);
-    if (r->environment.map.pixel && r->environment.saturated_share > 0.0)
+    if (r->environment.map.pixel && r->environment.saturated_share > SKY_SATURATED)
         lamps_add_sky(&lamps);
     add_segments(&lamps);
     if (lamps.count > 0) {

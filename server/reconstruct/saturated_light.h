@@ -2,7 +2,8 @@
  *
  * An ordinary photograph is exposed for the room: its lamps and windows are white, and how much brighter than white
  * they are no frame tells unless some are much shorter than others. Left at that lower bound they light the room too
- * little by as much, and all that they light comes out too white. What they light tells (lamps.h). */
+ * little by as much, and all that they light comes out too white. What they light tells (lamps.h). A sky is one lamp
+ * here; one of which photographs show half or more as it is stays as it is. */
 #ifndef UNBAKE_RECONSTRUCT_SATURATED_LIGHT_H
 #define UNBAKE_RECONSTRUCT_SATURATED_LIGHT_H
 
