@@ -16,18 +16,18 @@
 /* What is known of a segment's light. */
 struct emitter_evidence {
     rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
-    rgb least;   /* the same, where `shown` was made what it must be */
+    rgb least;   /* the same: it stays when `shown` is made brighter */
     bool seen;   /* some photograph shows it, and not what is beside or behind it */
     bool mixed;  /* it was only seen in pixels that mix surfaces */
     bool hidden; /* a lamp that no photograph shows: `shown` is told by what it lights (lamp_find.h) */
-    bool bound[3]; /* by channel: nearly all that shows it saturates, and it is a lower bound */
-    bool unbound;  /* of such a lamp `shown` was made what it must be by what it lights (saturated_light.h) */
+    bool bound[3]; /* by channel: nearly all that shows it saturates, and `least` is a lower bound */
+    bool unbound;  /* such a lamp: `shown` is told by what it lights (saturated_light.h) */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */
 };
 
-/* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of each; not
- * those of hidden lamps, nor `shown` of what is unbound. */
+/* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of
+ * each; not those of hidden lamps, nor `shown` of what is unbound. */
 void emitters_observe(const struct reconstruction *r, const struct views *views,
                       struct emitter_evidence *evidence);
 

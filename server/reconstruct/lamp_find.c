@@ -41,7 +41,6 @@ struct candidate {
 };
 
 struct search {
-    struct reconstruction *r;
     bool is_open;          /* one looks out of it to where no photograph does */
     struct lamps lamps;    /* that were found; and all places */
     struct light_places few;
@@ -52,7 +51,7 @@ struct search {
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
 static void find_candidates(struct search *s, const struct views *views) {
-    const struct reconstruction *r = s->r;
+    const struct reconstruction *r = s->lamps.r;
     emitters_observe(r, views, r->evidence);
     s->candidate = mem_array(r->segments.count + 1, sizeof *s->candidate);
     for (size_t i = 0; i < r->segments.count; i++) {
@@ -144,7 +143,7 @@ static void report(const struct lamps *l) {
 }
 
 void lamp_find(struct reconstruction *r, const struct views *views) {
-    struct search s = {.r = r};
+    struct search s = {0};
     lamps_init(&s.lamps, r, views);
     find_candidates(&s, views);
     if (s.candidate_count > 0) {

@@ -82,20 +82,18 @@ struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance) {
     return lamp;
 }
 
-struct lamp *lamps_add_bound(struct lamps *l, uint32_t segment) {
+void lamps_add_bound(struct lamps *l, uint32_t segment) {
     const struct emitter_evidence *e = &l->r->evidence[segment];
     struct lamp *lamp = lamps_add(l, segment, e->shown);
     lamp->least = e->least;
     for (int c = 0; c < 3; c++)
         lamp->told[c] = !e->bound[c];
-    return lamp;
 }
 
-struct lamp *lamps_add_sky(struct lamps *l) {
+void lamps_add_sky(struct lamps *l) {
     rgb by = l->r->environment.brightened;
     struct lamp *lamp = lamps_add(l, LAMPS_SKY, rgb_gray(1.0f));
     lamp->least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b);
-    return lamp;
 }
 
 void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]) {
@@ -136,7 +134,7 @@ static void take_lit(struct lamps *l, const struct lamp *lamp) {
         l->places.place[i].lit = lamp->lit[i];
 }
 
-/* So much more than photographs tell, in the channels in which they do not. */
+/* Makes it so much brighter than photographs tell, in the channels in which they do not. */
 static void set_radiance(struct lamp *lamp, rgb more) {
     lamp->radiance = lamp->least;
     for (int c = 0; c < 3; c++)

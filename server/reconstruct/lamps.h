@@ -2,7 +2,8 @@
  *
  * Places all over the room are lit by what is known, and by these lamps: those that no photograph shows
  * (lamp_find.h), and those at which every photograph saturates (saturated_light.h). Each in turn, the others being as
- * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). */
+ * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). Which lamps there
+ * are is not decided here. */
 #ifndef UNBAKE_RECONSTRUCT_LAMPS_H
 #define UNBAKE_RECONSTRUCT_LAMPS_H
 
@@ -40,12 +41,12 @@ struct lamps {
 void lamps_init(struct lamps *l, struct reconstruction *r, const struct views *views);
 void lamps_release(struct lamps *l);
 
-/* Adds a segment of which nothing is told; there must be room for it. After the survey only for what
- * photographs do not show: it lights the places from then on. The pointer holds until lamps_release. */
+/* Adds a segment of which photographs tell nothing; there must be room for it. After the survey it lights the places
+ * from then on. */
 struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance);
-/* Adds a segment at which photographs saturate, r->evidence of which is known; the sky of which some do. */
-struct lamp *lamps_add_bound(struct lamps *l, uint32_t segment);
-struct lamp *lamps_add_sky(struct lamps *l);
+/* Before the survey: a segment at which photographs saturate, as r->evidence has it; the sky at which they do. */
+void lamps_add_bound(struct lamps *l, uint32_t segment);
+void lamps_add_sky(struct lamps *l);
 
 /* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less. */
 void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]);
@@ -57,19 +58,20 @@ bool lamps_is_open(const struct lamps *l);
 /* By how much it should be brighter, and how much less odd places would be then. */
 float lamps_missing(struct lamps *l, const struct lamp *lamp, double *explained);
 
-/* Gives one lamp the radiance that explains most, no less than photographs tell; the first `count` in turn, twice. `missing` is
- * to be renewed after the former. */
+/* Gives a lamp the radiance that explains most, no less than photographs tell. `missing` is to be renewed after it. */
 void lamps_fit_one(struct lamps *l, struct lamp *lamp);
+/* The same for the first `count` in turn, twice; renews `missing`. */
 void lamps_fit_all(struct lamps *l, size_t count);
 
 /* Makes r->evidence and r->environment of the first `count` what they are by now. */
 void lamps_hand_over(const struct lamps *l, size_t count);
 
 /* Fits all lamps again that were handed over before, with what texels send out, those too that no photograph shows:
- * radiance[height][width], half precision. The world is without emitters after it. What that does to the sky is
- * r->sky_factor; lamps_brighten_sky does it. */
+ * radiance[height][width], half precision. The world is without emitters after it. The factor by which
+ * the sky changes is noted in r->sky_factor. */
 void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]);
 
+/* Changes the environment, and the world's, by such a factor. */
 void lamps_brighten_sky(struct reconstruction *r, rgb factor);
 
 /* Adds the light of a lamp that is `lit` in places. */

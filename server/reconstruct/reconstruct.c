@@ -264,7 +264,7 @@ static enum status run_resumable(struct run *run, struct error *err) {
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
     bool was_solved = status == STATUS_OK && solves && found;
-    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f)
+    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* a checkpoint holds no map, only what solve did to it */
         lamps_brighten_sky(run->r, run->r->sky_factor);
     if (run->r->sun.is_there) {
         sun_draw(&run->r->sun, &run->r->environment);

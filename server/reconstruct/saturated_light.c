@@ -13,7 +13,7 @@
  * light is of that kind, .04. */
 #define EXPLAINS 0.01
 #define EXPLAINS_OPEN 0.08
-/* Nothing is so many times brighter than white paper in the same room. */
+/* Nothing that a mesh has as a segment is so many times brighter than what saturates a photograph of its room. */
 #define TOO_BRIGHT 1000.0f
 /* The sky is asked for where this share of what is seen of it saturates: else what is unseen of it was not filled in
  * from a bound, and is unseen_light.h's. */
@@ -47,9 +47,8 @@ static void add_segments(struct lamps *l) {
             found[count++] = (struct saturated){(uint32_t)i, (double)(rgb_mean(e->shown) * l->light.area_m2[i])};
     }
     qsort(found, count, sizeof *found, by_power);
-    for (size_t i = 0; i < count && l->count < LAMPS_MOST; i++) {
+    for (size_t i = 0; i < count && l->count < LAMPS_MOST; i++)
         lamps_add_bound(l, found[i].segment);
-    }
     mem_free(found);
 }
 

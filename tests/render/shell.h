@@ -7,6 +7,13 @@
 #include "server/reconstruct/reconstruct.h"
 #include "tests/check.h"
 
+/* To the thread sanitizer, which takes minutes, further rooms are the same code again. */
+#ifdef __SANITIZE_THREAD__
+#define IS_BRIEF true
+#else
+#define IS_BRIEF false
+#endif
+
 struct shell {
     long polls_until_stop; /* negative: never */
     bool spares_solve;     /* polls count from the first checkpoint on */

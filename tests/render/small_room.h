@@ -42,26 +42,8 @@ static inline void add_quad(struct mesh *m, int64_t object, vec3 corner, vec3 u,
     m->face_count = m->triangle_count;
 }
 
-/* A room of 4 x 3 x 3 m, normals inward, a lamp of 1 m^2 under the ceiling. y is up. */
-static inline void make_mesh(struct mesh *m) {
-    *m = (struct mesh){0};
-    m->position = mem_array(4 * OBJECTS, sizeof *m->position);
-    m->index = mem_array(2 * OBJECTS, sizeof *m->index);
-    m->face = mem_array(2 * OBJECTS, sizeof *m->face);
-    m->object_id = mem_array(2 * OBJECTS, sizeof *m->object_id);
-    vec3 x = {4, 0, 0}, y = {0, 3, 0}, z = {0, 0, 3};
-    add_quad(m, FLOOR, (vec3){0, 0, 0}, z, x);
-    add_quad(m, 1, (vec3){0, 3, 0}, x, z);
-    add_quad(m, 2, (vec3){0, 0, 0}, y, z);
-    add_quad(m, 3, (vec3){4, 0, 0}, z, y);
-    add_quad(m, 4, (vec3){0, 0, 0}, x, y);
-    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
-    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
-}
-
-/* The same with a window of 2 x 1.5 m in the wall at z = 0. */
-static inline void make_mesh_with_window(struct mesh *m) {
-    size_t quads = OBJECTS + 3;
+/* Floor, ceiling and the two walls across x of a room of 4 x 3 x 3 m, normals inward, y up; memory for so many quads. */
+static inline void start_room(struct mesh *m, size_t quads) {
     *m = (struct mesh){0};
     m->position = mem_array(4 * quads, sizeof *m->position);
     m->index = mem_array(2 * quads, sizeof *m->index);
@@ -72,13 +54,40 @@ static inline void make_mesh_with_window(struct mesh *m) {
     add_quad(m, 1, (vec3){0, 3, 0}, x, z);
     add_quad(m, 2, (vec3){0, 0, 0}, y, z);
     add_quad(m, 3, (vec3){4, 0, 0}, z, y);
-    add_quad(m, 5, (vec3){0, 0, 3}, y, x);
+}
+
+/* A lamp of 1 m^2 under the ceiling. */
+static inline void add_lamp(struct mesh *m) {
+    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
+}
+
+/* The whole room, closed, with its lamp. */
+static inline void make_mesh(struct mesh *m) {
+    start_room(m, OBJECTS);
+    add_quad(m, 4, (vec3){0, 0, 0}, (vec3){4, 0, 0}, (vec3){0, 3, 0});
+    add_quad(m, 5, (vec3){0, 0, 3}, (vec3){0, 3, 0}, (vec3){4, 0, 0});
+    add_lamp(m);
+}
+
+/* The same with a window of 2 x 1.5 m in the wall at z = 0. */
+static inline void make_mesh_with_window(struct mesh *m) {
+    vec3 x = {4, 0, 0};
+    start_room(m, OBJECTS + 3);
+    add_quad(m, 5, (vec3){0, 0, 3}, (vec3){0, 3, 0}, x);
     add_quad(m, 4, (vec3){0, 0, 0}, x, (vec3){0, 1.25f, 0});
     add_quad(m, 4, (vec3){0, 2.75f, 0}, x, (vec3){0, 0.25f, 0});
     add_quad(m, 4, (vec3){0, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
     add_quad(m, 4, (vec3){3, 1.25f, 0}, (vec3){1, 0, 0}, (vec3){0, 1.5f, 0});
-    add_quad(m, LAMP, (vec3){1.5f, 2.9f, 1.0f}, (vec3){1, 0, 0}, (vec3){0, 0, 1});
+    add_lamp(m);
 }
+
+/* Each channel within a share of what it should be. */
+#define CHECK_RGB(found, wanted, share)                              \
+    do {                                                             \
+        CHECK_NEAR((found).r, (wanted).r, (share) * (wanted).r);     \
+        CHECK_NEAR((found).g, (wanted).g, (share) * (wanted).g);     \
+        CHECK_NEAR((found).b, (wanted).b, (share) * (wanted).b);     \
+    } while (0)
 
 /* A camera at `from` that looks at `to`. */
 static inline struct camera look(vec3 from, vec3 to) {

@@ -46,9 +46,7 @@ static void test_lamp(struct parallel *pool) {
             if (is_lamp)
                 found[i] = r.materials.emission[s];
         }
-        CHECK_NEAR(found[i].r, lamp_radiance.r, 0.15f * lamp_radiance.r);
-        CHECK_NEAR(found[i].g, lamp_radiance.g, 0.15f * lamp_radiance.g);
-        CHECK_NEAR(found[i].b, lamp_radiance.b, 0.15f * lamp_radiance.b);
+        CHECK_RGB(found[i], lamp_radiance, 0.15f);
         check_floor(&r);
         reconstruct_release(&r);
     }
@@ -125,8 +123,10 @@ static void test_measured(struct parallel *pool) {
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_lamp(pool);
-    test_sky(pool);
-    test_measured(pool);
+    if (!IS_BRIEF) {
+        test_sky(pool);
+        test_measured(pool);
+    }
     parallel_free(pool);
     return check_result();
 }
