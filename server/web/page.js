@@ -301,7 +301,7 @@ $("submit").addEventListener("submit", async (event) => {
 function showWho() {
   const limit = me.kept_bytes_max ? ` of ${bytes(me.kept_bytes_max)}` : "";
   const who = me.user ? `${me.user} (${me.role})` : "open to everybody who reaches it";
-  $("who").textContent = `${who}, keeps ${bytes(me.kept_bytes)}${limit}`;
+  $("who").textContent = `${who}; ${bytes(me.kept_bytes)}${limit} kept`;
 }
 
 // What is kept changes with every job.
