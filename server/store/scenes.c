@@ -24,9 +24,11 @@
 #define SCENES                                                                                             \
     "scenes LEFT JOIN scene_owners AS shown ON shown.scene_id = scenes.id AND shown.user_id = " SHOWN_OWNER \
     " LEFT JOIN users ON users.id = shown.user_id"
+/* When that owner sent it. */
+#define CREATED "ifnull(shown.created_ms, scenes.created_ms)"
 /* One who shared it and gave it up leaves it without a name for its readers. */
 #define COLUMNS                                                                                            \
-    "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, scenes.created_ms, problems,"  \
+    "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, " CREATED ", problems,"        \
     " facts, users.name, pinned, " SCENE_EXPIRES ", disk_bytes"
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                            \
@@ -218,8 +220,8 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
                                    "SELECT " COLUMNS " FROM " SCENES
-                                   " WHERE (scenes.created_ms, scenes.id) < (?3, ?4) AND " IS_READABLE
-                                   " ORDER BY scenes.created_ms DESC, scenes.id DESC LIMIT ?5",
+                                   " WHERE (" CREATED ", scenes.id) < (?3, ?4) AND " IS_READABLE
+                                   " ORDER BY " CREATED " DESC, scenes.id DESC LIMIT ?5",
                                    "niiti", (int)sees_all(who), user_of(who),
                                    (int64_t)before_ms, before_id, (int64_t)limit + 1);
     bool row = status == STATUS_OK;

@@ -62,7 +62,7 @@ struct scene_row {
     enum scene_state state;
     uint64_t bytes;         /* of the archive */
     int64_t disk_bytes;     /* that its folder takes; -1: not known */
-    int64_t created_ms;
+    int64_t created_ms;     /* when that owner sent it */
     char *problems;         /* JSON array text: [{"file","reason"}]; "[]" if none */
     char *facts;            /* JSON object text: what the check found; "{}" before */
     bool is_pinned;

@@ -1,6 +1,7 @@
 /* test_users.c -- tokens, and what is readable for whom in lists. */
 #include <limits.h>
 #include <sqlite3.h>
+#include <time.h>
 
 #include "common/sha256.h"
 #include "tests/unit/store_rig.h"
@@ -196,6 +197,43 @@ static void test_names(void) {
     drop_dir(dir);
 }
 
+/* To each owner a scene is as new as his own upload of it, also in the order of lists and from page to page. */
+static void test_ages(void) {
+    const struct timespec moment = {.tv_nsec = 3000000};
+    char *dir = fresh_dir(), token[TOKEN_SIZE], at[128] = "", next[128];
+    struct caller alice, bob;
+    struct store *store;
+    struct scene_row row;
+    int64_t id, created_ms[3];
+    size_t count;
+    bool existed;
+    OK(store_open(&store, dir, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &alice, &err));
+    OK(store_token_add(store, "bob", ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &bob, &err));
+    OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
+    nanosleep(&moment, NULL);
+    OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
+    nanosleep(&moment, NULL);
+    OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
+    static const char *const newest_first[] = {SCENE_A, SCENE_C};
+    for (size_t i = 0; i < 2; i++) {
+        OK(store_scene_list(store, &bob, at, 1, &row, &count, next, &err));
+        memcpy(at, next, sizeof at);
+        CHECK(count == 1 && (next[0] != '\0') == (i == 0));
+        CHECK_STRING(row.id, newest_first[i]);
+        created_ms[i] = row.created_ms;
+        scene_row_release(&row);
+    }
+    OK(store_scene_find(store, &alice, SCENE_A, &row, &err));
+    created_ms[2] = row.created_ms;
+    scene_row_release(&row);
+    CHECK(created_ms[0] > created_ms[1] && created_ms[1] > created_ms[2]);
+    store_close(store);
+    drop_dir(dir);
+}
+
 static void test_lists(void) {
     char *dir = fresh_dir(), token[TOKEN_SIZE];
     struct store *store;
@@ -269,5 +307,6 @@ int main(void) {
     test_tokens();
     test_lists();
     test_names();
+    test_ages();
     return check_result();
 }
