@@ -7,8 +7,9 @@
 #include "common/mem.h"
 #include "server/scene/surface.h"
 
-/* Variance by light of others (struct measured, mixing) at which a texel counts half. */
-#define MIXING_FLOOR 0.01
+/* Variance by light of others (struct measured, mixing) at which a texel counts half: of a black frame before a
+ * window a few clean texels must outweigh many that shine with it. */
+#define MIXING_FLOOR 0.001
 #define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
 /* Share of a segment's texels that must be measured cleanly for its own mean to count as much as its
  * surroundings; it counts with the square of that share. */

@@ -1,5 +1,6 @@
 /* color_prior.h: a chart that photographs show well expects its own colour, one that they do not show that
- * of the surfaces around it, and one that they show in mixed pixels only hardly more than that. */
+ * of the surfaces around it, and one that they show in mixed pixels only hardly more than that; where a part is clean, that
+ * part tells. */
 #include <math.h>
 
 #include "common/image.h"
@@ -7,13 +8,13 @@
 #include "server/reconstruct/color_prior.h"
 #include "tests/check.h"
 
-#define WALLS 5
+#define WALLS 6
 #define SIDE 32 /* texels of a wall */
 
-/* Walls of 1 x 1 m in the plane z = 0, a row of them: white, hidden, mixed, and 20 m further black, and a
- * lamp. Each has its own segment and chart. */
-enum { WHITE, HIDDEN, MIXED, BLACK, LAMP };
-static const float left[WALLS] = {0, 1, 2, 20, 21};
+/* Walls of 1 x 1 m in the plane z = 0, a row of them: white, hidden, mixed, and 20 m further black, a
+ * lamp, and a black frame. Each has its own segment and chart. */
+enum { WHITE, HIDDEN, MIXED, BLACK, LAMP, FRAME };
+static const float left[WALLS] = {0, 1, 2, 20, 21, 22};
 
 static vec3 position[WALLS * 4];
 static uint32_t indices[WALLS * 2][3], of_triangle[WALLS * 2];
@@ -36,12 +37,17 @@ static void make_walls(void) {
     }
 }
 
-static void show(uint32_t wall, float value, float mixing) {
-    for (uint32_t i = wall * SIDE * SIDE; i < (wall + 1) * SIDE * SIDE; i++) {
+/* All texels of a wall but the first `from`. */
+static void show_from(uint32_t from, uint32_t wall, float value, float mixing) {
+    for (uint32_t i = wall * SIDE * SIDE + from; i < (wall + 1) * SIDE * SIDE; i++) {
         uint16_t half = image_half_from_float(value);
         measured[i] = (struct measured){.weight = 1.0f, .value = {half, half, half},
                                         .mixing = image_half_from_float(mixing)};
     }
+}
+
+static void show(uint32_t wall, float value, float mixing) {
+    show_from(0, wall, value, mixing);
 }
 
 int main(void) {
@@ -58,6 +64,8 @@ int main(void) {
     show(MIXED, 3.0f, 20.0f);
     show(BLACK, 0.05f, 0.0f);
     show(LAMP, 4.0f, 0.0f);
+    show(FRAME, 0.01f, 0.0f);
+    show_from(SIDE * SIDE / 10, FRAME, 0.5f, 0.25f);
 
     struct color_prior *prior = color_priors(&r, measured);
     CHECK_THAT(fabsf(prior[WHITE].mean.g - 0.9f) < 0.01f, "%g", (double)prior[WHITE].mean.g);
@@ -65,6 +73,7 @@ int main(void) {
     CHECK_THAT(prior[BLACK].variance < 0.01f, "%g", (double)prior[BLACK].variance);
     CHECK_THAT(prior[HIDDEN].mean.g > 0.75f, "the white wall is beside it: %g", (double)prior[HIDDEN].mean.g);
     CHECK_THAT(prior[MIXED].mean.g < 1.2f, "%g", (double)prior[MIXED].mean.g);
+    CHECK_THAT(prior[FRAME].mean.g < 0.05f, "%g", (double)prior[FRAME].mean.g);
     CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
 
     /* Where nothing is known at all, grey; and nothing is known well. */
