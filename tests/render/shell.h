@@ -7,8 +7,8 @@
 #include "server/reconstruct/reconstruct.h"
 #include "tests/check.h"
 
-/* To the thread sanitizer, which takes minutes, further rooms are the same code again. */
-#ifdef __SANITIZE_THREAD__
+/* To a sanitizer, which takes minutes, further rooms are much the same code again. */
+#if defined __SANITIZE_THREAD__ || defined __SANITIZE_ADDRESS__
 #define IS_BRIEF true
 #else
 #define IS_BRIEF false

@@ -19,7 +19,7 @@ static void test_hidden(struct parallel *pool) {
     photograph_mesh(&scene, lamp_radiance, NULL, look_down, pool);
     const int threads[] = {1, 3};
     rgb found[2];
-    for (int i = 0; i < 2; i++) {
+    for (int i = IS_BRIEF; i < 2; i++) {
         struct reconstruction r;
         shell_solve(&scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
@@ -35,7 +35,7 @@ static void test_hidden(struct parallel *pool) {
         CHECK_NEAR(color.b, wall_color[FLOOR].b, 0.2f * wall_color[FLOOR].b);
         reconstruct_release(&r);
     }
-    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    CHECK(IS_BRIEF || memcmp(&found[0], &found[1], sizeof found[0]) == 0);
     scene_release(&scene);
 }
 

@@ -36,7 +36,7 @@ static void test_lamp(struct parallel *pool) {
     saturate(&scene, CLIP);
     const int threads[] = {1, 3};
     rgb found[2];
-    for (int i = 0; i < 2; i++) {
+    for (int i = IS_BRIEF; i < 2; i++) {
         struct reconstruction r;
         shell_solve(&scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
@@ -50,7 +50,7 @@ static void test_lamp(struct parallel *pool) {
         check_floor(&r);
         reconstruct_release(&r);
     }
-    CHECK(memcmp(&found[0], &found[1], sizeof found[0]) == 0);
+    CHECK(IS_BRIEF || memcmp(&found[0], &found[1], sizeof found[0]) == 0);
     scene_release(&scene);
 }
 
