@@ -14,7 +14,7 @@ render/test_environment render/test_sun render/test_split api/test_resume api/te
 # The thread sanitizer has nothing to find in one thread either.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
 gradient/test_path render/test_calibrate_light render/test_calibrate_poses render/test_gloss render/test_saturated_light
-chaos/test_clock chaos/test_power_cut chaos/test_disk_faults chaos/test_memory_faults chaos/test_worker_kill api/test_http_faults $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
+chaos/test_clock chaos/test_power_cut chaos/test_disk_faults chaos/test_memory_faults chaos/test_worker_kill api/test_http_faults api/test_client_commands $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 
 # One test: prints its line in one piece and adds its outcome to $outcomes.
 run_one() {
