@@ -27,7 +27,7 @@
 #define MATT_PRIOR_LARGE 0.65
 #define LARGE_PART 0.05
 #define PRIOR_SPECULAR 0.5f
-#define PRIOR_WEIGHT 1.0f /* of the square of the difference to that, in the misfit of the best candidate */
+#define PRIOR_WEIGHT 1.0f /* of the square of the difference to that, in a candidate's cost */
 /* Rougher highlights cannot be told from matt reflection; of one of .8 large walls tell by 3 to 10 standard errors. */
 #define GLOSS_ROUGHEST 0.8f
 /* A segment is matt, or as glossy as the best candidate, from this probability on; else the mean of all

@@ -5,7 +5,7 @@
  * diffuse lobe sends, with one base colour for all views of a texel. How much worse than the best one a
  * candidate does, in standard errors over the texels, is how likely it is: a segment that is sure to be
  * glossy is as the best candidate, placed between its neighbours by a parabola; one that is sure to be matt is
- * matt; any other gets the mean of all candidates. */
+ * matt; any other gets the mean of all candidates. Emitters are matt: their own light hides what they reflect. */
 #ifndef UNBAKE_RECONSTRUCT_GLOSS_H
 #define UNBAKE_RECONSTRUCT_GLOSS_H
 

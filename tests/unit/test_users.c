@@ -143,21 +143,27 @@ static void check_name(struct store *store, const struct caller *who, const char
     }
 }
 
+static struct caller add_user(struct store *store, const char *name) {
+    char token[TOKEN_SIZE];
+    struct caller who = {0};
+    int64_t id;
+    OK(store_token_add(store, name, ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &who, &err));
+    return who;
+}
+
 /* Each owner of a scene calls it as he likes, and learns neither how others call it nor who they are. */
 static void test_names(void) {
     static const char *const users[] = {"alice", "bob", "carol", "dora"};
-    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    char *dir = fresh_dir();
     struct caller who[4], *alice = &who[0], *bob = &who[1], *carol = &who[2], *dora = &who[3];
     const struct caller admin = {.role = ROLE_ADMIN};
     const struct keeping as_is = {0};
     struct store *store;
-    int64_t id;
     bool existed, is_gone;
     OK(store_open(&store, dir, &err));
-    for (int i = 0; i < 4; i++) {
-        OK(store_token_add(store, users[i], ROLE_USER, token, &id, &err));
-        OK(store_token_find(store, token, &who[i], &err));
-    }
+    for (int i = 0; i < 4; i++)
+        who[i] = add_user(store, users[i]);
     OK(store_scene_add(store, SCENE_A, "secret of alice", 1, alice->user_id, &existed, &err));
     OK(store_scene_add(store, SCENE_A, "kitchen", 1, bob->user_id, &existed, &err));
     OK(store_scene_add(store, SCENE_A, "hall", 1, carol->user_id, &existed, &err));
@@ -200,18 +206,16 @@ static void test_names(void) {
 /* To each owner a scene is as new as his own upload of it, also in the order of lists and from page to page. */
 static void test_ages(void) {
     const struct timespec moment = {.tv_nsec = 3000000};
-    char *dir = fresh_dir(), token[TOKEN_SIZE], at[128] = "", next[128];
+    char *dir = fresh_dir(), at[128] = "", next[128];
     struct caller alice, bob;
     struct store *store;
     struct scene_row row;
-    int64_t id, created_ms[3];
+    int64_t created_ms[3];
     size_t count;
     bool existed;
     OK(store_open(&store, dir, &err));
-    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
-    OK(store_token_find(store, token, &alice, &err));
-    OK(store_token_add(store, "bob", ROLE_USER, token, &id, &err));
-    OK(store_token_find(store, token, &bob, &err));
+    alice = add_user(store, "alice");
+    bob = add_user(store, "bob");
     OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
     nanosleep(&moment, NULL);
     OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
@@ -235,19 +239,16 @@ static void test_ages(void) {
 }
 
 static void test_lists(void) {
-    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    char *dir = fresh_dir();
     struct store *store;
     struct caller alice, bob, admin = {.role = ROLE_ADMIN};
     struct scene_row row;
     struct job job;
-    int64_t id;
     bool existed, is_gone;
     enum access access;
     OK(store_open(&store, dir, &err));
-    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
-    OK(store_token_find(store, token, &alice, &err));
-    OK(store_token_add(store, "bob", ROLE_USER, token, &id, &err));
-    OK(store_token_find(store, token, &bob, &err));
+    alice = add_user(store, "alice");
+    bob = add_user(store, "bob");
     OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
     OK(store_scene_ready(store, SCENE_A, "{}", &err));
     OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
