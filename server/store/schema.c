@@ -188,7 +188,11 @@ static const char step_11[] =
     "UPDATE scene_owners SET name = (SELECT name FROM scenes WHERE id = scene_id);"
     "ALTER TABLE scenes DROP COLUMN name;";
 
+/* Lists of scenes go by when each owner sent them. */
+static const char step_12[] =
+    "DROP INDEX scenes_by_age;";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
                                     step_6, step_7, step_8, step_9, step_10,
-                                    step_11};
+                                    step_11, step_12};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);
