@@ -12,7 +12,7 @@ build=$1 one=${2:-}
 rows=$build/coverage.tsv
 
 find "$build/obj" -name '*.gcda' -delete
-bash tests/run.sh "$one" "$build"
+TEST_TIMEOUT=${TEST_TIMEOUT:-1800} bash tests/run.sh "$one" "$build" # counting is slow
 failed=$?
 
 # Branches are not told, lines are.

@@ -23,7 +23,8 @@ static char dir[64];
 static struct store *store;
 static const struct scheduler_config config = {.data_dir = dir, .worker_binary = "/proc/self/exe", .max_running = 1,
                                                .thread_count = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1,
-                                               .event_keep_sec = 3600, .checkpoint_keep_sec = 3600};
+                                               .event_keep_sec = 3600, .checkpoint_keep_sec = 3600,
+                                               .user_max_bytes = (uint64_t)1 << 40};
 
 /* --- faults --------------------------------------------------------------------------------------- */
 

@@ -287,6 +287,9 @@ static void test_many(void) {
     strike_sql("OFFSET", 1, false);
     measure_unknown(&config, store);
     CHECK(lift() && log_count("is not known of all: ") == 1);
+    strike_sql("UPDATE jobs SET disk_bytes", 1, false);
+    measure_unknown(&config, store);
+    CHECK(lift() && log_count("is not known of all: ") == 2);
     measure_unknown(&config, store);
     for (int i = 0; i < 150; i++) {
         CHECK(disk_of(ids[i]) >= 4 * KIB);

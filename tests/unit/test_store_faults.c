@@ -139,6 +139,15 @@ static enum status submit_second(void) {
     bool replayed;
     return store_job_add(store, &new, 9, &second_job, &replayed, &err);
 }
+/* He keeps as many as he may. */
+static enum status submit_too_many(void) {
+    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .owner_id = alice.user_id,
+                          .max_attempts = 1, .user_max_jobs = 2};
+    bool replayed;
+    int64_t none;
+    enum status status = store_job_add(store, &new, 9, &none, &replayed, &err);
+    return status == STATUS_NO_SPACE && strstr(err.message, "may keep 2") ? STATUS_OK : status;
+}
 static enum status get_job(void) {
     struct job row;
     enum status status = store_job_get(store, job, &row, &err);
@@ -358,8 +367,8 @@ static const struct step {
     STEP(access_scene), STEP(user_bytes), STEP(check_share), STEP(check_scene_share), STEP(would_delete_scene),
     STEP(add_upload), STEP(add_other_upload), STEP(get_upload), STEP(list_uploads), STEP(begin_upload), STEP(advance_upload),
     STEP(finish_upload), STEP(keep_upload), STEP(delete_upload), STEP(list_expired), STEP(expire_upload),
-    STEP(submit), STEP(submit), STEP(submit_second), STEP(unknown_disk), STEP(enter_disk), STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first),
-    STEP(place_last), STEP(place_before), STEP(count), STEP(next_job), STEP(pause_job), STEP(resume_job), STEPS(explain),
+    STEP(submit), STEP(submit), STEP(submit_second), STEP(submit_too_many), STEP(unknown_disk), STEP(enter_disk),
+    STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first), STEP(place_last), STEP(place_before), STEP(count), STEP(next_job), STEP(pause_job), STEP(resume_job), STEPS(explain),
     STEPS(explain_no_more),
     STEP(start_job), STEP(progress), STEP(progress), STEPS(many_events), STEP(put_output), STEP(get_output), STEP(list_outputs),
     STEP(list_events), STEP(page_of_job), STEP(page_of_all), STEP(page_of_mine), STEP(last_event_of_job),
