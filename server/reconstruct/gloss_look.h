@@ -16,7 +16,7 @@
 #include "server/reconstruct/reconstruction.h"
 
 #define GLOSS_VIEWS 10        /* photographs of a texel, at most */
-#define GLOSS_POINTS_MOST 256 /* texels of a segment, at most */
+#define GLOSS_POINTS_MOST 1024 /* texels of a segment, at most */
 #define GLOSS_PATCH_LEAST 8.0f /* texels a side of what is looked at around a texel, at least */
 
 /* Roughness and specular of the candidates. */
