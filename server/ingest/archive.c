@@ -99,13 +99,15 @@ static bool open_gzip(struct unpacking *u) {
     return true;
 }
 
-/* As archive_read_open, which in libarchive 3.6.2 does not look whether there was memory for the first
- * of these. */
+/* As archive_read_open and archive_read_open_fd, which in libarchive 3.6.2 do not look whether there was memory for the
+ * first of these; what is there is not made again. */
 static int open_stream(struct unpacking *u) {
-    int result = archive_read_set_callback_data(u->archive, u);
-    if (result == ARCHIVE_OK)
-        result = archive_read_set_read_callback(u->archive, read_gzip);
-    return result == ARCHIVE_OK ? archive_read_open1(u->archive) : result;
+    struct archive *a = u->archive;
+    if (archive_read_set_callback_data(a, u) != ARCHIVE_OK)
+        return ARCHIVE_FATAL;
+    if (!open_gzip(u))
+        return archive_read_open_fd(a, u->fd, BLOCK_BYTES);
+    return archive_read_set_read_callback(a, read_gzip) == ARCHIVE_OK ? archive_read_open1(a) : ARCHIVE_FATAL;
 }
 
 /* The formats and filters that are promised and no others: each is a parser of hostile bytes. */
@@ -125,10 +127,7 @@ static enum status open_archive(struct unpacking *u, const char *path) {
                          archive_error_string(a));
     }
     errno = 0;
-    int result = open_gzip(u) ? open_stream(u) : archive_read_open_fd(a, u->fd, BLOCK_BYTES);
-    if (result != ARCHIVE_OK)
-        return library_error(u, NULL);
-    return STATUS_OK;
+    return open_stream(u) == ARCHIVE_OK ? STATUS_OK : library_error(u, NULL);
 }
 
 /* A word for an entry that is neither file nor folder; NULL for those two. */

@@ -5,8 +5,8 @@
  * attempt, when all is well again, ends with the textures of one that nobody disturbed. The same of the check
  * of a scene, which never finds fault with the scene for it.
  *
- * From n = FROM (1) on. Of operations every STEP-th fails; ALL: 1 for all of these ways at each, 0 for one in
- * turn. Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such
+ * From n = FROM (1) on. Of operations every STEP-th fails, of a check's more; ALL: 1 for all of these ways at each, 0
+ * for one in turn. Of allocations, which are many and alike, the first that the same calls led to, for every STEP-th such
  * stack of calls; ALL: in both ways, and once more, in turn, the last and the one in the middle. */
 #include <dirent.h>
 
@@ -245,7 +245,8 @@ int main(int argc, char **argv) {
     worker_hash(dir, peace);
     file_remove_tree(dir, NULL);
     long strikes = campaign("workers", strike, step, all, from);
-    strikes += campaign("checks of scenes", strike_check, (step + 6) / 7, all, 1); /* they do less, and sooner */
+    /* They do less, and sooner. */
+    strikes += campaign("checks of scenes", strike_check, is_memory ? 1 : (step + 6) / 7, all, 1);
     if (is_memory) {
         figure("no memory, workers: allocations made to fail", (double)strikes, 5000, "higher");
         figure("no memory, workers: of them elsewhere than planned", (double)astray, 0.05 * (double)strikes, "lower");
