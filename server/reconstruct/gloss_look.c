@@ -10,7 +10,7 @@
 #include "server/scene/surface.h"
 
 /* Texels that are looked at in all; a segment's share of them goes by the root of its share of the texels. */
-#define POINTS_IN_ALL 24000
+#define POINTS_IN_ALL 60000
 #define POINTS_LEAST 24
 #define TRIES 16 /* texels tried for one that is looked at */
 #define VIEWS_ASKED 40 /* of which those far from edges are taken */
