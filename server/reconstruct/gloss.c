@@ -6,8 +6,10 @@
 #include "common/mem.h"
 #include "server/reconstruct/gloss_look.h"
 
-/* With fewer than these, pixels nearer to edges are taken as well, then smaller patches. */
+/* With fewer than these, and than this part of those asked for, pixels nearer to edges are taken as well, then smaller
+ * patches. */
 #define POINTS_ENOUGH 32
+#define PART_ENOUGH 8
 #define VIEWS_LEAST 3
 /* Misfit at which a look has a quarter of its influence: parts of the texel's radiance and of the
  * median of the room. */
@@ -122,11 +124,13 @@ static bool look(const struct gloss_job *job, size_t segment, struct gloss_way w
 /* Looks ever closer until enough texels were seen; false where hardly any is. */
 static bool look_well(const struct gloss_job *job, size_t segment, int thread) {
     struct gloss_way way = {gloss_widest_patch(&job->looker, segment), 0, VIEWS_LEAST};
+    size_t enough = gloss_points_of(&job->looker, segment) / PART_ENOUGH;
+    enough = enough < POINTS_ENOUGH ? POINTS_ENOUGH : enough;
     for (;; way.patch = fmaxf(0.5f * way.patch, GLOSS_PATCH_LEAST)) {
         bool seen = false;
         for (way.edge = 0; way.edge < VIEWS_EDGE; way.edge++) {
             seen = look(job, segment, way, thread);
-            if (job->evidence[thread].count >= POINTS_ENOUGH)
+            if (job->evidence[thread].count >= enough)
                 return true;
         }
         if (way.patch <= GLOSS_PATCH_LEAST)

@@ -58,7 +58,10 @@ struct gloss_way {
 /* The widest patch, within reason, of which a segment has room for many. */
 float gloss_widest_patch(const struct gloss_looker *l, size_t segment);
 
-/* Fills point[GLOSS_POINTS_MOST] with texels of a segment; returns their number. */
+/* So many texels of a segment are asked for. */
+size_t gloss_points_of(const struct gloss_looker *l, size_t segment);
+
+/* Fills point[GLOSS_POINTS_MOST] with so many texels of a segment, or fewer; returns their number. */
 size_t gloss_look_at(const struct gloss_looker *l, size_t segment, struct gloss_way way, int thread,
                      struct gloss_point *point);
 

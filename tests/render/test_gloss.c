@@ -40,7 +40,7 @@ static void test_told(struct scene *scene) {
 
 /* Every pixel is off by up to NOISE of itself: of the floor it is not sure any more, and takes it for something in
  * between, glossier than the ceiling. */
-#define NOISE 0.9f
+#define NOISE 0.99f
 
 static void test_hardly_told(struct scene *scene) {
     float roughness[OBJECTS], specular[OBJECTS];
