@@ -2,7 +2,7 @@
  * allocation fails, for every STEP-th n: a disk by ENOSPC or EIO, once or from then on, memory once or
  * from then on (ALL: 1 for all of these at each n, 0 for one in turn). First while clients send scenes,
  * upload in parts, make, change and remove jobs that never run; then, of a disk, over the life of jobs
- * that do.
+ * that do (without ALL at every sixth of these n).
  *
  * Each request does what it should or says why not: 507 for a full disk, 500 for a broken one, and on a
  * full disk what is there can be removed. Without memory a request may find its connection closed, and
@@ -454,7 +454,7 @@ int main(int argc, char **argv) {
     daemon_remove(&daemon_);
     if (check_failed_count == 0 && !is_memory) {
         begin(argv[1], false, argv[2]);
-        lived = go_on(live_once, 6 * step, false);
+        lived = go_on(live_once, all ? step : 6 * step, all); /* a life takes longer than a talk */
         daemon_remove(&daemon_);
     }
     printf("the daemon, %s: %ld in a talk, %ld in a job's life; %ld made to fail; %ld requests, %ld ends\n",
