@@ -24,6 +24,18 @@ uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key) {
     return index;
 }
 
+size_t choose_even_step(size_t count) {
+    for (size_t step = (size_t)(0.6180339887 * (double)count) + 1;; step++) {
+        size_t a = count, b = step;
+        while (b != 0) {
+            size_t rest = a % b;
+            a = b, b = rest;
+        }
+        if (a == 1)
+            return step;
+    }
+}
+
 void chooser_init(struct chooser *c, size_t item_count, size_t per_iteration, uint64_t seed) {
     c->item_count = item_count;
     c->stratum_count = per_iteration < item_count ? per_iteration : item_count;

@@ -29,4 +29,8 @@ size_t chooser_item(const struct chooser *c, uint64_t iteration, size_t stratum)
  * next power of two with cycle walking, as in Kensler 2013 (Correlated Multi-Jittered Sampling). */
 uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key);
 
+/* Multiples of it, modulo `count`, are all of [0, count), each once, and spread evenly wherever the sequence is cut
+ * off: the first number from the golden section of `count` on that has no factor in common with it. */
+size_t choose_even_step(size_t count);
+
 #endif

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/capture/choose.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
@@ -140,27 +141,12 @@ float gloss_widest_patch(const struct gloss_looker *l, size_t segment) {
     return fmaxf(GLOSS_PATCH_LEAST, (float)fmin(side, PATCH_WIDEST * fmax(1.0, texture / 2048.0)));
 }
 
-/* Multiples of it, modulo `count`, are all numbers below that, spread evenly wherever the sequence is cut off: it is
- * near the golden section and has no factor in common with `count`. */
-static size_t even_step(size_t count) {
-    size_t step = (size_t)(0.6180339887 * (double)count) + 1;
-    for (;; step++) {
-        size_t a = count, b = step;
-        while (b != 0) {
-            size_t rest = a % b;
-            a = b, b = rest;
-        }
-        if (a == 1)
-            return step;
-    }
-}
-
 size_t gloss_look_at(const struct gloss_looker *l, size_t segment, struct gloss_way way, int thread,
                      struct gloss_point *point) {
     size_t points = gloss_points_of(l, segment);
     uint32_t texels = l->texels.first[segment + 1] - l->texels.first[segment];
     const uint32_t *texel = &l->texels.texel[l->texels.first[segment]];
-    size_t tries = TRIES * points, count = 0, step = even_step(texels);
+    size_t tries = TRIES * points, count = 0, step = choose_even_step(texels);
     for (size_t i = 0; i < tries && i < texels && count < points; i++)
         count += look_at_texel(l, texel[i * step % texels], way, &l->scratch[thread], &point[count]);
     return count;

@@ -1,4 +1,4 @@
-/* choose.h: permutations permute; an epoch visits every texel once, evenly over the surface. */
+/* choose.h: permutations permute, even steps reach all; an epoch visits every texel once, evenly over the surface. */
 #include "server/capture/choose.h"
 
 #include "tests/check.h"
@@ -26,6 +26,24 @@ static void test_even(void) {
     CHECK_THAT(chi < 37.7, "chi-square %.1f", chi);
 }
 
+/* All are visited, and the first `part` of them leave no gap of more than a few times the mean. */
+static void test_even_step(size_t count, size_t part) {
+    unsigned char *seen = calloc(count, 1);
+    size_t step = choose_even_step(count), gap = 0, widest = 0;
+    for (size_t i = 0; i < part; i++)
+        seen[i * step % count]++;
+    for (size_t i = 0; i < count; i++) {
+        gap = seen[i] ? 0 : gap + 1;
+        widest = gap > widest ? gap : widest;
+    }
+    CHECK_THAT(widest * part <= 6 * count, "%zu of %zu leave a gap of %zu", part, count, widest);
+    for (size_t i = part; i < count; i++)
+        seen[i * step % count]++;
+    for (size_t i = 0; i < count; i++)
+        CHECK_THAT(seen[i] == 1, "%zu of %zu is visited %d times", i, count, seen[i]);
+    free(seen);
+}
+
 static void test_epoch(size_t items, size_t per_iteration) {
     struct chooser c;
     chooser_init(&c, items, per_iteration, 7);
@@ -49,6 +67,12 @@ static void test_epoch(size_t items, size_t per_iteration) {
 int main(void) {
     test_permutation();
     test_even();
+    test_even_step(1, 1);
+    test_even_step(2, 1);
+    test_even_step(97, 10);
+    test_even_step(1000, 24);
+    test_even_step(5040, 256);
+    test_even_step(65536, 1024);
     test_epoch(1000, 64);
     test_epoch(1000, 1000);
     test_epoch(10, 64);
