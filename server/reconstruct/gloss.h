@@ -1,6 +1,6 @@
 /* gloss.h -- roughness and specular of each segment, from how its texels change with the view.
  *
- * At a few hundred texels of a segment, each seen by several photographs, the highlight of every
+ * At up to a thousand texels of a segment, each seen by several photographs, the highlight of every
  * candidate material is gathered (highlight.h); what remains must be base colour times what the
  * diffuse lobe sends, with one base colour for all views of a texel. How much worse than the best one a
  * candidate does, in standard errors over the texels, is how likely it is: a segment that is sure to be
