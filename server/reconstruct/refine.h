@@ -6,8 +6,8 @@
  * to what was rendered, against a prior for what was solved (match.h); the emitters move by what is
  * seen of them (emission.h); roughness and specular stay.
  *
- * It ends before its time when windows had enough looks (setting refine_looks): from then on what moves them is no
- * longer noise nor what solve left but the faults of renders and photographs themselves, and base colour gets worse. */
+ * It ends before its time when windows had enough looks (setting refine_looks): from then on what moves them is
+ * hardly what solve left but the faults of renders and photographs themselves, and base colour stays or gets worse. */
 #ifndef UNBAKE_RECONSTRUCT_REFINE_H
 #define UNBAKE_RECONSTRUCT_REFINE_H
 
