@@ -28,6 +28,8 @@ static const struct setting table[] = {
      "listing1: base colour moves in blocks of 2^n texels a side at first, then smaller ones, at last single texels"},
     {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true", "solve",
      "solve: take the photographs' noise out of base colour"},
+    {"denoise_mesh", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
+     "put the vertices of a rough mesh back to where its surfaces are; one that has normals stays as it is"},
     {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.002", NULL,
      "first step size of emission, in logarithms of radiance"},
     {"emitters", SETTING_CHOICE, "", 0, 0, "decide|any", "decide", "listing1",

@@ -22,6 +22,7 @@
 #include "server/reconstruct/split.h"
 #include "server/reconstruct/sun_find.h"
 #include "server/reconstruct/unseen_light.h"
+#include "server/scene/mesh_denoise.h"
 #include "server/scene/normals.h"
 
 /* Where every surface starts, with a neutral base colour: half rough, half glossy. */
@@ -37,6 +38,7 @@ struct run {
     struct optimiser *optimiser; /* of listing1 or refine; owned */
     size_t turned;               /* triangles whose back was taken for the front */
     const char *normals;         /* where they come from: given, estimated, none */
+    float mesh_noise_m;          /* deviation of its vertices, 0 where none was moved */
     float roughness;             /* of the mesh whose normals are estimated */
     cJSON *stages;               /* owned by the report */
 };
@@ -90,6 +92,7 @@ static void add_prepare_figures(const struct run *run) {
     json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
     json_add_int(figures, "triangles_turned", (int64_t)run->turned);
     json_add_string(figures, "normals", run->normals);
+    json_add_number(figures, "mesh_noise_m", (double)run->mesh_noise_m);
     json_add_number(figures, "mesh_roughness", (double)run->roughness);
     json_add_int(figures, "segments", (int64_t)r->segments.count);
     json_add_int(figures, "charts", (int64_t)r->atlas.chart_count);
@@ -181,6 +184,17 @@ static enum status remap_surface(struct run *run, bool has_split, struct error *
     return STATUS_OK;
 }
 
+static void denoise_mesh(struct run *run) {
+    char line[128];
+    if (settings_bool(run->r->settings, "denoise_mesh"))
+        run->mesh_noise_m = mesh_denoise(&run->r->scene->mesh, run->r->pool);
+    if (run->mesh_noise_m == 0.0f)
+        return;
+    snprintf(line, sizeof line, "mesh: its vertices are off by %.2g mm; they were put back",
+             1e3 * (double)run->mesh_noise_m);
+    run->hooks->log(run->hooks->user, line);
+}
+
 static void estimate_normals(struct run *run) {
     struct mesh *mesh = &run->r->scene->mesh;
     bool had_some = mesh->normal != NULL;
@@ -199,6 +213,7 @@ static enum status prepare(struct run *run, struct error *err) {
     enum status status = orient_mesh(r->scene, r->pool, &run->turned, err);
     if (status != STATUS_OK)
         return status;
+    denoise_mesh(run);
     estimate_normals(run);
     make_segments(r);
     status = map_surface(r, NULL, err);

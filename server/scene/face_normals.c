@@ -1,0 +1,124 @@
+/* face_normals.c -- see face_normals.h. */
+#include "server/scene/face_normals.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+
+#define CHUNK 1024 /* triangles a work item */
+#define PASSES 5   /* of the filter */
+/* Normals that differ by this many times the roughness count .6, within bounds. */
+#define ALIKE 2.0f
+#define LEAST_ALIKE 0.15f
+#define MOST_ALIKE 0.4f
+#define NEIGHBOURS_MOST 64 /* of a triangle that are looked at; more meet at the poles of spheres only */
+#define SAMPLES_MOST 65536 /* triangles of which roughness is taken */
+
+struct filter {
+    const struct mesh *mesh;
+    const struct face_normals *faces;
+    const vec3 *from;  /* [triangle_count] */
+    vec3 *to;          /* [triangle_count] */
+    float spread;
+};
+
+static void collect_triangles(struct face_normals *f, const struct mesh *m) {
+    f->first = mem_calloc(m->vertex_count + 1, sizeof *f->first);
+    f->triangle = mem_array(3 * m->triangle_count, sizeof *f->triangle);
+    for (size_t t = 0; t < m->triangle_count; t++)
+        for (int c = 0; c < 3; c++)
+            f->first[f->weld[m->index[t][c]] + 1]++;
+    for (size_t v = 0; v < m->vertex_count; v++)
+        f->first[v + 1] += f->first[v];
+    uint32_t *end = mem_array(m->vertex_count + 1, sizeof *end);
+    memcpy(end, f->first, (m->vertex_count + 1) * sizeof *end);
+    for (size_t t = 0; t < m->triangle_count; t++)
+        for (int c = 0; c < 3; c++)
+            f->triangle[end[f->weld[m->index[t][c]]]++] = (uint32_t)t;
+    mem_free(end);
+}
+
+/* Those that share a corner with a triangle; one that shares two is there twice. */
+static size_t neighbours_of(const struct face_normals *f, const struct mesh *mesh, size_t t,
+                            uint32_t neighbour[NEIGHBOURS_MOST]) {
+    size_t count = 0;
+    for (int c = 0; c < 3; c++) {
+        uint32_t v = f->weld[mesh->index[t][c]];
+        for (uint32_t i = f->first[v]; i < f->first[v + 1] && count < NEIGHBOURS_MOST; i++) {
+            if (f->triangle[i] != t)
+                neighbour[count++] = f->triangle[i];
+        }
+    }
+    return count;
+}
+
+static float roughness_of(const struct face_normals *f, const struct mesh *mesh) {
+    size_t triangles = mesh->triangle_count, samples = triangles < SAMPLES_MOST ? triangles : SAMPLES_MOST;
+    float *rough = mem_array(samples, sizeof *rough);
+    for (size_t i = 0; i < samples; i++) {
+        uint32_t neighbour[NEIGHBOURS_MOST];
+        float off[NEIGHBOURS_MOST];
+        size_t t = i * triangles / samples, count = neighbours_of(f, mesh, t, neighbour);
+        for (size_t k = 0; k < count; k++)
+            off[k] = vec3_length(vec3_sub(f->normal[neighbour[k]], f->normal[t]));
+        rough[i] = quantile(off, count, 0.25);
+    }
+    float median = quantile(rough, samples, 0.5);
+    mem_free(rough);
+    return median;
+}
+
+static void filter_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct filter *filter = user;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK;
+    for (size_t t = begin; t < end && t < filter->mesh->triangle_count; t++) {
+        uint32_t neighbour[NEIGHBOURS_MOST];
+        size_t count = neighbours_of(filter->faces, filter->mesh, t, neighbour);
+        const float *area = filter->faces->area;
+        vec3 sum = vec3_scale(filter->from[t], area[t]);
+        for (size_t k = 0; k < count; k++) {
+            vec3 other = filter->from[neighbour[k]], off = vec3_sub(other, filter->from[t]);
+            float unlike = vec3_dot(off, off) / (2.0f * filter->spread * filter->spread);
+            sum = vec3_mad(sum, area[neighbour[k]] * expf(-unlike), other);
+        }
+        filter->to[t] = vec3_normalize(sum);
+    }
+}
+
+static void filter_normals(struct face_normals *f, const struct mesh *mesh, struct parallel *pool) {
+    vec3 *next = mem_array(mesh->triangle_count, sizeof *next);
+    float spread = fminf(fmaxf(ALIKE * f->roughness, LEAST_ALIKE), MOST_ALIKE);
+    for (int pass = 0; pass < PASSES; pass++) {
+        struct filter filter = {mesh, f, f->normal, next, spread};
+        parallel_for(pool, (mesh->triangle_count + CHUNK - 1) / CHUNK, filter_chunk, &filter);
+        next = f->normal;
+        f->normal = filter.to;
+    }
+    mem_free(next);
+}
+
+void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct parallel *pool) {
+    *f = (struct face_normals){.weld = mesh_weld(mesh)};
+    collect_triangles(f, mesh);
+    f->area = mem_array(mesh->triangle_count, sizeof *f->area);
+    f->normal = mem_array(mesh->triangle_count, sizeof *f->normal);
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        vec3 cross = mesh_cross(mesh, t);
+        f->area[t] = vec3_length(cross);
+        f->normal[t] = vec3_normalize(cross);
+    }
+    f->roughness = roughness_of(f, mesh);
+    if (face_normals_rough(f))
+        filter_normals(f, mesh, pool);
+}
+
+void face_normals_release(struct face_normals *f) {
+    mem_free(f->normal);
+    mem_free(f->area);
+    mem_free(f->weld);
+    mem_free(f->first);
+    mem_free(f->triangle);
+}

@@ -1,0 +1,203 @@
+/* mesh_denoise.c -- see mesh_denoise.h. */
+#include "server/scene/mesh_denoise.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/scene/face_normals.h"
+
+#define CHUNK 1024      /* vertices a work item */
+#define ROUNDS 3        /* normals filtered, then vertices moved */
+#define STEPS 10        /* of the vertices in a round */
+#define AVERAGE_PASSES 2 /* over neighbours: some 20 vertices */
+#define SHAPE_LEAST 0.4f /* times the noise: what moved them all by as much may still be chance */
+#define EXCESS_LEAST 2.5f /* times the variance of the noise: so may be a mean square of as much */
+#define ALIKE 0.8f      /* cosine between normals of neighbours on the same surface */
+#define DEVIATION_OF_MEDIAN 0.6745f /* of a normal distribution: its median modulus over its deviation */
+
+struct denoising {
+    const struct face_normals *faces;
+    struct mesh *mesh;
+    const vec3 *start;  /* [vertex_count] positions before anything moved */
+    vec3 *normal;       /* [vertex_count] unit; of vertices, from the filtered ones of triangles */
+    vec3 *next;         /* [vertex_count] */
+    float *moved;       /* [vertex_count] metres along the normal */
+    float *value;       /* [vertex_count] to be averaged */
+    float *average;     /* [vertex_count] */
+    float noise;        /* metres */
+};
+
+static size_t chunks_of(const struct mesh *mesh) { return (mesh->vertex_count + CHUNK - 1) / CHUNK; }
+
+/* The end of a chunk of vertices. */
+static size_t chunk_end(const struct mesh *mesh, size_t chunk) {
+    size_t end = (chunk + 1) * CHUNK;
+    return end < mesh->vertex_count ? end : mesh->vertex_count;
+}
+
+static vec3 centre_of(const struct mesh *mesh, size_t t) {
+    const uint32_t *v = mesh->index[t];
+    vec3 sum = vec3_add(vec3_add(mesh->position[v[0]], mesh->position[v[1]]), mesh->position[v[2]]);
+    return vec3_scale(sum, 1.0f / 3.0f);
+}
+
+/* Vertices that coincide follow the one that stands for them. */
+static void move_together(struct mesh *mesh, const uint32_t *weld, const vec3 *to) {
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        mesh->position[v] = to[weld[v]];
+}
+
+/* --- vertices to normals ------------------------------------------------------------------------ */
+
+static void step_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    const struct face_normals *f = d->faces;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        vec3 at = d->mesh->position[v], sum = {0.0f, 0.0f, 0.0f};
+        uint32_t count = f->first[v + 1] - f->first[v];
+        for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++) {
+            vec3 n = f->normal[f->triangle[i]];
+            sum = vec3_mad(sum, vec3_dot(n, vec3_sub(centre_of(d->mesh, f->triangle[i]), at)), n);
+        }
+        d->next[v] = count > 0 ? vec3_mad(at, 1.0f / (float)count, sum) : at;
+    }
+}
+
+static void move_to_normals(struct denoising *d, struct parallel *pool) {
+    for (int step = 0; step < STEPS; step++) {
+        parallel_for(pool, chunks_of(d->mesh), step_chunk, d);
+        move_together(d->mesh, d->faces->weld, d->next);
+    }
+}
+
+/* --- shape -------------------------------------------------------------------------------------- */
+
+static void measure_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    const struct face_normals *f = d->faces;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        vec3 sum = {0.0f, 0.0f, 0.0f};
+        for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++)
+            sum = vec3_mad(sum, f->area[f->triangle[i]], f->normal[f->triangle[i]]);
+        d->normal[v] = vec3_normalize(sum);
+        d->moved[v] = vec3_dot(d->normal[v], vec3_sub(d->mesh->position[v], d->start[v]));
+    }
+}
+
+/* The standard deviation of what moved vertices. */
+static float noise_of(const struct denoising *d) {
+    float *modulus = mem_array(d->mesh->vertex_count, sizeof *modulus);
+    size_t count = 0;
+    for (size_t v = 0; v < d->mesh->vertex_count; v++) {
+        if (d->faces->first[v + 1] > d->faces->first[v])
+            modulus[count++] = fabsf(d->moved[v]);
+    }
+    float noise = quantile(modulus, count, 0.5) / DEVIATION_OF_MEDIAN;
+    mem_free(modulus);
+    return noise;
+}
+
+static void average_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    const struct face_normals *f = d->faces;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        float sum = d->value[v], count = 1.0f;
+        for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++) {
+            for (int c = 0; c < 3; c++) {
+                uint32_t other = f->weld[d->mesh->index[f->triangle[i]][c]];
+                if (other == v || vec3_dot(d->normal[v], d->normal[other]) < ALIKE)
+                    continue;
+                sum += d->value[other];
+                count += 1.0f;
+            }
+        }
+        d->average[v] = sum / count;
+    }
+}
+
+/* Averages d->value over some 20 neighbours on the same surface. */
+static void average(struct denoising *d, struct parallel *pool) {
+    for (int pass = 0; pass < AVERAGE_PASSES; pass++) {
+        parallel_for(pool, chunks_of(d->mesh), average_chunk, d);
+        float *averaged = d->average;
+        d->average = d->value;
+        d->value = averaged;
+    }
+}
+
+/* What moved the whole neighbourhood is taken out of what moved a vertex; the square of the rest is to be averaged. */
+static void take_shape_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    float by_chance = SHAPE_LEAST * SHAPE_LEAST * d->noise * d->noise;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        float mean = d->value[v], square = mean * mean;
+        d->moved[v] -= square > by_chance ? mean * (1.0f - by_chance / square) : 0.0f;
+        d->value[v] = d->moved[v] * d->moved[v];
+    }
+}
+
+static void place_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct denoising *d = user;
+    float variance = d->noise * d->noise;
+    for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
+        float excess = fmaxf(0.0f, d->value[v] - EXCESS_LEAST * variance);
+        float share = variance > 0.0f ? variance / (variance + excess) : 0.0f;
+        d->next[v] = vec3_mad(d->start[v], share * d->moved[v], d->normal[v]);
+    }
+}
+
+static void restore_shape(struct denoising *d, struct parallel *pool) {
+    parallel_for(pool, chunks_of(d->mesh), measure_chunk, d);
+    d->noise = noise_of(d);
+    memcpy(d->value, d->moved, d->mesh->vertex_count * sizeof *d->value);
+    average(d, pool);
+    parallel_for(pool, chunks_of(d->mesh), take_shape_chunk, d);
+    average(d, pool);
+    parallel_for(pool, chunks_of(d->mesh), place_chunk, d);
+    move_together(d->mesh, d->faces->weld, d->next);
+}
+
+/* ------------------------------------------------------------------------------------------------ */
+
+static void denoise_rough(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
+    size_t vertices = d->mesh->vertex_count;
+    vec3 *start = mem_array(vertices, sizeof *start);
+    memcpy(start, d->mesh->position, vertices * sizeof *start);
+    d->start = start;
+    d->normal = mem_array(vertices, sizeof *d->normal);
+    d->next = mem_array(vertices, sizeof *d->next);
+    d->moved = mem_array(vertices, sizeof *d->moved);
+    d->value = mem_array(vertices, sizeof *d->value);
+    d->average = mem_array(vertices, sizeof *d->average);
+    for (int round = 0; round < ROUNDS; round++) {
+        move_to_normals(d, pool);
+        face_normals_release(faces);
+        face_normals_init(faces, d->mesh, pool);
+    }
+    restore_shape(d, pool);
+    mem_free(d->average);
+    mem_free(d->value);
+    mem_free(d->moved);
+    mem_free(d->next);
+    mem_free(d->normal);
+    mem_free(start);
+}
+
+float mesh_denoise(struct mesh *mesh, struct parallel *pool) {
+    if (mesh->normal)
+        return 0.0f;
+    struct face_normals faces;
+    face_normals_init(&faces, mesh, pool);
+    struct denoising denoising = {.faces = &faces, .mesh = mesh};
+    if (face_normals_rough(&faces))
+        denoise_rough(&denoising, &faces, pool);
+    face_normals_release(&faces);
+    return denoising.noise;
+}
