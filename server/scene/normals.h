@@ -2,9 +2,8 @@
  *
  * Scanned surfaces are rough by millimetres, and each triangle of a wall looks another way. Shaded as it stands the
  * wall would be facetted, and base colour would have to make up for it. So normals are estimated: those of the
- * triangles are averaged with their neighbours', like with like (the bilateral filter of normals, Zheng et al. 2011),
- * the wider the rougher the mesh is; then corners that meet in a vertex get one normal, unless an edge is between
- * them. What is plane stays so to the bit. */
+ * triangles with their roughness filtered out (face_normals.h); then corners that meet in a vertex get one normal,
+ * unless an edge is between them. What is plane stays so to the bit. */
 #ifndef UNBAKE_SCENE_NORMALS_H
 #define UNBAKE_SCENE_NORMALS_H
 
