@@ -264,7 +264,7 @@ static void step_chunk(void *user, size_t chunk, int thread) {
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-bool detail_is_lost(const struct reconstruction *r, const struct views *views) {
+double detail_texels_a_pixel(const struct reconstruction *r, const struct views *views) {
     double area = 0.0, count = 0.0;
     for (uint32_t t = 0; t < views->train_count; t++) {
         const struct camera *camera = &r->scene->photograph[views->train[t]].camera;
@@ -278,7 +278,7 @@ bool detail_is_lost(const struct reconstruction *r, const struct views *views) {
             }
         }
     }
-    return area > count;
+    return count > 0.0 ? area / count : 0.0;
 }
 
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,

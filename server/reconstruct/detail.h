@@ -27,8 +27,8 @@ struct detail {
                                       * the texture tells; both owned */
 };
 
-/* Whether pixels cover more than a texel, in the mean: else no detail is lost that a texture could hold. */
-bool detail_is_lost(const struct reconstruction *r, const struct views *views);
+/* Texels that a pixel covers, in the mean: where it is no more than one, no detail is lost that a texture could hold. */
+double detail_texels_a_pixel(const struct reconstruction *r, const struct views *views);
 
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
                  const uint16_t (*white)[3], struct measured *measured);

@@ -17,9 +17,11 @@
 
 #define CHUNK 256 /* texels a work item */
 #define MAX_LOOKS 48
-/* Directions for one highlight. Each texel sees several photographs, and its neighbours as many. */
-#define SAMPLES 16
-#define LIGHT_SAMPLES 8
+/* Directions for one highlight, at most and at least, and half as many samples of lights. Each texel sees several
+ * photographs, and its neighbours as many; those that share a pixel need so many together. */
+#define SAMPLES_MOST 16
+#define SAMPLES_LEAST 4
+#define SAMPLES_A_PIXEL 128.0
 #define KEY_DIVIDE 5 /* keeps these random numbers apart from others of the texel */
 /* Base colours differ by this much in their logarithm before one counts half; dark ones by this
  * much in themselves. */
@@ -44,6 +46,11 @@ struct texel_looks {
     size_t count;
     struct robust_sample look[MAX_LOOKS];
 };
+
+size_t divide_highlight_samples(double texels_a_pixel) {
+    double samples = SAMPLES_A_PIXEL / fmax(texels_a_pixel, 1.0);
+    return (size_t)fmin(fmax(samples, SAMPLES_LEAST), SAMPLES_MOST);
+}
 
 static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
                      struct irradiance *light) {
@@ -95,7 +102,8 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
         struct highlight highlight;
         struct highlight_levels level = {1, 1, {m->roughness[segment]}, {m->specular[segment]}};
         highlight_gather(&highlight, scratch, d->field, at, wo, &level,
-                         sampler_key(KEY_DIVIDE, texel, view->train), SAMPLES, LIGHT_SAMPLES);
+                         sampler_key(KEY_DIVIDE, texel, view->train), d->highlight_samples,
+                         d->highlight_samples / 2);
         gloss = highlight.radiance[0][0];
         float both = fmaxf(rgb_mean(typical) + rgb_mean(gloss), 0.01f * median);
         float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);

@@ -24,10 +24,14 @@ struct divide {
     const struct light_field *field;
     const struct noise *noise;
     bool denoises;                    /* else base colour is as measured */
+    size_t highlight_samples;         /* directions for one highlight (divide_highlight_samples) */
     uint32_t stride;                  /* one texel is measured for its chart in every stride x stride */
     struct incident *scratch;         /* [threads] */
     struct measured *measured;        /* [height][width] what the photographs tell of each texel */
 };
+
+/* How many directions are enough for the highlights of texels of which a pixel covers so many. */
+size_t divide_highlight_samples(double texels_a_pixel);
 
 /* Measures the valid texels [first, first + count), by their place in inverse.valid. Emitters, whose own
  * light hides it, get a neutral base colour. */

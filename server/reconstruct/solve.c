@@ -47,6 +47,7 @@ struct solve {
     struct probes probes;
     struct divide divide;
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
+    double texels_a_pixel;   /* detail_texels_a_pixel */
     double begin_sec;
     bool hurries;            /* the time limit is too short to measure every texel */
     double work_done, work_total;
@@ -211,9 +212,11 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
+    s->texels_a_pixel = detail_texels_a_pixel(r, views);
     s->divide = (struct divide){
         .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise,
-        .denoises = settings_bool(r->settings, "denoise")};
+        .denoises = settings_bool(r->settings, "denoise"),
+        .highlight_samples = divide_highlight_samples(s->texels_a_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     for (size_t i = 0; i < r->segments.count; i++) {
@@ -255,7 +258,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     if (pass == 0)
         s->hurries = is_short(s, LAST_OVER_FIRST * (clock_sec() - divide_sec));
-    if (s->divide.stride == 1 && s->divide.denoises && detail_is_lost(s->r, s->views) && !find_detail(s))
+    if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
         return false;
     divide_finish(&s->divide, s->radiance);
     return true;
