@@ -19,11 +19,10 @@
 #define LEAST_SPACING 4
 /* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
 #define FIRST_PASS_PART 0.25
-/* It measures one texel in so many squared: only what no photograph sees is taken from it. So does the last
- * where the time limit is short: where all texels would take longer than what is left of it, at so many times
- * what the first pass took (highlights are looked at as well). */
+/* It measures one texel in so many squared: only what no photograph sees is taken from it. So does the last where the
+ * time limit is too short for all of them. */
 #define COARSE_STRIDE 2
-#define LAST_OVER_FIRST 6.0
+#define TRIED 0.03 /* of all texels: so many tell how long they will take */
 /* Steps of detail.h after it has measured every texel. More sharpen what glossy surfaces mirror, too. */
 #define DETAIL_STEPS 4
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
@@ -49,7 +48,6 @@ struct solve {
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
     double texels_a_pixel;   /* detail_texels_a_pixel */
     double begin_sec;
-    bool hurries;            /* the time limit is too short to measure every texel */
     double work_done, work_total;
 };
 
@@ -92,13 +90,27 @@ static bool gather(struct solve *s, int pass) {
     return true;
 }
 
+/* Whether the time limit, where there is one, leaves less time than the rest of the work takes at the rate of the last
+ * `work`, begun at begin_sec. */
+static bool is_short(const struct solve *s, double begin_sec, double work) {
+    const struct settings *set = s->r->settings;
+    double now = clock_sec(), rest_sec = (now - begin_sec) / work * (s->work_total - s->work_done);
+    return settings_number(set, "iterations") == 0.0 &&
+           now - s->begin_sec + rest_sec > settings_number(set, "time_limit_sec");
+}
+
+/* Measures all texels; one in COARSE_STRIDE squared, also of those before, from when time is found to be short. */
 static bool divide_all(struct solve *s) {
     size_t valid = s->r->inverse.valid_count;
+    double begin_sec = clock_sec();
     for (size_t first = 0; first < valid; first += SLICE_TEXELS) {
         size_t count = valid - first < SLICE_TEXELS ? valid - first : SLICE_TEXELS;
         divide_texels(&s->divide, first, count);
         if (!advance(s, RAYS_A_TEXEL * (double)count))
             return false;
+        double done = (double)(first + count);
+        if (done >= TRIED * (double)valid && is_short(s, begin_sec, RAYS_A_TEXEL * done))
+            s->divide.stride = COARSE_STRIDE;
     }
     return true;
 }
@@ -233,13 +245,6 @@ static void solve_release(struct solve *s) {
     mem_free(s->radiance);
 }
 
-/* Whether the time limit, where there is one, leaves less than so long. */
-static bool is_short(const struct solve *s, double seconds) {
-    const struct settings *set = s->r->settings;
-    return settings_number(set, "iterations") == 0.0 &&
-           clock_sec() - s->begin_sec + seconds > settings_number(set, "time_limit_sec");
-}
-
 static bool solve_pass(struct solve *s, int pass) {
     if (pass == 0) {
         emitters_light_bright(s->r, s->views, s->r->evidence);
@@ -252,12 +257,9 @@ static bool solve_pass(struct solve *s, int pass) {
     decide_emitters(s);
     if (pass > 0)
         gloss_fit(s->r, s->views, &s->probes, &s->field);
-    s->divide.stride = pass == 0 || s->hurries ? COARSE_STRIDE : 1;
-    double divide_sec = clock_sec();
+    s->divide.stride = pass == 0 ? COARSE_STRIDE : 1;
     if (!divide_all(s))
         return false;
-    if (pass == 0)
-        s->hurries = is_short(s, LAST_OVER_FIRST * (clock_sec() - divide_sec));
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
         return false;
     divide_finish(&s->divide, s->radiance);
