@@ -54,9 +54,9 @@ static size_t neighbours_of(const struct face_normals *f, const struct mesh *mes
     return count;
 }
 
-static float roughness_of(const struct face_normals *f, const struct mesh *mesh) {
+static void measure_roughness(struct face_normals *f, const struct mesh *mesh) {
     size_t triangles = mesh->triangle_count, samples = triangles < SAMPLES_MOST ? triangles : SAMPLES_MOST;
-    float *rough = mem_array(samples, sizeof *rough);
+    float *rough = mem_array(samples, sizeof *rough), *least = mem_array(samples, sizeof *least);
     for (size_t i = 0; i < samples; i++) {
         uint32_t neighbour[NEIGHBOURS_MOST];
         float off[NEIGHBOURS_MOST];
@@ -64,10 +64,12 @@ static float roughness_of(const struct face_normals *f, const struct mesh *mesh)
         for (size_t k = 0; k < count; k++)
             off[k] = vec3_length(vec3_sub(f->normal[neighbour[k]], f->normal[t]));
         rough[i] = quantile(off, count, 0.25);
+        least[i] = quantile(off, count, 0.0);
     }
-    float median = quantile(rough, samples, 0.5);
+    f->roughness = quantile(rough, samples, 0.5);
+    f->least = quantile(least, samples, 0.5);
+    mem_free(least);
     mem_free(rough);
-    return median;
 }
 
 static void filter_chunk(void *user, size_t chunk, int thread) {
@@ -110,7 +112,7 @@ void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct p
         f->area[t] = vec3_length(cross);
         f->normal[t] = vec3_normalize(cross);
     }
-    f->roughness = roughness_of(f, mesh);
+    measure_roughness(f, mesh);
     if (face_normals_rough(f))
         filter_normals(f, mesh, pool);
 }

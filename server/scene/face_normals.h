@@ -14,12 +14,17 @@ struct face_normals {
     uint32_t *weld;      /* [vertex_count] as mesh_weld has it */
     uint32_t *first;     /* [vertex_count + 1] the triangles at welded vertex v are ... */
     uint32_t *triangle;  /* ... those at [first[v], first[v + 1]) here, ascending */
+    float least;         /* by how much at least each differs from a neighbour, median, before the filter: 0 of what was
+                          * modelled by hand, whose walls have two triangles */
     float roughness;     /* by how much neighbours' normals differ before the filter: length of the difference; half
                           * of the triangles have a quarter of their neighbours nearer */
 };
 
-/* A mesh is rough enough to be worth the filter. */
+/* A mesh is rough enough to be worth the filter of normals. */
 static inline bool face_normals_rough(const struct face_normals *f) { return f->roughness > 0.005f; }
+
+/* It is noise that makes it rough, not that it has few triangles. */
+static inline bool face_normals_noisy(const struct face_normals *f) { return face_normals_rough(f) && f->least > 0.002f; }
 
 /* The same for any number of threads. */
 void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct parallel *pool);

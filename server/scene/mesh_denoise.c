@@ -196,7 +196,7 @@ float mesh_denoise(struct mesh *mesh, struct parallel *pool) {
     struct face_normals faces;
     face_normals_init(&faces, mesh, pool);
     struct denoising denoising = {.faces = &faces, .mesh = mesh};
-    if (face_normals_rough(&faces))
+    if (face_normals_noisy(&faces))
         denoise_rough(&denoising, &faces, pool);
     face_normals_release(&faces);
     return denoising.noise;

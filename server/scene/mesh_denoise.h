@@ -13,9 +13,9 @@
 #include "common/parallel.h"
 #include "server/scene/mesh.h"
 
-/* Moves the vertices of a rough mesh; one that is smooth, or has normals, stays as it is. Coincident vertices stay
- * together. Returns the standard deviation of the noise, metres, 0 where nothing was moved. The same for any number of
- * threads. */
+/* Moves the vertices of a rough mesh. One that has normals, is smooth, or mostly of triangles with another one in their
+ * plane, stays as it is. Coincident vertices stay together. Returns the standard deviation of the noise, metres, 0 where
+ * nothing was moved. The same for any number of threads. */
 float mesh_denoise(struct mesh *mesh, struct parallel *pool);
 
 #endif

@@ -1,5 +1,5 @@
 /* mesh_denoise.h: a rough floor and wall become plane and keep their edge, a ball beside them is
- * not spoiled, what coincides stays together; what is smooth, or has normals, stays as it is. The same for any
+ * not spoiled, what coincides stays together; what is smooth, has few triangles, or has normals stays as it is. The same for any
  * number of threads. */
 #include <math.h>
 #include <string.h>
@@ -85,6 +85,25 @@ static void test_ball(struct parallel *pool) {
     mesh_release(&m);
 }
 
+/* Its triangles differ from most of those beside them, and yet it has no noise. */
+static void test_box(struct parallel *pool) {
+    static const uint32_t side[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    struct mesh m = {0}, before = {0};
+    rough_grow(&m, 8, 12);
+    rough_grow(&before, 8, 12);
+    for (uint32_t v = 0; v < 8; v++)
+        m.position[m.vertex_count++] = (vec3){(float)(v & 1), (float)(v >> 1 & 1), (float)(v >> 2)};
+    for (int i = 0; i < 6; i++) {
+        rough_triangle(&m, side[i][0], side[i][1], side[i][2]);
+        rough_triangle(&m, side[i][0], side[i][2], side[i][3]);
+    }
+    memcpy(before.position, m.position, 8 * sizeof *m.position);
+    before.vertex_count = 8;
+    CHECK(mesh_denoise(&m, pool) == 0.0f && farthest_move(&before, &m) == 0.0f);
+    mesh_release(&before);
+    mesh_release(&m);
+}
+
 static void test_kept(struct parallel *pool) {
     struct mesh before, m;
     rough_sheets(&before, 0.0f);
@@ -105,6 +124,7 @@ int main(void) {
     struct parallel *pool = parallel_new(3);
     test_sheets(pool);
     test_ball(pool);
+    test_box(pool);
     test_kept(pool);
     parallel_free(pool);
     return check_result();
