@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/reconstruct/gloss_belief.h"
 #include "server/reconstruct/gloss_look.h"
 
 /* With fewer than these, and than this part of those asked for, pixels nearer to edges are taken as well, then smaller
@@ -21,25 +22,12 @@
 /* Light and base colour are off by about this part of the misfit, which adds to the standard error of what one
  * candidate's is beyond another's. */
 #define MISFIT_FLOOR 0.01
-/* Before anything is seen, so many of the segments that are hard to tell are matt, and of those that are a large
- * part of the surface, which mostly are painted walls and ceilings. Others are dielectrics, most of
- * them near an index of refraction of 1.5 (specular .5), and the likelier the smoother: what has a highlight is
- * varnished or polished. */
-#define MATT_PRIOR 0.35
-#define MATT_PRIOR_LARGE 0.65
-#define LARGE_PART 0.05
-#define PRIOR_SPECULAR 0.5f
-#define PRIOR_WEIGHT 1.0f /* of the square of the difference to that, in a candidate's cost */
-/* Rougher highlights cannot be told from matt reflection; of one of .8 large walls tell by 3 to 10 standard errors. */
-#define GLOSS_ROUGHEST 0.8f
-/* A segment is matt, or as glossy as the best candidate, from this probability on; else the mean of all
- * candidates by their probability is taken. */
+/* A segment is matt from this probability on. */
 #define SURELY_MATT 0.7
-#define SURELY_GLOSSY 0.95
 /* What a segment is taken for of which too few photographs speak: half way to an ordinary dielectric. Either way
  * its base colour is then off by 2 %, unless it is darker by a part of its misfit and so many standard errors. */
 #define UNKNOWN_ROUGHNESS 0.5f
-#define UNKNOWN_SPECULAR (0.5f * PRIOR_SPECULAR)
+#define UNKNOWN_SPECULAR 0.25f
 #define DARKER_PART 0.03
 #define DARKER_ERRORS 3.0
 
@@ -47,7 +35,6 @@
 #define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
 
 static const float specular_of[SPECULARS] = {0.0f, 0.125f, 0.25f, 0.5f, 0.75f, 1.0f};
-static const double specular_prior[SPECULARS] = {0.0, 0.05, 0.15, 0.5, 0.15, 0.15};
 
 /* A place of the candidates' table. */
 struct candidate {
@@ -67,6 +54,7 @@ struct gloss_job {
     struct materials *materials;
     struct gloss_looker looker;
     struct evidence *evidence; /* [threads] */
+    struct gloss_told *told;   /* [segments] */
 };
 
 /* --- misfits ------------------------------------------------------------------------------------ */
@@ -146,20 +134,14 @@ static double misfit_of(const struct evidence *e, struct candidate c) {
     return sum;
 }
 
-/* More where its specular is uncommon. */
-static double cost_of(const struct evidence *e, struct candidate c) {
-    double off = c.m == 0 ? 0.0 : (double)(specular_of[c.m] - PRIOR_SPECULAR);
-    return misfit_of(e, c) * (1.0 + PRIOR_WEIGHT * off * off);
-}
-
-/* Matt, or the glossy candidate of the least misfit or cost where that is less. */
-static struct candidate best_of(const struct evidence *e, double (*of)(const struct evidence *e, struct candidate c)) {
+/* Matt, or the glossy candidate of the least misfit where that is less. */
+static struct candidate best_of(const struct evidence *e) {
     struct candidate best = matt;
-    double least = of(e, matt);
+    double least = misfit_of(e, matt);
     for (size_t k = 0; k < ROUGHNESSES && gloss_levels.roughness[k] <= GLOSS_ROUGHEST; k++) {
         for (size_t m = 1; m < SPECULARS; m++) {
             struct candidate c = {k, m};
-            double misfit = of(e, c);
+            double misfit = misfit_of(e, c);
             if (misfit < least)
                 best = c, least = misfit;
         }
@@ -182,46 +164,30 @@ static void compare(const struct evidence *e, struct candidate a, struct candida
     *errors = gain / sqrt(fmax(squares - gain * gain / n + floor * floor, 1e-30));
 }
 
-/* --- belief ------------------------------------------------------------------------------------- */
-
-/* What is known after the photographs: how likely matt is, and the means over all candidates. */
-struct belief {
-    double matt, roughness, specular;
-};
-
-/* How likely a glossy candidate was before, up to a factor of all. */
-static double prior_of(struct candidate c) {
-    float roughness = gloss_levels.roughness[c.k];
-    return roughness > GLOSS_ROUGHEST ? 0.0 : (double)(1.0f - roughness) * specular_prior[c.m];
-}
-
-/* How likely what was seen is under a candidate, up to a factor of all: a normal deviate of its misfit beyond
- * that of the best one. */
+/* How likely what was seen is under a candidate: a normal deviate of its misfit beyond that of the best one. */
 static double likelihood(const struct evidence *e, struct candidate c, struct candidate best) {
     double part, errors;
     compare(e, c, best, &part, &errors);
     return errors > 0.0 ? exp(-0.5 * errors * errors) : 1.0;
 }
 
-static struct belief believe(const struct evidence *e, double matt_prior) {
-    struct candidate best = best_of(e, misfit_of);
-    double all = 0.0, glossy = 0.0, roughness = 0.0, specular = 0.0;
-    for (size_t k = 0; k < ROUGHNESSES; k++) {
-        for (size_t m = 1; m < SPECULARS; m++) {
-            struct candidate c = {k, m};
-            double weight = prior_of(c) * likelihood(e, c, best);
-            all += prior_of(c);
-            glossy += weight;
-            roughness += weight * (double)gloss_levels.roughness[k];
-            specular += weight * (double)specular_of[m];
-        }
-    }
-    double as_matt = matt_prior * likelihood(e, matt, best), scale = (1.0 - matt_prior) / all;
-    double sum = as_matt + scale * glossy;
-    return (struct belief){as_matt / sum, (as_matt + scale * roughness) / sum, scale * specular / sum};
-}
+/* --- segments ----------------------------------------------------------------------------------- */
 
-/* --- the choice --------------------------------------------------------------------------------- */
+/* The mean of those texels of a segment that photographs show. */
+static rgb mean_base_color(const struct gloss_looker *l, size_t segment) {
+    const struct reconstruction *r = l->r;
+    double sum[3] = {0.0}, count = 0.0;
+    for (uint32_t i = l->texels.first[segment]; i < l->texels.first[segment + 1]; i++) {
+        uint32_t texel = l->texels.texel[i];
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        for (size_t c = 0; c < 3; c++)
+            sum[c] += (double)r->materials.base_color.texel[texel][c];
+        count += 1.0;
+    }
+    double scale = 1.0 / fmax(count, 1.0);
+    return rgb_make((float)(scale * sum[0]), (float)(scale * sum[1]), (float)(scale * sum[2]));
+}
 
 /* Offset in [-0.5, 0.5] of a parabola's least through three values of which the middle is least. */
 static double between(double left, double middle, double right) {
@@ -229,9 +195,29 @@ static double between(double left, double middle, double right) {
     return offset < -0.5 ? -0.5 : offset > 0.5 ? 0.5 : offset;
 }
 
-static float interpolate(const float *value, size_t at, double offset) {
-    float beside = offset < 0.0 ? value[at] - value[at - 1] : offset > 0.0 ? value[at + 1] - value[at] : 0.0f;
-    return value[at] + (float)offset * beside;
+/* Where between the levels the misfit is least about the best candidate. */
+static double roughness_about(const struct evidence *e, struct candidate best) {
+    const float *level = gloss_levels.roughness;
+    size_t k = best.k, m = best.m;
+    double middle = (double)level[k];
+    if (m == 0 || k == 0 || k + 1 == ROUGHNESSES)
+        return middle;
+    double offset = between(misfit_of(e, (struct candidate){k - 1, m}), misfit_of(e, best),
+                            misfit_of(e, (struct candidate){k + 1, m}));
+    return middle + offset * (offset < 0.0 ? middle - (double)level[k - 1] : (double)level[k + 1] - middle);
+}
+
+static void note(const struct gloss_looker *l, size_t segment, const struct evidence *e, struct gloss_told *told) {
+    struct candidate best = best_of(e);
+    told->any = true;
+    told->part = (double)(l->texels.first[segment + 1] - l->texels.first[segment]) / (double)l->r->inverse.valid_count;
+    told->base_color = mean_base_color(l, segment);
+    told->best = best.m == 0 ? GLOSS_MATT : gloss_candidate(best.k, best.m - 1);
+    told->best_roughness = roughness_about(e, best);
+    told->likelihood[GLOSS_MATT] = likelihood(e, matt, best);
+    for (size_t k = 0; k < ROUGHNESSES; k++)
+        for (size_t m = 1; m < SPECULARS; m++)
+            told->likelihood[gloss_candidate(k, m - 1)] = likelihood(e, (struct candidate){k, m}, best);
 }
 
 static void set_gloss(struct materials *materials, size_t segment, double roughness, double specular) {
@@ -256,45 +242,29 @@ static bool is_too_dark(const struct gloss_job *job, size_t segment, int thread)
     return part < -DARKER_PART && errors < -DARKER_ERRORS;
 }
 
-/* The least of the cost about the best candidate. */
-static void set_between(struct materials *materials, size_t segment, const struct evidence *e, struct candidate best) {
-    size_t k = best.k, m = best.m;
-    double along = 0.0, across = 0.0, least = cost_of(e, best);
-    if (k > 0 && k + 1 < ROUGHNESSES)
-        along = between(cost_of(e, (struct candidate){k - 1, m}), least, cost_of(e, (struct candidate){k + 1, m}));
-    if (m + 1 < SPECULARS)
-        across = between(cost_of(e, (struct candidate){k, m - 1}), least, cost_of(e, (struct candidate){k, m + 1}));
-    set_gloss(materials, segment, (double)interpolate(gloss_levels.roughness, k, along),
-              (double)interpolate(specular_of, m, across));
-}
-
-static double matt_prior_of(const struct gloss_looker *l, size_t segment) {
-    double texels = (double)(l->texels.first[segment + 1] - l->texels.first[segment]);
-    double part = texels / (double)l->r->inverse.valid_count;
-    return MATT_PRIOR + (MATT_PRIOR_LARGE - MATT_PRIOR) * fmin(part / LARGE_PART, 1.0);
-}
-
-static void fit_segment(void *user, size_t segment, int thread) {
+static void look_at_segment(void *user, size_t segment, int thread) {
     const struct gloss_job *job = user;
-    const struct reconstruction *r = job->looker.r;
-    struct evidence *e = &job->evidence[thread];
-    if (r->is_emitter[segment]) { /* its own light hides what it reflects */
+    if (job->looker.r->is_emitter[segment]) { /* its own light hides what it reflects */
         set_gloss(job->materials, segment, 1.0, 0.0);
         return;
     }
     set_gloss(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
-    if (!look_well(job, segment, thread)) {
-        if (is_too_dark(job, segment, thread))
-            set_gloss(job->materials, segment, 1.0, 0.0);
-        return;
+    if (look_well(job, segment, thread)) {
+        take_misfits(job, &job->evidence[thread]);
+        note(&job->looker, segment, &job->evidence[thread], &job->told[segment]);
+    } else if (is_too_dark(job, segment, thread)) {
+        set_gloss(job->materials, segment, 1.0, 0.0);
     }
-    take_misfits(job, e);
-    struct candidate best = best_of(e, cost_of);
-    struct belief belief = believe(e, matt_prior_of(&job->looker, segment));
+}
+
+static void fit_segment(void *user, size_t segment, int thread) {
+    (void)thread;
+    const struct gloss_job *job = user;
+    if (!job->told[segment].any)
+        return;
+    struct gloss_belief belief = gloss_believe(job->told, job->looker.r->segments.count, segment);
     if (belief.matt > SURELY_MATT)
         set_gloss(job->materials, segment, 1.0, 0.0);
-    else if (best.m > 0 && belief.matt < 1.0 - SURELY_GLOSSY)
-        set_between(job->materials, segment, e, best);
     else
         set_gloss(job->materials, segment, belief.roughness, belief.specular);
 }
@@ -304,7 +274,10 @@ void gloss_fit(struct reconstruction *r, const struct views *views, const struct
     struct gloss_job job = {.materials = &r->materials};
     gloss_looker_init(&job.looker, r, views, probes, field);
     job.evidence = mem_array((size_t)parallel_thread_count(r->pool), sizeof *job.evidence);
+    job.told = mem_calloc(r->segments.count, sizeof *job.told);
+    parallel_for(r->pool, r->segments.count, look_at_segment, &job);
     parallel_for(r->pool, r->segments.count, fit_segment, &job);
+    mem_free(job.told);
     mem_free(job.evidence);
     gloss_looker_release(&job.looker);
 }

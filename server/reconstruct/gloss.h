@@ -3,9 +3,10 @@
  * At up to a thousand texels of a segment, each seen by several photographs, the highlight of every
  * candidate material is gathered (highlight.h); what remains must be base colour times what the
  * diffuse lobe sends, with one base colour for all views of a texel. How much worse than the best one a
- * candidate does, in standard errors over the texels, is how likely it is: a segment that is sure to be
- * glossy is as the best candidate, placed between its neighbours by a parabola; one that is sure to be matt is
- * matt; any other gets the mean of all candidates. Emitters are matt: their own light hides what they reflect. */
+ * candidate does, in standard errors over the texels, is how likely it is by that segment's photographs; segments of
+ * about the same base colour are taken into account (gloss_belief.h). A segment that is likely to be matt is matt; any
+ * other is as the mean of all candidates by their probability, the best of them placed between its neighbours by a
+ * parabola. Emitters are matt: their own light hides what they reflect. */
 #ifndef UNBAKE_RECONSTRUCT_GLOSS_H
 #define UNBAKE_RECONSTRUCT_GLOSS_H
 
