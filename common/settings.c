@@ -43,7 +43,7 @@ static const struct setting table[] = {
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
      "optimiser steps; 0: as many as time_limit_sec holds"},
     {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16", NULL,
-     "length of a path from the camera, in segments"},
+     "longest path from the camera; light that takes more segments is missing from renders, most of all in white rooms"},
     {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve", NULL,
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,

@@ -2,6 +2,7 @@
  * number of threads; and where edges are sharpened the draw of noise grows. */
 #include "server/capture/halves.h"
 #include "server/reconstruct/detail.h"
+#include "server/reconstruct/divide.h"
 #include "server/scene/surface.h"
 #define PAINTED_WIDTH 40 /* pixels larger than texels */
 #define PAINTED_HEIGHT 30
@@ -115,9 +116,18 @@ static void test_paint(bool tiles, int threads, struct spread *before, struct sp
     painted_release(&room);
 }
 
+/* Texels that share a pixel share the directions of its highlights, between bounds. */
+static void test_highlight_samples(void) {
+    CHECK(divide_highlight_samples(0.5) == 16);
+    CHECK(divide_highlight_samples(8.0) == 16);
+    CHECK(divide_highlight_samples(16.0) == 8);
+    CHECK(divide_highlight_samples(1000.0) == 4);
+}
+
 int main(void) {
     struct spread before, after;
     uint32_t sum[2];
+    test_highlight_samples();
     test_paint(true, 1, &before, &after, &sum[0]);
     CHECK(after.error < 0.95 * before.error);
     CHECK(after.draw > before.draw);
