@@ -323,10 +323,33 @@ static void arm(long n, long way) {
     faults_arm(faults, FAULTS_DAEMON, n, error, for_good);
 }
 
-/* Without memory it may have ended, if it said why; then there is another. */
+/* Whether no thread of the daemon is at work. */
+static bool is_at_rest(void) {
+    char path[64];
+    snprintf(path, sizeof path, "/proc/%d/task", (int)daemon_.pid);
+    DIR *folder = opendir(path);
+    bool is = true;
+    for (const struct dirent *it; folder && is && (it = readdir(folder));) {
+        struct buf stat;
+        char *file = mem_printf("%s/%s/stat", path, it->d_name);
+        buf_init(&stat, 4096);
+        const char *state = file_read(file, &stat, NULL) == STATUS_OK ? strrchr(buf_text(&stat), ')') : NULL;
+        is = !state || (state[2] != 'R' && state[2] != 'D');
+        buf_release(&stat);
+        mem_free(file);
+    }
+    if (folder)
+        closedir(folder);
+    return is;
+}
+
+/* Without memory it may have ended, if it said why; then there is another. A thread that got none may still be on
+ * its way to the end, while others answer. */
 static void revive(void) {
     struct buf body;
     int status = 0;
+    for (int i = 0; is_memory && i < 3000 && !is_at_rest(); i++)
+        usleep(10000);
     bool lives = !is_memory || http_get(daemon_.port, "/healthz", &body) == 200;
     if (is_memory)
         buf_release(&body);
