@@ -328,19 +328,19 @@ static bool is_at_rest(void) {
     char path[64];
     snprintf(path, sizeof path, "/proc/%d/task", (int)daemon_.pid);
     DIR *folder = opendir(path);
-    bool is = true;
-    for (const struct dirent *it; folder && is && (it = readdir(folder));) {
+    bool rests = true;
+    for (const struct dirent *it; folder && rests && (it = readdir(folder));) {
         struct buf stat;
         char *file = mem_printf("%s/%s/stat", path, it->d_name);
         buf_init(&stat, 4096);
         const char *state = file_read(file, &stat, NULL) == STATUS_OK ? strrchr(buf_text(&stat), ')') : NULL;
-        is = !state || (state[2] != 'R' && state[2] != 'D');
+        rests = !state || (state[2] != 'R' && state[2] != 'D');
         buf_release(&stat);
         mem_free(file);
     }
     if (folder)
         closedir(folder);
-    return is;
+    return rests;
 }
 
 /* Without memory it may have ended, if it said why; then there is another. A thread that got none may still be on
