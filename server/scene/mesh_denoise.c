@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/scene/face_normals.h"
+#include "server/scene/mesh_planes.h"
 
 #define CHUNK 1024      /* vertices a work item */
 #define ROUNDS 3        /* normals filtered, then vertices moved */
@@ -154,8 +155,6 @@ static void place_chunk(void *user, size_t chunk, int thread) {
 }
 
 static void restore_shape(struct denoising *d, struct parallel *pool) {
-    parallel_for(pool, chunks_of(d->mesh), measure_chunk, d);
-    d->noise = noise_of(d);
     memcpy(d->value, d->moved, d->mesh->vertex_count * sizeof *d->value);
     average(d, pool);
     parallel_for(pool, chunks_of(d->mesh), take_shape_chunk, d);
@@ -166,8 +165,14 @@ static void restore_shape(struct denoising *d, struct parallel *pool) {
 
 /* ------------------------------------------------------------------------------------------------ */
 
+static void renew_normals(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
+    face_normals_release(faces);
+    face_normals_init(faces, d->mesh, pool);
+}
+
 static void denoise_rough(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
     size_t vertices = d->mesh->vertex_count;
+    struct mesh_planes planes;
     vec3 *start = mem_array(vertices, sizeof *start);
     memcpy(start, d->mesh->position, vertices * sizeof *start);
     d->start = start;
@@ -178,10 +183,18 @@ static void denoise_rough(struct denoising *d, struct face_normals *faces, struc
     d->average = mem_array(vertices, sizeof *d->average);
     for (int round = 0; round < ROUNDS; round++) {
         move_to_normals(d, pool);
-        face_normals_release(faces);
-        face_normals_init(faces, d->mesh, pool);
+        renew_normals(d, faces, pool);
     }
+    parallel_for(pool, chunks_of(d->mesh), measure_chunk, d);
+    d->noise = noise_of(d);
+    mesh_planes_find(&planes, d->mesh, start, d->noise, faces);
     restore_shape(d, pool);
+    mesh_planes_flatten(&planes, d->mesh, faces);
+    mesh_planes_release(&planes);
+    renew_normals(d, faces, pool); /* those beside planes are surer now */
+    mesh_planes_find(&planes, d->mesh, start, d->noise, faces);
+    mesh_planes_flatten(&planes, d->mesh, faces);
+    mesh_planes_release(&planes);
     mem_free(d->average);
     mem_free(d->value);
     mem_free(d->moved);

@@ -6,7 +6,7 @@
  *
  * What is round and made of few triangles is flattened by that. So what moved a whole neighbourhood the same way is
  * taken back, and where vertices moved by more than noise elsewhere explains they move by less, as Wiener's filter has
- * it: there they end about as far off as they were. */
+ * it: there they end about as far off as they were. What is plane is then made plane (mesh_planes.h). */
 #ifndef UNBAKE_SCENE_MESH_DENOISE_H
 #define UNBAKE_SCENE_MESH_DENOISE_H
 

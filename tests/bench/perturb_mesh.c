@@ -26,6 +26,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 #include "server/ingest/ply.h"
+#include "server/scene/adjacency.h"
 #include "server/scene/mesh.h"
 
 /* Makes all triangles use the first of coincident vertices. */
@@ -35,10 +36,6 @@ static void weld(struct mesh *mesh) {
         for (int k = 0; k < 3; k++)
             mesh->index[t][k] = first[mesh->index[t][k]];
     mem_free(first);
-}
-
-static bool is_long(const struct mesh *mesh, uint32_t a, uint32_t b, float edge) {
-    return vec3_length(vec3_sub(mesh->position[a], mesh->position[b])) > edge;
 }
 
 static uint32_t add_middle(struct mesh *mesh, uint32_t a, uint32_t b) {
@@ -52,15 +49,12 @@ static void add_triangle(struct mesh *mesh, size_t like, uint32_t a, uint32_t b,
     mesh->object_id[mesh->triangle_count++] = mesh->object_id[like];
 }
 
-/* Halves the long edges of triangle t, which is cut into two, three or four. Whether an edge is
- * long does not depend on the triangle, so neighbours agree. */
-static void split_triangle(struct mesh *mesh, size_t t, float edge) {
+/* Halves the marked edges of triangle t, which is cut into two, three or four. */
+static void split_triangle(struct mesh *mesh, size_t t, const bool *marked) {
     uint32_t v[3], m[3];
     memcpy(v, mesh->index[t], sizeof v);
-    bool cut[3];
-    int cuts = 0;
-    for (int k = 0; k < 3; k++)
-        cuts += cut[k] = is_long(mesh, v[k], v[(k + 1) % 3], edge);
+    const bool *cut = marked + 3 * t;
+    int cuts = cut[0] + cut[1] + cut[2];
     if (cuts == 0)
         return;
     /* Turned so that with one cut it is the first edge, and with two the last is whole. */
@@ -87,16 +81,92 @@ static void split_triangle(struct mesh *mesh, size_t t, float edge) {
     add_triangle(mesh, t, m[2], m[1], c);
 }
 
+static vec3 corner(const struct mesh *mesh, size_t half_edge) {
+    return mesh->position[mesh->index[half_edge / 3][half_edge % 3]];
+}
+
+static float edge_length(const struct mesh *mesh, size_t half_edge) {
+    size_t t = half_edge / 3, e = half_edge % 3;
+    return vec3_length(vec3_sub(corner(mesh, 3 * t + (e + 1) % 3), corner(mesh, half_edge)));
+}
+
+/* The angle of a triangle that lies opposite a half-edge. */
+static float angle_opposite(const struct mesh *mesh, size_t half_edge) {
+    size_t t = half_edge / 3, e = half_edge % 3;
+    vec3 apex = corner(mesh, 3 * t + (e + 2) % 3);
+    vec3 a = vec3_sub(corner(mesh, half_edge), apex), b = vec3_sub(corner(mesh, 3 * t + (e + 1) % 3), apex);
+    return atan2f(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
+}
+
+/* Two triangles of one object meet at the edge and lie in one plane. */
+static bool is_inner(const struct mesh *mesh, const struct adjacency *adjacency, size_t half_edge) {
+    size_t other = adjacency->next[half_edge], t = half_edge / 3, u = other / 3;
+    return other != half_edge && adjacency->next[other] == half_edge && mesh->object_id[t] == mesh->object_id[u] &&
+           mesh->index[t][half_edge % 3] == mesh->index[u][(other % 3 + 1) % 3] &&
+           vec3_dot(vec3_normalize(mesh_cross(mesh, t)), vec3_normalize(mesh_cross(mesh, u))) > 0.99999f;
+}
+
+/* Within planes the triangles of Delaunay (1934), by flips of edges: no slivers where a narrow strip was cut. */
+static void flip_edges(struct mesh *mesh) {
+    for (bool more = true; more;) {
+        struct adjacency adjacency;
+        bool *touched = mem_calloc(mesh->triangle_count, sizeof *touched);
+        adjacency_make(&adjacency, mesh);
+        more = false;
+        for (size_t h = 0; h < 3 * mesh->triangle_count; h++) {
+            size_t other = adjacency.next[h], t = h / 3, u = other / 3;
+            if (touched[t] || touched[u] || !is_inner(mesh, &adjacency, h) ||
+                angle_opposite(mesh, h) + angle_opposite(mesh, other) < 3.1417f)
+                continue;
+            const uint32_t *v = mesh->index[t], *w = mesh->index[u];
+            uint32_t a = v[h % 3], b = v[(h % 3 + 1) % 3], c = v[(h % 3 + 2) % 3], d = w[(other % 3 + 2) % 3];
+            memcpy(mesh->index[t], (uint32_t[3]){a, d, c}, sizeof *mesh->index);
+            memcpy(mesh->index[u], (uint32_t[3]){d, b, c}, sizeof *mesh->index);
+            more = touched[t] = touched[u] = true;
+        }
+        adjacency_release(&adjacency);
+        mem_free(touched);
+    }
+}
+
+static bool is_longest(const struct mesh *mesh, size_t half_edge) {
+    size_t first = half_edge - half_edge % 3;
+    float length = edge_length(mesh, half_edge);
+    return length >= edge_length(mesh, first) && length >= edge_length(mesh, first + 1) &&
+           length >= edge_length(mesh, first + 2);
+}
+
+/* Marks, [3 * triangle_count] by half-edges, those longer than `edge`: creases and outlines first; where none of those
+ * is left, within planes what is the longest of both its triangles. False where there is none at all. */
+static bool mark_edges(const struct mesh *mesh, float edge, bool *marked) {
+    struct adjacency adjacency;
+    bool any = false;
+    adjacency_make(&adjacency, mesh);
+    for (int inner = 0; inner < 2 && !any; inner++) {
+        for (size_t h = 0; h < 3 * mesh->triangle_count; h++) {
+            marked[h] = edge_length(mesh, h) > edge && is_inner(mesh, &adjacency, h) == inner &&
+                        (!inner || (is_longest(mesh, h) && is_longest(mesh, adjacency.next[h])));
+            any = any || marked[h];
+        }
+    }
+    adjacency_release(&adjacency);
+    return any;
+}
+
 static void split(struct mesh *mesh, float edge) {
-    for (size_t before = 0; before != mesh->triangle_count;) {
-        before = mesh->triangle_count;
+    bool *marked = mem_array(3 * mesh->triangle_count, sizeof *marked);
+    while (mark_edges(mesh, edge, marked)) {
+        size_t before = mesh->triangle_count;
         mesh->position = mem_realloc_array(mesh->position, mesh->vertex_count + 3 * before, sizeof *mesh->position);
         mesh->index = mem_realloc_array(mesh->index, 4 * before, sizeof *mesh->index);
         mesh->object_id = mem_realloc_array(mesh->object_id, 4 * before, sizeof *mesh->object_id);
         for (size_t t = 0; t < before; t++)
-            split_triangle(mesh, t, edge);
+            split_triangle(mesh, t, marked);
         weld(mesh);
+        flip_edges(mesh);
+        marked = mem_realloc_array(marked, 3 * mesh->triangle_count, sizeof *marked);
     }
+    mem_free(marked);
 }
 
 /* A draw from the normal distribution (Box & Muller 1958). */
