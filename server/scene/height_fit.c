@@ -71,6 +71,16 @@ double height_fitted(const struct height_fit *fit, const struct height_frame *f,
     return sum;
 }
 
+double height_variance(const struct height_fit *fit, const struct height_frame *f, vec3 at) {
+    double term[HEIGHT_PARABOLOID], solved[HEIGHT_PARABOLOID], sum = 0.0;
+    terms_at(f, at, term);
+    memcpy(solved, term, sizeof solved);
+    cholesky_solve(fit->terms, fit->factor, solved);
+    for (size_t k = 0; k < fit->terms; k++)
+        sum += term[k] * solved[k];
+    return sum;
+}
+
 bool height_fit(struct height_fit *fit, size_t terms, const struct height_frame *f, const vec3 *position,
                 const uint32_t *vertex, size_t count) {
     double term[HEIGHT_PARABOLOID];

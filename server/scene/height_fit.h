@@ -41,6 +41,9 @@ bool height_fit(struct height_fit *fit, size_t terms, const struct height_frame 
 /* What the fit says of the height over the place of `at`, metres. */
 double height_fitted(const struct height_fit *fit, const struct height_frame *f, vec3 at);
 
+/* The variance of that, over that of a vertex. */
+double height_variance(const struct height_fit *fit, const struct height_frame *f, vec3 at);
+
 /* Of a symmetric positive definite matrix, n <= HEIGHT_PARABOLOID: its lower factor in its place, false where it is
  * singular; and from the right side to the solution, in place. */
 bool cholesky_factor(size_t n, double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]);

@@ -8,10 +8,12 @@
 #include "common/quantile.h"
 #include "server/scene/face_normals.h"
 #include "server/scene/mesh_planes.h"
+#include "server/scene/mesh_round.h"
 
 #define CHUNK 1024      /* vertices a work item */
 #define ROUNDS 3        /* normals filtered, then vertices moved */
 #define STEPS 10        /* of the vertices in a round */
+#define ROUND_PASSES 2  /* of what smooths round surfaces: the first gives it their normals */
 #define AVERAGE_PASSES 2 /* over neighbours: some 20 vertices */
 #define SHAPE_LEAST 0.4f /* times the noise: what moved them all by as much may still be chance */
 #define EXCESS_LEAST 2.5f /* times the variance of the noise: so may be a mean square of as much */
@@ -194,6 +196,10 @@ static void denoise_rough(struct denoising *d, struct face_normals *faces, struc
     renew_normals(d, faces, pool); /* those beside planes are surer now */
     mesh_planes_find(&planes, d->mesh, start, d->noise, faces);
     mesh_planes_flatten(&planes, d->mesh, faces);
+    for (int round = 0; round < ROUND_PASSES; round++) {
+        renew_normals(d, faces, pool);
+        mesh_round_smooth(d->mesh, start, d->noise, faces, &planes, pool);
+    }
     mesh_planes_release(&planes);
     mem_free(d->average);
     mem_free(d->value);

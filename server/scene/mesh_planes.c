@@ -36,8 +36,8 @@ struct growing {
 /* --- fits --------------------------------------------------------------------------------------- */
 
 /* The plane of the part's vertices, from one that they lie near. False where they do not tell it, which is then as it
- * was; else the sum of their squares off it in *squares. */
-static bool fit_plane(const struct growing *g, struct mesh_plane *p, const vec3 *position, double *squares) {
+ * was. */
+static bool fit_plane(const struct growing *g, struct mesh_plane *p, const vec3 *position) {
     struct height_frame f;
     struct height_fit fit;
     height_frame_init(&f, p->frame.normal, position, g->vertex, g->vertices);
@@ -50,8 +50,7 @@ static bool fit_plane(const struct growing *g, struct mesh_plane *p, const vec3 
         vec3_frame(f.normal, &f.u, &f.v);
     }
     p->frame = f;
-    memcpy(p->factor, fit.factor, sizeof p->factor);
-    *squares = fit.squares;
+    p->fit = fit;
     return true;
 }
 
@@ -80,13 +79,13 @@ static double share_continued(const struct growing *g, const struct mesh_plane *
 
 /* From where the vertices were measured they lie in a plane, which then is the one that fits them best. */
 static bool is_plane(const struct growing *g, struct mesh_plane *p) {
-    double count = (double)g->vertices, variance = (double)g->noise * (double)g->noise, squares;
+    double count = (double)g->vertices, variance = (double)g->noise * (double)g->noise;
     struct height_fit curved;
-    if (g->vertices < VERTICES_LEAST || share_continued(g, p) > CONTINUED_MOST || !fit_plane(g, p, g->measured, &squares) ||
-        squares > NOISE_MOST * NOISE_MOST * variance * count ||
+    if (g->vertices < VERTICES_LEAST || share_continued(g, p) > CONTINUED_MOST || !fit_plane(g, p, g->measured) ||
+        p->fit.squares > NOISE_MOST * NOISE_MOST * variance * count ||
         !height_fit(&curved, HEIGHT_PARABOLOID, &p->frame, g->measured, g->vertex, g->vertices))
         return false;
-    double bow = fmax(0.0, squares - curved.squares), freedom = count - HEIGHT_PARABOLOID;
+    double bow = fmax(0.0, p->fit.squares - curved.squares), freedom = count - HEIGHT_PARABOLOID;
     return bow < BOW_MOST * BOW_MOST * variance * count ||
            bow / 3.0 < curved_by_chance(freedom) * curved.squares / freedom;
 }
@@ -120,7 +119,6 @@ static void add(struct growing *g, uint32_t t) {
 static void grow(struct growing *g, uint32_t first, struct mesh_plane *p) {
     const struct face_normals *f = g->faces;
     size_t fitted = VERTICES_LEAST / 2;
-    double squares;
     g->visit++;
     g->triangles = g->vertices = 0;
     g->seen[first] = g->visit;
@@ -138,17 +136,17 @@ static void grow(struct growing *g, uint32_t first, struct mesh_plane *p) {
         }
         if (g->vertices >= 2 * fitted) {
             fitted = g->vertices;
-            fit_plane(g, p, g->mesh->position, &squares);
+            fit_plane(g, p, g->mesh->position);
         }
     }
-    fit_plane(g, p, g->mesh->position, &squares);
+    fit_plane(g, p, g->mesh->position);
 }
 
 static bool find_part(struct growing *g, uint32_t first, struct mesh_plane *p) {
     const uint32_t *v = g->mesh->index[first];
     const vec3 *at = g->mesh->position;
-    *p = (struct mesh_plane){{.centre = vec3_scale(vec3_add(vec3_add(at[v[0]], at[v[1]]), at[v[2]]), 1.0f / 3.0f),
-                              .normal = g->faces->normal[first]}, {{0.0}}};
+    p->frame.centre = vec3_scale(vec3_add(vec3_add(at[v[0]], at[v[1]]), at[v[2]]), 1.0f / 3.0f);
+    p->frame.normal = g->faces->normal[first];
     for (int pass = 0; pass < PASSES; pass++)
         grow(g, first, p);
     return is_plane(g, p);
@@ -189,22 +187,10 @@ static struct seed *seeds_make(const struct growing *g) {
 
 /* --- vertices ----------------------------------------------------------------------------------- */
 
-/* The variance of the plane's height at a place, over that of a vertex. */
-static double variance_at(const struct mesh_plane *p, vec3 at) {
-    vec3 from = vec3_sub(at, p->frame.centre);
-    double term[HEIGHT_PLANE] = {1.0, (double)vec3_dot(p->frame.u, from) / p->frame.unit,
-                                 (double)vec3_dot(p->frame.v, from) / p->frame.unit}, solved[HEIGHT_PLANE], sum = 0.0;
-    memcpy(solved, term, sizeof solved);
-    cholesky_solve(HEIGHT_PLANE, p->factor, solved);
-    for (int i = 0; i < HEIGHT_PLANE; i++)
-        sum += term[i] * solved[i];
-    return sum;
-}
-
 /* Adds that the vertex at `at` lies in the plane to the normal equations of its move, a x = b. */
 static void add_plane(const struct mesh_plane *p, vec3 at, double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID], double b[3]) {
     vec3 normal = p->frame.normal;
-    double weight = 1.0 / variance_at(p, at), n[3] = {(double)normal.x, (double)normal.y, (double)normal.z};
+    double weight = 1.0 / height_variance(&p->fit, &p->frame, at), n[3] = {(double)normal.x, (double)normal.y, (double)normal.z};
     for (int r = 0; r < 3; r++) {
         b[r] -= weight * n[r] * height_over(&p->frame, at);
         for (int c = 0; c <= r; c++)
@@ -241,7 +227,7 @@ static vec3 place(const struct mesh_planes *planes, const struct mesh *mesh, con
 void mesh_planes_find(struct mesh_planes *planes, const struct mesh *mesh, const vec3 *measured, float noise_m,
                       const struct face_normals *faces) {
     size_t capacity = 0;
-    struct mesh_plane found;
+    struct mesh_plane found = {0};
     *planes = (struct mesh_planes){.part = mem_array(mesh->triangle_count, sizeof *planes->part)};
     for (size_t t = 0; t < mesh->triangle_count; t++)
         planes->part[t] = UNTRIED;

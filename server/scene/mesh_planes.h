@@ -14,8 +14,8 @@
 #define MESH_PLANES_NONE UINT32_MAX
 
 struct mesh_plane {
-    struct height_frame frame;                           /* heights over it are 0 */
-    double factor[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]; /* of how surely: as height_fit has it */
+    struct height_frame frame; /* heights over it are 0 */
+    struct height_fit fit;     /* what tells how surely */
 };
 
 struct mesh_planes {
