@@ -3,16 +3,18 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "common/mem.h"
 
-#define CHUNK 1024    /* vertices a work item */
-#define EDGE 0.5f     /* cosine between normals of a vertex and a triangle at it, where no edge runs */
-#define LIKE 0.5f     /* cosine between normals of vertices that may lie on one bend */
-#define NEAR_LEAST 12 /* vertices in a fit; half as many again each time */
+#define CHUNK 1024     /* vertices a work item */
+#define EDGE 0.5f      /* cosine between normals of a vertex and a triangle at it, where no edge runs */
+#define LIKE 0.5f      /* cosine between normals of vertices that may lie on one bend */
+#define NEAR_LEAST 12  /* vertices in a fit; half as many again each time */
 #define NEAR_MOST 96
-#define UNLIKELY 5.0  /* standard deviations of what is left, over what noise would leave: no fit any more */
-#define AGREE 0.7     /* standard deviations of a fit: by as much either way it may be off */
+#define KNOWN_MOST 256 /* slots, more than twice as many */
+#define UNLIKELY 5.0   /* standard deviations of what is left, over what noise would leave: no fit any more */
+#define AGREE 0.7      /* standard deviations of a fit: by as much either way it may be off */
 
 struct smoothing {
     struct mesh *mesh;
@@ -45,19 +47,29 @@ static bool is_round(const struct smoothing *s, uint32_t v) {
     return is;
 }
 
+/* Adds a vertex to a set of fewer than KNOWN_MOST; false where it is there already. */
+static bool learn(uint32_t known[KNOWN_MOST], uint32_t vertex) {
+    uint32_t slot = vertex * 2654435761u % KNOWN_MOST; /* Knuth 1973 */
+    while (known[slot] != UINT32_MAX && known[slot] != vertex)
+        slot = (slot + 1) % KNOWN_MOST;
+    bool is_new = known[slot] != vertex;
+    known[slot] = vertex;
+    return is_new;
+}
+
 /* The vertices that are joined to v over such as face its way, nearest first. */
 static size_t find_near(const struct smoothing *s, uint32_t v, struct near near[NEAR_MOST]) {
     const struct face_normals *f = s->faces;
+    uint32_t known[KNOWN_MOST];
     size_t count = 1;
+    memset(known, 0xff, sizeof known);
+    learn(known, v);
     near[0] = (struct near){0.0f, v};
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count && count < NEAR_MOST; i++) {
         uint32_t from = near[i].vertex;
-        for (uint32_t k = 3 * f->first[from]; k < 3 * f->first[from + 1]; k++) {
+        for (uint32_t k = 3 * f->first[from]; k < 3 * f->first[from + 1] && count < NEAR_MOST; k++) {
             uint32_t other = f->weld[s->mesh->index[f->triangle[k / 3]][k % 3]];
-            size_t known = 0;
-            while (known < count && near[known].vertex != other)
-                known++;
-            if (known < count || count == NEAR_MOST || vec3_dot(s->normal[other], s->normal[v]) < LIKE)
+            if (vec3_dot(s->normal[other], s->normal[v]) < LIKE || !learn(known, other))
                 continue;
             vec3 off = vec3_sub(s->mesh->position[other], s->mesh->position[v]);
             near[count++] = (struct near){vec3_dot(off, off), other};
