@@ -54,10 +54,11 @@ static bool fit_plane(const struct growing *g, struct mesh_plane *p, const vec3 
     return true;
 }
 
-/* The F of a paraboloid's three terms that one plane in a thousand has by chance: a fit to the tables, to 3 % from 10
- * degrees of freedom on, and too strict with fewer. */
-static double curved_by_chance(double freedom) {
-    return 5.42 * (1.0 + 8.5 / freedom + 45.0 / (freedom * freedom));
+/* The variance by which, at most, the three terms that a paraboloid has more seem to be there by chance, in all but one
+ * plane of a thousand: chi squared's of vertices as noisy as all, F's of such as are noisier. The latter is a fit to the
+ * tables, to 3 % from 10 degrees of freedom on. Vertices of edges are less noisy, across them, than those between. */
+static double curved_by_chance(double variance, double rest, double freedom) {
+    return 5.42 * fmax(variance, rest * (1.0 + 8.5 / freedom + 45.0 / (freedom * freedom)));
 }
 
 /* The share of a part's vertices beyond which the surface goes on, turned by little: of what is plane few do, at holes,
@@ -87,7 +88,7 @@ static bool is_plane(const struct growing *g, struct mesh_plane *p) {
         return false;
     double bow = fmax(0.0, p->fit.squares - curved.squares), freedom = count - HEIGHT_PARABOLOID;
     return bow < BOW_MOST * BOW_MOST * variance * count ||
-           bow / 3.0 < curved_by_chance(freedom) * curved.squares / freedom;
+           bow / 3.0 < curved_by_chance(variance, curved.squares / freedom, freedom);
 }
 
 /* --- growth ------------------------------------------------------------------------------------- */
