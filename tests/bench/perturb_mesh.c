@@ -2,7 +2,8 @@
  * would, for Table 1 of the paper (see paper.sh).
  *
  * EDGE   longest edge in metres: longer ones are halved first, since a wall of two triangles has
- *        no vertices to displace or to drop
+ *        no vertices to displace or to drop; within planes what comes of it is made well-shaped,
+ *        as a scanner's triangles are
  * NOISE  metres: each vertex moves along its normal by a normally distributed distance of this
  *        standard deviation, always the same ones for a mesh
  * KEEP   share of the triangles that is kept, object by object, by quadric edge collapse
