@@ -117,6 +117,13 @@ void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct p
         filter_normals(f, mesh, pool);
 }
 
+vec3 face_normals_at(const struct face_normals *f, size_t v) {
+    vec3 sum = {0.0f, 0.0f, 0.0f};
+    for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++)
+        sum = vec3_mad(sum, f->area[f->triangle[i]], f->normal[f->triangle[i]]);
+    return vec3_normalize(sum);
+}
+
 void face_normals_release(struct face_normals *f) {
     mem_free(f->normal);
     mem_free(f->area);

@@ -26,6 +26,9 @@ static inline bool face_normals_rough(const struct face_normals *f) { return f->
 /* It is noise that makes it rough, not that it has few triangles. */
 static inline bool face_normals_noisy(const struct face_normals *f) { return face_normals_rough(f) && f->least > 0.002f; }
 
+/* Unit, of welded vertex v: the mean of its triangles' by area; 0 where it has none. */
+vec3 face_normals_at(const struct face_normals *f, size_t v);
+
 /* The same for any number of threads. */
 void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct parallel *pool);
 void face_normals_release(struct face_normals *f);

@@ -81,12 +81,8 @@ static void move_to_normals(struct denoising *d, struct parallel *pool) {
 static void measure_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct denoising *d = user;
-    const struct face_normals *f = d->faces;
     for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
-        vec3 sum = {0.0f, 0.0f, 0.0f};
-        for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++)
-            sum = vec3_mad(sum, f->area[f->triangle[i]], f->normal[f->triangle[i]]);
-        d->normal[v] = vec3_normalize(sum);
+        d->normal[v] = face_normals_at(d->faces, v);
         d->moved[v] = vec3_dot(d->normal[v], vec3_sub(d->mesh->position[v], d->start[v]));
     }
 }

@@ -119,15 +119,10 @@ static void smooth_chunk(void *user, size_t chunk, int thread) {
 
 void mesh_round_smooth(struct mesh *mesh, const vec3 *measured, float noise_m, const struct face_normals *faces,
                        const struct mesh_planes *planes, struct parallel *pool) {
-    vec3 *normal = mem_calloc(mesh->vertex_count, sizeof *normal);
+    vec3 *normal = mem_array(mesh->vertex_count, sizeof *normal);
     vec3 *to = mem_array(mesh->vertex_count, sizeof *to);
-    for (size_t t = 0; t < mesh->triangle_count; t++)
-        for (int c = 0; c < 3; c++) {
-            uint32_t v = faces->weld[mesh->index[t][c]];
-            normal[v] = vec3_mad(normal[v], faces->area[t], faces->normal[t]);
-        }
     for (size_t v = 0; v < mesh->vertex_count; v++)
-        normal[v] = vec3_normalize(normal[v]);
+        normal[v] = face_normals_at(faces, v);
     struct smoothing smoothing = {mesh, measured, faces, planes, normal, to, noise_m};
     parallel_for(pool, (mesh->vertex_count + CHUNK - 1) / CHUNK, smooth_chunk, &smoothing);
     for (size_t v = 0; v < mesh->vertex_count; v++)
