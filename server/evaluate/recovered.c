@@ -216,29 +216,83 @@ static size_t *sample_texels(const struct recovered *r) {
 }
 
 static enum status take_segment_values(struct recovered *r, const char *dir, struct error *err) {
-    static const char *const name[3] = {"roughness.exr", "specular.exr", "emission.exr"};
+    static const char *const name[2] = {"roughness.exr", "specular.exr"};
+    float *const to[2] = {r->materials.roughness, r->materials.specular};
     size_t *texel = sample_texels(r);
     enum status status = STATUS_OK;
-    for (int k = 0; k < 3 && status == STATUS_OK; k++) {
+    for (int k = 0; k < 2 && status == STATUS_OK; k++) {
         struct image image;
         status = read_sized(dir, name[k], &r->atlas, &image, err);
         if (status != STATUS_OK)
             break;
         for (size_t s = 0; s < r->segments.count; s++) {
-            if (texel[s] == NO_TEXEL)
-                continue;
-            const float *v = image.pixel + 3 * texel[s];
-            if (k == 0)
-                r->materials.roughness[s] = v[0];
-            else if (k == 1)
-                r->materials.specular[s] = v[0];
-            else
-                r->materials.emission[s] = rgb_make(v[0], v[1], v[2]);
+            if (texel[s] != NO_TEXEL)
+                to[k][s] = image.pixel[3 * texel[s]];
         }
         image_release(&image);
     }
     mem_free(texel);
     return status;
+}
+
+static uint32_t segment_of_texel(const struct recovered *r, size_t texel) {
+    return r->segments.of_triangle[r->inverse.triangle[texel]];
+}
+
+/* The emission of a segment's texels, one by one. */
+struct emission_sum {
+    double sum[3], count;
+    rgb first;
+    bool varies; /* some texel's is not that of the first */
+};
+
+static rgb emission_at(const struct image *image, size_t texel) {
+    const float *v = image->pixel + 3 * texel;
+    return rgb_make(v[0], v[1], v[2]);
+}
+
+static void add_emission(struct emission_sum *e, rgb value) {
+    const float v[3] = {value.r, value.g, value.b};
+    if (e->count == 0.0)
+        e->first = value;
+    for (int c = 0; c < 3; c++)
+        e->sum[c] += (double)v[c];
+    e->count += 1.0;
+    e->varies = e->varies || !rgb_is_black(rgb_sub(value, e->first));
+}
+
+/* A segment's emission is the mean of its texels, with a pattern where these differ. */
+static void take_emission(struct recovered *r, const struct image *image) {
+    struct materials *m = &r->materials;
+    struct emission_sum *of = mem_calloc(r->segments.count, sizeof *of);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        size_t texel = r->inverse.valid[i];
+        add_emission(&of[segment_of_texel(r, texel)], emission_at(image, texel));
+    }
+    for (size_t s = 0; s < r->segments.count; s++) {
+        const double *sum = of[s].sum, count = of[s].count;
+        if (count > 0.0)
+            m->emission[s] = rgb_make((float)(sum[0] / count), (float)(sum[1] / count), (float)(sum[2] / count));
+    }
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        size_t texel = r->inverse.valid[i], s = segment_of_texel(r, texel);
+        if (!of[s].varies)
+            continue;
+        if (!m->emission_pattern)
+            materials_start_emission_pattern(m);
+        materials_set_emission_pattern(m, texel, emission_at(image, texel), m->emission[s]);
+    }
+    mem_free(of);
+}
+
+static enum status read_emission(struct recovered *r, const char *dir, struct error *err) {
+    struct image image;
+    enum status status = read_sized(dir, "emission.exr", &r->atlas, &image, err);
+    if (status != STATUS_OK)
+        return status;
+    take_emission(r, &image);
+    image_release(&image);
+    return STATUS_OK;
 }
 
 /* Distant light; most rooms have none. */
@@ -272,6 +326,8 @@ enum status recovered_load(const char *dir, const struct mesh *mesh, struct para
     materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
     take_base_color(r, &base_color);
     status = take_segment_values(r, dir, err);
+    if (status == STATUS_OK)
+        status = read_emission(r, dir, err);
     if (status == STATUS_OK)
         status = world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, pool, err);
     if (status == STATUS_OK)

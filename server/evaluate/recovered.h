@@ -23,8 +23,8 @@ struct recovered {
     struct world world;
 };
 
-/* `mesh` is borrowed until recovered_release. Roughness, specular and emission are one value a
- * segment: each segment's is read where a texel of it is. */
+/* `mesh` is borrowed until recovered_release. Roughness and specular are one value a segment: each segment's is
+ * read where a texel of it is. Emission is the mean of its texels, and a pattern where these differ. */
 enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
                            struct recovered *recovered, struct error *err);
 void recovered_release(struct recovered *recovered);

@@ -5,7 +5,10 @@
 #include "server/export/input.h"
 #include "server/export/parts.h"
 
-#define FORMATS_BASE_COLOR "base_color.png" /* must be in the folder before the others are written */
+/* These must be in the folder before the others are written; the latter (emission_texture.h) where an emitter has a
+ * pattern. */
+#define FORMATS_BASE_COLOR "base_color.png"
+#define FORMATS_EMISSION "emission.png"
 
 struct format {
     const char *name, *content_type, *about;

@@ -1,6 +1,6 @@
 /* glb.c -- see glb.h. The container is that of the glTF 2.0 specification, section 4: a header, a
  * chunk of JSON, a chunk of bytes, each padded to four bytes. The bytes: positions, normals, texture
- * coordinates and indices of all parts, one after the other, then the picture. */
+ * coordinates and indices of all parts, one after the other, then the pictures. */
 #include "server/export/glb.h"
 
 #include <errno.h>
@@ -11,6 +11,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/export/emission_texture.h"
 #include "server/export/sink.h"
 
 #define MAGIC 0x46546c67 /* "glTF" */
@@ -30,12 +31,13 @@
 #define CAMERAS_MAX 100 /* of held-out views */
 #define NEAR_M 0.01
 
-/* Buffer views, in order; NORMAL is missing where the mesh has no normals. */
-enum view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_IMAGE, VIEW_COUNT };
+/* Buffer views, in order; NORMAL is missing where the mesh has no normals, EMISSION where no emitter has a pattern. */
+enum view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_BASE_COLOR, VIEW_EMISSION, VIEW_COUNT };
 
 struct glb {
     const struct export_input *in;
     const struct parts *parts;
+    const float *whites; /* [segment_count] of emission_texture.h; NULL: no emitter has a pattern */
     struct { uint64_t offset, length; int number; } view[VIEW_COUNT];
     uint64_t length; /* of the bytes, padding included */
     cJSON *root, *accessors, *nodes, *children;
@@ -46,14 +48,15 @@ static uint64_t padded(uint64_t length) {
     return (length + 3) / 4 * 4;
 }
 
-static void lay_out(struct glb *g, uint64_t image_bytes) {
+static void lay_out(struct glb *g, uint64_t base_color_bytes, uint64_t emission_bytes) {
     uint64_t vertices = g->parts->seams.vertex_count;
     const uint64_t length[VIEW_COUNT] = {
         [VIEW_POSITION] = 12 * vertices,
         [VIEW_NORMAL] = g->in->mesh->normal ? 12 * vertices : 0,
         [VIEW_UV] = 8 * vertices,
         [VIEW_INDEX] = 12 * (uint64_t)g->in->mesh->triangle_count,
-        [VIEW_IMAGE] = image_bytes,
+        [VIEW_BASE_COLOR] = base_color_bytes,
+        [VIEW_EMISSION] = emission_bytes,
     };
     int number = 0;
     for (int v = 0; v < VIEW_COUNT; v++) {
@@ -92,24 +95,32 @@ static void add_views(struct glb *g) {
         json_add_int(view, "byteLength", (int64_t)g->view[v].length);
         if (v < VIEW_INDEX)
             json_add_int(view, "byteStride", v == VIEW_UV ? 8 : 12); /* several accessors share it */
-        if (v < VIEW_IMAGE)
+        if (v < VIEW_BASE_COLOR)
             json_add_int(view, "target", v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
     }
 }
 
-static void add_picture(struct glb *g) {
-    cJSON *image = append(cJSON_AddArrayToObject(g->root, "images"));
-    json_add_string(image, "name", "base_color");
+/* A texture of the same number as its image. */
+static void add_picture(cJSON *images, cJSON *textures, const char *name, int view) {
+    cJSON *image = append(images), *texture = append(textures);
+    json_add_string(image, "name", name);
     json_add_string(image, "mimeType", "image/png");
-    json_add_int(image, "bufferView", g->view[VIEW_IMAGE].number);
+    json_add_int(image, "bufferView", view);
+    json_add_int(texture, "sampler", 0);
+    json_add_int(texture, "source", cJSON_GetArraySize(images) - 1);
+}
+
+static void add_pictures(struct glb *g) {
+    cJSON *images = cJSON_AddArrayToObject(g->root, "images");
     cJSON *sampler = append(cJSON_AddArrayToObject(g->root, "samplers"));
     json_add_int(sampler, "magFilter", FILTER_LINEAR);
     json_add_int(sampler, "minFilter", FILTER_MIPMAP);
     json_add_int(sampler, "wrapS", WRAP_CLAMP);
     json_add_int(sampler, "wrapT", WRAP_CLAMP);
-    cJSON *texture = append(cJSON_AddArrayToObject(g->root, "textures"));
-    json_add_int(texture, "sampler", 0);
-    json_add_int(texture, "source", 0);
+    cJSON *textures = cJSON_AddArrayToObject(g->root, "textures");
+    add_picture(images, textures, "base_color", g->view[VIEW_BASE_COLOR].number);
+    if (g->whites)
+        add_picture(images, textures, "emission", g->view[VIEW_EMISSION].number);
 }
 
 /* Returns its number. */
@@ -154,7 +165,7 @@ static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
 
 static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
     const struct materials *m = g->in->materials;
-    bool shines = rgb_max(m->emission[s]) > 0.0f;
+    bool varies = g->whites && g->whites[s] > 0.0f, shines = rgb_max(m->emission[s]) > 0.0f;
     json_add_string(material, "name", name);
     cJSON *model = add_object(material, "pbrMetallicRoughness");
     json_add_int(add_object(model, "baseColorTexture"), "index", 0);
@@ -167,7 +178,9 @@ static void add_material(const struct glb *g, cJSON *material, uint32_t s, const
                     root > 0.0 ? 1.0 : 0.0);
     json_add_number(add_object(extensions, "KHR_materials_ior"), "ior", (1.0 + root) / (1.0 - root));
     if (shines)
-        add_emission(material, extensions, m->emission[s]);
+        add_emission(material, extensions, varies ? rgb_gray(g->whites[s]) : m->emission[s]);
+    if (varies)
+        json_add_int(add_object(material, "emissiveTexture"), "index", 1);
     json_add_number(add_object(material, "extras"), "specular", (double)m->specular[s]);
 }
 
@@ -261,7 +274,7 @@ static char *describe(struct glb *g) {
     json_add(g->root, "extensionsUsed", cJSON_CreateStringArray(used, 3));
     json_add_int(append(cJSON_AddArrayToObject(g->root, "buffers")), "byteLength", (int64_t)g->length);
     add_views(g);
-    add_picture(g);
+    add_pictures(g);
     json_add_int(g->root, "scene", 0);
     cJSON *scene = append(cJSON_AddArrayToObject(g->root, "scenes"));
     json_add_string(scene, "name", g->in->title);
@@ -280,10 +293,15 @@ static char *describe(struct glb *g) {
 
 /* --- bytes ---------------------------------------------------------------------------------- */
 
-static void put_bytes(const struct glb *g, struct sink *out, const char *picture) {
+static void put_picture(const struct glb *g, struct sink *out, enum view view, const char *path) {
+    uint64_t length = g->view[view].length;
+    sink_copy(out, path, length);
+    sink_bytes(out, "\0\0\0", padded(length) - length);
+}
+
+static void put_bytes(const struct glb *g, struct sink *out, const char *base_color, const char *emission) {
     const struct seams *seams = &g->parts->seams;
     const struct mesh *mesh = g->in->mesh;
-    uint64_t image_bytes = g->view[VIEW_IMAGE].length;
     for (size_t v = 0; v < seams->vertex_count; v++)
         sink_vec3(out, seams_position(seams, mesh, v));
     for (size_t v = 0; v < seams->vertex_count && mesh->normal; v++)
@@ -299,8 +317,9 @@ static void put_bytes(const struct glb *g, struct sink *out, const char *picture
             for (int c = 0; c < 3; c++)
                 sink_u32(out, seams->index[g->parts->order[i]][c] - (uint32_t)part->first_vertex);
     }
-    sink_copy(out, picture, image_bytes);
-    sink_bytes(out, "\0\0\0", padded(image_bytes) - image_bytes);
+    put_picture(g, out, VIEW_BASE_COLOR, base_color);
+    if (g->whites)
+        put_picture(g, out, VIEW_EMISSION, emission);
 }
 
 static void put_chunk_head(struct sink *out, uint64_t length, uint32_t type) {
@@ -309,13 +328,16 @@ static void put_chunk_head(struct sink *out, uint64_t length, uint32_t type) {
 }
 
 enum status glb_write(const char *path, const struct export_input *input, const struct parts *parts,
-                      const char *base_color, struct error *err) {
-    struct glb g = {.in = input, .parts = parts};
-    struct stat info;
+                      const char *base_color, const char *emission, struct error *err) {
+    struct stat info, emission_info = {.st_size = 0};
     struct sink out;
     if (stat(base_color, &info) != 0)
         return error_set_errno(err, errno, "cannot look at %s", base_color);
-    lay_out(&g, (uint64_t)info.st_size);
+    if (input->materials->emission_pattern && stat(emission, &emission_info) != 0)
+        return error_set_errno(err, errno, "cannot look at %s", emission);
+    float *whites = emission_texture_whites(input);
+    struct glb g = {.in = input, .parts = parts, .whites = whites};
+    lay_out(&g, (uint64_t)info.st_size, (uint64_t)emission_info.st_size);
     char *json = describe(&g);
     uint64_t json_length = strlen(json);
     uint64_t length = HEAD_BYTES + 2 * CHUNK_HEAD_BYTES + json_length + g.length;
@@ -332,9 +354,10 @@ enum status glb_write(const char *path, const struct export_input *input, const 
         put_chunk_head(&out, json_length, CHUNK_JSON);
         sink_bytes(&out, json, json_length);
         put_chunk_head(&out, g.length, CHUNK_BIN);
-        put_bytes(&g, &out, base_color);
+        put_bytes(&g, &out, base_color, emission);
         status = sink_close(&out, STATUS_OK, err);
     }
     mem_free(json);
+    mem_free(whites);
     return status;
 }

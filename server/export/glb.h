@@ -13,9 +13,10 @@
  *                 reflectance at normal incidence is 0.08 specular, as ours is
  *                 (KHR_materials_specular, "Materials with reflectance parameter"). Specular 0 has no
  *                 reflection at all: KHR_materials_specular, specularFactor 0
- *   emission      emissiveFactor times KHR_materials_emissive_strength = radiance, in our units
+ *   emission      emissiveFactor times KHR_materials_emissive_strength = radiance, in our units; where an
+ *                 emitter has a pattern, times a texture, 8-bit sRGB (emission_texture.h)
  *
- * These but the first are one number a segment, so factors hold them exactly where textures would
+ * These but base colour and patterns are one number a segment, so factors hold them exactly where textures would
  * round them to 8 bits and bleed at seams. What differs: glTF takes from the diffuse light what the
  * surface reflects (times 1 - F, F by Schlick), ours does not, so glossy surfaces look a few percent
  * darker, and rooms of them more; its diffuse lobe is Lambert's. Emitters are single-sided, since ours
@@ -29,9 +30,9 @@
 #include "server/export/input.h"
 #include "server/export/parts.h"
 
-/* `base_color` is the PNG that goes into the file. The same input gives the same bytes; STATUS_LIMIT
- * where they would be 4 GiB or more. */
+/* `base_color` and, where an emitter has a pattern, `emission` are the PNGs that go into the file. The same input gives
+ * the same bytes; STATUS_LIMIT where they would be 4 GiB or more. */
 enum status glb_write(const char *path, const struct export_input *input, const struct parts *parts,
-                      const char *base_color, struct error *err);
+                      const char *base_color, const char *emission, struct error *err);
 
 #endif

@@ -1,6 +1,8 @@
 /* mesh_obj.c -- see mesh_obj.h. */
 #include "server/export/mesh_obj.h"
 
+#include "common/mem.h"
+#include "server/export/emission_texture.h"
 #include "server/export/sink.h"
 
 #define NS_MOST 1000.0 /* of a surface of roughness 0 */
@@ -45,12 +47,13 @@ enum status mesh_obj_write(const char *path, const struct export_input *input, c
 }
 
 enum status mesh_mtl_write(const char *path, const struct export_input *input, const struct parts *parts,
-                           const char *base_color, struct error *err) {
+                           const char *base_color, const char *emission, struct error *err) {
     const struct materials *m = input->materials;
     struct sink out;
     enum status status = sink_open(&out, path, UINT32_MAX, err);
     if (status != STATUS_OK)
         return status;
+    float *whites = emission_texture_whites(input);
     for (size_t p = 0; p < parts->count; p++) {
         uint32_t s = parts->part[p].segment;
         double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
@@ -58,11 +61,15 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
         sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
                     "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n", s, base_color, specular, specular,
                     specular, NS_MOST * smooth * smooth, roughness);
-        rgb e = m->emission[s];
+        bool varies = whites && whites[s] > 0.0f;
+        rgb e = varies ? rgb_gray(whites[s]) : m->emission[s];
         if (rgb_max(e) > 0.0f)
             sink_printf(&out, "Ke " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)e.r, (double)e.g,
                         (double)e.b);
+        if (varies)
+            sink_printf(&out, "map_Ke %s\n", emission);
         sink_printf(&out, "illum 2\n\n");
     }
+    mem_free(whites);
     return sink_close(&out, STATUS_OK, err);
 }

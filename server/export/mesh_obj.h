@@ -6,8 +6,8 @@
  *
  * MTL has no specular as ours: Ks is specular, for readers that take Ks for the level of a
  * reflection whose half is that of an index of refraction of 1.5 (Ni), as Blender does. Ns is
- * 1000 (1 - roughness)^2, as Blender turns it back into roughness. Pr is roughness, Ke radiance,
- * map_Kd the picture beside it, in sRGB. */
+ * 1000 (1 - roughness)^2, as Blender turns it back into roughness. Pr is roughness, Ke radiance, where an
+ * emitter has a pattern that of what is white in map_Ke; map_Kd and map_Ke are the pictures beside it, in sRGB. */
 #ifndef UNBAKE_EXPORT_MESH_OBJ_H
 #define UNBAKE_EXPORT_MESH_OBJ_H
 
@@ -18,8 +18,8 @@
 enum status mesh_obj_write(const char *path, const struct export_input *input, const struct parts *parts,
                            struct error *err);
 
-/* `base_color` is the picture's name as the material says it. */
+/* `base_color` and `emission` (emission_texture.h) are the pictures' names as the materials say them. */
 enum status mesh_mtl_write(const char *path, const struct export_input *input, const struct parts *parts,
-                           const char *base_color, struct error *err);
+                           const char *base_color, const char *emission, struct error *err);
 
 #endif

@@ -9,6 +9,7 @@
 #include <zlib.h>
 
 #include "common/mem.h"
+#include "server/export/emission_texture.h"
 #include "server/export/sink.h"
 
 #define SENSORS_MAX 100
@@ -48,10 +49,17 @@ static void put_sensor(struct sink *out, size_t number, const struct camera *c) 
                 c->height);
 }
 
+static void put_emitter(struct sink *out, rgb radiance, bool varies) {
+    if (varies)
+        sink_printf(out, "    <emitter type=\"area\"><ref name=\"radiance\" id=\"emission\"/></emitter>\n");
+    else
+        sink_printf(out, "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" SINK_FLOAT " " SINK_FLOAT
+                    " " SINK_FLOAT "\"/></emitter>\n", (double)radiance.r, (double)radiance.g, (double)radiance.b);
+}
+
 static void put_shape(struct sink *out, const struct export_input *in, const char *shapes, size_t number,
-                      uint32_t segment) {
+                      uint32_t segment, bool varies) {
     const struct materials *m = in->materials;
-    rgb e = m->emission[segment];
     sink_printf(out,
                 "  <shape type=\"serialized\" id=\"segment_%u\">\n"
                 "    <string name=\"filename\" value=\"%s\"/>\n"
@@ -64,9 +72,8 @@ static void put_shape(struct sink *out, const struct export_input *in, const cha
                 "    </bsdf></bsdf>\n",
                 segment, shapes, number, in->mesh->normal ? "false" : "true",
                 (double)m->roughness[segment], (double)m->specular[segment]);
-    if (rgb_max(e) > 0.0f)
-        sink_printf(out, "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" SINK_FLOAT " " SINK_FLOAT
-                    " " SINK_FLOAT "\"/></emitter>\n", (double)e.r, (double)e.g, (double)e.b);
+    if (rgb_max(m->emission[segment]) > 0.0f)
+        put_emitter(out, m->emission[segment], varies);
     sink_printf(out, "  </shape>\n");
 }
 
@@ -92,8 +99,15 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
                 "    <string name=\"filename\" value=\"base_color.exr\"/>\n"
                 "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
                 "  </texture>\n");
+    float *whites = emission_texture_whites(in);
+    if (whites)
+        sink_printf(&out, "  <texture type=\"bitmap\" id=\"emission\">\n"
+                    "    <string name=\"filename\" value=\"emission.exr\"/>\n"
+                    "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
+                    "  </texture>\n");
     for (size_t p = 0; p < parts->count; p++)
-        put_shape(&out, in, shapes, p, parts->part[p].segment);
+        put_shape(&out, in, shapes, p, parts->part[p].segment, whites && whites[parts->part[p].segment] > 0.0f);
+    mem_free(whites);
     if (in->environment)
         sink_printf(&out, "  <emitter type=\"envmap\"><string name=\"filename\" value=\"environment.exr\"/>"
                     "</emitter>\n");

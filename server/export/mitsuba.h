@@ -5,7 +5,7 @@
  * rendered there is ours but for noise, for how values are filtered at the border of charts, and
  * where specular is 0, which Mitsuba takes for 0.001. base_color.exr and environment.exr are used as
  * they are. Emitters are area lights with the segment's radiance: they shine from their front and
- * reflect, as ours do.
+ * reflect, as ours do; those with a pattern have emission.exr.
  *
  * Each held-out view N of views.json is the sensor view_N: its pinhole, with fx for both axes and
  * without lens distortion. */

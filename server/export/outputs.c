@@ -12,6 +12,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/vec.h"
+#include "server/export/emission_texture.h"
 #include "server/export/formats.h"
 #include "server/export/mesh_ply.h"
 #include "server/export/pictures.h"
@@ -167,6 +168,21 @@ static enum status put_previews(struct export *e, struct error *err) {
     return status == STATUS_OK ? put_environment_preview(e, err) : status;
 }
 
+/* Of rooms in which an emitter has a pattern. */
+static enum status put_emission_png(struct export *e, const uint32_t *source, struct error *err) {
+    float *whites = emission_texture_whites(e->input);
+    struct image image;
+    if (!whites)
+        return STATUS_OK;
+    emission_texture(e->input, source, whites, &image);
+    enum status status = put_image(e, EVENT_OUTPUT, FORMATS_EMISSION, &image, FORMAT_PNG,
+                                   "what emitters show that are not equally bright all over, each over the brightest of "
+                                   "it, in 8 bits, sRGB", err);
+    image_release(&image);
+    mem_free(whites);
+    return status;
+}
+
 static enum status put_textures(struct export *e, struct error *err) {
     uint32_t *source = picture_margin(e->input->inverse);
     enum status status = STATUS_OK;
@@ -183,6 +199,8 @@ static enum status put_textures(struct export *e, struct error *err) {
                                "the same in 8 bits, sRGB", err);
         image_release(&image);
     }
+    if (status == STATUS_OK)
+        status = put_emission_png(e, source, err);
     mem_free(source);
     return status;
 }
@@ -285,6 +303,7 @@ static cJSON *describe_segments(const struct export_input *in) {
     double(*color)[3] = mem_calloc(count, sizeof *color);
     size_t *triangles = mem_calloc(count, sizeof *triangles);
     size_t *texels = mem_calloc(count, sizeof *texels);
+    float *whites = emission_texture_whites(in);
     for (size_t t = 0; t < in->mesh->triangle_count; t++) {
         uint32_t s = in->segments->of_triangle[t];
         triangles[s]++;
@@ -315,8 +334,10 @@ static cJSON *describe_segments(const struct export_input *in) {
         json_add_bool(entry, "emitter", in->is_emitter[s]);
         json_add(entry, "emission",
                  cJSON_CreateDoubleArray((double[]){(double)e.r, (double)e.g, (double)e.b}, 3));
+        json_add_bool(entry, "emission_varies", whites && whites[s] > 0.0f);
         cJSON_AddItemToArray(list, entry);
     }
+    mem_free(whites);
     mem_free(texels);
     mem_free(triangles);
     mem_free(color);

@@ -83,7 +83,7 @@ static rgb value_at(const struct export_input *input, enum picture_kind kind, si
         const float *c = m->base_color.texel[texel];
         return rgb_make(c[0], c[1], c[2]);
     }
-    case PICTURE_EMISSION: return m->emission[segment_of_texel(input, texel)];
+    case PICTURE_EMISSION: return materials_emission_of_texel(m, segment_of_texel(input, texel), texel);
     case PICTURE_ROUGHNESS: return rgb_gray(m->roughness[segment_of_texel(input, texel)]);
     case PICTURE_SPECULAR: return rgb_gray(m->specular[segment_of_texel(input, texel)]);
     case PICTURE_CONFIDENCE: break;

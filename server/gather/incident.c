@@ -16,14 +16,19 @@ enum { PAIR_WAY, PAIR_PICK, PAIR_LIGHT, PAIR_BACK = 32 };
 #define ENCLOSED_RAYS 32
 #define ENCLOSED_STEP 4
 
-/* The texel at a hit. */
-static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
-    const struct world_triangle *t = &world->triangle[hit->triangle];
+/* Where in the texture a hit is, texels. */
+static vec2 place_at(const struct world *world, const struct accel_hit *hit) {
+    const vec2 *c = world->triangle[hit->triangle].corner;
     float b0 = 1.0f - hit->b1 - hit->b2;
-    float x = b0 * t->corner[0].x + hit->b1 * t->corner[1].x + hit->b2 * t->corner[2].x;
-    float y = b0 * t->corner[0].y + hit->b1 * t->corner[1].y + hit->b2 * t->corner[2].y;
+    return (vec2){b0 * c[0].x + hit->b1 * c[1].x + hit->b2 * c[2].x,
+                  b0 * c[0].y + hit->b1 * c[1].y + hit->b2 * c[2].y};
+}
+
+/* The texel there. */
+static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
+    vec2 at = place_at(world, hit);
     uint32_t width = world->atlas->width, height = world->atlas->height;
-    uint32_t column = x > 0.0f ? (uint32_t)x : 0, row = y > 0.0f ? (uint32_t)y : 0;
+    uint32_t column = at.x > 0.0f ? (uint32_t)at.x : 0, row = at.y > 0.0f ? (uint32_t)at.y : 0;
     column = column < width ? column : width - 1;
     row = row < height ? row : height - 1;
     return (size_t)row * width + column;
@@ -36,7 +41,8 @@ static rgb look_at(const struct light_field *field, const struct accel_hit *hit,
     *light_pdf = 0.0f;
     if (world->lights->area_density[t->segment] > 0.0f) {
         *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, facing);
-        return world->materials->emission[t->segment];
+        vec2 at = place_at(world, hit);
+        return materials_emission(world->materials, t->segment, at.x, at.y);
     }
     return rgb_from_half(field->radiance[texel_at(world, hit)]);
 }

@@ -321,11 +321,13 @@ static struct box common(struct box a, struct box b) {
                         a.y1 < b.y1 ? a.y1 : b.y1};
 }
 
-/* The parts of all charts; item may be NULL to count them. */
-static size_t list_items(const struct atlas *atlas, const struct box *chart, struct item *item) {
+/* The parts of all charts that are wanted; item may be NULL to count them. */
+static size_t list_items(const struct atlas *atlas, const struct box *chart, const bool *wanted, struct item *item) {
     const struct box whole = {0, 0, (long)atlas->width, (long)atlas->height};
     size_t count = 0;
     for (size_t i = 0; i < atlas->chart_count; i++) {
+        if (wanted && !wanted[i])
+            continue;
         struct box own = common(chart[i], whole);
         for (long y = own.y0; y < own.y1; y += TILE) {
             for (long x = own.x0; x < own.x1; x += TILE, count++) {
@@ -340,14 +342,14 @@ static size_t list_items(const struct atlas *atlas, const struct box *chart, str
 }
 
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
-             const struct measured *measured, const struct color_prior *prior, struct texture *out,
-             struct parallel *pool) {
+             const struct measured *measured, const struct color_prior *prior, const bool *wanted,
+             struct texture *out, struct parallel *pool) {
     struct denoise_job job = {atlas, inverse, measured, prior, out, NULL, NULL};
     size_t threads = (size_t)parallel_thread_count(pool);
     struct box *chart = chart_boxes(atlas, triangle_count);
-    size_t count = list_items(atlas, chart, NULL);
+    size_t count = list_items(atlas, chart, wanted, NULL);
     job.item = mem_array(count + 1, sizeof *job.item);
-    list_items(atlas, chart, job.item);
+    list_items(atlas, chart, wanted, job.item);
     job.tile = mem_array(threads, sizeof *job.tile);
     for (size_t i = 0; i < threads; i++)
         tile_init(&job.tile[i]);

@@ -12,6 +12,7 @@
 #ifndef UNBAKE_RECONSTRUCT_DENOISE_H
 #define UNBAKE_RECONSTRUCT_DENOISE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/parallel.h"
@@ -40,10 +41,10 @@ struct color_prior {
     float variance; /* of texels about the mean, summed over the channels */
 };
 
-/* Writes the valid texels of `out` from measured[height][width] and prior[chart_count]. The same for any
- * number of threads. */
+/* Writes the valid texels of `out` from measured[height][width] and prior[chart_count]: those of the charts for which
+ * wanted[chart_count] is true, or of all where it is NULL. The same for any number of threads. */
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
-             const struct measured *measured, const struct color_prior *prior, struct texture *out,
-             struct parallel *pool);
+             const struct measured *measured, const struct color_prior *prior, const bool *wanted,
+             struct texture *out, struct parallel *pool);
 
 #endif

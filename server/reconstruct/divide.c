@@ -297,7 +297,7 @@ void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
         d->measured[r->inverse.valid[i]] = d->measured[stand_in(d, r->inverse.valid[i])];
     struct color_prior *prior = color_priors(r, d->measured);
     if (d->denoises)
-        denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior,
+        denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior, NULL,
                 &r->materials.base_color, r->pool);
     else
         keep_noise(d, prior);

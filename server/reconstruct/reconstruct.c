@@ -11,6 +11,7 @@
 #include "server/capture/shown.h"
 #include "server/capture/views.h"
 #include "server/reconstruct/calibrate.h"
+#include "server/reconstruct/emission_pattern.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/lamp_find.h"
 #include "server/reconstruct/lamps.h"
@@ -281,6 +282,8 @@ static enum status run_resumable(struct run *run, struct error *err) {
     bool was_solved = status == STATUS_OK && solves && found;
     if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* a checkpoint holds no map, only what solve did to it */
         lamps_brighten_sky(run->r, run->r->sky_factor);
+    if (was_solved)
+        emission_pattern_restore(run->r, &run->views);
     if (run->r->sun.is_there) {
         sun_draw(&run->r->sun, &run->r->environment);
         light_by_environment(run->r);

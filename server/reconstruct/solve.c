@@ -9,6 +9,7 @@
 #include "server/gather/probes.h"
 #include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
+#include "server/reconstruct/emission_pattern.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
 #include "server/reconstruct/lamps.h"
@@ -46,6 +47,7 @@ struct solve {
     struct probes probes;
     struct divide divide;
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
+    bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
     double texels_a_pixel;   /* detail_texels_a_pixel */
     double begin_sec;
     double work_done, work_total;
@@ -135,10 +137,20 @@ static bool find_detail(struct solve *s) {
 
 /* --- emitters ----------------------------------------------------------------------------------- */
 
+/* Finds what pictures the emitters show, unless they are those of the last time. */
+static void find_patterns(struct solve *s) {
+    struct reconstruction *r = s->r;
+    if (memcmp(s->patterned, r->is_emitter, r->segments.count * sizeof *s->patterned) == 0)
+        return;
+    memcpy(s->patterned, r->is_emitter, r->segments.count * sizeof *s->patterned);
+    emission_pattern_find(r, s->views);
+}
+
 /* Lights are sampled by what is shown of them, own and reflected light together: that is what they
  * send out. */
 static void set_lights(struct solve *s) {
     struct reconstruction *r = s->r;
+    find_patterns(s);
     for (size_t i = 0; i < r->segments.count; i++)
         r->materials.emission[i] = r->is_emitter[i] ? r->evidence[i].shown : rgb_gray(0.0f);
     world_update_lights(&r->world);
@@ -195,16 +207,21 @@ static void decide_emitters(struct solve *s) {
     }
 }
 
-/* An emitter's own light: what is shown less what a neutral base colour reflects. */
+/* Gives emitters their own light, and the base colour by which they reflect. */
 static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
-    for (size_t i = 0; i < r->segments.count; i++) {
-        const struct emitter_evidence *e = &r->evidence[i];
-        rgb own = rgb_mad(e->shown, e->hidden ? 0.0f : -NEUTRAL_BASE_COLOR, e->arrived);
-        r->materials.emission[i] = r->is_emitter[i]
-                                       ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))
-                                       : rgb_gray(0.0f);
+    struct emission_own *own = mem_array(r->segments.count, sizeof *own);
+    find_patterns(s);
+    emission_pattern_own(r, own);
+    for (size_t i = 0; i < r->segments.count; i++)
+        r->materials.emission[i] = own[i].radiance;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        float *color = r->materials.base_color.texel[texel];
+        for (int c = 0; c < 3 && r->is_emitter[segment]; c++)
+            color[c] = own[segment].base_color;
     }
+    mem_free(own);
     world_update_lights(&r->world);
 }
 
@@ -222,6 +239,7 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
     s->radiance = mem_calloc_large(texels, sizeof *s->radiance);
     memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
+    s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_a_pixel = detail_texels_a_pixel(r, views);
@@ -242,6 +260,7 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
+    mem_free(s->patterned);
     mem_free(s->radiance);
 }
 

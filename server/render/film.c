@@ -125,7 +125,8 @@ static void add_hit(const struct film *f, const struct accel_hit *hit, float dep
     struct texture_taps taps;
     vec2 place = atlas_point(f->world->atlas, hit->triangle, hit->b1, hit->b2);
     texture_taps(&m->base_color, place.x, place.y, &taps);
-    rgb base = texture_gather(&m->base_color, &taps), emission = m->emission[t->segment];
+    rgb base = texture_gather(&m->base_color, &taps);
+    rgb emission = materials_emission(m, t->segment, place.x, place.y);
     const float value[] = {base.r, base.g, base.b, m->roughness[t->segment], m->specular[t->segment],
                            emission.r, emission.g, emission.b};
     for (int c = 0; c < SEGMENT; c++)

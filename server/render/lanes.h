@@ -42,7 +42,8 @@ struct vertex_block {
     uint32_t segment[LANES];
     uint32_t light_segment[LANES];   /* of the light sample, LIGHT_ENVIRONMENT where none */
     float roughness[LANES], specular[LANES];
-    struct lanes3 emission;          /* of the segment */
+    struct lanes3 emission;
+    struct lanes3 pattern;           /* emission = pattern * that of the segment; only where materials have one */
     struct lanes3 beta;              /* from the camera to here */
     float emission_weight[LANES];    /* 0 on the back */
     uint16_t x[LANES], y[LANES];     /* as in struct gradient_entry */
@@ -50,7 +51,8 @@ struct vertex_block {
     struct lanes3 base_color;
     struct lanes3 wo, light, wi;     /* in the shading frame */
     struct lanes3 incident;          /* 0: no light sample */
-    float light_factor[LANES];       /* incident = light_factor * emission of light_segment */
+    float light_factor[LANES];       /* incident = light_factor * light_pattern * emission of light_segment */
+    struct lanes3 light_pattern;     /* only where materials have one */
     float scale[LANES];              /* 0: the path ends here */
     struct lanes3 next;              /* L_(k+1) */
 };

@@ -222,7 +222,7 @@ static struct light_triangle whole_triangle(const struct mesh *mesh, size_t tria
     const uint32_t *v = mesh->index[triangle];
     vec3 a = mesh->position[v[0]];
     return (struct light_triangle){.corner = a, .edge1 = vec3_sub(mesh->position[v[1]], a),
-                                   .edge2 = vec3_sub(mesh->position[v[2]], a)};
+                                   .edge2 = vec3_sub(mesh->position[v[2]], a), .whole = (uint32_t)triangle};
 }
 
 /* Lists the triangles of the segments that emit, large ones in parts. */
@@ -255,7 +255,9 @@ static void find_triangles(struct lights *l, const struct mesh *mesh, const stru
 }
 
 bool lights_update(struct lights *l, const struct mesh *mesh, const struct segments *segments,
-                   const struct materials *materials) {
+                   const struct atlas *atlas, const struct materials *materials) {
+    l->atlas = atlas;
+    l->materials = materials;
     bool same = l->segment_count == segments->count && l->first_of;
     for (size_t s = 0; s < segments->count && same; s++)
         same = (rgb_luminance(l->emission[s]) > 0.0f) == (rgb_luminance(materials->emission[s]) > 0.0f);
@@ -332,6 +334,21 @@ static void sample_environment(const struct lights *l, float pick, float u, floa
     s->pdf = density_of(l, block, fmaxf((float)sine, 1e-6f));
 }
 
+rgb lights_pattern(const struct lights *l, const struct light_triangle *t, float u, float v) {
+    if (!l->materials->emission_pattern)
+        return rgb_gray(1.0f);
+    float root = sqrtf(u), b1 = root * (1.0f - v), b2 = root * v;
+    /* Of the part to those of the whole; see lights_part for the order. */
+    uint32_t n = UINT32_C(1) << t->level, part = (uint32_t)(t - l->triangle) - l->first_of[t->whole], i = 0;
+    for (; part >= 2 * (n - i) - 1; i++)
+        part -= 2 * (n - i) - 1;
+    bool turned = part % 2 == 1;
+    b1 = ((float)i + (turned ? 1.0f - b1 : b1)) / (float)n;
+    b2 = ((float)(part / 2) + (turned ? 1.0f - b2 : b2)) / (float)n;
+    vec2 at = atlas_point(l->atlas, t->whole, b1, b2);
+    return materials_emission_pattern(l->materials, at.x, at.y);
+}
+
 void lights_sample(const struct lights *l, vec3 point, float pick, float u, float v,
                    struct light_sample *s) {
     float chance = l->environment_chance;
@@ -351,7 +368,7 @@ void lights_sample(const struct lights *l, vec3 point, float pick, float u, floa
     s->distance_m = sqrtf(distance2);
     s->direction = vec3_scale(to, 1.0f / fmaxf(s->distance_m, 1e-20f));
     s->segment = t->segment;
-    s->radiance = t->radiance;
+    s->radiance = rgb_mul(t->radiance, lights_pattern(l, t, u, v));
     float cosine = -vec3_dot(s->direction, s->normal);
     if (cosine > 0.0f && distance2 > 0.0f)
         s->pdf = lights_pdf_segment(l, t->segment, s->distance_m, cosine);

@@ -1,7 +1,8 @@
 /* light.h -- what light comes from: emitter triangles and the environment, and how to pick one.
  *
  * A triangle of an emitter segment is picked with probability proportional to its power, area
- * times luminance, and a point on it uniformly; it emits from its front side only. The
+ * times luminance (that of the segment's mean, whatever pattern its emission has), and a point on it
+ * uniformly; it emits from its front side only. The
  * environment is a latitude-longitude map, picked by luminance times solid angle and, where that
  * was measured, by how much of the direction's light finds a way in (reach.h), constant within a
  * cell of the map (of a large map: a block of cells, so that the table stays in the cache). With
@@ -17,6 +18,7 @@
 #include "common/image.h"
 #include "common/vec.h"
 #include "server/render/reach.h"
+#include "server/scene/atlas.h"
 #include "server/scene/materials.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
@@ -30,11 +32,11 @@
 /* One cache line. The front side is that of edge1 x edge2. */
 struct light_triangle {
     vec3 corner, edge1, edge2;
-    rgb radiance;
+    rgb radiance;  /* mean of the segment */
     float density; /* by area, with which its points are picked */
     uint32_t segment;
-    uint32_t level;   /* cut out of a triangle of the mesh of 4^level parts */
-    uint32_t pad;
+    uint32_t level;   /* cut out of a triangle of the mesh into 4^level parts */
+    uint32_t whole;   /* that triangle */
 };
 
 /* Cumulative sums end in this many infinite entries: searches take several entries at once. */
@@ -54,6 +56,8 @@ struct lights {
     size_t triangle_count;
     struct light_triangle *triangle; /* owned */
     struct light_table triangles;
+    const struct atlas *atlas;         /* borrowed, both; NULL before lights_update */
+    const struct materials *materials;
     uint32_t *first_of;      /* [triangles of the mesh] the first part of those that emit; owned */
     size_t segment_count;
     rgb *emission;           /* [segment_count] owned copy: what the tables were made from */
@@ -110,10 +114,13 @@ void lights_free(struct lights *lights);
 void lights_set_environment(struct lights *lights, const struct image *environment,
                             const struct reach *reach);
 
-/* Takes over changed emission. The mesh and its segments are those of the last call. True when other
- * segments emit than before, and the list of triangles is a new one. */
+/* Takes over changed emission. The mesh, its segments and its atlas are those of the last call; the materials stay
+ * borrowed. True when other segments emit than before, and the list of triangles is a new one. */
 bool lights_update(struct lights *lights, const struct mesh *mesh, const struct segments *segments,
-                   const struct materials *materials);
+                   const struct atlas *atlas, const struct materials *materials);
+
+/* The radiance of a light triangle at the point that u, v in [0, 1) pick, over the mean of its segment. */
+rgb lights_pattern(const struct lights *lights, const struct light_triangle *triangle, float u, float v);
 
 /* The part of a triangle of the mesh, which must emit, in which (b1, b2) lie. Parts are in rows
  * along the second edge, those that stand on their heads between the others. */

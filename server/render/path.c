@@ -57,6 +57,7 @@ struct path_batch {
     size_t capacity;
     bool keeps;                       /* vertices, for the backward walk */
     int max_depth, depth_count;       /* depths used by the last trace */
+    bool has_pattern;                 /* the materials have an emission pattern */
     bool ended;                       /* vertices of the last depth used do not scatter */
     size_t vertex_count[MAX_DEPTH];
     struct vertex_block *vertex[MAX_DEPTH]; /* [capacity / LANES, rounded up] each, owned; unless vertices
@@ -173,6 +174,15 @@ static float4 corner_normal(const struct world_triangle *t, int corner) {
     return __builtin_convertvector(n, float4);
 }
 
+/* Makes the emission of a lane, that of its segment, that at its place. */
+static void apply_pattern(const struct materials *m, const struct shade_block *s, struct vertex_block *v, int lane) {
+    rgb mean = lanes3_rgb(&v->emission, lane);
+    rgb pattern = rgb_is_black(mean) ? rgb_gray(1.0f)
+                                     : materials_emission_pattern(m, s->place_x[lane], s->place_y[lane]);
+    lanes3_set_rgb(&v->pattern, lane, pattern);
+    lanes3_set_rgb(&v->emission, lane, rgb_mul(mean, pattern));
+}
+
 /* Puts the vertex that a ray hit into a lane. */
 static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
                       size_t flight, const rgb *radiance) {
@@ -206,6 +216,8 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->roughness[lane] = m->roughness[segment];
     v->specular[lane] = m->specular[segment];
     lanes3_set_rgb(&v->emission, lane, m->emission[segment]);
+    if (b->has_pattern)
+        apply_pattern(m, s, v, lane);
     s->area_density[lane] = world->lights->area_density[segment];
     if (s->area_density[lane] > 0.0f && world->guide)
         s->area_density[lane] *= guide_density_factor(world->guide, f->row,
@@ -238,6 +250,11 @@ static void load_light(struct shade_block *s, struct vertex_block *v, int lane, 
     lanes3_set(&s->light_edge1, lane, t->edge1);
     lanes3_set(&s->light_edge2, lane, t->edge2);
     lanes3_set_rgb(&s->radiance, lane, t->radiance);
+    if (lights->materials->emission_pattern) {
+        rgb pattern = lights_pattern(lights, t, s->light_u[lane], s->light_v[lane]);
+        lanes3_set_rgb(&v->light_pattern, lane, pattern);
+        lanes3_set_rgb(&s->radiance, lane, rgb_mul(t->radiance, pattern));
+    }
     s->light_density[lane] = t->density * s->density_factor[lane];
     v->light_segment[lane] = t->segment;
 }
@@ -462,6 +479,7 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     }
     for (b->bucket_shift = 0; world->lights->triangle_count > (size_t)BUCKETS << b->bucket_shift;)
         b->bucket_shift++;
+    b->has_pattern = world->materials->emission_pattern != NULL;
     b->depth_count = 0;
     b->flight_count = count;
     for (int depth = 0; depth < settings->max_depth && b->flight_count > 0; depth++) {
@@ -490,9 +508,22 @@ static void log_emission(struct gradient_log *log, uint32_t segment, rgb amount)
     d[2] += (double)amount.b;
 }
 
+/* Takes derivatives by the emission at places of a block to those by the emission of their segments. */
+static void apply_patterns(const struct vertex_block *v, int count, struct shade_derivative *d) {
+    for (int i = 0; i < count; i++) {
+        lanes3_set_rgb(&d->d_emission, i, rgb_mul(lanes3_rgb(&d->d_emission, i), lanes3_rgb(&v->pattern, i)));
+        if (v->light_factor[i] > 0.0f && v->light_segment[i] != LIGHT_ENVIRONMENT)
+            lanes3_set_rgb(&d->d_light_emission, i,
+                           rgb_mul(lanes3_rgb(&d->d_light_emission, i), lanes3_rgb(&v->light_pattern, i)));
+    }
+}
+
 /* The last depth's vertices only emit. */
-static rgb end_backward(const struct vertex_block *v, int lane, rgb d_radiance, struct gradient_log *log) {
+static rgb end_backward(const struct vertex_block *v, int lane, bool has_pattern, rgb d_radiance,
+                        struct gradient_log *log) {
     rgb adjoint = rgb_mul(d_radiance, lanes3_rgb(&v->beta, lane));
+    if (has_pattern)
+        adjoint = rgb_mul(adjoint, lanes3_rgb(&v->pattern, lane));
     if (v->emission_weight[lane] > 0.0f)
         log_emission(log, v->segment[lane], rgb_scale(adjoint, v->emission_weight[lane]));
     return rgb_scale(lanes3_rgb(&v->emission, lane), v->emission_weight[lane]);
@@ -527,11 +558,13 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
         lanes3_set_rgb(&d->d_radiance, i, d_radiance[v->path[i]]);
     if (!ends)
         shade_backward(v, d);
+    if (!ends && b->has_pattern)
+        apply_patterns(v, count, d);
     for (int i = 0; i < count; i++) {
         uint32_t path = v->path[i];
         if (b->dropped[path])
             continue;
-        rgb out = ends ? end_backward(v, i, d_radiance[path], log) : lanes3_rgb(&d->out, i);
+        rgb out = ends ? end_backward(v, i, b->has_pattern, d_radiance[path], log) : lanes3_rgb(&d->out, i);
         if (!ends)
             log_lane(v, d, i, log);
         if (depth > 0)

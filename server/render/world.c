@@ -64,7 +64,7 @@ void world_release(struct world *w) {
 }
 
 void world_update_lights(struct world *w) {
-    bool others = lights_update(w->lights, w->mesh, w->segments, w->materials);
+    bool others = lights_update(w->lights, w->mesh, w->segments, w->atlas, w->materials);
     if (others) {
         guide_free(w->guide);
         w->guide = guide_new(w->lights, w->mesh, w->accel);

@@ -7,6 +7,7 @@ void materials_init(struct materials *m, const struct inverse_uv *inverse, size_
                     rgb base_color, float roughness, float specular) {
     texture_init(&m->base_color, inverse, base_color);
     m->segment_count = segment_count;
+    m->emission_pattern = NULL;
     m->roughness = mem_array(segment_count, sizeof *m->roughness);
     m->specular = mem_array(segment_count, sizeof *m->specular);
     m->emission = mem_calloc(segment_count, sizeof *m->emission);
@@ -21,5 +22,63 @@ void materials_release(struct materials *m) {
     mem_free(m->roughness);
     mem_free(m->specular);
     mem_free(m->emission);
+    materials_drop_emission_pattern(m);
     *m = (struct materials){0};
+}
+
+void materials_start_emission_pattern(struct materials *m) {
+    materials_drop_emission_pattern(m);
+    size_t texels = (size_t)m->base_color.width * m->base_color.height;
+    m->emission_pattern = mem_calloc(texels, sizeof *m->emission_pattern);
+}
+
+void materials_drop_emission_pattern(struct materials *m) {
+    mem_free(m->emission_pattern);
+    m->emission_pattern = NULL;
+}
+
+/* The least of a pattern, by channel: 0 would mean that none is told. */
+#define LEAST_PATTERN 1e-3f
+
+static float pattern_of(float radiance, float mean) {
+    return mean > 0.0f ? fmaxf(radiance / mean, LEAST_PATTERN) : 1.0f;
+}
+
+void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radiance, rgb mean) {
+    rgb pattern = {pattern_of(radiance.r, mean.r), pattern_of(radiance.g, mean.g), pattern_of(radiance.b, mean.b)};
+    rgb_to_half(m->emission_pattern[texel], pattern);
+}
+
+/* The place of the first of two neighbours around `at`, both within [0, size), and the share of the second. */
+static uint32_t first_of_two(float at, uint32_t size, float *share) {
+    float x = clampf(at - 0.5f, 0.0f, (float)(size - 1));
+    uint32_t first = size > 1 && x >= (float)(size - 1) ? size - 2 : (uint32_t)x;
+    *share = x - (float)first;
+    return first;
+}
+
+rgb materials_emission_pattern(const struct materials *m, float x, float y) {
+    uint32_t width = m->base_color.width, height = m->base_color.height;
+    float right, down, weights = 0.0f;
+    uint32_t column = first_of_two(x, width, &right), row = first_of_two(y, height, &down);
+    rgb sum = rgb_gray(0.0f);
+    for (uint32_t k = 0; k < 4; k++) {
+        uint32_t dx = k % 2, dy = k / 2;
+        float weight = (dx ? right : 1.0f - right) * (dy ? down : 1.0f - down);
+        if (!(weight > 0.0f))
+            continue;
+        rgb own = rgb_from_half(m->emission_pattern[(size_t)(row + dy) * width + column + dx]);
+        if (rgb_is_black(own))
+            continue;
+        sum = rgb_mad(sum, weight, own);
+        weights += weight;
+    }
+    return weights > 0.0f ? rgb_scale(sum, 1.0f / weights) : rgb_gray(1.0f);
+}
+
+rgb materials_emission_of_texel(const struct materials *m, uint32_t segment, size_t texel) {
+    rgb mean = m->emission[segment], own = {0.0f, 0.0f, 0.0f};
+    if (m->emission_pattern)
+        own = rgb_from_half(m->emission_pattern[texel]);
+    return rgb_is_black(own) ? mean : rgb_mul(mean, own);
 }

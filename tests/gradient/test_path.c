@@ -217,6 +217,31 @@ static void check_under_sky(void) {
     box_release(&b);
 }
 
+/* The same where the lamp shows a picture: its emission is the mean of it. */
+static void check_picture(void) {
+    struct box b;
+    box_init(&b);
+    materials_start_emission_pattern(&b.materials);
+    for (uint32_t i = 0; i < BOX_SIDE * BOX_SIDE; i++) {
+        float random[3];
+        for (uint32_t c = 0; c < 3; c++)
+            random[c] = 2.0f * rng_to_float((uint32_t)rng_key(9, i, c));
+        if (texel_of_segment(i, 2))
+            materials_set_emission_pattern(&b.materials, i, rgb_make(random[0], random[1], random[2]), rgb_gray(1.0f));
+    }
+    box_build(&b);
+    const struct parameter parameters[] = {
+        {"emission of a picture", EMISSION, 2, true, 1},
+        {"emission of a picture", EMISSION, 2, true, 2},
+        {"emission of a picture", EMISSION, 2, true, 7},
+        {"a texel under a picture", TEXEL, 8 * BOX_SIDE + 40, true, 7},
+    };
+    for (size_t i = 0; i < sizeof parameters / sizeof *parameters; i++)
+        check_parameter(&b, &parameters[i]);
+    check_forward(&b);
+    box_release(&b);
+}
+
 /* --- the loss of two estimates ---------------------------------------------------------------- */
 
 enum { PIXELS = 64, ROUNDS = 6000, SLOPE_PARTS = 48, LOSS_DEPTH = 3 };
@@ -336,6 +361,7 @@ static void check_loss(void) {
 int main(void) {
     check_parameters();
     check_under_sky();
+    check_picture();
     check_loss();
     return check_result();
 }

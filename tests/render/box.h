@@ -106,6 +106,7 @@ static inline void box_release(struct box *b) {
     mem_free(b->materials.roughness);
     mem_free(b->materials.specular);
     mem_free(b->materials.emission);
+    materials_drop_emission_pattern(&b->materials);
     mem_free(b->materials.base_color.texel);
 }
 

@@ -7,6 +7,7 @@
 #include "server/render/film.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/scene.h"
+#include "server/scene/surface.h"
 #include "tests/check.h"
 
 #define OBJECTS 7 /* six walls and a lamp */
@@ -24,6 +25,8 @@ static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f,
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
 static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
+/* A test may have the lamp show a picture: the radiance at a place of it over lamp_radiance. */
+static rgb (*lamp_picture)(vec3 place);
 
 static inline void add_quad(struct mesh *m, int64_t object, vec3 corner, vec3 u, vec3 v) {
     uint32_t first = (uint32_t)m->vertex_count;
@@ -148,6 +151,18 @@ static inline void model_release(struct model *m) {
     segments_release(&m->segments);
 }
 
+/* Has the lamp show its picture. */
+static inline void model_show_picture(struct model *m, const struct mesh *mesh, rgb picture(vec3 place)) {
+    materials_start_emission_pattern(&m->materials);
+    for (size_t i = 0; i < m->inverse.valid_count; i++) {
+        uint32_t texel = m->inverse.valid[i];
+        struct surface_point at;
+        if (m->segments.of_triangle[m->inverse.triangle[texel]] == LAMP &&
+            surface_at_texel(mesh, &m->atlas, &m->inverse, texel, &at))
+            materials_set_emission_pattern(&m->materials, texel, picture(at.position), rgb_gray(1.0f));
+    }
+}
+
 /* Photographs of scene->mesh in its true colours by FRAMES cameras, which look at target(frame); every
  * fifth of them is held out. environment may be NULL. */
 static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct image *environment,
@@ -161,6 +176,8 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
     }
     memcpy(truth.materials.roughness, wall_roughness, sizeof wall_roughness);
     memcpy(truth.materials.specular, wall_specular, sizeof wall_specular);
+    if (lamp_picture)
+        model_show_picture(&truth, &scene->mesh, lamp_picture);
     model_light(&truth, &scene->mesh, lamp, environment, pool);
     struct path_settings path = {.max_depth = 8, .roulette_depth = 5, .seed = 99};
     scene->photograph = mem_calloc(FRAMES, sizeof *scene->photograph);

@@ -57,7 +57,7 @@ static void measure(void) {
 static void filter(void) {
     prior[0] = prior[1] = (struct color_prior){rgb_gray(0.5f), 0.05f};
     texture_init(&out, &inverse, rgb_gray(0.0f));
-    denoise(&atlas, &inverse, 2, measured, prior, &out, pool);
+    denoise(&atlas, &inverse, 2, measured, prior, NULL, &out, pool);
 }
 
 /* Root mean square error over [x0, x1) x [y0, y1). */

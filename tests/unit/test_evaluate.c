@@ -8,6 +8,7 @@
 #include "server/demo/generate.h"
 #include "server/demo/room.h"
 #include "server/evaluate/evaluate.h"
+#include "server/evaluate/recovered.h"
 #include "server/evaluate/score.h"
 #include "server/export/outputs.h"
 #include "tests/check.h"
@@ -133,6 +134,38 @@ static void test_known(const char *dir, struct parallel *pool) {
     mem_free(outputs);
 }
 
+/* A lamp that shows a picture is read back as it was, texel by texel, in half precision. */
+static void test_picture(const char *dir, struct parallel *pool) {
+    struct room room;
+    struct recovered r;
+    struct error err;
+    char *outputs = file_join(dir, "picture");
+    CHECK(file_make_dirs(outputs, &err) == STATUS_OK);
+    CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
+    struct materials *m = &room.materials;
+    materials_start_emission_pattern(m);
+    for (size_t i = 0; i < room.inverse.valid_count; i++) {
+        uint32_t texel = room.inverse.valid[i];
+        if (room.segments.of_triangle[room.inverse.triangle[texel]] == ROOM_WALL_EMITTER)
+            materials_set_emission_pattern(m, texel, rgb_make(texel % 7 ? 1.5f : 0.1f, 1.0f, texel % 3 ? 0.5f : 0.0f),
+                                           rgb_gray(1.0f));
+    }
+    export_room(outputs, &room);
+    CHECK_THAT(recovered_load(outputs, &room.mesh, pool, &r, &err) == STATUS_OK, "%s", err.message);
+    CHECK(r.materials.emission_pattern != NULL);
+    CHECK_NEAR(r.materials.emission[ROOM_CEILING_EMITTER].g, m->emission[ROOM_CEILING_EMITTER].g, 0.01);
+    for (size_t i = 0; i < room.inverse.valid_count; i++) {
+        uint32_t texel = room.inverse.valid[i], s = room.segments.of_triangle[room.inverse.triangle[texel]];
+        rgb wanted = materials_emission_of_texel(m, s, texel), found = materials_emission_of_texel(&r.materials, s, texel);
+        CHECK_NEAR(found.r, wanted.r, 2e-3f * wanted.r);
+        CHECK_NEAR(found.g, wanted.g, 2e-3f * wanted.g);
+        CHECK_NEAR(found.b, wanted.b, 2e-3f * wanted.b + 0.01f); /* its least is a share of a mean that is another */
+    }
+    recovered_release(&r);
+    room_release(&room);
+    mem_free(outputs);
+}
+
 /* Outputs of another room, and no outputs at all, are refused with a sentence. */
 static void test_refused(const char *dir, struct parallel *pool) {
     struct evaluate_settings settings = evaluate_default_settings();
@@ -154,6 +187,7 @@ int main(void) {
     test_score();
     test_known(dir, pool);
     test_refused(dir, pool);
+    test_picture(dir, pool);
     CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
     parallel_free(pool);
     return check_result();

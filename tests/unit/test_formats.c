@@ -11,8 +11,10 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "server/demo/room.h"
+#include "server/export/emission_texture.h"
 #include "server/export/glb.h"
 #include "server/export/mesh_obj.h"
+#include "server/export/pictures.h"
 #include "server/export/sink.h"
 #include "server/ingest/mesh_file.h"
 #include "tests/check.h"
@@ -158,12 +160,12 @@ static void check_material(const cJSON *material, const struct materials *m, uin
     }
 }
 
-static void check_picture(const struct glb *g, const char *png) {
+static void check_picture(const struct glb *g, double number_of, const char *png) {
     struct buf file;
     struct error err;
     buf_init(&file, 1 << 26);
     CHECK(file_read(png, &file, &err) == STATUS_OK);
-    const cJSON *view = item(g, "bufferViews", number(item(g, "images", 0), "bufferView"));
+    const cJSON *view = item(g, "bufferViews", number(item(g, "images", number_of), "bufferView"));
     size_t length = (size_t)number(view, "byteLength"), offset = (size_t)number(view, "byteOffset");
     CHECK(length == file.length && offset + length <= g->length && offset % 4 == 0);
     CHECK(memcmp(g->bytes + offset, file.data, length) == 0);
@@ -202,7 +204,7 @@ static void test_glb(const char *dir, struct export_input *in, const struct part
     size_t triangles = 0;
     for (size_t i = 0; i < sizeof axes / sizeof *axes; i++) {
         in->up = axes[i];
-        CHECK(glb_write(path, in, parts, png, &err) == STATUS_OK);
+        CHECK(glb_write(path, in, parts, png, "/nowhere", &err) == STATUS_OK);
         read_glb(path, &g);
         check_nodes(&g, axes[i], parts->count, in->comparison->camera);
         if (i + 1 < sizeof axes / sizeof *axes)
@@ -218,7 +220,7 @@ static void test_glb(const char *dir, struct export_input *in, const struct part
         check_material(item(&g, "materials", (double)p), in->materials, s);
     }
     CHECK(triangles == in->mesh->triangle_count);
-    check_picture(&g, png);
+    check_picture(&g, 0, png);
     release_glb(&g);
     mem_free(png);
     mem_free(path);
@@ -255,7 +257,7 @@ static void test_obj(const char *dir, const struct export_input *in, const struc
     }
     mem_free(path);
     path = file_join(dir, "scene.mtl");
-    CHECK(mesh_mtl_write(path, in, parts, "base_color.png", &err) == STATUS_OK);
+    CHECK(mesh_mtl_write(path, in, parts, "base_color.png", "emission.png", &err) == STATUS_OK);
     buf_clear(&file);
     CHECK(file_read(path, &file, &err) == STATUS_OK);
     CHECK(count_lines(buf_text(&file), "newmtl segment_") == parts->count);
@@ -301,6 +303,67 @@ static void test_same_bytes(const char *dir, const struct export_input *in, cons
         buf_release(&twice);
         mem_free(path);
     }
+}
+
+static void check_text(const char *dir, const char *name, const char *wanted, size_t times) {
+    struct buf file;
+    struct error err;
+    char *path = file_join(dir, name);
+    size_t count = 0;
+    buf_init(&file, 1 << 26);
+    CHECK(file_read(path, &file, &err) == STATUS_OK);
+    for (const char *at = buf_text(&file); (at = strstr(at, wanted)) != NULL; at++)
+        count++;
+    CHECK_THAT(count == times, "%s: %zu times %s", name, count, wanted);
+    buf_release(&file);
+    mem_free(path);
+}
+
+/* A lamp that shows a picture has a texture of its own, scaled to its brightest texel; the other has none. */
+static void test_picture(const char *dir, struct room *room, const struct export_input *input,
+                         const struct parts *parts) {
+    struct export_input in = *input;
+    struct materials *m = &room->materials;
+    struct error err;
+    struct glb g;
+    char *png = file_join(dir, FORMATS_EMISSION), *path = file_join(dir, "scene.glb");
+    in.inverse = &room->inverse;
+    materials_start_emission_pattern(m);
+    for (size_t i = 0; i < room->inverse.valid_count; i++) {
+        uint32_t texel = room->inverse.valid[i];
+        if (room->segments.of_triangle[room->inverse.triangle[texel]] == ROOM_WALL_EMITTER)
+            materials_set_emission_pattern(m, texel, rgb_gray(texel % 2 ? 1.5f : 0.5f), rgb_gray(1.0f));
+    }
+    CHECK(formats[0].write(dir, &in, parts, &err) != STATUS_OK && strstr(err.message, FORMATS_EMISSION));
+    struct image picture;
+    uint32_t *source = picture_margin(&room->inverse);
+    float *whites = emission_texture_whites(&in), white = 1.5f * rgb_max(m->emission[ROOM_WALL_EMITTER]);
+    CHECK_NEAR(whites[ROOM_WALL_EMITTER], white, 2e-3f * white);
+    CHECK(whites[ROOM_CEILING_EMITTER] == 0.0f && whites[ROOM_FLOOR] == 0.0f);
+    emission_texture(&in, source, whites, &picture);
+    CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
+    for (size_t f = 0; f < FORMATS_COUNT; f++)
+        CHECK(formats[f].write(dir, &in, parts, &err) == STATUS_OK);
+    read_glb(path, &g);
+    for (size_t p = 0; p < parts->count; p++) {
+        const cJSON *material = item(&g, "materials", (double)p);
+        bool varies = parts->part[p].segment == ROOM_WALL_EMITTER;
+        CHECK((cJSON_GetObjectItem(material, "emissiveTexture") != NULL) == varies);
+        double strength = number(member(material, "extensions", "KHR_materials_emissive_strength"), "emissiveStrength");
+        CHECK(!varies || fabs(strength - (double)white) < 2e-3 * (double)white);
+    }
+    check_picture(&g, 1, png);
+    check_text(dir, "scene.mtl", "map_Ke emission.png", 1);
+    check_text(dir, "scene.xml", "name=\"radiance\" id=\"emission\"", 1);
+    check_text(dir, "scene.xml", "emission.exr", 1);
+    check_text(dir, "scene.xml", "<rgb name=\"radiance\"", 1);
+    materials_drop_emission_pattern(m);
+    release_glb(&g);
+    image_release(&picture);
+    mem_free(whites);
+    mem_free(source);
+    mem_free(path);
+    mem_free(png);
 }
 
 static bool is_there(const char *dir, const char *name) {
@@ -386,10 +449,11 @@ int main(void) {
     test_glb(dir, &in, &parts);
     test_obj(dir, &in, &parts);
     in.up = (vec3){0.0f, 1.0f, 0.0f};
-    CHECK(glb_write(glb, &in, &parts, png, &err) == STATUS_OK);
+    CHECK(glb_write(glb, &in, &parts, png, "/nowhere", &err) == STATUS_OK);
     test_round(dir, "scene.obj", &in, &parts);
     test_round(dir, "scene.glb", &in, &parts);
     test_same_bytes(dir, &in, &parts);
+    test_picture(dir, &room, &in, &parts);
     test_failures(dir, &in, &parts);
     vec3 *normal = room.mesh.normal;
     room.mesh.normal = NULL;
