@@ -17,23 +17,10 @@
 
 #include "common/parallel.h"
 #include "common/vec.h"
+#include "server/reconstruct/measured.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
-#include "server/scene/rgb_half.h"
 #include "server/scene/texture.h"
-
-/* What was measured of a texel; half precision but for the weight, since there may be many millions.
- * The variance is that of the sum over the channels. */
-struct measured {
-    float weight;           /* inverse variance, up to a factor of the capture; 0: nothing was measured */
-    uint16_t value[3];
-    uint16_t noise[3];      /* a draw of its noise */
-    uint16_t mixing;        /* variance by light of other surfaces; neighbours share it */
-};
-
-static inline rgb measured_value(const struct measured *m) {
-    return rgb_from_half(m->value);
-}
 
 /* What is known of a chart's colour before its texels are looked at. */
 struct color_prior {

@@ -6,8 +6,6 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/capture/halves.h"
-#include "server/capture/robust.h"
 #include "server/gather/highlight.h"
 #include "server/reconstruct/color_prior.h"
 #include "server/render/bsdf.h"
@@ -16,7 +14,6 @@
 #include "server/scene/surface.h"
 
 #define CHUNK 256 /* texels a work item */
-#define MAX_LOOKS 48
 /* Directions for one highlight, at most and at least, and half as many samples of lights. Each texel sees several
  * photographs, and its neighbours as many; those that share a pixel need so many together. */
 #define SAMPLES_MOST 16
@@ -40,12 +37,6 @@
 /* Variance of base colour by light of others at which what photographs show of a texel counts as much as
  * what is to be expected there. */
 #define MIXING_TOLD 0.01f
-
-/* What is gathered of one texel. */
-struct texel_looks {
-    size_t count;
-    struct robust_sample look[MAX_LOOKS];
-};
 
 size_t divide_highlight_samples(double texels_a_pixel) {
     double samples = SAMPLES_A_PIXEL / fmax(texels_a_pixel, 1.0);
@@ -87,7 +78,7 @@ static bool sharpen(const struct divide *d, const struct view *view, uint32_t tr
 
 static void add_look(const struct divide *d, uint32_t texel, const struct surface_point *at,
                      const struct irradiance *light, const struct view *view, rgb shown,
-                     struct incident *scratch, struct texel_looks *looks) {
+                     struct incident *scratch, struct measured_looks *looks) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = reconstruction_segment(d->r, texel);
     float median = d->views->median_radiance;
@@ -125,12 +116,12 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
 }
 
 static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,
-                     struct irradiance *light, struct texel_looks *looks) {
+                     struct irradiance *light, struct measured_looks *looks) {
     struct surface_point at;
     looks->count = 0;
     if (!light_at(d, texel, &at, light))
         return;
-    for (uint32_t t = 0; t < d->views->train_count && looks->count < MAX_LOOKS; t++) {
+    for (uint32_t t = 0; t < d->views->train_count && looks->count < MEASURED_LOOKS; t++) {
         struct view view;
         struct photograph_sample s;
         if (views_sees(d->views, t, at.position, at.normal, &view) &&
@@ -145,24 +136,10 @@ static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
     return rgb_make(from[0], from[1], from[2]);
 }
 
-static struct measured mean_of(struct texel_looks *looks, const struct irradiance *light) {
-    struct measured m = {.weight = robust_weigh(looks->look, looks->count, OUTLIER_SCALE)};
-    rgb value = {0.0f, 0.0f, 0.0f}, noise = value;
-    float mixing = 0.0f;
-    for (size_t i = 0; i < looks->count; i++) {
-        const struct robust_sample *l = &looks->look[i];
-        float share = l->weight / m.weight;
-        value = rgb_mad(value, share, l->value);
-        noise = rgb_mad(noise, share, l->noise);
-        mixing += share * l->mixing;
-    }
+static struct measured mean_of(struct measured_looks *looks, const struct irradiance *light) {
     const float *sum = light->moment[0];
-    rgb off = divide_channels(rgb_mul(value, light->noise), rgb_make(sum[0], sum[1], sum[2]), FLT_MIN);
-    halves_draw(looks->look, looks->count, &noise);
-    rgb_to_half(m.value, value);
-    rgb_to_half(m.noise, rgb_add(noise, off));
-    m.mixing = image_half_from_float(mixing);
-    return m;
+    rgb arrived = rgb_make(sum[0], sum[1], sum[2]);
+    return measured_mean(looks, OUTLIER_SCALE, divide_channels(light->noise, arrived, FLT_MIN));
 }
 
 /* The texel that is measured in place of this one. */
@@ -177,7 +154,7 @@ static uint32_t stand_in(const struct divide *d, uint32_t texel) {
 }
 
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
-    struct texel_looks looks;
+    struct measured_looks looks;
     struct irradiance light;
     look_all(d, texel, scratch, &light, &looks);
     d->measured[texel] = (struct measured){0};

@@ -5,8 +5,6 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/capture/halves.h"
-#include "server/capture/robust.h"
 #include "server/reconstruct/by_segment.h"
 #include "server/reconstruct/denoise.h"
 #include "server/reconstruct/emitters.h"
@@ -23,7 +21,6 @@
 /* Looks differ by this much in their logarithm before one counts half. */
 #define OUTLIER_SCALE 0.3f
 #define LOG_FLOOR 0.01f /* of what the segment shows, where a logarithm is taken */
-#define MAX_LOOKS 48
 #define CHUNK 64 /* texels a work item */
 
 struct finder;
@@ -49,11 +46,6 @@ struct finder {
     struct texture found;            /* the measured without noise */
 };
 
-struct texel_looks {
-    size_t count;
-    struct robust_sample look[MAX_LOOKS];
-};
-
 /* --- what is shown --------------------------------------------------------------------------------- */
 
 static struct robust_sample look_of(const struct emitter *e, const struct view *view, float mixing, rgb shown,
@@ -74,7 +66,7 @@ static struct robust_sample look_of(const struct emitter *e, const struct view *
 
 /* What the photographs show of a texel, clear of all edges. Saturated, they tell how bright it is at least: the greatest
  * of that is taken where nothing else is told. */
-static void look_all(const struct emitter *e, uint32_t texel, struct texel_looks *looks) {
+static void look_all(const struct emitter *e, uint32_t texel, struct measured_looks *looks) {
     const struct reconstruction *r = e->finder->r;
     const struct views *views = e->finder->views;
     rgb fused = fused_radiance(&r->fused, texel);
@@ -83,7 +75,7 @@ static void look_all(const struct emitter *e, uint32_t texel, struct texel_looks
     looks->count = 0;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    for (uint32_t t = 0; t < views->train_count && looks->count < MAX_LOOKS; t++) {
+    for (uint32_t t = 0; t < views->train_count && looks->count < MEASURED_LOOKS; t++) {
         const struct photograph *photo = &r->scene->photograph[views->train[t]];
         struct view view;
         struct photograph_sample s;
@@ -105,25 +97,10 @@ static void look_all(const struct emitter *e, uint32_t texel, struct texel_looks
 }
 
 static void measure_texel(const struct emitter *e, uint32_t texel) {
-    struct texel_looks looks;
+    struct measured_looks looks;
     look_all(e, texel, &looks);
-    if (looks.count == 0)
-        return;
-    struct measured m = {.weight = robust_weigh(looks.look, looks.count, OUTLIER_SCALE)};
-    rgb value = {0.0f, 0.0f, 0.0f}, noise = value;
-    float mixing = 0.0f;
-    for (size_t i = 0; i < looks.count; i++) {
-        const struct robust_sample *l = &looks.look[i];
-        float share = l->weight / m.weight;
-        value = rgb_mad(value, share, l->value);
-        noise = rgb_mad(noise, share, l->noise);
-        mixing += share * l->mixing;
-    }
-    halves_draw(looks.look, looks.count, &noise);
-    rgb_to_half(m.value, value);
-    rgb_to_half(m.noise, noise);
-    m.mixing = image_half_from_float(mixing);
-    e->finder->measured[texel] = m;
+    if (looks.count > 0)
+        e->finder->measured[texel] = measured_mean(&looks, OUTLIER_SCALE, rgb_gray(0.0f));
 }
 
 static void measure_chunk(void *user, size_t chunk, int thread) {
