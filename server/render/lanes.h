@@ -2,8 +2,8 @@
  *
  * A block holds LANES vertices of one depth, one per lane. Kernels (shade.c) are plain loops over
  * the lanes of a block with the vector functions of vec.h inlined; lanes past the block's count
- * compute on whatever is there and are never read. Everything here is internal to path.c and
- * shade.c. */
+ * compute on whatever is there and are never read. Everything here is internal to path.c,
+ * path_backward.c and shade.c. */
 #ifndef UNBAKE_RENDER_LANES_H
 #define UNBAKE_RENDER_LANES_H
 

@@ -2,7 +2,7 @@
  *
  * A batch advances all of its paths one surface at a time: nearest hits of all, then block by
  * block the shading of the vertices found (lanes.h, shade.c), then all shadow rays. Vertex k of
- * a path is kept with what the backward walk needs; with the names of struct vertex_block, the
+ * a path is kept with what the backward walk (path_backward.c) needs; with the names of struct vertex_block, the
  * radiance that leaves it is
  *
  *   L_k = emission_weight * emission + f(light) * incident + f(wi) * scale * L_(k+1)
@@ -28,10 +28,10 @@
 #include "common/mem.h"
 #include "server/render/accel.h"
 #include "server/render/light.h"
+#include "server/render/path_batch.h"
 #include "server/render/sampler.h"
 #include "server/render/shade.h"
 
-#define MAX_DEPTH 32
 #define MIN_CHANCE 0.05f
 #define MAX_CHANCE 0.95f
 #define MIN_LIGHT_CHANCE 0.1f
@@ -41,50 +41,8 @@
 #define DERIVATIVE_WORTH 1.25f
 #define BUCKETS 256 /* by which shadow rays are sorted */
 
-/* A path under way to its next surface. */
-struct flight {
-    uint32_t path, parent;
-    rgb beta, worth; /* see struct shade_block */
-    uint32_t row; /* of the guide, where it starts */
-    float pdf; /* of its direction by solid angle; 0 for a camera ray */
-};
-
-/* A light sample that waits for its shadow ray. */
-struct shadow {
-    uint32_t path, vertex;
-    rgb gain;
-};
-
-struct path_batch {
-    size_t capacity;
-    bool keeps;                       /* vertices, for the backward walk */
-    int max_depth, depth_count;       /* depths used by the last trace */
-    bool has_pattern;                 /* the materials have an emission pattern */
-    bool ended;                       /* vertices of the last depth used do not scatter */
-    size_t vertex_count[MAX_DEPTH];
-    struct vertex_block *vertex[MAX_DEPTH]; /* [capacity / LANES, rounded up] each, owned; unless vertices
-                                             * are kept there is one block, that of the vertices at hand */
-    struct shade_block *shade;
-    struct shade_derivative *derivative;
-    struct flight *flight;            /* [capacity] */
-    struct accel_ray *ray, *shadow_ray; /* [capacity] */
-    struct accel_hit *hit;            /* [capacity] */
-    struct shadow *shadow;            /* [capacity] */
-    uint8_t *bucket;                  /* [capacity] of each: rises with the number of its light */
-    struct accel_ray *sorted_ray;     /* [capacity] the shadow rays by bucket */
-    struct shadow *sorted;            /* [capacity] and what waits for them */
-    uint8_t *occluded;                /* [capacity] */
-    uint32_t *key, *sample;           /* [capacity] per path, of the sampler */
-    bool *dropped;                    /* [capacity] the path's estimate was not finite */
-    size_t flight_count, shadow_count;
-    unsigned bucket_shift;            /* a light's bucket is its number shifted down by so many bits */
-    uint64_t ray_count, dropped_count;
-    void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray);
-    void *tap_user;
-};
-
 static struct path_batch *batch_new(size_t capacity, int max_depth) {
-    assert(max_depth >= 1 && max_depth <= MAX_DEPTH);
+    assert(max_depth >= 1 && max_depth <= PATH_MAX_DEPTH);
     struct path_batch *b = mem_calloc(1, sizeof *b);
     b->capacity = capacity;
     b->max_depth = max_depth;
@@ -115,7 +73,7 @@ struct path_batch *path_batch_new(size_t capacity, int max_depth) {
 }
 
 struct path_batch *path_batch_new_forward(size_t capacity) {
-    struct path_batch *b = batch_new(capacity, MAX_DEPTH);
+    struct path_batch *b = batch_new(capacity, PATH_MAX_DEPTH);
     b->vertex[0] = mem_calloc_large(1, sizeof *b->vertex[0]);
     return b;
 }
@@ -500,89 +458,6 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
             radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
             b->dropped_count++;
         }
-    }
-}
-
-static void log_emission(struct gradient_log *log, uint32_t segment, rgb amount) {
-    double *d = log->segment[segment].d_emission;
-    d[0] += (double)amount.r;
-    d[1] += (double)amount.g;
-    d[2] += (double)amount.b;
-}
-
-/* Takes derivatives by the emission at places of a block to those by the emission of their segments. */
-static void apply_patterns(const struct vertex_block *v, int count, struct shade_derivative *d) {
-    for (int i = 0; i < count; i++) {
-        lanes3_set_rgb(&d->d_emission, i, rgb_mul(lanes3_rgb(&d->d_emission, i), lanes3_rgb(&v->pattern, i)));
-        if (v->light_factor[i] > 0.0f && v->light_segment[i] != LIGHT_ENVIRONMENT)
-            lanes3_set_rgb(&d->d_light_emission, i,
-                           rgb_mul(lanes3_rgb(&d->d_light_emission, i), lanes3_rgb(&v->light_pattern, i)));
-    }
-}
-
-/* The last depth's vertices only emit. */
-static rgb end_backward(const struct vertex_block *v, int lane, bool has_pattern, rgb d_radiance,
-                        struct gradient_log *log) {
-    rgb adjoint = rgb_mul(d_radiance, lanes3_rgb(&v->beta, lane));
-    if (has_pattern)
-        adjoint = rgb_mul(adjoint, lanes3_rgb(&v->pattern, lane));
-    if (v->emission_weight[lane] > 0.0f)
-        log_emission(log, v->segment[lane], rgb_scale(adjoint, v->emission_weight[lane]));
-    return rgb_scale(lanes3_rgb(&v->emission, lane), v->emission_weight[lane]);
-}
-
-/* Writes a lane's derivatives to the log. */
-static void log_lane(const struct vertex_block *v, const struct shade_derivative *d, int lane,
-                     struct gradient_log *log) {
-    struct gradient_segment *own = &log->segment[v->segment[lane]];
-    own->d_roughness += (double)d->d_roughness[lane];
-    own->d_specular += (double)d->d_specular[lane];
-    if (v->emission_weight[lane] > 0.0f)
-        log_emission(log, v->segment[lane], lanes3_rgb(&d->d_emission, lane));
-    if (v->light_factor[lane] > 0.0f && v->light_segment[lane] != LIGHT_ENVIRONMENT)
-        log_emission(log, v->light_segment[lane], lanes3_rgb(&d->d_light_emission, lane));
-    rgb d_base_color = lanes3_rgb(&d->d_base_color, lane);
-    if (rgb_is_black(d_base_color))
-        return;
-    log->entry[log->entry_count++] = (struct gradient_entry){
-        v->x[lane],
-        v->y[lane],
-        {v->weight[0][lane], v->weight[1][lane], v->weight[2][lane], v->weight[3][lane]},
-        d_base_color};
-}
-
-static void backward_block(struct path_batch *b, int depth, size_t block, int count,
-                           const rgb *d_radiance, struct gradient_log *log) {
-    struct vertex_block *v = &b->vertex[depth][block];
-    struct shade_derivative *d = b->derivative;
-    bool ends = b->ended && depth == b->depth_count - 1;
-    for (int i = 0; i < count && !ends; i++)
-        lanes3_set_rgb(&d->d_radiance, i, d_radiance[v->path[i]]);
-    if (!ends)
-        shade_backward(v, d);
-    if (!ends && b->has_pattern)
-        apply_patterns(v, count, d);
-    for (int i = 0; i < count; i++) {
-        uint32_t path = v->path[i];
-        if (b->dropped[path])
-            continue;
-        rgb out = ends ? end_backward(v, i, b->has_pattern, d_radiance[path], log) : lanes3_rgb(&d->out, i);
-        if (!ends)
-            log_lane(v, d, i, log);
-        if (depth > 0)
-            lanes3_set_rgb(&b->vertex[depth - 1][v->parent[i] / LANES].next,
-                           (int)(v->parent[i] % LANES), out);
-    }
-}
-
-void path_batch_backward(struct path_batch *b, const rgb *d_radiance, struct gradient_log *log) {
-    assert(b->keeps);
-    for (int depth = b->depth_count - 1; depth >= 0; depth--) {
-        size_t count = b->vertex_count[depth];
-        gradient_log_reserve(log, count);
-        for (size_t first = 0; first < count; first += LANES)
-            backward_block(b, depth, first / LANES, (int)(count - first < LANES ? count - first : LANES),
-                           d_radiance, log);
     }
 }
 
