@@ -3,6 +3,7 @@
  * checkpoint. Where the lamp is equally bright all over, none is found. */
 #include "server/reconstruct/emission_pattern.h"
 #include "server/reconstruct/emitters.h"
+#include "server/render/bsdf.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
@@ -22,6 +23,11 @@ static rgb opposite(vec3 place) {
 /* A bright half and a dark one. */
 static rgb halves(vec3 place) {
     return rgb_gray(place.x < 2.0f ? 1.7f : 0.3f);
+}
+
+/* Linear, so that a bilinear look-up is exact but at the rim. */
+static rgb slope(vec3 place) {
+    return rgb_make(1.0f + 1.6f * (place.x - 2.0f), 1.0f - 1.6f * (place.x - 2.0f), 1.0f + 1.6f * (place.z - 1.5f));
 }
 
 static void test_placement(struct parallel *pool) {
@@ -84,6 +90,58 @@ static void test_linear(struct parallel *pool) {
     image_release(&one);
     image_release(&other);
     image_release(&plain);
+    mesh_release(&mesh);
+}
+
+/* Radiance that a place of the floor sends to `wo` by the lamp's light alone: a sum over a grid of the lamp's places. */
+static rgb direct_light(const struct model *m, vec3 floor, vec3 wo) {
+    enum { SIDE = 200 };
+    rgb sum = {0.0f, 0.0f, 0.0f}, base = rgb_gray(0.5f);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        vec3 on = {1.5f + ((float)(i % SIDE) + 0.5f) / SIDE, 2.9f, 1.0f + ((float)(i / SIDE) + 0.5f) / SIDE};
+        vec3 to = vec3_sub(on, floor);
+        float square = vec3_dot(to, to);
+        vec3 wi = vec3_scale(to, 1.0f / sqrtf(square));
+        /* The floor's frame: y is up. */
+        vec3 a = {wo.z, wo.x, wo.y}, b = {wi.z, wi.x, wi.y};
+        struct bsdf bsdf = bsdf_make(base, m->materials.roughness[FLOOR], m->materials.specular[FLOOR], a.z);
+        struct bsdf_value f = bsdf_eval(&bsdf, a, b); /* with the cosine there */
+        sum = rgb_mad(sum, 0.5f * f.diffuse * wi.y / square / (SIDE * SIDE), rgb_mul(lamp_radiance, slope(on)));
+    }
+    return sum;
+}
+
+/* Paths bring what the picture sheds, place by place of it. */
+static void test_direct(struct parallel *pool) {
+    enum { PATHS = 2048, ROUNDS = 8 };
+    static struct ray ray[PATHS];
+    static struct path_key key[PATHS];
+    static rgb radiance[PATHS];
+    const struct path_settings settings = {.max_depth = 2, .roulette_depth = 9, .seed = 4};
+    struct path_batch *batch = path_batch_new_forward(PATHS);
+    struct mesh mesh;
+    struct model m;
+    make_mesh(&mesh);
+    model_init(&m, &mesh, TEXTURE, 0.5f, pool);
+    model_show_picture(&m, &mesh, slope);
+    model_light(&m, &mesh, lamp_radiance, NULL, pool);
+    for (int place = 0; place < 3; place++) {
+        vec3 floor = {0.8f + 1.2f * (float)place, 0.0f, 1.3f}, from = {2.0f, 1.5f, 2.6f};
+        vec3 wo = vec3_normalize(vec3_sub(from, floor));
+        rgb found = {0.0f, 0.0f, 0.0f};
+        for (uint32_t round = 0; round < ROUNDS; round++) {
+            for (uint32_t i = 0; i < PATHS; i++) {
+                ray[i] = (struct ray){from, vec3_neg(wo)};
+                key[i] = (struct path_key){(uint32_t)place, round, i};
+            }
+            path_batch_trace(batch, &m.world, &settings, PATHS, ray, key, radiance);
+            for (int i = 0; i < PATHS; i++)
+                found = rgb_mad(found, 1.0f / (PATHS * ROUNDS), radiance[i]);
+        }
+        CHECK_RGB(found, direct_light(&m, floor, wo), 0.01f);
+    }
+    path_batch_free(batch);
+    model_release(&m);
     mesh_release(&mesh);
 }
 
@@ -176,6 +234,7 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     test_placement(pool);
     test_linear(pool);
+    test_direct(pool);
     test_found(pool);
     if (!IS_BRIEF)
         test_plain(pool);
