@@ -39,6 +39,15 @@ double metrics_msre(const struct image *photograph, const struct image *render, 
     return mean_square(photograph, render, relative_square, median);
 }
 
+static double relative_noise(float photograph, float deviation, double median) {
+    double r = (double)photograph, d = (double)deviation;
+    return d * d / (r * r + 0.01 * median * median);
+}
+
+double metrics_msre_noise(const struct image *photograph, const struct image *deviation, double median) {
+    return mean_square(photograph, deviation, relative_noise, median);
+}
+
 static double shown(float radiance, double exposure) {
     return (double)image_linear_to_srgb(fminf(fmaxf(radiance * (float)exposure, 0.0f), 1.0f));
 }

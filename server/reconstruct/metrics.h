@@ -11,6 +11,10 @@
  * the render's, m the median radiance of the training photographs. */
 double metrics_msre(const struct image *photograph, const struct image *render, double median_radiance);
 
+/* What noise adds to that on average: the mean of d^2 / (R^2 + 0.01 m^2), d the standard deviation of the render's or the
+ * photograph's values. */
+double metrics_msre_noise(const struct image *photograph, const struct image *deviation, double median_radiance);
+
 /* Peak signal-to-noise ratio in dB of the pictures as shown: sRGB of radiance x exposure,
  * clamped to [0, 1]. Infinite for equal pictures. */
 double metrics_psnr_db(const struct image *photograph, const struct image *render, double exposure);

@@ -52,6 +52,7 @@ struct held_out {
     const struct camera *camera;
     struct image photograph, render; /* linear radiance, R G B, of one size; owned */
     double msre, psnr_db, ssim;
+    double msre_render_noise, msre_photograph_noise; /* about so much of msre is noise, each its part */
 };
 
 struct reconstruction {

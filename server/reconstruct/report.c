@@ -2,6 +2,7 @@
 #include "server/reconstruct/report.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -67,14 +68,31 @@ static void clip_image(struct image *image, const struct photograph *photo) {
     }
 }
 
-/* The room as recovered, from a camera, as an R G B picture. */
+/* The room as recovered, from a camera, as an R G B picture, and the standard errors of its values as another. */
 static void render_radiance(struct reconstruction *r, const struct camera *camera,
-                            const struct path_settings *path, struct image *image) {
-    struct image film; /* has standard errors too */
+                            const struct path_settings *path, struct image *image, struct image *error) {
+    struct image film;
     film_render(&r->world, camera, (uint32_t)settings_number(r->settings, "report_samples"), path, 0,
                 r->pool, &film);
     image_take_rgb(&film, image);
+    image_init_rgb(error, film.width, film.height);
+    for (size_t i = 0; i < (size_t)film.width * film.height; i++)
+        memcpy(error->pixel + 3 * i, film.pixel + film.channel_count * i + 3, 3 * sizeof *error->pixel);
     image_release(&film);
+}
+
+/* The standard deviation of the noise of a photograph, whose radiance is `shown`; NaN where that is. */
+static void photograph_noise(const struct reconstruction *r, const struct photograph *photo,
+                             const struct image *shown, struct image *noise) {
+    image_init_rgb(noise, shown->width, shown->height);
+    for (size_t i = 0; i < (size_t)shown->width * shown->height; i++) {
+        const float *p = shown->pixel + 3 * i;
+        rgb radiance = {p[0], p[1], p[2]};
+        bool usable = rgb_is_finite(radiance);
+        float share = usable ? 1.0f / sqrtf(noise_weight_of_brightness(&r->noise, photo, radiance)) : NAN;
+        for (size_t c = 0; c < 3; c++)
+            noise->pixel[3 * i + c] = share * p[c];
+    }
 }
 
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view,
@@ -88,7 +106,8 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     view->name = photo->name;
     view->camera = &photo->camera;
     photograph_radiance(photo, &view->photograph);
-    render_radiance(r, &photo->camera, &path, &view->render);
+    struct image error, noise;
+    render_radiance(r, &photo->camera, &path, &view->render, &error);
     if (!photo->exposure_known) {
         double gain = fit_gain(&view->photograph, &view->render);
         scale_image(&view->photograph, gain);
@@ -97,9 +116,14 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     if (!photo->is_hdr)
         clip_image(&view->render, photo);
     double exposure = photo->is_hdr ? SHOWN_MEDIAN / median : (double)photo->exposure;
+    photograph_noise(r, photo, &view->photograph, &noise);
     view->msre = metrics_msre(&view->photograph, &view->render, median);
+    view->msre_render_noise = metrics_msre_noise(&view->photograph, &error, median);
+    view->msre_photograph_noise = metrics_msre_noise(&view->photograph, &noise, median);
     view->psnr_db = metrics_psnr_db(&view->photograph, &view->render, exposure);
     view->ssim = metrics_ssim(&view->photograph, &view->render, exposure);
+    image_release(&noise);
+    image_release(&error);
 }
 
 /* Over the views that have a value: none of a view's pixels may be usable. */
@@ -119,7 +143,7 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");
-    struct mean msre = {0}, psnr = {0}, ssim = {0};
+    struct mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
     r->held_out = mem_calloc(total + 1, sizeof *r->held_out);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
@@ -127,11 +151,15 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         struct held_out *view = &r->held_out[r->held_out_count++];
         render_view(r, &scene->photograph[i], view, (double)views->median_radiance);
         mean_add(&msre, view->msre);
+        mean_add(&render_noise, view->msre_render_noise);
+        mean_add(&photograph_noise, view->msre_photograph_noise);
         mean_add(&psnr, view->psnr_db);
         mean_add(&ssim, view->ssim);
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", view->name);
         json_add_number(entry, "msre", view->msre);
+        json_add_number(entry, "msre_render_noise", view->msre_render_noise);
+        json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
         json_add_number(entry, "psnr_db", view->psnr_db);
         json_add_number(entry, "ssim", view->ssim);
         cJSON_AddItemToArray(list, entry);
@@ -143,6 +171,8 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     json_add_int(metrics, "held_out_views", (int64_t)total);
     if (msre.count > 0.0) {
         json_add_number(metrics, "msre", msre.sum / msre.count);
+        json_add_number(metrics, "msre_render_noise", render_noise.sum / render_noise.count);
+        json_add_number(metrics, "msre_photograph_noise", photograph_noise.sum / photograph_noise.count);
         json_add_number(metrics, "psnr_db", psnr.sum / psnr.count);
         json_add_number(metrics, "ssim", ssim.sum / ssim.count);
         hooks->metric(hooks->user, "msre", 0, msre.sum / msre.count);

@@ -226,6 +226,16 @@ static void test_plain(struct parallel *pool) {
     struct found found = find(&r);
     CHECK(!found.any);
     CHECK_RGB(found.dark, lamp_radiance, 0.06f);
+    /* Renders of four samples a pixel beside photographs of 64: nearly all of the error is noise of the former. */
+    double msre = 0.0, of_renders = 0.0, of_photographs = 0.0;
+    for (size_t i = 0; i < r.held_out_count; i++) {
+        msre += r.held_out[i].msre;
+        of_renders += r.held_out[i].msre_render_noise;
+        of_photographs += r.held_out[i].msre_photograph_noise;
+    }
+    printf("MSRE %g, noise of renders %g, of photographs %g\n", msre, of_renders, of_photographs);
+    CHECK(of_renders > 0.6 * msre && of_renders < 1.4 * msre);
+    CHECK(of_photographs > 0.01 * of_renders && of_photographs < 0.3 * of_renders);
     reconstruct_release(&r);
     scene_release(&scene);
 }

@@ -15,6 +15,7 @@ int main(void) {
     fill(&render, 0.6f);
     /* (0.1)^2 / (0.25 + 0.01 * 4) */
     CHECK_NEAR(metrics_msre(&photograph, &render, 2.0), 0.01 / 0.29, 1e-6);
+    CHECK_NEAR(metrics_msre_noise(&photograph, &render, 2.0), 0.36 / 0.29, 1e-6);
     /* sRGB(0.5) = 0.735357, sRGB(0.6) = 0.797738 */
     double wanted = -20.0 * log10(0.797738 - 0.735357);
     CHECK_NEAR(metrics_psnr_db(&photograph, &render, 1.0), wanted, 1e-3);
