@@ -20,9 +20,13 @@
  * then costs more in a deeper hierarchy than it spares (5 % of all time at 370,000 triangles). */
 #define FINE_MESH_TRIANGLES 100000
 
-/* One thread builds, ours trace. AVX-512 is left out: packets of 8 are up to 9 % slower with it (Zen 5), and machines
- * with and without it find the same hits, to the bit. */
+/* One thread builds, ours trace. AVX-512 is left out: packets of 8 are up to 9 % slower with it (Zen 5), and so
+ * machines with and without it find the same hits, to the bit. */
+#ifdef __x86_64__
 #define DEVICE "threads=1,user_threads=1,max_isa=avx2"
+#else
+#define DEVICE "threads=1,user_threads=1"
+#endif
 
 struct accel {
     RTCDevice device;
