@@ -37,18 +37,12 @@ struct window {
     int grid;           /* places over a cell, along each side */
 };
 
-/* Solid angles, in units of a cell at the equator. */
-struct seen {
-    double angle, saturated;
-};
-
 struct gather {
     const struct views *views;
     struct environment *e;
     size_t window_count;
     struct window *window; /* [window_count] */
     struct censored *scratch; /* [threads][3][window_count] what photographs show in a direction */
-    struct seen *seen;     /* [height] by row */
 };
 
 /* --- photographs that look out -------------------------------------------------------------- */
@@ -238,9 +232,6 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct cens
     }
     e->confidence.pixel[2 * at] = (float)count;
     e->confidence.pixel[2 * at + 1] = spread_of(&spread);
-    double angle = row_angle(e, row);
-    g->seen[row].angle += angle;
-    g->seen[row].saturated += is_bound ? angle : 0.0;
     e->is_bound[at] = is_bound;
 }
 
@@ -268,6 +259,50 @@ static void join_pole(struct environment *e, size_t row) {
         for (size_t c = 0; c < 3; c++)
             pixel[3 * x + c] = (float)(sum[c] / (double)seen);
     }
+}
+
+/* --- lower bounds ------------------------------------------------------------------------------- */
+
+static bool is_seen(const struct environment *e, size_t cell) {
+    return e->confidence.pixel[2 * cell] > 0.0f;
+}
+
+/* Median over directions whose light is told, the mean of the channels; 0 where none is. */
+static float median_told(const struct environment *e) {
+    size_t cells = (size_t)e->map.width * e->map.height, count = 0;
+    float *told = mem_array(cells, sizeof *told);
+    for (size_t i = 0; i < cells; i++) {
+        const float *p = e->map.pixel + 3 * i;
+        if (is_seen(e, i) && !e->is_bound[i])
+            told[count++] = rgb_mean(rgb_make(p[0], p[1], p[2]));
+    }
+    float median = quantile(told, count, 0.5);
+    mem_free(told);
+    return median;
+}
+
+/* Where only frames of long exposure look out, their bound lies below what shorter ones show elsewhere, and tells less
+ * than that does: such directions count as unseen. Under one exposure no bound is below what is told. */
+static void forget_weak_bounds(struct environment *e) {
+    float median = median_told(e);
+    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
+        const float *p = e->map.pixel + 3 * i;
+        if (e->is_bound[i] && rgb_mean(rgb_make(p[0], p[1], p[2])) < median) {
+            e->is_bound[i] = false;
+            e->confidence.pixel[2 * i] = e->confidence.pixel[2 * i + 1] = 0.0f;
+        }
+    }
+}
+
+/* The share of what is seen, by solid angle, of which only a lower bound is known; negative where nothing is seen. */
+static double saturated_share(const struct environment *e) {
+    double seen = 0.0, saturated = 0.0;
+    for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
+        double angle = is_seen(e, i) ? row_angle(e, i / e->map.width) : 0.0;
+        seen += angle;
+        saturated += e->is_bound[i] ? angle : 0.0;
+    }
+    return seen > 0.0 ? saturated / seen : -1.0;
 }
 
 /* --- the whole ---------------------------------------------------------------------------------- */
@@ -305,32 +340,27 @@ static void make_images(struct environment *e, uint32_t width) {
 
 bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
     struct gather g = {.views = views, .e = e};
-    struct seen seen = {0.0, 0.0};
+    double saturated = -1.0;
     *e = (struct environment){0};
     uint32_t width = find_windows(&g, pool);
     if (width > 0) {
         make_images(e, width);
         g.scratch = mem_array((size_t)parallel_thread_count(pool) * 3 * g.window_count, sizeof *g.scratch);
-        g.seen = mem_calloc(e->map.height, sizeof *g.seen);
         parallel_for(pool, e->map.height, gather_row, &g);
         join_pole(e, 0);
         join_pole(e, e->map.height - 1);
-        for (uint32_t row = 0; row < e->map.height; row++) {
-            seen.angle += g.seen[row].angle;
-            seen.saturated += g.seen[row].saturated;
-        }
+        forget_weak_bounds(e);
+        saturated = saturated_share(e);
     }
-    /* Pixels may be open and yet masked. */
-    bool any = seen.angle > 0.0;
+    bool any = saturated >= 0.0; /* pixels may be open and yet masked */
     if (any) {
         fill_sphere(&e->map, &e->confidence);
         environment_update_figures(e);
-        e->saturated_share = seen.saturated / seen.angle;
+        e->saturated_share = saturated;
         e->photograph_count = g.window_count;
     } else {
         environment_release(e);
     }
-    mem_free(g.seen);
     mem_free(g.scratch);
     mem_free(g.window);
     return any;

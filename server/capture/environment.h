@@ -7,6 +7,7 @@
  * Limits. What an opening shows is taken to be infinitely far: where it is near (a wall that was
  * not scanned, seen through a hole of the mesh), photographs from different places disagree about
  * a direction; the map then holds their median, and `spread` says by how much they disagree.
+ * A direction that is only seen by frames which saturate below what others tell of the sky counts as unseen.
  * Light is known only in the directions in which some photograph looks out; the rest is filled
  * in smoothly from its surroundings and is a guess, but for a sun, which is looked for by what it lights
  * (sun_find.h). */

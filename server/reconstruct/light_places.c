@@ -6,6 +6,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
 #define WAYS 128 /* directions a point */
@@ -31,6 +32,7 @@ static void gather_place(void *user, size_t index, int thread) {
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
     irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
+    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
 }
 
