@@ -30,7 +30,7 @@ struct emitter {
     const struct finder *finder;
     size_t segment, count;
     const uint32_t *texel; /* [count] of the finder's list */
-    float scale;           /* measured = scale * radiance */
+    float scale;           /* measured = scale * radiance; first that makes what it is known to show 1 in the mean */
     bool is_asked;         /* enough of it was measured */
 };
 
@@ -65,7 +65,8 @@ static struct robust_sample look_of(const struct emitter *e, const struct view *
 }
 
 /* What the photographs show of a texel, clear of all edges. Saturated, they tell how bright it is at least: the greatest
- * of that is taken where nothing else is told. */
+ * of that is taken where nothing else is told, unless it is less than the segment is known to show: then it may be as
+ * bright as the rest of it. */
 static void look_all(const struct emitter *e, uint32_t texel, struct measured_looks *looks) {
     const struct reconstruction *r = e->finder->r;
     const struct views *views = e->finder->views;
@@ -92,7 +93,7 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
         else if (bound.weight == 0.0f || look.gray > bound.gray)
             bound = look;
     }
-    if (looks->count == 0 && bound.weight > 0.0f)
+    if (looks->count == 0 && bound.weight > 0.0f && rgb_mean(bound.value) > 1.0f)
         looks->look[looks->count++] = bound;
 }
 

@@ -240,14 +240,56 @@ static void test_plain(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* Leaves out of a photograph what lies behind the dark half of the lamp, or before it. */
+static void hide_half(struct photograph *photo) {
+    vec3 from = camera_origin(&photo->camera), direction;
+    photo->mask = mem_array(WIDTH * HEIGHT, sizeof *photo->mask);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        camera_direction(&photo->camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, &direction);
+        photo->mask[i] = !(direction.y > 0.0f && from.x + (2.9f - from.y) / direction.y * direction.x > 2.0f);
+    }
+}
+
+/* By exposures of which some saturate far below the lamp, and only these see one half of it: that is not darker for it. */
+static void test_exposures(struct parallel *pool) {
+    struct scene scene = {0};
+    struct reconstruction r;
+    make_mesh(&scene.mesh);
+    for (size_t i = 0; i < 4; i++) { /* twice as wide, so that more of it is clear of its edges */
+        vec3 *corner = &scene.mesh.position[4 * LAMP + i];
+        *corner = (vec3){corner->x > 2.0f ? 3.0f : 1.0f, corner->y, corner->z > 1.5f ? 2.5f : 0.5f};
+    }
+    photograph_mesh(&scene, lamp_radiance, NULL, look_anywhere, pool);
+    for (size_t f = 0; f < scene.photograph_count; f++) {
+        struct photograph *photo = &scene.photograph[f];
+        photo->is_hdr = false;
+        photo->clip = 1.0f;
+        photo->exposure = f % 3 > 0 ? 0.05f : 0.5f;
+        for (size_t i = 0; i < 3 * WIDTH * HEIGHT; i++) {
+            uint16_t *value = &photo->pixel[i / 3][i % 3];
+            *value = image_half_from_float(fminf(photo->exposure * image_float_from_half(*value), 1.0f));
+        }
+        if (f % 3 > 0)
+            hide_half(photo);
+    }
+    shell_solve(&scene, 0, &r);
+    struct found found = find(&r);
+    CHECK(!found.any);
+    CHECK_RGB(found.dark, lamp_radiance, 0.06f);
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_placement(pool);
     test_linear(pool);
     test_direct(pool);
     test_found(pool);
-    if (!IS_BRIEF)
+    if (!IS_BRIEF) {
         test_plain(pool);
+        test_exposures(pool);
+    }
     parallel_free(pool);
     return check_result();
 }
