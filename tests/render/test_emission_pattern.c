@@ -30,13 +30,19 @@ static rgb slope(vec3 place) {
     return rgb_make(1.0f + 1.6f * (place.x - 2.0f), 1.0f - 1.6f * (place.x - 2.0f), 1.0f + 1.6f * (place.z - 1.5f));
 }
 
+/* The room, ready to be rendered, whose lamp shows a picture, or none. */
+static void lit_model(struct model *m, const struct mesh *mesh, rgb picture(vec3), struct parallel *pool) {
+    model_init(m, mesh, TEXTURE, 0.5f, pool);
+    if (picture)
+        model_show_picture(m, mesh, picture);
+    model_light(m, mesh, lamp_radiance, NULL, pool);
+}
+
 static void test_placement(struct parallel *pool) {
     struct mesh mesh;
     struct model m;
     make_mesh(&mesh);
-    model_init(&m, &mesh, TEXTURE, 0.5f, pool);
-    model_show_picture(&m, &mesh, waves);
-    model_light(&m, &mesh, lamp_radiance, NULL, pool);
+    lit_model(&m, &mesh, waves, pool);
     CHECK(m.world.lights->triangle_count > 2); /* parts of triangles: the picture is read through them */
     size_t hits = 0;
     for (int i = 0; i < 500; i++) {
@@ -62,10 +68,7 @@ static void render(const struct mesh *mesh, rgb picture(vec3), struct parallel *
     struct model m;
     struct camera camera = look((vec3){3.6f, 2.2f, 2.7f}, (vec3){1.5f, 1.0f, 1.0f});
     const struct path_settings path = {.max_depth = 5, .roulette_depth = 9, .seed = 3};
-    model_init(&m, mesh, TEXTURE, 0.5f, pool);
-    if (picture)
-        model_show_picture(&m, mesh, picture);
-    model_light(&m, mesh, lamp_radiance, NULL, pool);
+    lit_model(&m, mesh, picture, pool);
     film_render(&m.world, &camera, 4, &path, 0, pool, image);
     model_release(&m);
 }
@@ -122,9 +125,7 @@ static void test_direct(struct parallel *pool) {
     struct mesh mesh;
     struct model m;
     make_mesh(&mesh);
-    model_init(&m, &mesh, TEXTURE, 0.5f, pool);
-    model_show_picture(&m, &mesh, slope);
-    model_light(&m, &mesh, lamp_radiance, NULL, pool);
+    lit_model(&m, &mesh, slope, pool);
     for (int place = 0; place < 3; place++) {
         vec3 floor = {0.8f + 1.2f * (float)place, 0.0f, 1.3f}, from = {2.0f, 1.5f, 2.6f};
         vec3 wo = vec3_normalize(vec3_sub(from, floor));
