@@ -19,11 +19,14 @@
 /* The light that arrives may be found too weak by so much. Held to 1, the base colour of something white could then not
  * explain what is seen, and highlights that are not there would. */
 #define MOST_BASE_COLOR 1.25f
-/* Light and base colour are off by about this part of the misfit, which adds to the standard error of what one
- * candidate's is beyond another's. */
+/* Errors that all texels of a segment share move the misfit of one candidate against another's by about this part of
+ * it, which adds to the standard error of the difference: those of light and base colour, and, where no pixel is far from
+ * an edge, what pixels take in of other surfaces. The bars of a window and the frame of a door let the true material
+ * look up to a tenth worse than matt. */
 #define MISFIT_FLOOR 0.01
-/* A segment is matt from this probability on. */
-#define SURELY_MATT 0.7
+#define MISFIT_FLOOR_EDGE 0.03
+/* A segment is matt from this probability on; below, the mean over all candidates is nearer to the truth. */
+#define SURELY_MATT 0.95
 /* What a segment is taken for of which too few photographs speak: half way to an ordinary dielectric. Either way
  * its base colour is then off by 2 %, unless it is darker by a part of its misfit and so many standard errors. */
 #define UNKNOWN_ROUGHNESS 0.5f
@@ -46,6 +49,7 @@ static const struct candidate matt = {ROUGHNESSES - 1, 0};
 /* What is known of a segment. */
 struct evidence {
     size_t count; /* texels */
+    double floor; /* part of a misfit by which differences of misfits are off, all texels together */
     struct gloss_point point[GLOSS_POINTS_MOST];
     float misfit[GLOSS_POINTS_MOST][ROUGHNESSES][SPECULARS];
 };
@@ -106,6 +110,7 @@ static void take_misfits(const struct gloss_job *job, struct evidence *e) {
 static bool look(const struct gloss_job *job, size_t segment, struct gloss_way way, int thread) {
     struct evidence *e = &job->evidence[thread];
     e->count = gloss_look_at(&job->looker, segment, way, thread, e->point);
+    e->floor = way.edge == 0 ? MISFIT_FLOOR : MISFIT_FLOOR_EDGE;
     return e->count >= 2;
 }
 
@@ -159,7 +164,7 @@ static void compare(const struct evidence *e, struct candidate a, struct candida
         gain += d;
         squares += d * d;
     }
-    double floor = MISFIT_FLOOR * total;
+    double floor = e->floor * total;
     *part = gain / fmax(total, 1e-30);
     *errors = gain / sqrt(fmax(squares - gain * gain / n + floor * floor, 1e-30));
 }
