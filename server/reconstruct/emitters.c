@@ -12,6 +12,8 @@
 #define VIEWS_PER_TEXEL 4
 /* Looks that a class of distance from an edge must have for its median to count. */
 #define LEAST_LOOKS 12
+/* Of a segment seen in mixed pixels alone, less than this are an accident of noise. */
+#define LEAST_LOOKS_MIXED 3
 #define RING_PIXELS 4.0f
 #define OUTSHINES 1.3f
 /* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
@@ -132,7 +134,8 @@ static void observe_segment(void *user, size_t segment, int thread) {
             best = &shown[edge];
     }
     size_t told = best->channel[0].count + best->channel[0].saturated_count;
-    bool is_own = told > 0 && (float)told >= OWN_PART * (float)(told + best->outshone_count);
+    size_t least = best == &shown[VIEWS_EDGE] ? LEAST_LOOKS_MIXED : 1;
+    bool is_own = told >= least && (float)told >= OWN_PART * (float)(told + best->outshone_count);
     if (!is_own)
         best = &shown[0]; /* most often it is not what shines: nothing is known */
     struct emitter_evidence *e = &job->evidence[segment];
