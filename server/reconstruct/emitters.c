@@ -12,7 +12,7 @@
 #define VIEWS_PER_TEXEL 4
 /* Looks that a class of distance from an edge must have for its median to count. */
 #define LEAST_LOOKS 12
-/* Of a segment seen in mixed pixels alone, less than this are an accident of noise. */
+/* Of a segment seen in mixed pixels alone, fewer than this are an accident of noise. */
 #define LEAST_LOOKS_MIXED 3
 #define RING_PIXELS 4.0f
 #define OUTSHINES 1.3f
