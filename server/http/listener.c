@@ -16,6 +16,7 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/http/acceptor.h"
 #include "server/http/auth.h"
 #include "server/http/bind.h"
 #include "server/http/head.h"
@@ -27,6 +28,8 @@
 
 #define LIBRARY_THREADS 4
 #define CLERK_THREADS 4
+/* The acceptor keeps to the limit; the library's own, a share of it for each thread, must never be met. */
+#define LIBRARY_LIMIT_FACTOR (2 * LIBRARY_THREADS)
 #define POOL_BYTES ((size_t)64 << 10)  /* a connection's head and buffers; a larger head gets 431 */
 #define UNSENT_BYTES (256 << 10) /* of a reply that wait in the kernel for a slow reader */
 #define DRAIN_BYTES ((size_t)64 << 20) /* read and forgotten after a refusal, so that it is seen */
@@ -55,7 +58,7 @@ struct listener {
     struct MHD_Daemon *daemon;
     struct guard *guard;
     struct tls *tls; /* NULL: plain HTTP */
-    int socket_fd; /* -1 while the library has it, which closes it when it stops, or does not start */
+    struct acceptor *acceptor;
     uint16_t port;
     pthread_t clerks[CLERK_THREADS];
     size_t clerk_count;
@@ -451,10 +454,16 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
     } else {
         guard_remove(l->guard, *socket_context);
         *socket_context = NULL;
+        acceptor_ended(l->acceptor);
     }
 }
 
 /* --- starting and stopping --------------------------------------------------------------- */
+
+static bool on_accepted(void *user, int fd, const struct sockaddr *address, socklen_t size) {
+    struct listener *l = user;
+    return MHD_add_connection(l->daemon, fd, address, size) == MHD_YES;
+}
 
 static void on_tick(void *user) {
     struct listener *l = user;
@@ -481,16 +490,13 @@ static enum status start_library(struct listener *l, const struct listener_confi
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
-    int fd = l->socket_fd;
-    l->socket_fd = -1;
     l->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC | MHD_USE_ERROR_LOG |
-            (l->tls ? (unsigned)MHD_USE_TLS : 0), 0, NULL,
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC |
+            MHD_USE_ERROR_LOG | (l->tls ? (unsigned)MHD_USE_TLS : 0), 0, NULL,
         NULL, on_request, l,
         MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
-        MHD_OPTION_LISTEN_SOCKET, fd,
         MHD_OPTION_THREAD_POOL_SIZE, (unsigned)LIBRARY_THREADS,
-        MHD_OPTION_CONNECTION_LIMIT, config->connection_max,
+        MHD_OPTION_CONNECTION_LIMIT, LIBRARY_LIMIT_FACTOR * config->connection_max,
         MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->limits.idle_sec,
         MHD_OPTION_CONNECTION_MEMORY_LIMIT, POOL_BYTES,
         MHD_OPTION_URI_LOG_CALLBACK, on_target, l,
@@ -505,11 +511,11 @@ enum status listener_start(struct listener **out, const struct listener_config *
                            struct error *err) {
     struct listener *l = mem_calloc(1, sizeof *l);
     l->api = api;
-    l->socket_fd = -1;
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     l->port = config->port;
-    enum status status = bind_listen(&l->socket_fd, config->address, &l->port, err);
+    int fd = -1;
+    enum status status = bind_listen(&fd, config->address, &l->port, err);
     if (status == STATUS_OK && config->certificate_file)
         status = tls_new(&l->tls, config->certificate_file, config->key_file, err);
     if (status == STATUS_OK)
@@ -523,7 +529,13 @@ enum status listener_start(struct listener **out, const struct listener_config *
     }
     if (status == STATUS_OK)
         status = start_library(l, config, err);
+    if (status == STATUS_OK) {
+        status = acceptor_start(&l->acceptor, fd, config->connection_max, on_accepted, l, err);
+        fd = -1;
+    }
     if (status != STATUS_OK) {
+        if (fd >= 0)
+            close(fd);
         listener_stop(l);
         return status;
     }
@@ -533,11 +545,7 @@ enum status listener_start(struct listener **out, const struct listener_config *
 }
 
 void listener_quiesce(struct listener *l) {
-    /* The library gives the socket back, but its threads may still be about to look at it: it
-     * stays open until the end, and clients are refused rather than left waiting. */
-    l->socket_fd = MHD_quiesce_daemon(l->daemon);
-    if (l->socket_fd >= 0)
-        shutdown(l->socket_fd, SHUT_RDWR);
+    acceptor_stop(l->acceptor);
 }
 
 /* Waits until none is left; for clients that do not read, not long enough; for others, plenty. */
@@ -573,11 +581,12 @@ static void settle(struct listener *l) {
 void listener_stop(struct listener *l) {
     if (!l)
         return;
+    if (l->acceptor)
+        acceptor_stop(l->acceptor);
     settle(l);
     if (l->daemon)
         MHD_stop_daemon(l->daemon);
-    if (l->socket_fd >= 0)
-        close(l->socket_fd);
+    acceptor_free(l->acceptor);
     if (l->guard)
         guard_free(l->guard);
     tls_free(l->tls);

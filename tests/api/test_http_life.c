@@ -1,5 +1,6 @@
 /* test_http_life.c -- the HTTP side starts where it can, and stops without losing what it was given. */
 #include <pthread.h>
+#include <sys/resource.h>
 
 #include "server/http/intake.h"
 #include "server/http/partial.h"
@@ -22,7 +23,118 @@ static void check_start(void) {
     }
 }
 
+/* --- how many ------------------------------------------------------------------------------------- */
+
+#define CONNECTION_MAX 9
+
+static const char request[] = "GET /readyz HTTP/1.1\r\nHost: localhost\r\n\r\n";
+
+static struct listener *start_small(void) {
+    struct listener_config network = {.address = "127.0.0.1", .connection_max = CONNECTION_MAX, .limits = rig_patient};
+    struct listener *listener;
+    rig_must(listener_start(&listener, &network, rig.api, &err), &err, "listener_start");
+    return listener;
+}
+
+/* Asks, and waits for the answer as long as it may take. */
+static void check_answer(int fd) {
+    struct buf reply;
+    buf_init(&reply, 1 << 20);
+    rig_send(fd, request, sizeof request - 1);
+    rig_receive(fd, &reply, "\r\n\r\n");
+    CHECK_THAT(rig_status(&reply) == 200, "%s", buf_text(&reply));
+    buf_release(&reply);
+}
+
+static bool is_answered(int fd, int within_ms) {
+    struct pollfd reply = {.fd = fd, .events = POLLIN};
+    return poll(&reply, 1, within_ms) != 0;
+}
+
+/* As many connections as allowed are served at a time; more have to wait, and are served when one ends. */
+static void check_limit(void) {
+    struct rig small = rig;
+    int fds[CONNECTION_MAX + 3];
+    small.listener = start_small();
+    for (int i = 0; i < CONNECTION_MAX + 3; i++)
+        fds[i] = rig_connect(&small);
+    for (int i = 0; i < CONNECTION_MAX; i++)
+        check_answer(fds[i]);
+    for (int i = CONNECTION_MAX; i < CONNECTION_MAX + 3; i++) {
+        rig_send(fds[i], request, sizeof request - 1);
+        CHECK(!is_answered(fds[i], 100) && listener_connections(small.listener) == CONNECTION_MAX);
+        close(fds[i - CONNECTION_MAX]);
+        CHECK(is_answered(fds[i], 60000));
+    }
+    for (int i = 3; i < CONNECTION_MAX + 3; i++)
+        close(fds[i]);
+    listener_stop(small.listener);
+    rig.api->listener = rig.listener;
+}
+
+/* Without descriptors left it waits until there are some. */
+static void check_descriptors(void) {
+    int fd = rig_connect(&rig); /* before: it needs one itself */
+    check_answer(fd);
+    close(fd);
+    fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(listener_port(rig.listener)),
+                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct rlimit before, none;
+    getrlimit(RLIMIT_NOFILE, &before);
+    none = (struct rlimit){.rlim_cur = 3, .rlim_max = before.rlim_max};
+    while (listener_connections(rig.listener) > 0)
+        usleep(1000);
+    setrlimit(RLIMIT_NOFILE, &none);
+    CHECK(connect(fd, (struct sockaddr *)&to, sizeof to) == 0);
+    rig_send(fd, request, sizeof request - 1);
+    usleep(250000);
+    CHECK(recv(fd, &(char){0}, 1, MSG_DONTWAIT | MSG_PEEK) < 0);
+    setrlimit(RLIMIT_NOFILE, &before);
+    CHECK(is_answered(fd, 60000));
+    close(fd);
+}
+
 /* --- stopping -------------------------------------------------------------------------------------- */
+
+struct knocker {
+    uint16_t port;
+    pthread_t thread;
+};
+
+/* Connects and asks again and again, until it is refused. */
+static void *knock(void *user) {
+    struct knocker *knocker = user;
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(knocker->port),
+                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    for (bool is_refused = false; !is_refused;) {
+        char reply[256];
+        int fd = socket(AF_INET, SOCK_STREAM, 0);
+        is_refused = connect(fd, (struct sockaddr *)&to, sizeof to) != 0;
+        if (!is_refused && send(fd, request, sizeof request - 1, MSG_NOSIGNAL) > 0)
+            (void)!recv(fd, reply, sizeof reply, 0);
+        close(fd);
+    }
+    return NULL;
+}
+
+/* It stops at any moment of its threads' work. */
+static void check_stop_when_busy(void) {
+    for (int round = 0; round < 200; round++) {
+        struct listener *listener = start_small();
+        struct knocker knockers[4];
+        for (int i = 0; i < 4; i++) {
+            knockers[i].port = listener_port(listener);
+            CHECK(pthread_create(&knockers[i].thread, NULL, knock, &knockers[i]) == 0);
+        }
+        usleep((useconds_t)(2000 + 37 * round));
+        listener_quiesce(listener);
+        listener_stop(listener);
+        for (int i = 0; i < 4; i++)
+            pthread_join(knockers[i].thread, NULL);
+        rig.api->listener = rig.listener;
+    }
+}
 
 static void create(char id[UPLOAD_ID_SIZE]) {
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
@@ -116,6 +228,9 @@ int main(void) {
     rig_start(&rig, &rig_patient, 60);
     log_set_level(LOG_ERROR);
     check_start();
+    check_limit();
+    check_descriptors();
+    check_stop_when_busy();
     check_stop();
     scheduler_free(rig.scheduler);
     store_close(rig.store);

@@ -1,0 +1,111 @@
+/* acceptor.c -- see acceptor.h. */
+#include "server/http/acceptor.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "common/log.h"
+#include "common/mem.h"
+
+#define PAUSE_MS 100 /* before the next try, when there are no descriptors or no memory left */
+
+struct acceptor {
+    int listen_fd; /* -1: stopped */
+    int wake_fd;   /* an eventfd: there is room again, or it is to stop */
+    size_t connection_max;
+    acceptor_take *take;
+    void *user;
+    atomic_size_t count; /* taken and not ended */
+    atomic_bool stopping;
+    bool is_in_trouble; /* of the thread: the last try failed */
+    pthread_t thread;
+};
+
+/* Whether the next may be tried at once. */
+static bool take_one(struct acceptor *a) {
+    struct sockaddr_storage address;
+    socklen_t size = sizeof address;
+    int fd = accept4(a->listen_fd, (struct sockaddr *)&address, &size, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd >= 0) {
+        atomic_fetch_add(&a->count, 1); /* first: it may have ended before take() returns */
+        if (!a->take(a->user, fd, (struct sockaddr *)&address, size))
+            atomic_fetch_sub(&a->count, 1);
+        a->is_in_trouble = false;
+        return true;
+    }
+    if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM)
+        return true; /* the connection's own fault, or there is none */
+    if (!a->is_in_trouble) {
+        struct error err;
+        error_set_errno(&err, errno, "cannot accept connections for now");
+        log_warning("%s", err.message);
+    }
+    a->is_in_trouble = true;
+    return false;
+}
+
+static void *run(void *user) {
+    struct acceptor *a = user;
+    bool pauses = false;
+    while (!atomic_load(&a->stopping)) {
+        bool has_room = atomic_load(&a->count) < a->connection_max;
+        struct pollfd fds[] = {{.fd = a->wake_fd, .events = POLLIN},
+                               {.fd = has_room && !pauses ? a->listen_fd : -1, .events = POLLIN}};
+        if (poll(fds, 2, pauses ? PAUSE_MS : -1) < 0)
+            continue;
+        eventfd_t times;
+        if (fds[0].revents)
+            eventfd_read(a->wake_fd, &times);
+        pauses = fds[1].revents && !take_one(a);
+    }
+    return NULL;
+}
+
+enum status acceptor_start(struct acceptor **out, int listen_fd, size_t connection_max, acceptor_take *take, void *user,
+                           struct error *err) {
+    struct acceptor *a = mem_calloc(1, sizeof *a);
+    a->listen_fd = listen_fd;
+    a->connection_max = connection_max;
+    a->take = take;
+    a->user = user;
+    a->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    *out = a; /* before the thread is there: what it takes may end at once */
+    int failed = a->wake_fd < 0 ? errno : pthread_create(&a->thread, NULL, run, a);
+    if (failed) {
+        if (a->wake_fd >= 0)
+            close(a->wake_fd);
+        close(listen_fd);
+        mem_free(a);
+        *out = NULL;
+        return error_set_errno(err, failed, "cannot start the thread that accepts connections");
+    }
+    return STATUS_OK;
+}
+
+void acceptor_ended(struct acceptor *a) {
+    if (atomic_fetch_sub(&a->count, 1) == a->connection_max)
+        eventfd_write(a->wake_fd, 1);
+}
+
+void acceptor_stop(struct acceptor *a) {
+    if (a->listen_fd < 0)
+        return;
+    atomic_store(&a->stopping, true);
+    eventfd_write(a->wake_fd, 1);
+    pthread_join(a->thread, NULL);
+    close(a->listen_fd);
+    a->listen_fd = -1;
+}
+
+void acceptor_free(struct acceptor *a) {
+    if (!a)
+        return;
+    acceptor_stop(a);
+    close(a->wake_fd);
+    mem_free(a);
+}

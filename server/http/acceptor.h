@@ -1,0 +1,29 @@
+/* acceptor.h -- takes in the connections that arrive at a listening socket, on a thread of its own, while there is room.
+ *
+ * libmicrohttpd would, too, but not stop: MHD_quiesce_daemon and each thread that waits by epoll remove the socket from
+ * the thread's set, and the second to do so aborts the process (0.9.75 and 1.0.1, daemon.c). */
+#ifndef UNBAKE_HTTP_ACCEPTOR_H
+#define UNBAKE_HTTP_ACCEPTOR_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <sys/socket.h>
+
+#include "common/error.h"
+
+struct acceptor; /* opaque; thread-safe */
+
+/* Is given the connection `fd`, which neither blocks nor outlives an exec; false: that was refused, and is closed. */
+typedef bool acceptor_take(void *user, int fd, const struct sockaddr *address, socklen_t size);
+
+/* Has at most connection_max open; further ones wait in the kernel. listen_fd, which must not block, is the acceptor's
+ * from now on, even when this fails. */
+enum status acceptor_start(struct acceptor **a, int listen_fd, size_t connection_max, acceptor_take *take, void *user,
+                           struct error *err);
+/* One that was taken has ended. Any thread. */
+void acceptor_ended(struct acceptor *a);
+/* Takes no more, those that wait in the kernel are refused; may be said again, but not by two threads at once. */
+void acceptor_stop(struct acceptor *a);
+void acceptor_free(struct acceptor *a); /* stops it, too; NULL is fine */
+
+#endif
