@@ -20,7 +20,7 @@ struct acceptor {
     size_t connection_max;
     acceptor_take *take;
     void *user;
-    atomic_size_t count; /* taken and not ended */
+    atomic_size_t count;
     atomic_bool stopping;
     bool is_in_trouble; /* of the thread: the last try failed */
     pthread_t thread;
@@ -90,6 +90,10 @@ enum status acceptor_start(struct acceptor **out, int listen_fd, size_t connecti
 void acceptor_ended(struct acceptor *a) {
     if (atomic_fetch_sub(&a->count, 1) == a->connection_max)
         eventfd_write(a->wake_fd, 1);
+}
+
+size_t acceptor_count(struct acceptor *a) {
+    return atomic_load(&a->count);
 }
 
 void acceptor_stop(struct acceptor *a) {

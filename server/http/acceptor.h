@@ -20,8 +20,9 @@ typedef bool acceptor_take(void *user, int fd, const struct sockaddr *address, s
  * from now on, even when this fails. */
 enum status acceptor_start(struct acceptor **a, int listen_fd, size_t connection_max, acceptor_take *take, void *user,
                            struct error *err);
-/* One that was taken has ended. Any thread. */
+/* One that was taken has ended. Any thread, as the next. */
 void acceptor_ended(struct acceptor *a);
+size_t acceptor_count(struct acceptor *a); /* taken and not ended */
 /* Takes no more, those that wait in the kernel are refused; may be said again, but not by two threads at once. */
 void acceptor_stop(struct acceptor *a);
 void acceptor_free(struct acceptor *a); /* stops it, too; NULL is fine */

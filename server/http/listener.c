@@ -32,6 +32,7 @@
 #define LIBRARY_LIMIT_FACTOR (2 * LIBRARY_THREADS)
 #define POOL_BYTES ((size_t)64 << 10)  /* a connection's head and buffers; a larger head gets 431 */
 #define UNSENT_BYTES (256 << 10) /* of a reply that wait in the kernel for a slow reader */
+#define BEGIN_MS 1000 /* until the library has begun with what was accepted */
 #define DRAIN_BYTES ((size_t)64 << 20) /* read and forgotten after a refusal, so that it is seen */
 
 /* One request on its way. Belongs to the library's thread but for the time that a clerk has it. */
@@ -546,6 +547,9 @@ enum status listener_start(struct listener **out, const struct listener_config *
 
 void listener_quiesce(struct listener *l) {
     acceptor_stop(l->acceptor);
+    /* The library's threads may not have begun with all that was accepted; if one never does, its memory was refused. */
+    for (int ms = 0; ms < BEGIN_MS && guard_count(l->guard) < acceptor_count(l->acceptor); ms++)
+        usleep(1000);
 }
 
 /* Waits until none is left; for clients that do not read, not long enough; for others, plenty. */
@@ -582,7 +586,7 @@ void listener_stop(struct listener *l) {
     if (!l)
         return;
     if (l->acceptor)
-        acceptor_stop(l->acceptor);
+        listener_quiesce(l);
     settle(l);
     if (l->daemon)
         MHD_stop_daemon(l->daemon);

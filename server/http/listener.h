@@ -32,7 +32,7 @@ enum status listener_start(struct listener **l, const struct listener_config *co
 uint16_t listener_port(const struct listener *l);
 /* Reads the certificate and its key again, if there are any. Any thread but not two at once. */
 enum status listener_reload(struct listener *l, struct error *err);
-/* Accepts no further connection; those that exist are served. Any thread, once. */
+/* Accepts no further connection; those that exist are served. Any thread, one at a time. */
 void listener_quiesce(struct listener *l);
 void listener_stop(struct listener *l); /* NULL is fine */
 
