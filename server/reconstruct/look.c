@@ -68,7 +68,7 @@ static bool connect(struct look_batch *b, size_t at, const struct view *view, ui
         b->ray[path] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
         b->key[path] = key;
     }
-    b->look[at] = (struct look){texel, reconstruction_segment(r, texel), photo,
+    b->look[at] = (struct look){texel, reconstruction_segment(r, texel), photo, *view,
                                 clean ? 1.0f : UNCLEAN_TRUST};
     return true;
 }

@@ -16,6 +16,7 @@
 struct look {
     uint32_t texel, segment;
     const struct photograph *photograph; /* borrowed */
+    struct view view; /* of the texel's middle */
     float trust; /* 1, or less where the photograph's pixel mixes surfaces */
 };
 

@@ -9,6 +9,10 @@
 /* Share of the median radiance below which a relative difference counts for less. */
 #define DIFFERENCE_FLOOR 0.003f
 
+/* So many deviations of noise off a look still has half its trust. Were it few, what is rarely much too bright, as
+ * photographs of a renderer are, would count for less than what is often a little too dark, and all would darken. */
+#define NOISE_WIDTH 8.0f
+
 /* Looks that the solved state counts for. One look is off by a third (16 paths, one pixel), the
  * solved light of a block by 2 %: (.33 / .02)^2. */
 #define PRIOR_LOOKS 256.0f
@@ -17,7 +21,7 @@
 #define MOST_MOVED 0.1f
 
 struct match match_look(const struct photograph_sample *reference, const rgb *radiance,
-                        int sample_count, rgb expected, float median_radiance) {
+                        int sample_count, rgb expected, float deviation, float median_radiance) {
     float shown[3] = {0}, rendered[3] = {0}, clip[3] = {0};
     bool saturated[3] = {false};
     float each = 1.0f / (float)sample_count;
@@ -44,7 +48,8 @@ struct match match_look(const struct photograph_sample *reference, const rgb *ra
         match.rendered[c] = scale * rendered[c];
         off += (match.shown[c] - scale * about[c]) / 3.0f;
     }
-    match.trust = 1.0f / (1.0f + off * off);
+    float usual = NOISE_WIDTH * deviation / (rgb_mean(expected) + DIFFERENCE_FLOOR * median_radiance);
+    match.trust = 1.0f / (1.0f + off * off / (1.0f + usual * usual));
     return match;
 }
 

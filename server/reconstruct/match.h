@@ -23,14 +23,15 @@
 struct match {
     float shown[3];    /* by the photograph, over (expected + a share of the median) */
     float rendered[3]; /* over the same */
-    float trust;       /* half where the photograph is off by all that is expected: a highlight, or
-                        * light of what is in front */
+    float trust;       /* half where the photograph is off by all that is expected, or by more where its noise is that
+                        * far: a highlight, or light of what is in front */
 };
 
 /* From reference[sample_count] and radiance[sample_count] of one look. A saturated channel that the
- * render exceeds too counts as equal. `median_radiance` is the photographs'. */
+ * render exceeds too counts as equal. `deviation` is that of the photograph's noise there, in radiance;
+ * `median_radiance` is the photographs'. */
 struct match match_look(const struct photograph_sample *reference, const rgb *radiance,
-                        int sample_count, rgb expected, float median_radiance);
+                        int sample_count, rgb expected, float deviation, float median_radiance);
 
 struct matcher {
     struct texture *base_color;        /* borrowed, as all but block */

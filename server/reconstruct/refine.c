@@ -30,10 +30,12 @@ static void note_looks(void *self, size_t chunk, struct look_batch *b) {
     for (size_t k = 0; k < b->look_count; k++) {
         const struct look *look = &b->look[k];
         size_t first = k * (size_t)b->samples;
+        rgb expected = fused_radiance(&f->o->r->fused, look->texel);
+        rgb noise = noise_deviation(&f->o->r->noise, f->o->views, &look->view, expected);
         f->look[chunk * b->look_capacity + k] = (struct look_match){
             look->texel, look->trust,
-            match_look(b->reference + first, b->radiance + first, b->samples,
-                       fused_radiance(&f->o->r->fused, look->texel), f->o->views->median_radiance)};
+            match_look(b->reference + first, b->radiance + first, b->samples, expected, rgb_mean(noise),
+                       f->o->views->median_radiance)};
     }
 }
 

@@ -85,11 +85,33 @@ static void test_look(void) {
     const struct photograph_sample shown = {.radiance = {1, 1, 2}, .saturated = {true, true, false},
                                             .clip_radiance = {1, 1, 1}};
     const rgb rendered = {3, 0.5f, 1};
-    struct match match = match_look(&shown, &rendered, 1, rgb_gray(1.0f), 0.0f);
+    struct match match = match_look(&shown, &rendered, 1, rgb_gray(1.0f), 0.0f, 0.0f);
     CHECK(match.shown[0] == 3.0f && match.rendered[0] == 3.0f);
     CHECK(match.shown[1] == 1.0f && match.rendered[1] == 0.5f);
     CHECK(match.shown[2] == 2.0f && match.rendered[2] == 1.0f);
     CHECK_NEAR(match.trust, 0.5, 1e-6);
+}
+
+/* Renders that are right and photographs whose noise is as large as what they show, seldom far too bright and often too
+ * dark: no look is an outlier, and base colour stays within 4 %. */
+static void test_noise(void) {
+    struct materials m;
+    struct emission e;
+    struct matcher matcher;
+    materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
+    emission_init(&e, &m);
+    matcher_init(&matcher, &m.base_color, &inverse, &segments, chart_of_triangle, &e, 2);
+    for (uint64_t look = 0; look < 20000; look++) {
+        float bright = -logf(1.0f - rng_to_float((uint32_t)rng_key(2, look, 0))); /* 1 in the mean, and its deviation */
+        const struct photograph_sample shown = {.radiance = rgb_gray(bright)};
+        const rgb rendered = rgb_scale(rgb_gray(2.0f), m.base_color.texel[0][0]);
+        struct match match = match_look(&shown, &rendered, 1, rgb_gray(1.0f), 1.0f, 1.0f);
+        matcher_step(&matcher, 0, &match, match.trust);
+    }
+    CHECK_NEAR(m.base_color.texel[0][0] / 0.5f, 1.0, 0.04);
+    matcher_release(&matcher);
+    emission_release(&e);
+    materials_release(&m);
 }
 
 int main(void) {
@@ -98,5 +120,6 @@ int main(void) {
     test_bound();
     test_window();
     test_look();
+    test_noise();
     return check_result();
 }
