@@ -5,17 +5,17 @@
 #include <poll.h>
 #include <pthread.h>
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/http/bind.h"
 
 #define PAUSE_MS 100 /* before the next try, when there are no descriptors or no memory left */
 
 struct acceptor {
-    int listen_fd; /* -1: stopped */
+    int listen_fd; /* -1: none, or stopped */
     int wake_fd;   /* an eventfd: there is room again, or it is to stop */
     size_t connection_max;
     acceptor_take *take;
@@ -23,6 +23,7 @@ struct acceptor {
     atomic_size_t count;
     atomic_bool stopping;
     bool is_in_trouble; /* of the thread: the last try failed */
+    bool runs; /* there is a thread */
     pthread_t thread;
 };
 
@@ -66,25 +67,27 @@ static void *run(void *user) {
     return NULL;
 }
 
-enum status acceptor_start(struct acceptor **out, int listen_fd, size_t connection_max, acceptor_take *take, void *user,
-                           struct error *err) {
+enum status acceptor_new(struct acceptor **out, const char *address, uint16_t *port, size_t connection_max,
+                         acceptor_take *take, void *user, struct error *err) {
     struct acceptor *a = mem_calloc(1, sizeof *a);
-    a->listen_fd = listen_fd;
     a->connection_max = connection_max;
     a->take = take;
     a->user = user;
-    a->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-    *out = a; /* before the thread is there: what it takes may end at once */
-    int failed = a->wake_fd < 0 ? errno : pthread_create(&a->thread, NULL, run, a);
-    if (failed) {
-        if (a->wake_fd >= 0)
-            close(a->wake_fd);
-        close(listen_fd);
-        mem_free(a);
-        *out = NULL;
-        return error_set_errno(err, failed, "cannot start the thread that accepts connections");
-    }
-    return STATUS_OK;
+    a->listen_fd = a->wake_fd = -1;
+    enum status status = bind_listen(&a->listen_fd, address, port, err);
+    if (status == STATUS_OK && (a->wake_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) < 0)
+        status = error_set_errno(err, errno, "cannot make an eventfd");
+    if (status == STATUS_OK)
+        *out = a;
+    else
+        acceptor_free(a);
+    return status;
+}
+
+enum status acceptor_start(struct acceptor *a, struct error *err) {
+    int failed = pthread_create(&a->thread, NULL, run, a);
+    a->runs = !failed;
+    return failed ? error_set_errno(err, failed, "cannot start the thread that accepts connections") : STATUS_OK;
 }
 
 void acceptor_ended(struct acceptor *a) {
@@ -97,12 +100,14 @@ size_t acceptor_count(struct acceptor *a) {
 }
 
 void acceptor_stop(struct acceptor *a) {
-    if (a->listen_fd < 0)
-        return;
-    atomic_store(&a->stopping, true);
-    eventfd_write(a->wake_fd, 1);
-    pthread_join(a->thread, NULL);
-    close(a->listen_fd);
+    if (a->runs) {
+        atomic_store(&a->stopping, true);
+        eventfd_write(a->wake_fd, 1);
+        pthread_join(a->thread, NULL);
+        a->runs = false;
+    }
+    if (a->listen_fd >= 0)
+        close(a->listen_fd);
     a->listen_fd = -1;
 }
 
@@ -110,6 +115,7 @@ void acceptor_free(struct acceptor *a) {
     if (!a)
         return;
     acceptor_stop(a);
-    close(a->wake_fd);
+    if (a->wake_fd >= 0)
+        close(a->wake_fd);
     mem_free(a);
 }

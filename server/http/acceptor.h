@@ -1,12 +1,14 @@
-/* acceptor.h -- takes in the connections that arrive at a listening socket, on a thread of its own, while there is room.
+/* acceptor.h -- owns the listening socket and takes in the connections that arrive there, on a thread of its own, while
+ * there is room. It never reads or writes one: whom it gives them to owns them from then on.
  *
- * libmicrohttpd would, too, but not stop: MHD_quiesce_daemon and each thread that waits by epoll remove the socket from
- * the thread's set, and the second to do so aborts the process (0.9.75 and 1.0.1, daemon.c). */
+ * libmicrohttpd would accept, too, but not stop: MHD_quiesce_daemon and each thread that waits by epoll remove the
+ * socket from the thread's set, and the second to do so aborts the process (0.9.75, daemon.c). */
 #ifndef UNBAKE_HTTP_ACCEPTOR_H
 #define UNBAKE_HTTP_ACCEPTOR_H
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <sys/socket.h>
 
 #include "common/error.h"
@@ -16,10 +18,11 @@ struct acceptor; /* opaque; thread-safe */
 /* Is given the connection `fd`, which neither blocks nor outlives an exec; false: that was refused, and is closed. */
 typedef bool acceptor_take(void *user, int fd, const struct sockaddr *address, socklen_t size);
 
-/* Has at most connection_max open; further ones wait in the kernel. listen_fd, which must not block, is the acceptor's
- * from now on, even when this fails. */
-enum status acceptor_start(struct acceptor **a, int listen_fd, size_t connection_max, acceptor_take *take, void *user,
-                           struct error *err);
+/* Listens, as bind_listen. What arrives waits in the kernel until acceptor_start, and later while connection_max are
+ * open. */
+enum status acceptor_new(struct acceptor **a, const char *address, uint16_t *port, size_t connection_max,
+                         acceptor_take *take, void *user, struct error *err);
+enum status acceptor_start(struct acceptor *a, struct error *err); /* once */
 /* One that was taken has ended. Any thread, as the next. */
 void acceptor_ended(struct acceptor *a);
 size_t acceptor_count(struct acceptor *a); /* taken and not ended */

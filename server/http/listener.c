@@ -18,7 +18,6 @@
 #include "common/mem.h"
 #include "server/http/acceptor.h"
 #include "server/http/auth.h"
-#include "server/http/bind.h"
 #include "server/http/head.h"
 #include "server/http/hub.h"
 #include "server/http/problem.h"
@@ -59,7 +58,7 @@ struct listener {
     struct MHD_Daemon *daemon;
     struct guard *guard;
     struct tls *tls; /* NULL: plain HTTP */
-    struct acceptor *acceptor;
+    struct acceptor *acceptor; /* has the listening socket */
     uint16_t port;
     pthread_t clerks[CLERK_THREADS];
     size_t clerk_count;
@@ -515,8 +514,8 @@ enum status listener_start(struct listener **out, const struct listener_config *
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     l->port = config->port;
-    int fd = -1;
-    enum status status = bind_listen(&fd, config->address, &l->port, err);
+    enum status status =
+        acceptor_new(&l->acceptor, config->address, &l->port, config->connection_max, on_accepted, l, err);
     if (status == STATUS_OK && config->certificate_file)
         status = tls_new(&l->tls, config->certificate_file, config->key_file, err);
     if (status == STATUS_OK)
@@ -530,13 +529,9 @@ enum status listener_start(struct listener **out, const struct listener_config *
     }
     if (status == STATUS_OK)
         status = start_library(l, config, err);
-    if (status == STATUS_OK) {
-        status = acceptor_start(&l->acceptor, fd, config->connection_max, on_accepted, l, err);
-        fd = -1;
-    }
+    if (status == STATUS_OK)
+        status = acceptor_start(l->acceptor, err);
     if (status != STATUS_OK) {
-        if (fd >= 0)
-            close(fd);
         listener_stop(l);
         return status;
     }
@@ -585,7 +580,7 @@ static void settle(struct listener *l) {
 void listener_stop(struct listener *l) {
     if (!l)
         return;
-    if (l->acceptor)
+    if (l->daemon)
         listener_quiesce(l);
     settle(l);
     if (l->daemon)

@@ -87,9 +87,13 @@ static inline bool rig_connected(int fd) {
     return getsockopt(fd, SOL_SOCKET, SO_ERROR, &failed, &size) == 0 && failed == 0;
 }
 
+static inline struct sockaddr_in rig_address(const struct listener *listener) {
+    return (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons(listener_port(listener)),
+                                .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+}
+
 static inline int rig_connect(const struct rig *rig) {
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(listener_port(rig->listener)),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_in to = rig_address(rig->listener);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     struct timeval patience = {.tv_sec = 60};
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);

@@ -78,8 +78,7 @@ static void check_descriptors(void) {
     check_answer(fd);
     close(fd);
     fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(listener_port(rig.listener)),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_in to = rig_address(rig.listener);
     struct rlimit before, none;
     getrlimit(RLIMIT_NOFILE, &before);
     none = (struct rlimit){.rlim_cur = 3, .rlim_max = before.rlim_max};
@@ -97,20 +96,13 @@ static void check_descriptors(void) {
 
 /* --- stopping -------------------------------------------------------------------------------------- */
 
-struct knocker {
-    uint16_t port;
-    pthread_t thread;
-};
-
 /* Connects and asks again and again, until it is refused. */
 static void *knock(void *user) {
-    struct knocker *knocker = user;
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(knocker->port),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    const struct sockaddr_in *to = user;
     for (bool is_refused = false; !is_refused;) {
         char reply[256];
         int fd = socket(AF_INET, SOCK_STREAM, 0);
-        is_refused = connect(fd, (struct sockaddr *)&to, sizeof to) != 0;
+        is_refused = connect(fd, (const struct sockaddr *)to, sizeof *to) != 0;
         if (!is_refused && send(fd, request, sizeof request - 1, MSG_NOSIGNAL) > 0)
             (void)!recv(fd, reply, sizeof reply, 0);
         close(fd);
@@ -122,16 +114,15 @@ static void *knock(void *user) {
 static void check_stop_when_busy(void) {
     for (int round = 0; round < 200; round++) {
         struct listener *listener = start_small();
-        struct knocker knockers[4];
-        for (int i = 0; i < 4; i++) {
-            knockers[i].port = listener_port(listener);
-            CHECK(pthread_create(&knockers[i].thread, NULL, knock, &knockers[i]) == 0);
-        }
+        struct sockaddr_in to = rig_address(listener);
+        pthread_t knocker[4];
+        for (int i = 0; i < 4; i++)
+            CHECK(pthread_create(&knocker[i], NULL, knock, &to) == 0);
         usleep((useconds_t)(2000 + 37 * round));
         listener_quiesce(listener);
         listener_stop(listener);
         for (int i = 0; i < 4; i++)
-            pthread_join(knockers[i].thread, NULL);
+            pthread_join(knocker[i], NULL);
         rig.api->listener = rig.listener;
     }
 }
