@@ -237,12 +237,13 @@ static void mark_by_truth(const struct image *truth, uint8_t *flags) {
     }
 }
 
-static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view,
-                                    const char *stem, double *msre, struct error *err) {
+static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view, const char *stem,
+                                    const struct image *truth, struct even *even, double *msre, struct error *err) {
     struct image photograph, render;
     enum status status = STATUS_OK;
     make_pair(e, p, view, &photograph, &render);
     *msre = metrics_msre(&photograph, &render, e->median);
+    even_add(even, &photograph, &render, truth, e->median);
     if (e->settings->pictures_dir)
         status = write_pair(e, "view", stem, &photograph, &render, "",
                             e->median > 0.0 ? (float)(0.2 / e->median) : 1.0f, err);
@@ -267,7 +268,7 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
     if (e->settings->pictures_dir)
         status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
     if (status == STATUS_OK && e->settings->spp)
-        status = score_photograph(e, p, view, stem, msre, err);
+        status = score_photograph(e, p, view, stem, &truth, &v->even, msre, err);
 out:
     image_release(&found);
     image_release(&truth);
@@ -363,5 +364,10 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_int(root, "emitters_false", (int64_t)v->emitters_false);
     json_add_number(root, "msre", v->msre);
     json_add_number(root, "msre_deviation", v->msre_deviation);
+    if (v->even.count > 0) {
+        json_add_number(root, "even_share", (double)v->even.count / (double)s->pixels);
+        json_add_number(root, "msre_even", v->even.render / (double)v->even.count);
+        json_add_number(root, "msre_even_noise", v->even.noise / (double)v->even.count);
+    }
     return root;
 }

@@ -14,6 +14,7 @@
 #include "common/error.h"
 #include "common/json.h"
 #include "common/parallel.h"
+#include "server/evaluate/even.h"
 #include "server/evaluate/score.h"
 
 struct evaluate_settings {
@@ -33,6 +34,7 @@ struct evaluation {
      * object that does not emit is a false emitter when any of it does. */
     size_t emitters, emitters_found, emitters_missed, emitters_false;
     double msre, msre_deviation; /* mean over the views, and how they spread; NaN without re-renders */
+    struct even even;            /* places whose photographs tell their own noise; nothing without re-renders */
 };
 
 /* `room` and `outputs` are folders. */

@@ -87,6 +87,10 @@ static void print_table(const struct evaluation *v) {
            score_mean(s->emission_log));
     if (isfinite(v->msre))
         printf("  %-22s %6.4f +- %.4f\n", "MSRE of re-renders", v->msre, v->msre_deviation);
+    if (v->even.count > 0)
+        printf("  %-22s %6.4f of which the photographs' own noise is %.4f (%.1f %% of the pixels)\n",
+               "  where all is even", v->even.render / (double)v->even.count,
+               v->even.noise / (double)v->even.count, 100.0 * (double)v->even.count / (double)s->pixels);
 }
 
 int evaluate_command(int argc, char **argv) {

@@ -62,6 +62,8 @@ measure() { # ROOM KIND
     row "emission, intersection over union" "$(value emission_iou)" "$overlap" higher
     row "emission, log error" "$(value emission_log_error)" "$log_error" lower
     row "MSRE of held-out views" "$(value msre)" "$msre" lower
+    row "MSRE of even places" "$(value msre_even)" - lower
+    row "MSRE of even places, the photographs' noise" "$(value msre_even_noise)" - lower
     row "time of all stages but the report, minutes" "$(quotient "$(working_sec "$dir/out")" 60)" - lower
 }
 

@@ -5,6 +5,7 @@
 #include "common/json.h"
 #include "common/mem.h"
 #include "common/parallel.h"
+#include "common/rng.h"
 #include "server/demo/generate.h"
 #include "server/demo/room.h"
 #include "server/evaluate/evaluate.h"
@@ -59,6 +60,45 @@ static void test_score(void) {
     CHECK(isnan(score_psnr_db(nothing.roughness)) && score_emission_iou(&nothing) == 1.0);
     image_release(&truth);
     image_release(&found);
+}
+
+/* A photograph of a wall under light that falls off, each pixel a tenth too bright or too dark, beside another object;
+ * a shiny and a striped one tell nothing. */
+static void test_even(void) {
+    enum { WIDTH = 96, HEIGHT = 64, OTHER = 80 }; /* from that column on it is the other object */
+    struct image truth, photograph, render;
+    struct even even = {0}, shiny = {0}, striped = {0};
+    image_init(&truth, WIDTH, HEIGHT, CHANNELS, channels);
+    image_init_rgb(&photograph, WIDTH, HEIGHT);
+    image_init_rgb(&render, WIDTH, HEIGHT);
+    for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+        float x = (float)(i % WIDTH), *t = truth.pixel + (size_t)i * CHANNELS;
+        float right = 1.0f + 0.01f * x + 0.0005f * x * x;
+        t[ROUGHNESS] = 1.0f;
+        t[OBJECT] = i % WIDTH < OTHER ? 0.0f : 1.0f;
+        for (uint32_t c = 0; c < 3; c++) {
+            t[BASE + c] = 0.5f;
+            photograph.pixel[3 * i + c] = right * (rng_mix32(3 * i + c) % 2 ? 1.1f : 0.9f);
+            render.pixel[3 * i + c] = right * 1.2f;
+        }
+    }
+    even_add(&even, &photograph, &render, &truth, 0.0);
+    CHECK_THAT(even.count == (OTHER - 6 + WIDTH - OTHER - 6) * (HEIGHT - 6), "%zu", even.count);
+    /* (.1 / 1.1)^2 or (.1 / .9)^2; and .1 or .3 of these */
+    CHECK_NEAR(even.noise / (double)even.count, 0.5 * (0.01 / 1.21 + 0.01 / 0.81), 0.0003);
+    CHECK_NEAR(even.render / (double)even.count, 0.5 * (0.01 / 1.21 + 0.09 / 0.81), 0.002);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+        truth.pixel[i * CHANNELS + ROUGHNESS] = 0.2f;
+    even_add(&shiny, &photograph, &render, &truth, 0.0);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        truth.pixel[i * CHANNELS + ROUGHNESS] = 1.0f;
+        truth.pixel[i * CHANNELS + BASE + 1] = i % WIDTH % 7 == 0 ? 0.3f : 0.5f;
+    }
+    even_add(&striped, &photograph, &render, &truth, 0.0);
+    CHECK(shiny.count == 0 && striped.count == 0);
+    image_release(&truth);
+    image_release(&photograph);
+    image_release(&render);
 }
 
 /* Writes a room's own materials as if a job had found them. */
@@ -185,6 +225,7 @@ int main(void) {
     struct parallel *pool = parallel_new(2);
     CHECK(mkdtemp(dir) != NULL);
     test_score();
+    test_even();
     test_known(dir, pool);
     test_refused(dir, pool);
     test_picture(dir, pool);
