@@ -13,6 +13,9 @@
 #include "server/reconstruct/look.h"
 #include "server/reconstruct/reconstruction.h"
 
+/* Share of what a segment was observed to show from which a texel is one of those observed. */
+#define EMITTERS_AS_BRIGHT 0.7f
+
 /* What is known of a segment's light. */
 struct emitter_evidence {
     rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
@@ -24,6 +27,7 @@ struct emitter_evidence {
     bool unbound;  /* such a lamp: `shown` is told by what it lights (saturated_light.h) */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */
+    float doubt; /* radiance that a white surface there would send of unseen sky (sky_doubt.h) */
 };
 
 /* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of

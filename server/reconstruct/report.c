@@ -191,6 +191,7 @@ void report_emitters(struct reconstruction *r) {
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
         json_add_bool(entry, "hidden", r->evidence[s].hidden);
         json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].share);
+        json_add_number(entry, "white_by_unseen_sky", (double)r->evidence[s].doubt);
         const rgb *e = &r->materials.emission[s];
         const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));

@@ -7,12 +7,14 @@
 #include "common/clock.h"
 #include "common/mem.h"
 #include "server/gather/probes.h"
+#include "server/reconstruct/by_segment.h"
 #include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emission_pattern.h"
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/gloss.h"
 #include "server/reconstruct/lamps.h"
+#include "server/reconstruct/sky_doubt.h"
 
 #define PASSES 2
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
@@ -33,8 +35,8 @@
 #define EMITTER_SHARE_MIXED 0.3f
 /* So much more is asked where all light that arrives is an estimate (unseen_light.h): it may be half. */
 #define EMITTER_SHARE_UNSEEN 0.25f
-/* Share of what a segment was observed to show from which a texel is one of those observed. */
-#define AS_BRIGHT 0.7f
+/* Where no photograph shows the sky it may be brighter than it was taken for by so many times that. */
+#define SKY_DOUBT 1.0f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
 #define SLICE_PROBES 1024 /* work between two questions whether to stop */
 #define SLICE_TEXELS 65536
@@ -182,7 +184,7 @@ static void average_arrived(const struct solve *s) {
         if (!is_seen || !divide_white(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
-        if (rgb_mean(fused_radiance(&r->fused, texel)) > AS_BRIGHT * rgb_mean(r->evidence[segment].shown))
+        if (rgb_mean(fused_radiance(&r->fused, texel)) > EMITTERS_AS_BRIGHT * rgb_mean(r->evidence[segment].shown))
             add_arrived(sum[segment].bright, white);
     }
     for (size_t i = 0; i < r->segments.count; i++) {
@@ -195,16 +197,31 @@ static void average_arrived(const struct solve *s) {
     mem_free(sum);
 }
 
+struct decision {
+    const struct solve *solve;
+    struct texels_by_segment texels;
+};
+
+static void decide(void *user, size_t segment, int thread) {
+    (void)thread;
+    const struct decision *d = user;
+    struct reconstruction *r = d->solve->r;
+    struct emitter_evidence *e = &r->evidence[segment];
+    size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
+    float shown = rgb_mean(e->shown), arrived = rgb_mean(e->arrived);
+    float needed = (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) + EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
+    e->share = shown > 0.0f ? clampf(1.0f - arrived / shown, 0.0f, 1.0f) : 0.0f;
+    e->doubt = e->share > needed && !r->sky_is_fitted ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
+    r->is_emitter[segment] = e->hidden || shown - arrived - SKY_DOUBT * e->doubt > needed * shown;
+}
+
 static void decide_emitters(struct solve *s) {
     struct reconstruction *r = s->r;
+    struct decision decision = {.solve = s};
     average_arrived(s);
-    for (size_t i = 0; i < r->segments.count; i++) {
-        struct emitter_evidence *e = &r->evidence[i];
-        float shown = rgb_mean(e->shown);
-        e->share = shown > 0.0f ? clampf(1.0f - rgb_mean(e->arrived) / shown, 0.0f, 1.0f) : 0.0f;
-        r->is_emitter[i] = e->hidden || e->share > (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) +
-                                          EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
-    }
+    by_segment_sort(&decision.texels, &r->segments, &r->inverse);
+    parallel_for(r->pool, r->segments.count, decide, &decision);
+    by_segment_release(&decision.texels);
 }
 
 /* Gives emitters their own light, and the base colour by which they reflect. */

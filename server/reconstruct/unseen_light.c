@@ -127,6 +127,7 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     bool matters = u.count >= LEAST_POINTS && base_color > IMPOSSIBLE_BASE_COLOR;
     if (matters)
         relight(&u);
+    r->sky_is_fitted = matters;
     json_add_number(figures, "share_of_rays", r->unseen_share);
     json_add_number(figures, "base_color_without", base_color);
     json_add_bool(figures, "estimated", matters);

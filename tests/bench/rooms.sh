@@ -7,7 +7,7 @@ set -u
 build=$1
 . tests/bench/lib.sh
 mitsuba_ready || exit 77
-for kind in kitchen parlour bedroom lounge study; do
+for kind in kitchen parlour bedroom lounge study cafe; do
     room=$build/rooms/$kind
     [ -e "$room/truth/objects.json" ] && continue
     mkdir -p "$room"
