@@ -1,6 +1,8 @@
 /* sky_doubt.c -- see sky_doubt.h. */
 #include "server/reconstruct/sky_doubt.h"
 
+#include <math.h>
+
 #include "server/gather/incident.h"
 #include "server/reconstruct/emitters.h"
 #include "server/render/sampler.h"
