@@ -13,9 +13,6 @@
 #include "server/reconstruct/look.h"
 #include "server/reconstruct/reconstruction.h"
 
-/* Share of what a segment was observed to show from which a texel is one of those observed. */
-#define EMITTERS_AS_BRIGHT 0.7f
-
 /* What is known of a segment's light. */
 struct emitter_evidence {
     rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
@@ -29,6 +26,13 @@ struct emitter_evidence {
     float share; /* part of `shown` that base colour 1 could not reflect */
     float doubt; /* radiance that a white surface there would send of unseen sky (sky_doubt.h) */
 };
+
+/* Whether a texel shows about what its segment was observed to show. */
+#define EMITTERS_AS_BRIGHT 0.7f
+static inline bool emitters_is_bright(const struct reconstruction *r, uint32_t texel) {
+    float shown = rgb_mean(r->evidence[reconstruction_segment(r, texel)].shown);
+    return rgb_mean(fused_radiance(&r->fused, texel)) > EMITTERS_AS_BRIGHT * shown;
+}
 
 /* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of
  * each; not those of hidden lamps, nor `shown` of what is unbound. */

@@ -30,22 +30,16 @@ static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
     return sum / WAYS;
 }
 
-/* Whether it is among those by which the segment is judged. */
-static bool is_bright(const struct reconstruction *r, uint32_t texel) {
-    float shown = rgb_mean(r->evidence[reconstruction_segment(r, texel)].shown);
-    return r->fused.count[texel] > 0.0f && rgb_mean(fused_radiance(&r->fused, texel)) > EMITTERS_AS_BRIGHT * shown;
-}
-
 float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count) {
     size_t bright = 0, met = 0, taken = 0;
     float sum = 0.0f;
     if (!r->environment.map.pixel)
         return 0.0f;
     for (size_t i = 0; i < count; i++)
-        bright += is_bright(r, texel[i]);
+        bright += emitters_is_bright(r, texel[i]);
     size_t of = bright > 0 ? bright : count, wanted = of < PLACES ? of : PLACES;
     for (size_t i = 0; i < count && taken < wanted; i++) {
-        if ((bright == 0 || is_bright(r, texel[i])) && met++ == taken * of / wanted) {
+        if ((bright == 0 || emitters_is_bright(r, texel[i])) && met++ == taken * of / wanted) {
             sum += unseen_light_at(r, texel[i]);
             taken++;
         }

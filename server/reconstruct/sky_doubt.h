@@ -2,7 +2,9 @@
  *
  * A window sill lies under the sky up to the zenith; photographs taken in the room look out a little above the horizon,
  * and what is above that was filled in from there (environment.h). Skies get brighter upwards, or towards the sun, by
- * factors. A sill that is brighter than white paint by the guess is no lamp as long as such a sky would explain it. */
+ * factors. A sill that is brighter than white paint by the guess is no lamp as long as such a sky would explain it.
+ * What falls there is told here; how much brighter it may be, and what emits, is decided in solve.c, and the map is not
+ * changed. */
 #ifndef UNBAKE_RECONSTRUCT_SKY_DOUBT_H
 #define UNBAKE_RECONSTRUCT_SKY_DOUBT_H
 

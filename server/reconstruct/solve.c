@@ -184,7 +184,7 @@ static void average_arrived(const struct solve *s) {
         if (!is_seen || !divide_white(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
-        if (rgb_mean(fused_radiance(&r->fused, texel)) > EMITTERS_AS_BRIGHT * rgb_mean(r->evidence[segment].shown))
+        if (emitters_is_bright(r, texel))
             add_arrived(sum[segment].bright, white);
     }
     for (size_t i = 0; i < r->segments.count; i++) {

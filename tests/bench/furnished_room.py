@@ -1,6 +1,7 @@
 """Makes a furnished room with its truth, to measure fidelity beyond the rooms of the test data.
 
-Not unseen any more: constants of gloss.c and sun_find.c were chosen on these rooms, too, but for the last.
+Not unseen any more: constants of gloss.c and sun_find.c were chosen on these rooms, too; on the last only SKY_DOUBT of
+solve.c was.
 
 usage: furnished_room.py kitchen|parlour|bedroom|lounge|study|cafe OUT [SPP]
 
