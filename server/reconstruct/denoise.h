@@ -1,11 +1,10 @@
 /* denoise.h -- base colour without the photographs' noise, and in-fill where nothing was measured.
  *
- * A Wiener filter (Wiener 1949) on an undecimated B3 spline wavelet (Starck, Fadili and Murtagh
- * 2007) of each chart. At every scale the power around a texel is that of texture plus that of
- * noise. What noise alone gives is known by a draw of it: half of the photographs of a texel held against
- * the others (halves.h), so that what they do not agree on is noise, and what correlates that of neighbouring texels
- * is accounted for. Where one photograph alone tells, the same look-up is made in a picture of pure noise (noise.h).
- * Detail is kept by its share of texture: walls become flat, wood keeps its grain.
+ * Each chart is filtered scale by scale (wiener.h), from one texel up to the whole chart: a wall that differs over a
+ * metre by no more than noise does is flat. What noise alone gives is known by a draw of it: half of the photographs
+ * of a texel held against the others (halves.h), so that what they do not agree on is noise, and what correlates that
+ * of neighbouring texels is accounted for. Where one photograph alone tells, the same look-up is made in a picture of
+ * pure noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain.
  * The weight of a texel tells how noisy it is beside its neighbours; one of weight 0 is filled in
  * from them, and a chart of which nothing is known from its prior. Nothing crosses the border of a
  * chart, so nothing crosses that of a segment. */
