@@ -48,7 +48,7 @@ static const struct setting table[] = {
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
      "time between preview pictures while the job runs"},
-    {"refine_looks", SETTING_INT, "looks", 0, 1000000000, NULL, "500", "solve",
+    {"refine_looks", SETTING_INT, "looks", 0, 1000000000, NULL, "1000", "solve",
      "refine: ends when so many looks were taken at each part of the texture; 0, or with iterations: goes on to the end"},
     {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64", NULL,
      "samples per pixel of the held-out re-renders"},

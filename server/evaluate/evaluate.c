@@ -238,13 +238,15 @@ static void mark_by_truth(const struct image *truth, uint8_t *flags) {
 }
 
 static enum status score_photograph(struct evaluator *e, const struct photograph *p, uint32_t view, const char *stem,
-                                    const struct image *truth, struct even *even, double *msre, struct error *err) {
+                                    const struct image *truth, struct evaluation *v, double *msre, struct error *err) {
     struct image photograph, render;
-    enum status status = STATUS_OK;
     make_pair(e, p, view, &photograph, &render);
     *msre = metrics_msre(&photograph, &render, e->median);
-    even_add(even, &photograph, &render, truth, e->median);
-    if (e->settings->pictures_dir)
+    even_add(&v->even, &photograph, &render, truth, e->median);
+    char *path = mem_printf("%s/truth/flat_%s.exr", e->room, stem);
+    enum status status = noise_floor_add(&v->floor, path, &photograph, *msre, e->median, err);
+    mem_free(path);
+    if (status == STATUS_OK && e->settings->pictures_dir)
         status = write_pair(e, "view", stem, &photograph, &render, "",
                             e->median > 0.0 ? (float)(0.2 / e->median) : 1.0f, err);
     image_release(&photograph);
@@ -268,7 +270,7 @@ static enum status score_view(struct evaluator *e, const struct photograph *p, u
     if (e->settings->pictures_dir)
         status = write_pair(e, "base_color", stem, &truth, &found, "base_color.", 1.0f, err);
     if (status == STATUS_OK && e->settings->spp)
-        status = score_photograph(e, p, view, stem, &truth, &v->even, msre, err);
+        status = score_photograph(e, p, view, stem, &truth, v, msre, err);
 out:
     image_release(&found);
     image_release(&truth);
@@ -368,6 +370,11 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
         json_add_number(root, "even_share", (double)v->even.count / (double)s->pixels);
         json_add_number(root, "msre_even", v->even.render / (double)v->even.count);
         json_add_number(root, "msre_even_noise", v->even.noise / (double)v->even.count);
+    }
+    if (v->floor.count > 0) {
+        json_add_int(root, "floor_views", (int64_t)v->floor.count);
+        json_add_number(root, "msre_floor_views", v->floor.msre / (double)v->floor.count);
+        json_add_number(root, "msre_floor", v->floor.floor / (double)v->floor.count);
     }
     return root;
 }

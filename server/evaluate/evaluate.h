@@ -15,6 +15,7 @@
 #include "common/json.h"
 #include "common/parallel.h"
 #include "server/evaluate/even.h"
+#include "server/evaluate/noise_floor.h"
 #include "server/evaluate/score.h"
 
 struct evaluate_settings {
@@ -35,6 +36,7 @@ struct evaluation {
     size_t emitters, emitters_found, emitters_missed, emitters_false;
     double msre, msre_deviation; /* mean over the views, and how they spread; NaN without re-renders */
     struct even even;            /* places whose photographs tell their own noise; nothing without re-renders */
+    struct noise_floor floor;    /* views whose photographs' noise the truth tells; none without re-renders */
 };
 
 /* `room` and `outputs` are folders. */

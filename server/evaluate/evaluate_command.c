@@ -91,6 +91,10 @@ static void print_table(const struct evaluation *v) {
         printf("  %-22s %6.4f of which the photographs' own noise is %.4f (%.1f %% of the pixels)\n",
                "  where all is even", v->even.render / (double)v->even.count,
                v->even.noise / (double)v->even.count, 100.0 * (double)v->even.count / (double)s->pixels);
+    if (v->floor.count > 0)
+        printf("  %-22s %6.4f of which the photographs' own noise is %.4f (by the errors of the truth's renders)\n",
+               v->floor.count == 1 ? "  in one view" : "  in some views", v->floor.msre / (double)v->floor.count,
+               v->floor.floor / (double)v->floor.count);
 }
 
 int evaluate_command(int argc, char **argv) {

@@ -177,6 +177,8 @@ static enum status loop(struct optimiser *o, struct error *err) {
                 return status;
         }
     }
+    if (o->method->finish)
+        o->method->finish(o->self);
     o->counters.elapsed_sec = fmax(o->counters.elapsed_sec, o->time_limit_sec); /* extended, it goes on for that long */
     return optimiser_save(o, err);
 }

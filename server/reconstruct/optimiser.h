@@ -30,6 +30,8 @@ struct optimiser_method {
     void (*resumed)(void *self);
     /* What part of its work is done, in [0, 1], for a run by time that may end before; NULL: it never does. */
     double (*done)(const void *self);
+    /* After the last iteration, before it is saved; NULL: nothing is left to do. */
+    void (*finish)(void *self);
     void (*free)(void *self);
 };
 

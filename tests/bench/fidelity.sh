@@ -64,6 +64,8 @@ measure() { # ROOM KIND
     row "MSRE of held-out views" "$(value msre)" "$msre" lower
     row "MSRE of even places" "$(value msre_even)" - lower
     row "MSRE of even places, the photographs' noise" "$(value msre_even_noise)" - lower
+    row "MSRE of views with a flat render" "$(value msre_floor_views)" - lower
+    row "MSRE of these, the photographs' noise" "$(value msre_floor)" - lower
     row "time of all stages but the report, minutes" "$(quotient "$(working_sec "$dir/out")" 60)" - lower
 }
 

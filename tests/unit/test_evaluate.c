@@ -62,6 +62,37 @@ static void test_score(void) {
     image_release(&found);
 }
 
+/* Two pixels of one radiance and another, of which flat renders are off by a tenth and a fifth; one is masked. */
+static void test_noise_floor(const char *dir) {
+    static const char *const flat_channels[6] = {"B", "G", "R", "err.B", "err.G", "err.R"};
+    struct image photograph, flat, render;
+    struct noise_floor floor = {0};
+    struct error err;
+    char *path = mem_printf("%s/flat.exr", dir);
+    image_init_rgb(&photograph, 3, 1);
+    image_init(&flat, 3, 1, 6, flat_channels);
+    for (size_t i = 0; i < 3; i++)
+        for (size_t c = 0; c < 3; c++) {
+            photograph.pixel[3 * i + c] = i == 0 ? 2.0f : i == 1 ? 1.0f : NAN;
+            flat.pixel[6 * i + c] = i == 0 ? 4.0f : 0.5f;
+            flat.pixel[6 * i + 3 + c] = i == 0 ? 0.4f : 0.1f;
+        }
+    /* 4 x (.2^2 / (4 + .01) + .2^2 / (1 + .01)) / 2 */
+    CHECK_NEAR(noise_floor_of(&photograph, &flat, 1.0), 2.0 * (0.04 / 4.01 + 0.04 / 1.01), 1e-6);
+    CHECK(noise_floor_add(&floor, path, &photograph, 0.5, 1.0, &err) == STATUS_OK && floor.count == 0);
+    CHECK(image_write_exr(path, &flat, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    CHECK(noise_floor_add(&floor, path, &photograph, 0.5, 1.0, &err) == STATUS_OK && floor.count == 1);
+    CHECK_NEAR(floor.floor, 2.0 * (0.04 / 4.01 + 0.04 / 1.01), 1e-6);
+    CHECK(floor.msre == 0.5);
+    image_init_rgb(&render, 3, 1); /* has no errors */
+    CHECK(image_write_exr(path, &render, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    CHECK(noise_floor_add(&floor, path, &photograph, 0.5, 1.0, &err) == STATUS_INPUT);
+    image_release(&render);
+    image_release(&flat);
+    image_release(&photograph);
+    mem_free(path);
+}
+
 /* A photograph of a wall under light that falls off, each pixel a tenth too bright or too dark, beside another object;
  * a shiny and a striped one tell nothing. */
 static void test_even(void) {
@@ -226,6 +257,7 @@ int main(void) {
     CHECK(mkdtemp(dir) != NULL);
     test_score();
     test_even();
+    test_noise_floor(dir);
     test_known(dir, pool);
     test_refused(dir, pool);
     test_picture(dir, pool);

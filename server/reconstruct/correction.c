@@ -1,0 +1,275 @@
+/* correction.c -- see correction.h. */
+#include "server/reconstruct/correction.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/scene/rgb_half.h"
+
+#define NONE UINT32_MAX
+/* Standard deviations of logarithms: of a cell's factor, and of its difference from that of the cell beside it. */
+static const float about_one[CORRECTION_KINDS] = {0.08f, 0.01f}, about_beside[CORRECTION_KINDS] = {0.01f, 0.003f};
+/* So many looks of the whole room's noise are added to those of a cell, whose own tell little of theirs. */
+#define ROOM_LOOKS 64.0f
+/* A logarithm is moved by so much at most. */
+#define MOST_MOVED 0.1f
+#define SWEEPS 100
+/* No factor takes a texel below this: from 0 none would bring it back. */
+#define LEAST_COLOR 0.002f
+
+/* --- cells -------------------------------------------------------------------------------------- */
+
+static uint32_t cell_in(const struct correction *c, long column, long row, uint32_t chart) {
+    if (column < 0 || row < 0 || column >= (long)c->columns || row >= (long)c->rows)
+        return NONE;
+    size_t block = (size_t)row * c->columns + (size_t)column;
+    for (uint32_t k = c->first[block]; k < c->first[block + 1]; k++)
+        if (c->cell[k].chart == chart)
+            return k;
+    return NONE;
+}
+
+static uint32_t cell_of(const struct correction *c, uint32_t texel) {
+    uint32_t width = c->inverse->width;
+    return cell_in(c, (long)(texel % width / c->spacing), (long)(texel / width / c->spacing),
+                   c->chart_of_triangle[c->inverse->triangle[texel]]);
+}
+
+/* Adds the cells of a block, which is the last so far. */
+static void add_cells(struct correction *c, size_t block, size_t *capacity) {
+    const struct inverse_uv *inverse = c->inverse;
+    uint32_t x0 = (uint32_t)(block % c->columns) * c->spacing, y0 = (uint32_t)(block / c->columns) * c->spacing;
+    c->first[block] = c->first[block + 1] = (uint32_t)c->count;
+    for (uint32_t y = y0; y < y0 + c->spacing && y < inverse->height; y++) {
+        for (uint32_t x = x0; x < x0 + c->spacing && x < inverse->width; x++) {
+            uint32_t triangle = inverse->triangle[(size_t)y * inverse->width + x];
+            if (triangle == INVERSE_UV_NONE || cell_of(c, y * inverse->width + x) != NONE)
+                continue;
+            if (c->count == *capacity) {
+                *capacity *= 2;
+                c->cell = mem_realloc_array(c->cell, *capacity, sizeof *c->cell);
+            }
+            c->cell[c->count++] = (struct correction_cell){.chart = c->chart_of_triangle[triangle]};
+            c->first[block + 1] = (uint32_t)c->count;
+        }
+    }
+}
+
+static void find_beside(struct correction *c, size_t block) {
+    long column = (long)(block % c->columns), row = (long)(block / c->columns);
+    for (uint32_t k = c->first[block]; k < c->first[block + 1]; k++) {
+        struct correction_cell *cell = &c->cell[k];
+        cell->beside[0] = cell_in(c, column - 1, row, cell->chart);
+        cell->beside[1] = cell_in(c, column + 1, row, cell->chart);
+        cell->beside[2] = cell_in(c, column, row - 1, cell->chart);
+        cell->beside[3] = cell_in(c, column, row + 1, cell->chart);
+    }
+}
+
+void correction_init(struct correction *c, struct texture *base_color, const struct inverse_uv *inverse,
+                     const uint32_t *chart_of_triangle, uint32_t spacing) {
+    *c = (struct correction){.base_color = base_color, .inverse = inverse, .chart_of_triangle = chart_of_triangle,
+                             .spacing = spacing, .columns = (inverse->width + spacing - 1) / spacing,
+                             .rows = (inverse->height + spacing - 1) / spacing};
+    size_t blocks = (size_t)c->columns * c->rows, capacity = blocks;
+    c->first = mem_calloc(blocks + 1, sizeof *c->first);
+    c->cell = mem_array(capacity, sizeof *c->cell);
+    for (size_t block = 0; block < blocks; block++)
+        add_cells(c, block, &capacity);
+    for (size_t block = 0; block < blocks; block++)
+        find_beside(c, block);
+    c->sums = mem_calloc(c->count, sizeof *c->sums);
+    c->solved = mem_calloc_large((size_t)inverse->width * inverse->height, sizeof *c->solved);
+    c->light = mem_calloc(c->count, sizeof *c->light);
+}
+
+void correction_release(struct correction *c) {
+    mem_free(c->first);
+    mem_free(c->cell);
+    mem_free(c->sums);
+    mem_free(c->solved);
+    mem_free(c->light);
+    *c = (struct correction){0};
+}
+
+void correction_start(struct correction *c) {
+    memset(c->sums, 0, c->count * sizeof *c->sums);
+    for (size_t i = 0; i < c->inverse->valid_count; i++) {
+        uint32_t texel = c->inverse->valid[i];
+        const float *color = c->base_color->texel[texel];
+        rgb_to_half(c->solved[texel], rgb_make(color[0], color[1], color[2]));
+    }
+}
+
+void correction_set_light(struct correction *c, const struct fused *fused) {
+    rgb *solved = mem_calloc(c->count, sizeof *solved), *shown = mem_calloc(c->count, sizeof *shown);
+    for (size_t i = 0; i < c->inverse->valid_count; i++) {
+        uint32_t texel = c->inverse->valid[i], cell = cell_of(c, texel);
+        if (!(fused->count[texel] > 0.0f))
+            continue;
+        solved[cell] = rgb_add(solved[cell], rgb_from_half(c->solved[texel]));
+        shown[cell] = rgb_add(shown[cell], fused_radiance(fused, texel));
+    }
+    for (size_t k = 0; k < c->count; k++) {
+        rgb s = rgb_clamp(solved[k], LEAST_COLOR, INFINITY);
+        c->light[k] = rgb_make(shown[k].r / s.r, shown[k].g / s.g, shown[k].b / s.b);
+    }
+    mem_free(shown);
+    mem_free(solved);
+}
+
+/* --- looks -------------------------------------------------------------------------------------- */
+
+rgb correction_expected(const struct correction *c, uint32_t texel) {
+    return rgb_mul(c->light[cell_of(c, texel)], rgb_from_half(c->solved[texel]));
+}
+
+void correction_look(struct correction *c, uint32_t texel, const struct match *match, float weight) {
+    struct correction_sums *s = &c->sums[cell_of(c, texel)];
+    float off[3], gray = 0.0f;
+    s->weight += weight;
+    for (int k = 0; k < 3; k++) {
+        s->shown[k] += weight * match->shown[k];
+        s->rendered[k] += weight * match->rendered[k] * expf(-s->factor[k]);
+        off[k] = match->shown[k] - match->rendered[k];
+        gray += off[k] / 3.0f;
+    }
+    s->squared[CORRECTION_GRAY] += weight * gray * gray;
+    for (int k = 0; k < 3; k++)
+        s->squared[CORRECTION_TINT] += weight / 3.0f * (off[k] - gray) * (off[k] - gray);
+}
+
+/* --- factors ------------------------------------------------------------------------------------ */
+
+/* The unknown logarithms of all cells, of one kind and channel, and what looks tell of them. */
+struct unknown {
+    const struct correction *correction;
+    float *told, *precision; /* [count] */
+    float *value;            /* [count] */
+};
+
+/* Gauss and Seidel's: each in turn where its looks, 1 and the cells beside it draw it. */
+static void sweep(const struct unknown *u, int kind) {
+    const struct correction *c = u->correction;
+    const float to_one = 1.0f / (about_one[kind] * about_one[kind]);
+    const float to_beside = 1.0f / (about_beside[kind] * about_beside[kind]);
+    for (size_t i = 0; i < c->count; i++) {
+        float sum = u->precision[i] * u->told[i], precision = u->precision[i] + to_one;
+        for (int k = 0; k < 4; k++) {
+            uint32_t beside = c->cell[i].beside[k];
+            if (beside == NONE)
+                continue;
+            sum += to_beside * u->value[beside];
+            precision += to_beside;
+        }
+        u->value[i] = sum / precision;
+    }
+}
+
+/* Mean squares of what looks in the whole room are off by. */
+static void room_variance(const struct correction *c, float variance[CORRECTION_KINDS]) {
+    double weight = 0.0, squared[CORRECTION_KINDS] = {0.0};
+    for (size_t i = 0; i < c->count; i++) {
+        weight += (double)c->sums[i].weight;
+        for (int kind = 0; kind < CORRECTION_KINDS; kind++)
+            squared[kind] += (double)c->sums[i].squared[kind];
+    }
+    for (int kind = 0; kind < CORRECTION_KINDS; kind++)
+        variance[kind] = weight > 0.0 ? (float)(squared[kind] / weight) : 0.0f;
+}
+
+/* How sure the looks at a cell are of its logarithms, as the inverse of a variance. */
+static float precision_of(const struct correction_sums *s, int kind, float room) {
+    float variance = (s->squared[kind] + ROOM_LOOKS * room) / (s->weight + ROOM_LOOKS);
+    return variance > 0.0f ? s->weight / variance : 0.0f;
+}
+
+/* Logarithm of shown over rendered, by channel; 0 where nothing was rendered. */
+static void told_by(const struct correction_sums *s, float log_ratio[3]) {
+    for (int k = 0; k < 3; k++)
+        log_ratio[k] = s->shown[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->shown[k] / s->rendered[k]) : 0.0f;
+}
+
+static float mean_of(const float value[3]) {
+    return (value[0] + value[1] + value[2]) / 3.0f;
+}
+
+/* Finds the most likely logarithms of one kind, of a channel where it is a tint, and adds them to factor[count][3]. */
+static void add_kind(const struct correction *c, struct unknown *u, int kind, int channel, float room,
+                     float (*factor)[3]) {
+    for (size_t i = 0; i < c->count; i++) {
+        float told[3];
+        told_by(&c->sums[i], told);
+        u->precision[i] = precision_of(&c->sums[i], kind, room);
+        u->told[i] = kind == CORRECTION_GRAY ? mean_of(told) : told[channel] - mean_of(told);
+        u->value[i] = 0.0f; /* and not what it was, or to apply twice would be to sweep longer */
+    }
+    for (int n = 0; n < SWEEPS; n++)
+        sweep(u, kind);
+    for (size_t i = 0; i < c->count; i++)
+        for (int k = 0; k < 3; k++)
+            factor[i][k] += kind == CORRECTION_GRAY || k == channel ? u->value[i] : 0.0f;
+}
+
+static void find_factors(struct correction *c) {
+    struct unknown u = {c, mem_array(c->count, sizeof(float)), mem_array(c->count, sizeof(float)),
+                        mem_array(c->count, sizeof(float))};
+    float(*factor)[3] = mem_calloc(c->count, sizeof *factor);
+    float room[CORRECTION_KINDS];
+    room_variance(c, room);
+    add_kind(c, &u, CORRECTION_GRAY, 0, room[CORRECTION_GRAY], factor);
+    for (int channel = 0; channel < 3; channel++)
+        add_kind(c, &u, CORRECTION_TINT, channel, room[CORRECTION_TINT], factor);
+    for (size_t i = 0; i < c->count; i++)
+        for (int k = 0; k < 3; k++)
+            c->sums[i].factor[k] = clampf(factor[i][k], -MOST_MOVED, MOST_MOVED);
+    mem_free(factor);
+    mem_free(u.told);
+    mem_free(u.precision);
+    mem_free(u.value);
+}
+
+/* --- texels ------------------------------------------------------------------------------------- */
+
+/* The logarithms at a valid texel: bilinear between the middles of the cells of its chart. */
+static void factor_at(const struct correction *c, uint32_t texel, float factor[3]) {
+    uint32_t width = c->inverse->width, chart = c->chart_of_triangle[c->inverse->triangle[texel]];
+    float x = ((float)(texel % width) + 0.5f) / (float)c->spacing - 0.5f;
+    float y = ((float)(texel / width) + 0.5f) / (float)c->spacing - 0.5f;
+    long column = (long)floorf(x), row = (long)floorf(y);
+    float tx = x - (float)column, ty = y - (float)row, weights = 0.0f;
+    factor[0] = factor[1] = factor[2] = 0.0f;
+    for (int tap = 0; tap < 4; tap++) {
+        uint32_t cell = cell_in(c, column + (tap & 1), row + (tap >> 1), chart);
+        if (cell == NONE)
+            continue;
+        float weight = (tap & 1 ? tx : 1.0f - tx) * (tap & 2 ? ty : 1.0f - ty) + 1e-6f;
+        for (int k = 0; k < 3; k++)
+            factor[k] += weight * c->sums[cell].factor[k];
+        weights += weight;
+    }
+    for (int k = 0; k < 3; k++)
+        factor[k] /= weights;
+}
+
+static void move_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct correction *c = user;
+    for (uint32_t x = 0; x < c->inverse->width; x++) {
+        uint32_t texel = (uint32_t)row * c->inverse->width + x;
+        if (c->inverse->triangle[texel] == INVERSE_UV_NONE)
+            continue;
+        float factor[3];
+        factor_at(c, texel, factor);
+        rgb solved = rgb_from_half(c->solved[texel]);
+        const float from[3] = {solved.r, solved.g, solved.b};
+        for (int k = 0; k < 3; k++)
+            c->base_color->texel[texel][k] = clampf(from[k] * expf(factor[k]), LEAST_COLOR, 1.0f);
+    }
+}
+
+void correction_apply(struct correction *c, struct parallel *pool) {
+    find_factors(c);
+    parallel_for(pool, c->inverse->height, move_row, c);
+}
