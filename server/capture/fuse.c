@@ -64,7 +64,8 @@ static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t c
     for (size_t i = 0; i < count; i++) {
         rgb deviation = noise_deviation(job->noise, job->views, &l->view[i], mean);
         l->look[i].deviation = BILINEAR_DEVIATION * rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
-        l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i]);
+        float times_mean = rgb_mean(l->look[i].value) / (rgb_mean(mean) + floor_radiance);
+        l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i] * times_mean * times_mean);
     }
 }
 

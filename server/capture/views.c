@@ -25,7 +25,8 @@
  * how many times brighter than the look-up it must be to make a difference. */
 #define MIXING_PIXELS 2.0f
 #define MIXING_FREE 2.0f
-#define MOST_MIXING 1000.0f
+/* No more can have been added than is shown. */
+#define MOST_MIXING 1.0f
 #define DARKEST 1e-3f /* shown radiance, as a share of the median */
 
 #define NO_SURFACE UINT32_MAX

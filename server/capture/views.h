@@ -70,9 +70,9 @@ vec3 views_direction(const struct views *v, uint32_t train, vec3 point);
 int views_edge(const struct views *v, const struct view *view, uint32_t triangle);
 float views_trust(const struct views *v, const struct view *view, uint32_t triangle);
 
-/* Variance, as a share of what is shown squared, that light of other surfaces may have added to a look-up
- * at a place of the triangle that shows `shown`: the more, the brighter its surroundings are. Neighbouring
- * look-ups share it: no mean takes it away. */
+/* Variance, as a share of what is shown squared, that light of other surfaces may have added to a look-up at a place
+ * of the triangle that shows `shown`: the more, the brighter its surroundings are, but no more than all that is
+ * shown. (So what looks dark beside light is dark.) Neighbouring look-ups share it: no mean takes it away. */
 float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown);
 
 /* Whether all four pixels that a look-up at the view's place reads are clean. */

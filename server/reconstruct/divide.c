@@ -88,6 +88,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
     vec3 wo = views_direction(d->views, view->train, at->position);
     rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
     rgb typical = rgb_scale(white, TYPICAL_BASE_COLOR);
+    float times_typical = rgb_mean(shown) / fmaxf(rgb_mean(typical), DARKEST * median);
     rgb gloss = rgb_gray(0.0f);
     if (m->specular[segment] > 0.0f) {
         struct highlight highlight;
@@ -108,7 +109,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
         .value = base,
         .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
         .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
-        .weight = weight * noise_weight(d->noise, d->views, view, typical, mixing),
+        .weight = weight * noise_weight(d->noise, d->views, view, typical, mixing * times_typical * times_typical),
         .source = view->train,
         .sharp = view->weight,
         .noise = rgb_scale(noise, noise_draw(view, sharp)),
