@@ -15,6 +15,8 @@ static const float about_one[CORRECTION_KINDS] = {0.08f, 0.01f}, about_beside[CO
 /* A logarithm is moved by so much at most. */
 #define MOST_MOVED 0.1f
 #define SWEEPS 100
+/* What a texel counts that photographs show only in pixels with other surfaces, when the light of its cell is told. */
+#define UNCLEAN 0.01f
 /* No factor takes a texel below this: from 0 none would bring it back. */
 #define LEAST_COLOR 0.002f
 
@@ -106,13 +108,15 @@ void correction_set_light(struct correction *c, const struct fused *fused) {
     rgb *solved = mem_calloc(c->count, sizeof *solved), *shown = mem_calloc(c->count, sizeof *shown);
     for (size_t i = 0; i < c->inverse->valid_count; i++) {
         uint32_t texel = c->inverse->valid[i], cell = cell_of(c, texel);
-        if (!(fused->count[texel] > 0.0f))
+        rgb radiance = fused_radiance(fused, texel);
+        if (rgb_is_black(radiance))
             continue;
-        solved[cell] = rgb_add(solved[cell], rgb_from_half(c->solved[texel]));
-        shown[cell] = rgb_add(shown[cell], fused_radiance(fused, texel));
+        float weight = fused->count[texel] > 0.0f ? 1.0f : UNCLEAN;
+        solved[cell] = rgb_mad(solved[cell], weight, rgb_from_half(c->solved[texel]));
+        shown[cell] = rgb_mad(shown[cell], weight, radiance);
     }
     for (size_t k = 0; k < c->count; k++) {
-        rgb s = rgb_clamp(solved[k], LEAST_COLOR, INFINITY);
+        rgb s = rgb_clamp(solved[k], LEAST_COLOR * UNCLEAN, INFINITY);
         c->light[k] = rgb_make(shown[k].r / s.r, shown[k].g / s.g, shown[k].b / s.b);
     }
     mem_free(shown);

@@ -136,12 +136,14 @@ static void test_expected(void) {
     begin();
     for (uint32_t i = 0; i < TEXELS; i++) {
         float shown = (i + i / WIDTH) % 2 ? 1.5f : 0.5f; /* 1 in the mean */
-        rgb_to_half(radiance[i], i == 1 ? rgb_make(0.75f, 1.5f, 1.5f) : rgb_gray(shown));
-        count[i] = i % WIDTH < WIDTH / 2 ? 1.0f : 0.0f;
+        bool is_shown = i % WIDTH < WIDTH / 2;
+        rgb_to_half(radiance[i], i == 1 ? rgb_make(0.75f, 1.5f, 1.5f) : rgb_gray(is_shown ? shown : 0.0f));
+        count[i] = i / WIDTH < 24 && is_shown ? 1.0f : 0.0f; /* below that only beside other surfaces */
     }
     correction_set_light(&correction, &fused);
     rgb plain = correction_expected(&correction, 20 * WIDTH + 20), texture = correction_expected(&correction, 1);
     CHECK_NEAR(plain.g, 1.0, 1e-3);
+    CHECK_NEAR(correction_expected(&correction, 28 * WIDTH + 4).g, 1.0, 1e-3);
     CHECK_NEAR(texture.g, 1.0, 1e-3);
     CHECK_NEAR(texture.r, 0.5, 0.01);
     CHECK(rgb_is_black(correction_expected(&correction, WIDTH - 1)));
