@@ -5,16 +5,21 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/capture/conjugate.h"
 #include "server/scene/rgb_half.h"
 
 #define NONE UINT32_MAX
-/* Standard deviations of logarithms: of a cell's factor, and of its difference from that of the cell beside it. */
-static const float about_one[CORRECTION_KINDS] = {0.08f, 0.01f}, about_beside[CORRECTION_KINDS] = {0.01f, 0.003f};
+/* Standard deviations of logarithms: of a cell's factor, and of its difference from that of the cell beside it. The
+ * first are wide, since what the cells of a chart are off by they share. */
+static const double about_one[CORRECTION_KINDS] = {0.3, 0.03}, about_beside[CORRECTION_KINDS] = {0.02, 0.006};
 /* So many looks of the whole room's noise are added to those of a cell, whose own tell little of theirs. */
 #define ROOM_LOOKS 64.0f
 /* A logarithm is moved by so much at most. */
-#define MOST_MOVED 0.1f
-#define SWEEPS 100
+#define MOST_MOVED 0.2f
+/* Conjugate gradients end when the residual has this part of its square, or after so many steps: the looser the hold
+ * on 1, the further what a chart's cells share has to travel. */
+#define RESIDUAL_PART 1e-8
+#define STEPS_MOST 2000
 /* What a texel counts that photographs show only in pixels with other surfaces, when the light of its cell is told. */
 #define UNCLEAN 0.01f
 /* No factor takes a texel below this: from 0 none would bring it back. */
@@ -146,28 +151,33 @@ void correction_look(struct correction *c, uint32_t texel, const struct match *m
 
 /* --- factors ------------------------------------------------------------------------------------ */
 
-/* The unknown logarithms of all cells, of one kind and channel, and what looks tell of them. */
-struct unknown {
+/* The logarithms of one kind, and of a channel where it is a tint, as least squares: drawn to what looks tell, to 0, and
+ * to those of the cells beside. */
+struct likely {
     const struct correction *correction;
-    float *told, *precision; /* [count] */
-    float *value;            /* [count] */
+    double to_one, to_beside; /* inverse variances */
+    double *precision;        /* [count] of looks */
 };
 
-/* Gauss and Seidel's: each in turn where its looks, 1 and the cells beside it draw it. */
-static void sweep(const struct unknown *u, int kind) {
-    const struct correction *c = u->correction;
-    const float to_one = 1.0f / (about_one[kind] * about_one[kind]);
-    const float to_beside = 1.0f / (about_beside[kind] * about_beside[kind]);
-    for (size_t i = 0; i < c->count; i++) {
-        float sum = u->precision[i] * u->told[i], precision = u->precision[i] + to_one;
+static void likely_multiply(const void *user, const double *value, double *out) {
+    const struct likely *l = user;
+    for (size_t i = 0; i < l->correction->count; i++) {
+        out[i] = (l->precision[i] + l->to_one) * value[i];
         for (int k = 0; k < 4; k++) {
-            uint32_t beside = c->cell[i].beside[k];
-            if (beside == NONE)
-                continue;
-            sum += to_beside * u->value[beside];
-            precision += to_beside;
+            uint32_t beside = l->correction->cell[i].beside[k];
+            out[i] += beside == NONE ? 0.0 : l->to_beside * (value[i] - value[beside]);
         }
-        u->value[i] = sum / precision;
+    }
+}
+
+/* By the diagonal. */
+static void likely_precondition(const void *user, const double *residual, double *out) {
+    const struct likely *l = user;
+    for (size_t i = 0; i < l->correction->count; i++) {
+        double diagonal = l->precision[i] + l->to_one;
+        for (int k = 0; k < 4; k++)
+            diagonal += l->correction->cell[i].beside[k] == NONE ? 0.0 : l->to_beside;
+        out[i] = residual[i] / diagonal;
     }
 }
 
@@ -199,39 +209,40 @@ static float mean_of(const float value[3]) {
     return (value[0] + value[1] + value[2]) / 3.0f;
 }
 
-/* Finds the most likely logarithms of one kind, of a channel where it is a tint, and adds them to factor[count][3]. */
-static void add_kind(const struct correction *c, struct unknown *u, int kind, int channel, float room,
-                     float (*factor)[3]) {
+/* Adds to factor[count][3] the most likely logarithms of one kind, of a channel where it is a tint. They are sought from
+ * 0 and not from what they were, or to apply twice would be to seek for longer. */
+static void add_kind(const struct correction *c, int kind, int channel, float room, float (*factor)[3]) {
+    struct likely l = {c, 1.0 / (about_one[kind] * about_one[kind]), 1.0 / (about_beside[kind] * about_beside[kind]),
+                       mem_array(c->count, sizeof *l.precision)};
+    const struct conjugate_system system = {c->count, likely_multiply, likely_precondition, &l};
+    double *value = mem_calloc(c->count, sizeof *value), *residual = mem_array(c->count, sizeof *residual);
     for (size_t i = 0; i < c->count; i++) {
         float told[3];
         told_by(&c->sums[i], told);
-        u->precision[i] = precision_of(&c->sums[i], kind, room);
-        u->told[i] = kind == CORRECTION_GRAY ? mean_of(told) : told[channel] - mean_of(told);
-        u->value[i] = 0.0f; /* and not what it was, or to apply twice would be to sweep longer */
+        l.precision[i] = (double)precision_of(&c->sums[i], kind, room);
+        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? mean_of(told) : told[channel] - mean_of(told));
     }
-    for (int n = 0; n < SWEEPS; n++)
-        sweep(u, kind);
+    double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);
+    conjugate_solve(&system, STEPS_MOST, goal, residual, value);
     for (size_t i = 0; i < c->count; i++)
         for (int k = 0; k < 3; k++)
-            factor[i][k] += kind == CORRECTION_GRAY || k == channel ? u->value[i] : 0.0f;
+            factor[i][k] += kind == CORRECTION_GRAY || k == channel ? (float)value[i] : 0.0f;
+    mem_free(l.precision);
+    mem_free(residual);
+    mem_free(value);
 }
 
 static void find_factors(struct correction *c) {
-    struct unknown u = {c, mem_array(c->count, sizeof(float)), mem_array(c->count, sizeof(float)),
-                        mem_array(c->count, sizeof(float))};
     float(*factor)[3] = mem_calloc(c->count, sizeof *factor);
     float room[CORRECTION_KINDS];
     room_variance(c, room);
-    add_kind(c, &u, CORRECTION_GRAY, 0, room[CORRECTION_GRAY], factor);
+    add_kind(c, CORRECTION_GRAY, 0, room[CORRECTION_GRAY], factor);
     for (int channel = 0; channel < 3; channel++)
-        add_kind(c, &u, CORRECTION_TINT, channel, room[CORRECTION_TINT], factor);
+        add_kind(c, CORRECTION_TINT, channel, room[CORRECTION_TINT], factor);
     for (size_t i = 0; i < c->count; i++)
         for (int k = 0; k < 3; k++)
             c->sums[i].factor[k] = clampf(factor[i][k], -MOST_MOVED, MOST_MOVED);
     mem_free(factor);
-    mem_free(u.told);
-    mem_free(u.precision);
-    mem_free(u.value);
 }
 
 /* --- texels ------------------------------------------------------------------------------------- */

@@ -4,11 +4,11 @@
  * the atlas, a cell, what photographs showed and what was rendered is summed, and their ratio is the factor by which
  * its base colour is off (to first order a surface's radiance is its base colour times its light). One look is off by
  * a third, so factors are those that are most likely by all looks and two priors: solve's light is about right, and a
- * factor is about that of the cells beside it in its chart. What makes colours other than they are is thought less
- * likely than what makes them lighter or darker. Between the middles of cells factors are interpolated; texture
- * within stays.
+ * factor is about that of the cells beside it in its chart (a Gaussian Markov random field: Rue and Held 2005). What
+ * makes colours other than they are is thought less likely than what makes them lighter or darker. Between the middles
+ * of cells factors are interpolated; texture within stays.
  *
- * Photographs' noise is taken as the looks themselves tell of it. No factor moves base colour by more than a tenth:
+ * Photographs' noise is taken as the looks themselves tell of it. No factor moves base colour by more than a fifth:
  * what asks for more is not what solve left, but light that the renders lack or have too much of. */
 #ifndef UNBAKE_RECONSTRUCT_CORRECTION_H
 #define UNBAKE_RECONSTRUCT_CORRECTION_H

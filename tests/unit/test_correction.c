@@ -104,6 +104,18 @@ static void test_few(void) {
     CHECK_THAT(red > 0.005 && red < 0.075, "%.4f", red);
 }
 
+/* Looks that tell little of each cell tell much of what a chart's cells share. */
+static void test_together(void) {
+    const float ratio[3] = {1.12f, 1.12f, 1.12f};
+    double sum = 0.0;
+    begin();
+    look(0, WIDTH / 2, ratio, 4);
+    for (uint32_t x = 4; x < WIDTH / 2; x += 8)
+        sum += factor(x, 12, 1) / 4.0;
+    CHECK_NEAR(sum, 1.12, 0.03);
+    end();
+}
+
 /* Renders that are right and photographs that are seldom far too bright and often too dark: base colour stays. */
 static void test_noise(void) {
     const float ratio[3] = {1.0f, 1.0f, 1.0f};
@@ -150,13 +162,13 @@ static void test_expected(void) {
     end();
 }
 
-/* However long looks ask for more, they move base colour by a tenth. */
+/* However long looks ask for more, they move base colour by a fifth. */
 static void test_bound(void) {
     const float ratio[3] = {3.0f, 1.0f, 0.2f};
     begin();
     look(0, WIDTH, ratio, 512);
-    CHECK_NEAR(factor(20, 16, 0), exp(0.1), 1e-3);
-    CHECK_NEAR(factor(20, 16, 2), exp(-0.1), 1e-3);
+    CHECK_NEAR(factor(20, 16, 0), exp(0.2), 1e-3);
+    CHECK_NEAR(factor(20, 16, 2), exp(-0.2), 1e-3);
     end();
 }
 
@@ -183,6 +195,7 @@ int main(void) {
     test_looks();
     test_beside();
     test_few();
+    test_together();
     test_noise();
     test_bound();
     test_again();
