@@ -151,8 +151,8 @@ void correction_look(struct correction *c, uint32_t texel, const struct match *m
 
 /* --- factors ------------------------------------------------------------------------------------ */
 
-/* The logarithms of one kind, and of a channel where it is a tint, as least squares: drawn to what looks tell, to 0, and
- * to those of the cells beside. */
+/* The logarithms of one kind, and of a channel where it is a tint, as least squares: drawn to what looks tell, to 0,
+ * and to those of the cells beside. */
 struct likely {
     const struct correction *correction;
     double to_one, to_beside; /* inverse variances */
@@ -209,8 +209,8 @@ static float mean_of(const float value[3]) {
     return (value[0] + value[1] + value[2]) / 3.0f;
 }
 
-/* Adds to factor[count][3] the most likely logarithms of one kind, of a channel where it is a tint. They are sought from
- * 0 and not from what they were, or to apply twice would be to seek for longer. */
+/* Adds to factor[count][3] the most likely logarithms of one kind, of a channel where it is a tint. They are sought
+ * from 0 and not from what they were, or to apply twice would be to seek for longer. */
 static void add_kind(const struct correction *c, int kind, int channel, float room, float (*factor)[3]) {
     struct likely l = {c, 1.0 / (about_one[kind] * about_one[kind]), 1.0 / (about_beside[kind] * about_beside[kind]),
                        mem_array(c->count, sizeof *l.precision)};
@@ -219,8 +219,9 @@ static void add_kind(const struct correction *c, int kind, int channel, float ro
     for (size_t i = 0; i < c->count; i++) {
         float told[3];
         told_by(&c->sums[i], told);
+        float gray = mean_of(told);
         l.precision[i] = (double)precision_of(&c->sums[i], kind, room);
-        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? mean_of(told) : told[channel] - mean_of(told));
+        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : told[channel] - gray);
     }
     double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);
     conjugate_solve(&system, STEPS_MOST, goal, residual, value);
