@@ -11,11 +11,11 @@
 #define NONE UINT32_MAX
 /* Standard deviations of logarithms: of a cell's factor, and of its difference from that of the cell beside it. The
  * first are wide, since what the cells of a chart are off by they share. */
-static const double about_one[CORRECTION_KINDS] = {0.3, 0.03}, about_beside[CORRECTION_KINDS] = {0.02, 0.006};
+static const double about_one[CORRECTION_KINDS] = {0.2, 0.03}, about_beside[CORRECTION_KINDS] = {0.02, 0.006};
 /* So many looks of the whole room's noise are added to those of a cell, whose own tell little of theirs. */
 #define ROOM_LOOKS 64.0f
 /* A logarithm is moved by so much at most. */
-#define MOST_MOVED 0.2f
+#define MOST_MOVED 0.1f
 /* Conjugate gradients end when the residual has this part of its square, or after so many steps: the looser the hold
  * on 1, the further what a chart's cells share has to travel. */
 #define RESIDUAL_PART 1e-8

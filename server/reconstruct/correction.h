@@ -8,7 +8,7 @@
  * makes colours other than they are is thought less likely than what makes them lighter or darker. Between the middles
  * of cells factors are interpolated; texture within stays.
  *
- * Photographs' noise is taken as the looks themselves tell of it. No factor moves base colour by more than a fifth:
+ * Photographs' noise is taken as the looks themselves tell of it. No factor moves base colour by more than a tenth:
  * what asks for more is not what solve left, but light that the renders lack or have too much of. */
 #ifndef UNBAKE_RECONSTRUCT_CORRECTION_H
 #define UNBAKE_RECONSTRUCT_CORRECTION_H
