@@ -1,145 +1,138 @@
-/* detail.c -- see detail.h. */
+/* detail.c -- see detail.h.
+ *
+ * Photographs are gone through pixel by pixel, on all threads; what each tells of the texels beneath it is added to sums
+ * of whole numbers, which come out the same in any order. */
 #include "server/reconstruct/detail.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "common/mem.h"
 #include "server/capture/halves.h"
 #include "server/reconstruct/footprint.h"
 #include "server/scene/rgb_half.h"
-#include "server/scene/surface.h"
 
-#define SIDE 3     /* places a row and column of a footprint at which the texture is read */
 #define CHUNK 4096 /* texels a work item */
 #define STRIDE 16  /* pixels, when it is asked how large they are */
+#define NONE UINT32_MAX
 /* A pixel is asked only where most of what it covers is known. */
 #define KNOWN_LEAST 0.75f
-#define TAP_LEAST 0.05f /* weight of the known ones among the four texels of a look-up */
 /* What differs over more than this many pixels to either side is not texture; told from at least so many of them. */
 #define WINDOW 5
 #define WINDOW_LEAST 12.0f
+/* Of base colour, by one pixel. */
+#define OFF_MOST 0.2f
+/* Noise of a pixel, as a share of what it shows, is told from base colour and so much more: highlights are noisy, too. */
+#define SHEEN 0.1f
 /* The lesser half of the photographs of a texel must have this part of the weight. */
 #define HALF_LEAST 0.15f
-/* Of base colour, at once: by one pixel, and of one texel. */
-#define OFF_MOST 0.2f
-#define STEP_MOST 0.2f
-#define BASE_MOST 1.2f
-/* Base colour by which looks are weighed, as in divide.c. */
-#define TYPICAL_BASE_COLOR 0.5f
+/* Texels to either side over which it is averaged how far the halves agree, and what disagreement counts: it is in part
+ * that one half is sharper than the other. */
+#define AROUND 4
+#define DISAGREEMENT 0.1f
+#define SHARE_LEAST 0.05f /* texels of which the photographs tell less stay as they are */
+/* Of whole numbers in sums: for pixels of a texel; so that the sum of the most of them has room. */
+#define COUNT_SCALE 4096.0f
+#define SUM_MOST 1e9f
 
-enum { VALUE, NOISE, KINDS };
+enum { RED, GREEN, BLUE, SUMS };
 
-/* What is told of a value, and of the noise in it. */
-struct both {
-    rgb of[KINDS];
-};
-
-/* One photograph of a step. */
+/* One photograph that is gone through. */
 struct picture_job {
     struct detail *detail;
     uint32_t train;
-    struct both *raw; /* [pixels] NAN where a pixel is not asked */
+    rgb *raw; /* [pixels] what is off before the mean is taken away */
 };
-
-static float *channels_of(rgb *value) {
-    return &value->r;
-}
 
 static const struct photograph *photograph_of(const struct detail *d, uint32_t train) {
     return &d->r->scene->photograph[d->views->train[train]];
 }
 
+static size_t pixels_of(const struct detail *d, uint32_t train) {
+    const struct camera *camera = &photograph_of(d, train)->camera;
+    return (size_t)camera->width * camera->height;
+}
+
+/* Calls body for each row of each photograph. */
+static void for_rows(struct detail *d, void (*body)(void *user, size_t row, int thread)) {
+    for (uint32_t t = 0; t < d->views->train_count; t++) {
+        struct picture_job job = {.detail = d, .train = t};
+        parallel_for(d->r->pool, photograph_of(d, t)->camera.height, body, &job);
+    }
+}
+
+static void for_texels(struct detail *d, void (*body)(void *user, size_t chunk, int thread)) {
+    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, body, d);
+}
+
+/* The texels beneath a pixel that shows a triangle; false where too few of them are known. */
+static bool texels_beneath(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
+                           struct footprint_texels *t) {
+    const struct reconstruction *r = d->r;
+    struct footprint f;
+    return triangle != NONE &&
+           footprint_of_triangle(&f, &r->scene->mesh, &r->atlas, &photograph_of(d, train)->camera, x, y, triangle) &&
+           footprint_texels(t, &f, r->atlas.chart_of_triangle[triangle], d->chart_of_texel, r->inverse.width,
+                            r->inverse.height) >= KNOWN_LEAST;
+}
+
+static void add_to(_Atomic int32_t *sum, float what) {
+    atomic_fetch_add_explicit(sum, (int32_t)lrintf(what), memory_order_relaxed);
+}
+
 /* --- what pixels should show -------------------------------------------------------------------- */
 
-static bool is_known(const struct detail *d, size_t texel) {
-    return d->measured[texel].weight > 0.0f && d->white[texel][0] != 0;
+static rgb divided(rgb over, rgb under) {
+    return rgb_make(over.r / under.r, over.g / under.g, over.b / under.b);
 }
 
-static void add(struct both *sum, float weight, const struct both *one) {
-    for (int kind = 0; kind < KINDS; kind++)
-        sum->of[kind] = rgb_mad(sum->of[kind], weight, one->of[kind]);
-}
-
-/* What the texel (x, y) of a chart sends out; false where that is not known. */
-static bool texel_sends(const struct detail *d, long x, long y, uint32_t chart, struct both *radiance) {
-    const struct inverse_uv *inverse = &d->r->inverse;
-    if (x < 0 || y < 0 || x >= (long)inverse->width || y >= (long)inverse->height)
-        return false;
-    size_t texel = (size_t)y * inverse->width + (size_t)x;
-    uint32_t triangle = inverse->triangle[texel];
-    if (triangle == INVERSE_UV_NONE || d->r->atlas.chart_of_triangle[triangle] != chart || !is_known(d, texel))
-        return false;
-    rgb white = rgb_from_half(d->white[texel]);
-    radiance->of[VALUE] = rgb_mul(rgb_from_half(d->measured[texel].value), white);
-    radiance->of[NOISE] = rgb_mul(rgb_from_half(d->measured[texel].noise), white);
-    return true;
-}
-
-/* Adds a bilinear look-up at a place of the atlas, of the texels that are known; false where there are none. */
-static bool add_place(struct both *sum, const struct detail *d, vec2 at, uint32_t chart) {
-    float fx = at.x - 0.5f, fy = at.y - 0.5f, weights = 0.0f;
-    long x = (long)floorf(fx), y = (long)floorf(fy);
-    float tx = fx - (float)x, ty = fy - (float)y;
-    struct both here = {{{0.0f, 0.0f, 0.0f}}}, tap;
-    for (int k = 0; k < 4; k++) {
-        float weight = (k & 1 ? tx : 1.0f - tx) * (k & 2 ? ty : 1.0f - ty);
-        if (texel_sends(d, x + (k & 1), y + (k >> 1), chart, &tap)) {
-            add(&here, weight, &tap);
-            weights += weight;
-        }
-    }
-    if (weights < TAP_LEAST)
-        return false;
-    add(sum, 1.0f / weights, &here);
-    return true;
-}
-
-/* The mean over a footprint. */
-static bool footprint_sends(const struct detail *d, const struct footprint *f, struct both *radiance) {
-    uint32_t chart = d->r->atlas.chart_of_triangle[f->triangle];
-    struct both sum = {{{0.0f, 0.0f, 0.0f}}};
-    float count = 0.0f;
-    for (int k = 0; k < SIDE * SIDE; k++) {
-        float a = ((float)(k % SIDE) + 0.5f) / SIDE - 0.5f, b = ((float)(k / SIDE) + 0.5f) / SIDE - 0.5f;
-        vec2 at = {f->middle.x + a * f->across.x + b * f->down.x, f->middle.y + a * f->across.y + b * f->down.y};
-        count += add_place(&sum, d, at, chart) ? 1.0f : 0.0f;
-    }
-    *radiance = (struct both){{rgb_scale(sum.of[VALUE], 1.0f / count), rgb_scale(sum.of[NOISE], 1.0f / count)}};
-    return count >= KNOWN_LEAST * SIDE * SIDE;
-}
-
-/* Bounds each channel by a part of what is white: a single pixel that is far too bright, as a renderer's samples may
- * leave it, would darken all around it when the mean is taken away. */
-static rgb bounded(rgb off, rgb white) {
-    rgb most = rgb_scale(white, OFF_MOST);
-    return rgb_make(clampf(off.r, -most.r, most.r), clampf(off.g, -most.g, most.g), clampf(off.b, -most.b, most.b));
-}
-
-/* What a pixel shows beyond what the texture tells; of noise it should show none. NAN where it is not asked. */
-static struct both pixel_off(const struct picture_job *job, uint32_t x, uint32_t y) {
-    const struct detail *d = job->detail;
+/* The triangle that a pixel shows; NONE where that is an emitter, or not all that it shows, or more than it can tell. */
+static uint32_t triangle_shown(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, rgb *shown) {
+    const struct photograph *photo = photograph_of(d, train);
     const struct reconstruction *r = d->r;
-    const struct photograph *photo = photograph_of(d, job->train);
     struct photograph_sample s;
     struct footprint f;
-    struct both told;
-    if (d->views->edge[job->train][(size_t)y * photo->camera.width + x] > 0 ||
+    if (d->views->edge[train][(size_t)y * photo->camera.width + x] > 0 ||
         !photograph_sample(photo, (float)x + 0.5f, (float)y + 0.5f, &s) || s.saturated[0] || s.saturated[1] ||
         s.saturated[2] || !footprint_find(&f, &r->scene->mesh, &r->atlas, d->views->accel, &photo->camera, x, y) ||
-        r->is_emitter[r->segments.of_triangle[f.triangle]] || !footprint_sends(d, &f, &told))
-        return (struct both){{rgb_gray(NAN), rgb_gray(NAN)}};
-    size_t middle = (size_t)f.middle.y * r->inverse.width + (size_t)f.middle.x;
-    rgb white = rgb_from_half(d->white[middle]);
-    return (struct both){{bounded(rgb_sub(s.radiance, told.of[VALUE]), white),
-                          bounded(rgb_scale(told.of[NOISE], -1.0f), white)}};
+        r->is_emitter[r->segments.of_triangle[f.triangle]])
+        return NONE;
+    *shown = s.radiance;
+    return f.triangle;
 }
 
+/* What of a pixel's noise is that of its brightness: as a share of white its variance is that of a share of what it
+ * shows. */
+static float worth_of(const struct detail *d, const struct photograph *photo, rgb told, rgb white) {
+    rgb bright = rgb_mad(rgb_clamp(told, 0.0f, INFINITY), SHEEN, white);
+    float dark = SHEEN * rgb_mean(white) / rgb_mean(bright);
+    return noise_weight_of_brightness(&d->r->noise, photo, bright) * dark * dark;
+}
+
+/* What each pixel shows beyond what the texture tells, as base colour. A single pixel that is far too bright, as a
+ * renderer's samples may leave it, would darken all around it when the mean is taken away. */
 static void find_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct picture_job *job = user;
-    uint32_t width = photograph_of(job->detail, job->train)->camera.width;
-    for (uint32_t x = 0; x < width; x++)
-        job->raw[row * width + x] = pixel_off(job, x, (uint32_t)row);
+    struct detail *d = job->detail;
+    const struct photograph *photo = photograph_of(d, job->train);
+    struct footprint_texels t;
+    for (uint32_t x = 0; x < photo->camera.width; x++) {
+        size_t at = row * photo->camera.width + x;
+        rgb shown = rgb_gray(0.0f), told = shown, white = shown;
+        uint32_t triangle = triangle_shown(d, job->train, x, (uint32_t)row, &shown);
+        d->triangle[job->train][at] = NONE;
+        if (!texels_beneath(d, job->train, x, (uint32_t)row, triangle, &t))
+            continue;
+        for (size_t i = 0; i < t.count; i++) {
+            rgb part = rgb_scale(rgb_from_half(d->white[t.texel[i]]), t.share[i]);
+            white = rgb_add(white, part);
+            told = rgb_add(told, rgb_mul(part, rgb_from_half(d->measured[t.texel[i]].value)));
+        }
+        d->triangle[job->train][at] = triangle;
+        d->worth[job->train][at] = worth_of(d, photo, told, white);
+        job->raw[at] = rgb_clamp(divided(rgb_sub(shown, told), white), -OFF_MOST, OFF_MOST);
+    }
 }
 
 /* Takes away the mean of the same segment's pixels around each. */
@@ -148,118 +141,204 @@ static void flatten_row(void *user, size_t row, int thread) {
     const struct picture_job *job = user;
     const struct camera *camera = &photograph_of(job->detail, job->train)->camera;
     const uint8_t *owner = job->detail->views->owner[job->train];
+    const uint32_t *triangle = job->detail->triangle[job->train];
     long width = (long)camera->width, height = (long)camera->height, y0 = (long)row;
     for (long x0 = 0; x0 < width; x0++) {
         size_t at = (size_t)(y0 * width + x0);
-        struct both off = job->raw[at], sum = {{{0.0f, 0.0f, 0.0f}}};
+        rgb sum = rgb_gray(0.0f), off = rgb_gray(NAN);
         float count = 0.0f;
-        for (long y = y0 > WINDOW ? y0 - WINDOW : 0; !isnan(off.of[VALUE].r) && y <= y0 + WINDOW && y < height; y++) {
+        for (long y = y0 > WINDOW ? y0 - WINDOW : 0; triangle[at] != NONE && y <= y0 + WINDOW && y < height; y++) {
             for (long x = x0 > WINDOW ? x0 - WINDOW : 0; x <= x0 + WINDOW && x < width; x++) {
-                const struct both *beside = &job->raw[y * width + x];
-                if (isnan(beside->of[VALUE].r) || owner[y * width + x] != owner[at])
+                size_t beside = (size_t)(y * width + x);
+                if (triangle[beside] == NONE || owner[beside] != owner[at])
                     continue;
-                add(&sum, 1.0f, beside);
+                sum = rgb_add(sum, job->raw[beside]);
                 count += 1.0f;
             }
         }
-        add(&off, count < WINDOW_LEAST ? NAN : -1.0f / count, &sum);
-        for (int kind = 0; kind < KINDS; kind++)
-            rgb_to_half(job->detail->off[kind][job->train][at], off.of[kind]);
+        if (count >= WINDOW_LEAST)
+            off = rgb_mad(job->raw[at], -1.0f / count, sum);
+        rgb_to_half(job->detail->off[job->train][at], off);
     }
 }
 
-static void make_picture(struct detail *d, uint32_t train) {
-    const struct camera *camera = &photograph_of(d, train)->camera;
-    struct picture_job job = {.detail = d, .train = train};
-    job.raw = mem_array((size_t)camera->width * camera->height, sizeof *job.raw);
-    parallel_for(d->r->pool, camera->height, find_row, &job);
-    parallel_for(d->r->pool, camera->height, flatten_row, &job);
-    mem_free(job.raw);
-}
-
-/* --- what it means for texels ------------------------------------------------------------------- */
-
-/* Bilinear look-up in a picture; false where a pixel was not asked. */
-static bool off_at(const struct detail *d, const struct view *view, int kind, rgb *off) {
-    const struct camera *camera = &photograph_of(d, view->train)->camera;
-    float fx = view->x - 0.5f, fy = view->y - 0.5f;
-    long x = (long)floorf(fx), y = (long)floorf(fy), width = (long)camera->width;
-    if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= (long)camera->height)
-        return false;
-    float tx = fx - (float)x, ty = fy - (float)y;
-    *off = rgb_gray(0.0f);
-    for (int k = 0; k < 4; k++) {
-        float weight = (k & 1 ? tx : 1.0f - tx) * (k & 2 ? ty : 1.0f - ty);
-        *off = rgb_mad(*off, weight, rgb_from_half(d->off[kind][view->train][(y + (k >> 1)) * width + x + (k & 1)]));
+/* Forgets pixels that are not asked after all, and counts the others by texel and half. */
+static void count_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct picture_job *job = user;
+    struct detail *d = job->detail;
+    uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
+    int half = halves_usual(train);
+    struct footprint_texels t;
+    for (uint32_t x = 0; x < width; x++) {
+        size_t at = row * width + x;
+        if (isnan(image_float_from_half(d->off[train][at][0])))
+            d->triangle[train][at] = NONE;
+        if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
+            continue;
+        for (size_t i = 0; i < t.count; i++)
+            add_to(&d->sum[t.texel[i]][half], COUNT_SCALE * d->worth[train][at] * t.share[i]);
     }
-    return !isnan(off->r);
 }
 
-/* Weighted sums over the photographs of a texel. */
-struct sums {
-    float weight, weight_squared, of_half[2];
-    rgb off[KINDS];
-    rgb squared, crossed; /* of value: weight squared x its square; x itself */
-};
+/* --- how far photographs agree ------------------------------------------------------------------ */
 
-static void add_photograph(struct sums *s, const struct detail *d, const struct view *view, uint32_t triangle,
-                           rgb typical) {
-    rgb value, noise;
-    if (views_edge(d->views, view, triangle) > 0 || !off_at(d, view, VALUE, &value) || !off_at(d, view, NOISE, &noise))
+/* Adds what pixels are off by, by texel and half. */
+static void halve_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct picture_job *job = user;
+    struct detail *d = job->detail;
+    uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
+    int half = halves_usual(train);
+    struct footprint_texels t;
+    for (uint32_t x = 0; x < width; x++) {
+        size_t at = row * width + x;
+        if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
+            continue;
+        float off = d->sum_scale * d->worth[train][at] * rgb_mean(rgb_from_half(d->off[train][at]));
+        for (size_t i = 0; i < t.count; i++)
+            add_to(&d->sum[t.texel[i]][half], off * t.share[i]);
+    }
+}
+
+/* Adds the square of the mean of what a texel is off by, and what both halves have in common of it; nothing where one
+ * tells next to nothing. */
+static void add_agreement(const struct detail *d, size_t texel, double *square, double *common) {
+    const float *count = d->count[texel];
+    float all = count[0] + count[1];
+    if (!(all > 0.0f) || fminf(count[0], count[1]) < HALF_LEAST * all)
         return;
-    float weight = view->weight * noise_weight_of_brightness(&d->r->noise, photograph_of(d, view->train), typical);
-    int half = halves_usual(view->train);
-    s->weight += weight;
-    s->weight_squared += weight * weight;
-    s->of_half[half] += weight;
-    s->off[VALUE] = rgb_mad(s->off[VALUE], weight, value);
-    s->off[NOISE] = rgb_mad(s->off[NOISE], weight, rgb_mad(noise, half ? 1.0f : -1.0f, value));
-    s->squared = rgb_mad(s->squared, weight * weight, rgb_mul(value, value));
-    s->crossed = rgb_mad(s->crossed, weight * weight, value);
+    double sum[2] = {(double)d->sum[texel][0], (double)d->sum[texel][1]}, mean = (sum[0] + sum[1]) / (double)all;
+    *square += mean * mean;
+    *common += sum[0] / (double)count[0] * (sum[1] / (double)count[1]);
 }
 
-/* How far the photographs agree: the part of the mean's square that is not its variance. */
-static float agreement(const struct sums *s) {
-    rgb mean = rgb_scale(s->off[VALUE], 1.0f / s->weight);
-    rgb scatter = rgb_mad(rgb_mad(s->squared, -2.0f, rgb_mul(mean, s->crossed)), s->weight_squared, rgb_mul(mean, mean));
-    float power = rgb_dot(mean, mean), variance = 3.0f * rgb_mean(scatter) / (s->weight * s->weight);
-    return power > variance ? 1.0f - variance / power : 0.0f;
-}
-
-static void move(uint16_t half[3], rgb by, rgb white) {
-    rgb value = rgb_from_half(half);
-    for (int c = 0; c < 3; c++) {
-        float step = clampf(channels_of(&by)[c] / channels_of(&white)[c], -STEP_MOST, STEP_MOST);
-        channels_of(&value)[c] = clampf(channels_of(&value)[c] + step, -BASE_MOST, BASE_MOST);
+/* Of what a texel is off by, the share that is not noise. */
+static float share_told(const struct detail *d, uint32_t texel) {
+    long width = (long)d->r->inverse.width, height = (long)d->r->inverse.height;
+    long x0 = (long)texel % width, y0 = (long)texel / width;
+    double square = 0.0, common = 0.0;
+    add_agreement(d, texel, &square, &common);
+    if (!(square > 0.0))
+        return 0.0f;
+    for (long y = y0 - AROUND; y <= y0 + AROUND; y++) {
+        for (long x = x0 - AROUND; x <= x0 + AROUND; x++) {
+            size_t at = (size_t)(y * width + x);
+            if (x >= 0 && y >= 0 && x < width && y < height && at != texel &&
+                d->chart_of_texel[at] == d->chart_of_texel[texel])
+                add_agreement(d, at, &square, &common);
+        }
     }
-    rgb_to_half(half, value);
+    double noise = DISAGREEMENT * fmax(square - common, 0.0);
+    float share = common > 0.0 ? (float)(common / (common + noise)) : 0.0f;
+    return share < SHARE_LEAST ? 0.0f : share;
 }
 
-static void step_texel(struct detail *d, uint32_t texel) {
-    const struct reconstruction *r = d->r;
-    struct surface_point at;
-    struct sums s = {.weight = 0.0f};
-    if (!is_known(d, texel) || !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
-        return;
-    rgb white = rgb_from_half(d->white[texel]);
-    for (uint32_t t = 0; t < d->views->train_count; t++) {
-        struct view view;
-        if (views_sees(d->views, t, at.position, at.normal, &view))
-            add_photograph(&s, d, &view, at.triangle, rgb_scale(white, TYPICAL_BASE_COLOR));
-    }
-    if (!(s.weight > 0.0f) || fminf(s.of_half[0], s.of_half[1]) < HALF_LEAST * s.weight)
-        return;
-    float part = agreement(&s) / s.weight;
-    move(d->measured[texel].value, rgb_scale(s.off[VALUE], part), white);
-    move(d->measured[texel].noise, rgb_scale(s.off[NOISE], part), white);
-}
-
-static void step_chunk(void *user, size_t chunk, int thread) {
+static void share_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     struct detail *d = user;
-    size_t begin = chunk * CHUNK, valid = d->r->inverse.valid_count, end = begin + CHUNK < valid ? begin + CHUNK : valid;
-    for (size_t i = begin; i < end; i++)
-        step_texel(d, d->r->inverse.valid[i]);
+    const struct inverse_uv *inverse = &d->r->inverse;
+    for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
+        if (d->chart_of_texel[inverse->valid[i]] != NONE)
+            d->told[inverse->valid[i]] = share_told(d, inverse->valid[i]);
+}
+
+/* Takes the counts from the sums, and scales sums so that the largest has room. */
+static void take_counts(struct detail *d) {
+    float most = 0.0f;
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
+        uint32_t texel = d->r->inverse.valid[i];
+        for (int half = 0; half < 2; half++)
+            d->count[texel][half] = (float)d->sum[texel][half] * (1.0f / COUNT_SCALE);
+        most = fmaxf(most, d->count[texel][0] + d->count[texel][1]);
+    }
+    d->sum_scale = SUM_MOST / fmaxf(most, 1.0f);
+}
+
+static void clear_sums(struct detail *d) {
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+        for (int k = 0; k < SUMS; k++)
+            d->sum[d->r->inverse.valid[i]][k] = 0;
+}
+
+/* --- steps -------------------------------------------------------------------------------------- */
+
+/* By how much a texel's base colour is taken to be off: as it was moved, and further the same way. */
+static rgb reached(const struct detail *d, uint32_t texel) {
+    rgb now = rgb_from_half(d->moved[texel][0]), before = rgb_from_half(d->moved[texel][1]);
+    return rgb_mad(now, d->onward, rgb_sub(now, before));
+}
+
+static void step_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct picture_job *job = user;
+    struct detail *d = job->detail;
+    uint32_t width = photograph_of(d, job->train)->camera.width;
+    struct footprint_texels t;
+    for (uint32_t x = 0; x < width; x++) {
+        size_t at = row * width + x;
+        if (!texels_beneath(d, job->train, x, (uint32_t)row, d->triangle[job->train][at], &t))
+            continue;
+        rgb off = rgb_from_half(d->off[job->train][at]);
+        bool moves = false;
+        for (size_t i = 0; i < t.count; i++) {
+            moves |= d->told[t.texel[i]] > 0.0f;
+            off = rgb_mad(off, -t.share[i], reached(d, t.texel[i]));
+        }
+        if (!moves) {
+            d->triangle[job->train][at] = NONE;
+            continue;
+        }
+        for (size_t i = 0; i < t.count; i++) {
+            float scale = d->sum_scale * d->worth[job->train][at] * t.share[i];
+            const float part[SUMS] = {off.r * scale, off.g * scale, off.b * scale};
+            for (int k = 0; k < SUMS; k++)
+                add_to(&d->sum[t.texel[i]][k], part[k]);
+        }
+    }
+}
+
+/* No darker than black, unless it was. */
+static float bounded(float moved, float start) {
+    return fmaxf(moved, fminf(-start, 0.0f));
+}
+
+static void move_texel(struct detail *d, uint32_t texel) {
+    float scale = 1.0f / (d->sum_scale * (d->count[texel][0] + d->count[texel][1]));
+    const _Atomic int32_t *sum = d->sum[texel];
+    rgb by = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
+    rgb moved = rgb_scale(rgb_add(reached(d, texel), by), d->told[texel]);
+    rgb start = measured_value(&d->measured[texel]);
+    memcpy(d->moved[texel][1], d->moved[texel][0], sizeof d->moved[texel][0]);
+    rgb_to_half(d->moved[texel][0], rgb_make(bounded(moved.r, start.r), bounded(moved.g, start.g),
+                                             bounded(moved.b, start.b)));
+}
+
+static void move_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    struct detail *d = user;
+    const struct inverse_uv *inverse = &d->r->inverse;
+    for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
+        if (d->told[inverse->valid[i]] > 0.0f)
+            move_texel(d, inverse->valid[i]);
+}
+
+void detail_step(struct detail *d) {
+    clear_sums(d);
+    for_rows(d, step_row);
+    for_texels(d, move_chunk);
+    float before = d->pace;
+    d->pace = 0.5f * (1.0f + sqrtf(1.0f + 4.0f * before * before));
+    d->onward = (before - 1.0f) / d->pace;
+}
+
+void detail_finish(struct detail *d) {
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
+        uint32_t texel = d->r->inverse.valid[i];
+        struct measured *m = &d->measured[texel];
+        if (d->told[texel] > 0.0f)
+            rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->moved[texel][0])));
+    }
 }
 
 /* --- the whole ---------------------------------------------------------------------------------- */
@@ -281,29 +360,73 @@ double detail_texels_a_pixel(const struct reconstruction *r, const struct views 
     return count > 0.0 ? area / count : 0.0;
 }
 
+static void make_picture(struct detail *d, uint32_t train) {
+    size_t pixels = pixels_of(d, train);
+    struct picture_job job = {.detail = d, .train = train, .raw = mem_array(pixels, sizeof *job.raw)};
+    d->triangle[train] = mem_array(pixels, sizeof **d->triangle);
+    d->worth[train] = mem_array(pixels, sizeof **d->worth);
+    d->off[train] = mem_array(pixels, sizeof **d->off);
+    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, find_row, &job);
+    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, flatten_row, &job);
+    mem_free(job.raw);
+}
+
+/* Makes the most that a pixel is worth 1, so that sums of whole numbers are fine enough. */
+static void scale_worth(struct detail *d) {
+    float most = 0.0f;
+    for (uint32_t t = 0; t < d->views->train_count; t++)
+        for (size_t i = 0; i < pixels_of(d, t); i++)
+            most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->worth[t][i]);
+    for (uint32_t t = 0; t < d->views->train_count; t++)
+        for (size_t i = 0; i < pixels_of(d, t); i++)
+            d->worth[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->worth[t][i] / most;
+}
+
+/* The texels that may be moved: those that were measured, where there is light to tell them by. */
+static void mark_known(struct detail *d, size_t texels) {
+    const struct reconstruction *r = d->r;
+    d->chart_of_texel = mem_array(texels, sizeof *d->chart_of_texel);
+    for (size_t i = 0; i < texels; i++) {
+        bool known = r->inverse.triangle[i] != INVERSE_UV_NONE && d->measured[i].weight > 0.0f && d->white[i][0] != 0;
+        d->chart_of_texel[i] = known ? r->atlas.chart_of_triangle[r->inverse.triangle[i]] : NONE;
+    }
+}
+
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
                  const uint16_t (*white)[3], struct measured *measured) {
-    *d = (struct detail){.r = r, .views = views, .white = white, .measured = measured};
-    for (int kind = 0; kind < KINDS; kind++) {
-        d->off[kind] = mem_array(views->train_count, sizeof *d->off[kind]);
-        for (uint32_t t = 0; t < views->train_count; t++) {
-            const struct camera *camera = &photograph_of(d, t)->camera;
-            d->off[kind][t] = mem_array((size_t)camera->width * camera->height, sizeof **d->off[kind]);
-        }
-    }
+    size_t texels = (size_t)r->inverse.width * r->inverse.height;
+    *d = (struct detail){.r = r, .views = views, .white = white, .measured = measured, .pace = 1.0f};
+    d->triangle = mem_array(views->train_count, sizeof *d->triangle);
+    d->worth = mem_array(views->train_count, sizeof *d->worth);
+    d->off = mem_array(views->train_count, sizeof *d->off);
+    d->sum = mem_calloc_large(texels, sizeof *d->sum);
+    d->count = mem_calloc_large(texels, sizeof *d->count);
+    d->told = mem_calloc_large(texels, sizeof *d->told);
+    mark_known(d, texels);
+    for (uint32_t t = 0; t < views->train_count; t++)
+        make_picture(d, t);
+    scale_worth(d);
+    for_rows(d, count_row);
+    take_counts(d);
+    clear_sums(d);
+    for_rows(d, halve_row);
+    for_texels(d, share_chunk);
+    d->moved = mem_calloc_large(texels, sizeof *d->moved);
 }
 
 void detail_release(struct detail *d) {
-    for (int kind = 0; kind < KINDS; kind++) {
-        for (uint32_t t = 0; t < d->views->train_count; t++)
-            mem_free(d->off[kind][t]);
-        mem_free(d->off[kind]);
+    for (uint32_t t = 0; t < d->views->train_count; t++) {
+        mem_free(d->triangle[t]);
+        mem_free(d->worth[t]);
+        mem_free(d->off[t]);
     }
+    mem_free(d->triangle);
+    mem_free(d->worth);
+    mem_free(d->off);
+    mem_free(d->chart_of_texel);
+    mem_free(d->sum);
+    mem_free(d->count);
+    mem_free(d->told);
+    mem_free(d->moved);
     *d = (struct detail){0};
-}
-
-void detail_step(struct detail *d) {
-    for (uint32_t t = 0; t < d->views->train_count; t++)
-        make_picture(d, t);
-    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, step_chunk, d);
 }

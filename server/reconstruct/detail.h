@@ -1,30 +1,43 @@
 /* detail.h -- texture as fine as the photographs together tell it.
  *
  * A pixel shows the mean over what it covers, so base colours read from photographs are blurred, the more the
- * further away those were taken. Here the photographs are made anew from the texture, each pixel from its
- * footprint, and where they come out otherwise than they are the texels beneath are moved by it (back-projection;
- * Irani and Peleg 1991). Only what differs within a few pixels counts: light and highlights, which are smooth, are
- * not texture. A step is taken as far as the photographs of a texel agree on it, and not at all where one alone tells.
+ * further away those were taken. Here those are found that show what all the photographs do, each pixel by its
+ * footprint: the least squares of what pixels are off by, weighed by their noise, no base colour darker than black, by
+ * accelerated projected gradients (FISTA; Beck and Teboulle 2009). Only what differs within a few pixels counts: light
+ * and highlights, which are smooth, are not texture.
  *
- * Sharpening makes noise larger, too. So the draw of it that `measured` holds goes the same way, with the photographs
- * of one half taken with the other sign, as in halves.h: what the two halves agree on cancels. */
+ * Sharpening makes noise larger, too. A texel is drawn back to where it was by the share of noise in what it is off by,
+ * told by one half of the photographs against the other (halves.h); where one half tells next to nothing it stays. The
+ * draw of noise in `measured` stays as it is: it has all in which the photographs do not agree, their blur as well, and
+ * so is more than the noise was. */
 #ifndef UNBAKE_RECONSTRUCT_DETAIL_H
 #define UNBAKE_RECONSTRUCT_DETAIL_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "server/capture/views.h"
-#include "server/reconstruct/denoise.h"
+#include "server/reconstruct/measured.h"
 #include "server/reconstruct/reconstruction.h"
 
 struct detail {
-    const struct reconstruction *r;  /* borrowed, as all but the pictures */
+    const struct reconstruction *r;  /* borrowed, as the next three */
     const struct views *views;
     const uint16_t (*white)[3];      /* [height][width] what a white texel would send out; 0: not known */
-    struct measured *measured;       /* [height][width] value and noise are written */
-    uint16_t (**off[2])[3];          /* [train_count][pixels] of value and noise: what a pixel shows beyond what
-                                      * the texture tells; both owned */
+    struct measured *measured;       /* [height][width] value is written */
+    /* Of each photograph, [train_count][pixels]; owned. */
+    uint32_t **triangle;             /* that is shown; UINT32_MAX: the pixel is not asked */
+    float **worth;                   /* inverse variance by noise, up to a factor; at most 1 */
+    uint16_t (**off)[3];             /* base colour that it shows beyond what the texture told at first */
+    /* Of each texel, [height][width]; owned. */
+    uint32_t *chart_of_texel;        /* UINT32_MAX where it is not known what it sends out */
+    _Atomic int32_t (*sum)[3];       /* over pixels, by sum_scale */
+    float (*count)[2];               /* pixels, by their worth: of either half of the photographs */
+    float *told;                     /* share of what it is off by that is not noise; 0: the texel stays */
+    uint16_t (*moved)[2][3];         /* base colour: by the last step and by the one before */
+    float sum_scale;
+    float pace, onward;              /* of the acceleration: its sequence, and how much further steps go */
 };
 
 /* Texels that a pixel covers, in the mean: where it is no more than one, no detail is lost that a texture could hold. */
@@ -34,7 +47,10 @@ void detail_init(struct detail *d, const struct reconstruction *r, const struct 
                  const uint16_t (*white)[3], struct measured *measured);
 void detail_release(struct detail *d);
 
-/* One step of all texels. Each of the first few finds about half of what is left. */
+/* One step of all texels. */
 void detail_step(struct detail *d);
+
+/* After the last step: writes what was found. */
+void detail_finish(struct detail *d);
 
 #endif

@@ -26,8 +26,8 @@
  * time limit is too short for all of them. */
 #define COARSE_STRIDE 2
 #define TRIED 0.03 /* of all texels: so many tell how long they will take */
-/* Steps of detail.h after it has measured every texel. More sharpen what glossy surfaces mirror, too. */
-#define DETAIL_STEPS 4
+/* Steps of detail.h after it has measured every texel: so many bring it to rest. */
+#define DETAIL_STEPS 16
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -66,7 +66,7 @@ static bool advance(struct solve *s, double work) {
 
 /* Rays are the measure of work: about so many a texel when its highlights are gathered. */
 #define RAYS_A_TEXEL 100.0
-#define RAYS_A_DETAIL 10.0 /* and step */
+#define RAYS_A_DETAIL 2.0 /* and step */
 
 static size_t samples_of(const struct solve *s, int pass) {
     double samples = settings_number(s->r->settings, "gather_samples");
@@ -132,6 +132,7 @@ static bool find_detail(struct solve *s) {
         detail_step(&detail);
         going = advance(s, RAYS_A_DETAIL * (double)r->inverse.valid_count);
     }
+    detail_finish(&detail);
     detail_release(&detail);
     mem_free(white);
     return going;
