@@ -2,7 +2,7 @@
  *
  * Chunks are handed out in order but finish in any order, so a body must write only to places
  * that belong to its own index. Results then depend on neither the number of threads nor on
- * timing; what must be summed across indices is summed afterwards, in index order. */
+ * timing; what must be summed across indices is summed afterwards, in index order, or as whole numbers, atomically. */
 #ifndef UNBAKE_COMMON_PARALLEL_H
 #define UNBAKE_COMMON_PARALLEL_H
 

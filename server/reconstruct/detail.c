@@ -31,7 +31,8 @@
 #define AROUND 4
 #define DISAGREEMENT 0.1f
 #define SHARE_LEAST 0.05f /* texels of which the photographs tell less stay as they are */
-/* Of whole numbers in sums: for pixels of a texel; so that the sum of the most of them has room. */
+/* Of whole numbers in sums: coarse, until the most pixels of a texel are known; then so that these have room. The
+ * worth of pixels differs by orders of magnitude: counted coarsely the least would be lost, and steps be too long. */
 #define COUNT_SCALE 4096.0f
 #define SUM_MOST 1e9f
 
@@ -162,43 +163,32 @@ static void flatten_row(void *user, size_t row, int thread) {
     }
 }
 
-/* Forgets pixels that are not asked after all, and counts the others by texel and half. */
-static void count_row(void *user, size_t row, int thread) {
-    (void)thread;
-    const struct picture_job *job = user;
+/* --- how far photographs agree ------------------------------------------------------------------ */
+
+/* Adds to the texels beneath each pixel, by half, its worth; or what it is off by, times its worth. */
+static void add_halves(const struct picture_job *job, size_t row, bool counts) {
     struct detail *d = job->detail;
     uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
     int half = halves_usual(train);
     struct footprint_texels t;
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
-        if (isnan(image_float_from_half(d->off[train][at][0])))
-            d->triangle[train][at] = NONE;
         if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
             continue;
+        float what = counts ? 1.0f : rgb_mean(rgb_from_half(d->off[train][at]));
         for (size_t i = 0; i < t.count; i++)
-            add_to(&d->sum[t.texel[i]][half], COUNT_SCALE * d->worth[train][at] * t.share[i]);
+            add_to(&d->sum[t.texel[i]][half], d->sum_scale * d->worth[train][at] * what * t.share[i]);
     }
 }
 
-/* --- how far photographs agree ------------------------------------------------------------------ */
+static void count_row(void *user, size_t row, int thread) {
+    (void)thread;
+    add_halves(user, row, true);
+}
 
-/* Adds what pixels are off by, by texel and half. */
 static void halve_row(void *user, size_t row, int thread) {
     (void)thread;
-    const struct picture_job *job = user;
-    struct detail *d = job->detail;
-    uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
-    int half = halves_usual(train);
-    struct footprint_texels t;
-    for (uint32_t x = 0; x < width; x++) {
-        size_t at = row * width + x;
-        if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
-            continue;
-        float off = d->sum_scale * d->worth[train][at] * rgb_mean(rgb_from_half(d->off[train][at]));
-        for (size_t i = 0; i < t.count; i++)
-            add_to(&d->sum[t.texel[i]][half], off * t.share[i]);
-    }
+    add_halves(user, row, false);
 }
 
 /* Adds the square of the mean of what a texel is off by, and what both halves have in common of it; nothing where one
@@ -243,22 +233,25 @@ static void share_chunk(void *user, size_t chunk, int thread) {
             d->told[inverse->valid[i]] = share_told(d, inverse->valid[i]);
 }
 
-/* Takes the counts from the sums, and scales sums so that the largest has room. */
-static void take_counts(struct detail *d) {
-    float most = 0.0f;
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
-        uint32_t texel = d->r->inverse.valid[i];
-        for (int half = 0; half < 2; half++)
-            d->count[texel][half] = (float)d->sum[texel][half] * (1.0f / COUNT_SCALE);
-        most = fmaxf(most, d->count[texel][0] + d->count[texel][1]);
-    }
-    d->sum_scale = SUM_MOST / fmaxf(most, 1.0f);
-}
-
 static void clear_sums(struct detail *d) {
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
         for (int k = 0; k < SUMS; k++)
             d->sum[d->r->inverse.valid[i]][k] = 0;
+}
+
+/* Counts pixels by texel and half; returns the most of a texel. */
+static float count_pixels(struct detail *d, float scale) {
+    float most = 0.0f;
+    clear_sums(d);
+    d->sum_scale = scale;
+    for_rows(d, count_row);
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
+        uint32_t texel = d->r->inverse.valid[i];
+        for (int half = 0; half < 2; half++)
+            d->count[texel][half] = (float)d->sum[texel][half] / scale;
+        most = fmaxf(most, d->count[texel][0] + d->count[texel][1]);
+    }
+    return most;
 }
 
 /* --- steps -------------------------------------------------------------------------------------- */
@@ -371,12 +364,16 @@ static void make_picture(struct detail *d, uint32_t train) {
     mem_free(job.raw);
 }
 
-/* Makes the most that a pixel is worth 1, so that sums of whole numbers are fine enough. */
-static void scale_worth(struct detail *d) {
+/* Forgets the pixels that too few others are around of, and makes the most that one is worth 1. */
+static void choose_pixels(struct detail *d) {
     float most = 0.0f;
-    for (uint32_t t = 0; t < d->views->train_count; t++)
-        for (size_t i = 0; i < pixels_of(d, t); i++)
+    for (uint32_t t = 0; t < d->views->train_count; t++) {
+        for (size_t i = 0; i < pixels_of(d, t); i++) {
+            if (isnan(image_float_from_half(d->off[t][i][0])))
+                d->triangle[t][i] = NONE;
             most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->worth[t][i]);
+        }
+    }
     for (uint32_t t = 0; t < d->views->train_count; t++)
         for (size_t i = 0; i < pixels_of(d, t); i++)
             d->worth[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->worth[t][i] / most;
@@ -405,9 +402,9 @@ void detail_init(struct detail *d, const struct reconstruction *r, const struct 
     mark_known(d, texels);
     for (uint32_t t = 0; t < views->train_count; t++)
         make_picture(d, t);
-    scale_worth(d);
-    for_rows(d, count_row);
-    take_counts(d);
+    choose_pixels(d);
+    float most = count_pixels(d, COUNT_SCALE);
+    count_pixels(d, SUM_MOST / fmaxf(most, 1.0f));
     clear_sums(d);
     for_rows(d, halve_row);
     for_texels(d, share_chunk);

@@ -1,5 +1,6 @@
 /* detail.h: of paint about as fine as the photographs' pixels less is lost than by the mean of what they show, on any
- * number of threads; none comes out darker than black; and what one half of the photographs alone tells stays. */
+ * number of threads; none comes out darker than black; what one half of the photographs alone tells
+ * stays; and pixels of little worth are counted as exactly as others. */
 #include "server/capture/halves.h"
 #include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
@@ -166,6 +167,30 @@ static void test_alone(void) {
     capture_release(&s);
 }
 
+/* Where one photograph is worth ten thousand times as much as any other, the others are counted, too. */
+static void test_count(void) {
+    struct capture s;
+    struct detail d;
+    double counted = 0.0, best = 0.0, others = 0.0;
+    capture_init(&s, true, 2, 0.0f);
+    const float bright = s.room.scene.photograph[s.room.views.train[0]].exposure;
+    for (uint32_t t = 1; t < s.room.views.train_count; t++)
+        s.room.scene.photograph[s.room.views.train[t]].exposure = bright / 4096.0f;
+    for (int octave = 0; octave < NOISE_OCTAVES; octave++) /* of these 12 lie between the two exposures */
+        s.r.noise.share[octave] = octave < NOISE_OCTAVES / 2 - 6 ? 1.0f : 0.01f;
+    detail_init(&d, &s.r, &s.room.views, (const uint16_t(*)[3])s.white, s.measured);
+    for (size_t i = 0; i < s.texels; i++)
+        counted += (double)d.count[i][0] + (double)d.count[i][1];
+    for (uint32_t t = 0; t < s.room.views.train_count; t++)
+        for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++)
+            *(t == 0 ? &best : &others) += (double)d.worth[t][i];
+    printf("worth %.3f and %.5f, counted %.5f\n", best, others, counted - best);
+    CHECK(others > 0.0 && others < 0.01 * best);
+    CHECK(fabs(counted - best - others) < 0.01 * others);
+    detail_release(&d);
+    capture_release(&s);
+}
+
 /* Texels that share a pixel share the directions of its highlights, between bounds. */
 static void test_highlight_samples(void) {
     CHECK(divide_highlight_samples(0.5) == 16);
@@ -183,5 +208,6 @@ int main(void) {
     test_paint(false, 2, &sum[2]);
     test_black();
     test_alone();
+    test_count();
     return check_result();
 }
