@@ -124,7 +124,7 @@ static float combine(struct censored *value, size_t count, bool *is_bound) {
         gone += far->is_bound ? 0.0f : far->weight;
         deviation = fabsf(far->value - middle);
     }
-    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, LEAST_DEVIATION * middle);
+    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, LEAST_DEVIATION * fabsf(middle));
     for (size_t i = 0; i < count; i++) {
         if (value[i].is_bound || fabsf(value[i].value - middle) > limit)
             continue;
@@ -176,7 +176,7 @@ static bool look_out(const struct gather *g, const struct window *w, const struc
         float trust = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_TRUST;
         const float radiance[3] = {sample.radiance.r, sample.radiance.g, sample.radiance.b};
         for (int c = 0; c < 3; c++) {
-            sum[c] += trust * fmaxf(radiance[c], 0.0f);
+            sum[c] += trust * radiance[c];
             saturated[c] |= sample.saturated[c];
         }
         trust_sum += trust;
@@ -227,7 +227,7 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct cens
     bool is_bound = false;
     for (size_t c = 0; c < 3; c++) {
         bool only_bound;
-        e->map.pixel[3 * at + c] = combine(scratch + c * g->window_count, count, &only_bound);
+        e->map.pixel[3 * at + c] = fmaxf(combine(scratch + c * g->window_count, count, &only_bound), 0.0f);
         is_bound |= only_bound;
     }
     e->confidence.pixel[2 * at] = (float)count;

@@ -16,6 +16,11 @@
 /* Var(b - (a + c) / 2) over that of one pixel. */
 #define DIFFERENCE_VARIANCE 1.5f
 #define MOST_SHARE 1.0f
+/* A share that is this near to MOST_SHARE is that of values lost in noise. */
+#define LOST_SHARE 0.97f
+/* Normal noise of deviation 1 that is cut off at 0 comes out too bright by .4 where the true value is 0, and by .08
+ * where it is 1; if what was cut off, or rounded down to 0, reads as minus this, by .1 at most either way. */
+#define BLACK_DEVIATIONS 0.6f
 #define LEAST_SHARE 0.01f /* poses and colours are off by as much */
 /* Of a block of pixels: differences that it takes, and bounds of its noise over the octaves'. */
 #define LEAST_DIFFERENCES 64
@@ -36,6 +41,10 @@ static int octave_of(float value) {
         frexpf(value, &exponent);
     int octave = exponent - LEAST_EXPONENT;
     return octave < 0 ? 0 : octave >= NOISE_OCTAVES ? NOISE_OCTAVES - 1 : octave;
+}
+
+static float middle_of(int octave) {
+    return ldexpf(0.75f, octave + LEAST_EXPONENT);
 }
 
 static void offer(struct octave *octave, float difference) {
@@ -88,6 +97,14 @@ static void add_row(struct octave *octaves, const struct photograph *photo, cons
     }
 }
 
+/* Of the values of 8 bits that are not lost in noise, the darkest has this deviation. */
+static float darkest_deviation(const struct noise *noise) {
+    for (int k = 0; k < NOISE_OCTAVES; k++)
+        if (noise->share[k] < LOST_SHARE * MOST_SHARE)
+            return noise->share[k] * middle_of(k);
+    return 0.0f;
+}
+
 static void measure_shares(struct noise *noise, const struct views *v) {
     struct octave *octaves = mem_calloc(NOISE_OCTAVES, sizeof *octaves);
     bool rounded = false;
@@ -104,11 +121,12 @@ static void measure_shares(struct noise *noise, const struct views *v) {
         if (count >= LEAST_SAMPLES) {
             float here = quantile(o->kept, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
             if (rounded)
-                here = fmaxf(here, rounding_share(ldexpf(0.75f, k + LEAST_EXPONENT)));
+                here = fmaxf(here, rounding_share(middle_of(k)));
             share = fminf(share, here);
         }
         noise->share[k] = share;
     }
+    noise->black = rounded ? BLACK_DEVIATIONS * darkest_deviation(noise) : 0.0f;
     mem_free(octaves);
 }
 
@@ -160,6 +178,13 @@ void noise_measure(struct noise *noise, const struct views *v) {
     noise->scale = mem_array(v->train_count, sizeof *noise->scale);
     for (size_t t = 0; t < v->train_count; t++)
         noise->scale[t] = measure_blocks(noise, &v->scene->photograph[v->train[t]], v->edge[t]);
+}
+
+void noise_tell_black(const struct noise *noise, struct scene *scene) {
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        struct photograph *photo = &scene->photograph[i];
+        photo->black = photo->is_test || photo->is_hdr ? 0.0f : noise->black;
+    }
 }
 
 void noise_release(struct noise *noise) {

@@ -7,7 +7,9 @@
  * a renderer's samples, the share only falls as the value rises. Around that it differs from place to
  * place (a renderer's samples are worse in one corner, a camera's processing smooths another). There
  * texture is told from noise by how the difference grows with the distance between the pixels:
- * what is left at distance 0, the nugget of a variogram (Matheron 1963), is noise. */
+ * what is left at distance 0, the nugget of a variogram (Matheron 1963), is noise.
+ *
+ * The darkest values of 8 bits of which noise can be told give its deviation at black, where it does not fall further. */
 #ifndef UNBAKE_CAPTURE_NOISE_H
 #define UNBAKE_CAPTURE_NOISE_H
 
@@ -19,12 +21,15 @@
 
 struct noise {
     float share[NOISE_OCTAVES]; /* standard deviation over value, of each octave */
+    float black;                /* see photograph.h; of pictures of 8 bits */
     size_t train_count;
     float **scale; /* [train_count][rows][columns] of the blocks of a photograph: what the share is
                     * multiplied by there; owned */
 };
 
 void noise_measure(struct noise *noise, const struct views *views);
+/* Sets `black` of the photographs of 8 bits that are not held out. */
+void noise_tell_black(const struct noise *noise, struct scene *scene);
 void noise_release(struct noise *noise);
 
 /* Standard deviation of the radiance that the pixel at the view's place tells, where it should tell

@@ -134,19 +134,34 @@ rgb correction_expected(const struct correction *c, uint32_t texel) {
     return rgb_mul(c->light[cell_of(c, texel)], rgb_from_half(c->solved[texel]));
 }
 
+/* The mean of the channels by their weights; 0 where they have none. */
+static float mean_by(const float value[3], const float weight[3]) {
+    float sum = 0.0f, weights = 0.0f;
+    for (int k = 0; k < 3; k++) {
+        sum += weight[k] * value[k];
+        weights += weight[k];
+    }
+    return weights > 0.0f ? sum / weights : 0.0f;
+}
+
+static float mean_of(const float value[3]) {
+    return (value[0] + value[1] + value[2]) / 3.0f;
+}
+
 void correction_look(struct correction *c, uint32_t texel, const struct match *match, float weight) {
     struct correction_sums *s = &c->sums[cell_of(c, texel)];
-    float off[3], gray = 0.0f;
-    s->weight += weight;
+    float off[3];
     for (int k = 0; k < 3; k++) {
-        s->shown[k] += weight * match->shown[k];
-        s->rendered[k] += weight * match->rendered[k] * expf(-s->factor[k]);
+        float worth = weight * match->worth[k];
+        s->weight[k] += worth;
+        s->shown[k] += worth * match->shown[k];
+        s->rendered[k] += worth * match->rendered[k] * expf(-s->factor[k]);
         off[k] = match->shown[k] - match->rendered[k];
-        gray += off[k] / 3.0f;
     }
-    s->squared[CORRECTION_GRAY] += weight * gray * gray;
+    float gray = mean_by(off, match->worth);
+    s->squared[CORRECTION_GRAY] += weight * mean_of(match->worth) * gray * gray;
     for (int k = 0; k < 3; k++)
-        s->squared[CORRECTION_TINT] += weight / 3.0f * (off[k] - gray) * (off[k] - gray);
+        s->squared[CORRECTION_TINT] += weight / 3.0f * match->worth[k] * (off[k] - gray) * (off[k] - gray);
 }
 
 /* --- factors ------------------------------------------------------------------------------------ */
@@ -185,7 +200,7 @@ static void likely_precondition(const void *user, const double *residual, double
 static void room_variance(const struct correction *c, float variance[CORRECTION_KINDS]) {
     double weight = 0.0, squared[CORRECTION_KINDS] = {0.0};
     for (size_t i = 0; i < c->count; i++) {
-        weight += (double)c->sums[i].weight;
+        weight += (double)mean_of(c->sums[i].weight);
         for (int kind = 0; kind < CORRECTION_KINDS; kind++)
             squared[kind] += (double)c->sums[i].squared[kind];
     }
@@ -193,20 +208,17 @@ static void room_variance(const struct correction *c, float variance[CORRECTION_
         variance[kind] = weight > 0.0 ? (float)(squared[kind] / weight) : 0.0f;
 }
 
-/* How sure the looks at a cell are of its logarithms, as the inverse of a variance. */
-static float precision_of(const struct correction_sums *s, int kind, float room) {
-    float variance = (s->squared[kind] + ROOM_LOOKS * room) / (s->weight + ROOM_LOOKS);
-    return variance > 0.0f ? s->weight / variance : 0.0f;
+/* How sure the looks at a cell are of its logarithms of one kind, as the inverse of a variance; of a channel where it is
+ * a tint. */
+static float precision_of(const struct correction_sums *s, int kind, int channel, float room) {
+    float weight = mean_of(s->weight), variance = (s->squared[kind] + ROOM_LOOKS * room) / (weight + ROOM_LOOKS);
+    return variance > 0.0f ? (kind == CORRECTION_GRAY ? weight : s->weight[channel]) / variance : 0.0f;
 }
 
 /* Logarithm of shown over rendered, by channel; 0 where nothing was rendered. */
 static void told_by(const struct correction_sums *s, float log_ratio[3]) {
     for (int k = 0; k < 3; k++)
         log_ratio[k] = s->shown[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->shown[k] / s->rendered[k]) : 0.0f;
-}
-
-static float mean_of(const float value[3]) {
-    return (value[0] + value[1] + value[2]) / 3.0f;
 }
 
 /* Adds to factor[count][3] the most likely logarithms of one kind, of a channel where it is a tint. They are sought
@@ -219,8 +231,8 @@ static void add_kind(const struct correction *c, int kind, int channel, float ro
     for (size_t i = 0; i < c->count; i++) {
         float told[3];
         told_by(&c->sums[i], told);
-        float gray = mean_of(told);
-        l.precision[i] = (double)precision_of(&c->sums[i], kind, room);
+        float gray = mean_by(told, c->sums[i].weight);
+        l.precision[i] = (double)precision_of(&c->sums[i], kind, channel, room);
         residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : told[channel] - gray);
     }
     double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);

@@ -8,7 +8,8 @@
  * makes colours other than they are is thought less likely than what makes them lighter or darker. Between the middles
  * of cells factors are interpolated; texture within stays.
  *
- * Photographs' noise is taken as the looks themselves tell of it. No factor moves base colour by more than a tenth:
+ * Photographs' noise is taken as the looks themselves tell of it; but a channel counts for less, in lightness too, the
+ * more of it is noise: that is told of all photographs (noise.h). No factor moves base colour by more than a tenth:
  * what asks for more is not what solve left, but light that the renders lack or have too much of. */
 #ifndef UNBAKE_RECONSTRUCT_CORRECTION_H
 #define UNBAKE_RECONSTRUCT_CORRECTION_H
@@ -32,9 +33,9 @@ struct correction_cell {
 
 /* What looks told of a cell. */
 struct correction_sums {
-    float weight;                    /* of looks, each of 1 at most */
+    float weight[3];                 /* of looks, each of 1 at most, by channel */
     float shown[3], rendered[3];     /* weighted, relative to what was expected; rendered with base colour as solved */
-    float squared[CORRECTION_KINDS]; /* weighted squares of what looks are off by, a channel */
+    float squared[CORRECTION_KINDS]; /* squares of what looks are off by, weighted by the mean of the channels */
     float factor[3];                 /* logarithm, now in force */
 };
 

@@ -13,14 +13,15 @@
 struct match {
     float shown[3];    /* by the photograph, over (expected + a share of the median) */
     float rendered[3]; /* over the same */
+    float worth[3];    /* of that channel: 1, or less the more noise the photograph has there */
     float trust;       /* half where the photograph is off by all that is expected, or by more where its noise is that
                         * far: a highlight, or light of what is in front */
 };
 
 /* From reference[sample_count] and radiance[sample_count] of one look. A saturated channel that the
- * render exceeds too counts as equal. `deviation` is that of the photograph's noise there, in radiance;
+ * render exceeds too counts as equal. `noise` is the deviation of the photograph's there, in radiance;
  * `median_radiance` is the photographs'. */
 struct match match_look(const struct photograph_sample *reference, const rgb *radiance,
-                        int sample_count, rgb expected, float deviation, float median_radiance);
+                        int sample_count, rgb expected, rgb noise, float median_radiance);
 
 #endif

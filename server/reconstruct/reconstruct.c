@@ -222,6 +222,8 @@ static enum status prepare(struct run *run, struct error *err) {
         return status;
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
     calibrate(r, &run->views, run->hooks);
+    noise_measure(&r->noise, &run->views);
+    noise_tell_black(&r->noise, r->scene);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
     status = remap_surface(run, split_shining(run), err);
@@ -245,7 +247,6 @@ static void log_unseen(const struct run *run) {
 
 static enum status fuse_photographs(struct run *run, struct error *err) {
     (void)err; /* nothing here can fail */
-    noise_measure(&run->r->noise, &run->views);
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     saturated_light_estimate(run->r, &run->views);
     lamp_find(run->r, &run->views);

@@ -39,7 +39,7 @@ static void note_looks(void *self, size_t chunk, struct look_batch *b) {
         rgb noise = noise_deviation(&f->o->r->noise, f->o->views, &look->view, expected);
         f->look[chunk * b->look_capacity + k] = (struct look_match){
             look->texel, look->trust,
-            match_look(b->reference + first, b->radiance + first, b->samples, expected, rgb_mean(noise),
+            match_look(b->reference + first, b->radiance + first, b->samples, expected, noise,
                        f->o->views->median_radiance)};
     }
 }

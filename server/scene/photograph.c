@@ -34,6 +34,12 @@ static inline float half_to_float(uint16_t half) {
     return half & 0x8000u ? -magnitude : magnitude;
 }
 
+/* A stored value, and less than nothing for black. */
+static inline float read_tap(const struct photograph *photo, uint16_t half) {
+    float value = half_to_float(half);
+    return value == 0.0f ? -photo->black : value;
+}
+
 /* The two pixels and the weight of the second around place x of a row of `count` pixels. */
 static inline void taps(float x, uint32_t count, size_t index[2], float *weight) {
     float centred = clampf(x - 0.5f, 0.0f, (float)(count - 1));
@@ -68,7 +74,7 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
         if (photo->mask && photo->mask[at] == 0)
             return false;
         for (int c = 0; c < 3; c++) {
-            float tap = half_to_float(photo->pixel[at][c]);
+            float tap = read_tap(photo, photo->pixel[at][c]);
             sample->saturated[c] |= tap >= photo->clip;
             value[c] += weight * tap;
         }
@@ -97,7 +103,7 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
             return false;
         float sum = 0.0f;
         for (int c = 0; c < 3; c++) {
-            float tap = half_to_float(photo->pixel[at][c]);
+            float tap = read_tap(photo, photo->pixel[at][c]);
             if (!(tap < photo->clip))
                 return false;
             value[c] += wx[k % 4] * wy[k / 4] * tap;

@@ -4,7 +4,10 @@
  * min(L * exposure * gain * falloff, clip), clip being infinite for HDR frames. The falloff
  * (vignette) is exp(v0 s + v1 s^2 + v2 s^3), s being the squared distance from the principal
  * point over the squared half diagonal: never 0 or negative, whatever the coefficients. It is
- * divided out in each look-up and not in the stored pixels, since the clip is of those. */
+ * divided out in each look-up and not in the stored pixels, since the clip is of those.
+ *
+ * A frame of 8 bits shows no pixel darker than black, so the noise of one that is nearly black is on one side, and the
+ * mean of many too bright. A stored 0 therefore reads as a little below 0, by what the noise below black is in the mean. */
 #ifndef UNBAKE_SCENE_PHOTOGRAPH_H
 #define UNBAKE_SCENE_PHOTOGRAPH_H
 
@@ -24,13 +27,14 @@ struct photograph {
     rgb gain;               /* per channel, 1 by default */
     float vignette[3];      /* v0 v1 v2 of the falloff; 0: none */
     float blur_px;          /* motion blur beyond that of its neighbours, standard deviation; 0: none */
+    float black;            /* a stored 0 reads as minus this value; 0 until noise is known, and for HDR */
     float clip;             /* value at which a pixel is saturated; INFINITY for HDR */
     uint16_t (*pixel)[3];   /* [height][width] linear half-precision values; owned */
     uint8_t *mask;          /* [height][width] 0 where the pixel must not be used, or NULL; owned */
 };
 
 struct photograph_sample {
-    rgb radiance;           /* value / (exposure * gain * falloff) */
+    rgb radiance;           /* value / (exposure * gain * falloff); may be below 0 */
     bool saturated[3];      /* per channel: the value is a lower bound */
     rgb clip_radiance;      /* radiance at which this frame saturates; INFINITY for HDR */
 };

@@ -1,6 +1,7 @@
 /* environment.h, fill.h, reach.h, relight.h: a room with a window, lit by a sky alone. The sky is
  * found in the photographs, lights the room, and can be replaced. */
 #include "common/file.h"
+#include "common/rng.h"
 #include "common/sha256.h"
 #include "server/capture/environment.h"
 #include "server/evaluate/relight.h"
@@ -227,6 +228,39 @@ static struct scene altered(const struct scene *scene) {
     other.photograph = mem_array(scene->photograph_count, sizeof *other.photograph);
     memcpy(other.photograph, scene->photograph, scene->photograph_count * sizeof *other.photograph);
     return other;
+}
+
+/* A night sky of noise about black: what black pixels read below 0 makes up for the others, and no direction is darker
+ * than black. */
+static void test_night(const struct scene *scene) {
+    struct scene other = altered(scene);
+    struct rig rig;
+    struct environment e;
+    double stored = 0.0, count = 0.0;
+    for (size_t f = 0; f < scene->photograph_count; f++) {
+        struct photograph *photo = &other.photograph[f];
+        size_t pixels = (size_t)photo->camera.width * photo->camera.height;
+        photo->is_hdr = false;
+        photo->clip = 1.0f;
+        photo->black = 0.3f;
+        photo->pixel = mem_array(pixels, sizeof *photo->pixel);
+        for (size_t i = 0; i < 3 * pixels; i++) {
+            float value = rng_key(5, f, i) % 3 == 0 ? 0.6f : 0.0f;
+            photo->pixel[i / 3][i % 3] = image_half_from_float(value);
+            stored += (double)value;
+            count += 1.0;
+        }
+    }
+    rig_init(&rig, &other, 2);
+    CHECK(environment_make(&e, &rig.views, rig.pool));
+    for (size_t i = 0; i < 3 * (size_t)e.map.width * e.map.height; i++)
+        CHECK(e.map.pixel[i] >= 0.0f);
+    CHECK_THAT(e.seen_luminance < 0.6 * stored / count, "%g of %g", e.seen_luminance, stored / count);
+    environment_release(&e);
+    rig_release(&rig);
+    for (size_t f = 0; f < scene->photograph_count; f++)
+        mem_free(other.photograph[f].pixel);
+    mem_free(other.photograph);
 }
 
 /* A few frames show something else in the same directions, brighter or darker: it changes little. */
@@ -485,6 +519,7 @@ int main(void) {
     test_exposures(&scene, CYCLING);
     test_exposures(&scene, ONLY_LONG);
     test_exposures(&scene, PARTED);
+    test_night(&scene);
     test_outliers(&scene);
     test_wrong_poses(&scene);
     test_nothing(&masked, pool);

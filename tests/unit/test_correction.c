@@ -40,6 +40,9 @@ static void end(void) {
     texture_release(&base_color);
 }
 
+/* How far each channel of the photographs tells. */
+static float worth[3] = {1.0f, 1.0f, 1.0f};
+
 /* Looks at the texels of columns [x0, x1): shown is `ratio` times what base colour as solved would have rendered, by
  * channel, both with noise of half of it and more; base colour moves in between. */
 static void look(uint32_t x0, uint32_t x1, const float ratio[3], uint64_t rounds) {
@@ -52,6 +55,7 @@ static void look(uint32_t x0, uint32_t x1, const float ratio[3], uint64_t rounds
                 float noise = 2.0f * rng_to_float((uint32_t)rng_key(1, round * TEXELS + i, (uint64_t)c));
                 float bright = -logf(1.0f - rng_to_float((uint32_t)rng_key(2, round * TEXELS + i, (uint64_t)c)));
                 match.shown[c] = ratio[c] * bright;
+                match.worth[c] = worth[c];
                 match.rendered[c] = noise * base_color.texel[i][c] / (i == 1 && c == 0 ? 0.25f : 0.5f);
             }
             correction_look(&correction, i, &match, 1.0f);
@@ -102,6 +106,18 @@ static void test_few(void) {
     end();
     CHECK_THAT(fabs(light) < 0.06, "%.4f", light);
     CHECK_THAT(red > 0.005 && red < 0.075, "%.4f", red);
+}
+
+/* A channel in which photographs show their noise and little else says nothing of the lightness of the others. */
+static void test_lost_channel(void) {
+    const float ratio[3] = {1.0f, 1.0f, 1.5f};
+    begin();
+    worth[2] = 0.01f;
+    look(0, WIDTH, ratio, 128);
+    worth[2] = 1.0f;
+    CHECK_THAT(fabs(factor(20, 16, 0) - 1.0) < 0.01 && factor(20, 16, 2) < 1.06, "%.4f %.4f", factor(20, 16, 0),
+               factor(20, 16, 2)); /* each alike: 1.06 */
+    end();
 }
 
 /* Looks that tell little of each cell tell much of what a chart's cells share. */
@@ -196,6 +212,7 @@ int main(void) {
     test_beside();
     test_few();
     test_together();
+    test_lost_channel();
     test_noise();
     test_bound();
     test_again();

@@ -56,6 +56,7 @@ static void test_photons(void) {
     struct noise noise;
     take(bright_and_dark, photons);
     noise_measure(&noise, &views);
+    CHECK(noise.black == 0.0f);
     CHECK_NEAR(share_at(&noise, 64.0f, 100.0f, 1.6f), 0.05 / sqrt(1.6), 0.006);
     CHECK_NEAR(share_at(&noise, 64.0f, 20.0f, 0.1f), 0.05 / sqrt(0.1), 0.025);
     /* Twice the noise: a quarter of the weight. */
@@ -86,6 +87,56 @@ static void test_places_and_texture(void) {
     noise_release(&noise);
 }
 
+#define CODE (1.0f / (255.0f * 12.92f)) /* of 8 bits, where sRGB is a line */
+
+/* Dark stripes, up to 8 codes bright. */
+static float stripes(uint32_t x, uint32_t y) {
+    static const float codes[8] = {0.0f, 0.25f, 0.5f, 1.0f, 2.0f, 4.0f, 6.0f, 8.0f};
+    (void)x;
+    return codes[y / 16] * CODE;
+}
+
+static float of_the_sensor(float value, uint32_t x) {
+    (void)value, (void)x;
+    return 1.2f * CODE;
+}
+
+/* Noise around black is cut off and rounded; what many such pixels read in the mean is right nevertheless, and
+ * photographs that are held out or not of 8 bits read as they are stored. */
+static void test_black(void) {
+    struct noise noise;
+    take(stripes, of_the_sensor);
+    for (uint32_t t = 0; t < PHOTOGRAPHS; t++) {
+        photograph[t].is_hdr = false;
+        photograph[t].clip = 1.0f;
+        for (uint32_t i = 0; i < 3 * PIXELS; i++) {
+            float code = roundf(image_float_from_half(photograph[t].pixel[i / 3][i % 3]) / CODE);
+            photograph[t].pixel[i / 3][i % 3] = image_half_from_float(code * CODE);
+        }
+    }
+    photograph[2].is_hdr = photograph[3].is_test = true;
+    noise_measure(&noise, &views);
+    noise_tell_black(&noise, &scene);
+    CHECK(photograph[0].black == noise.black && photograph[1].black == noise.black && photograph[2].black == 0.0f &&
+          photograph[3].black == 0.0f);
+    CHECK_NEAR(noise.black / CODE, 0.72, 0.15);
+    for (uint32_t stripe = 0; stripe < 8; stripe++) {
+        double sum = 0.0, stored = 0.0, truth = (double)stripes(0, 16 * stripe);
+        for (uint32_t i = 16 * stripe * SIDE; i < 16 * (stripe + 1) * SIDE; i++) {
+            struct photograph_sample s, as_stored;
+            CHECK(photograph_sample(&photograph[0], (float)(i % SIDE) + 0.5f, (float)(i / SIDE) + 0.5f, &s) &&
+                  photograph_sample(&photograph[3], (float)(i % SIDE) + 0.5f, (float)(i / SIDE) + 0.5f, &as_stored));
+            sum += (double)rgb_mean(s.radiance) / (16.0 * SIDE);
+            stored += (double)rgb_mean(as_stored.radiance) / (16.0 * SIDE);
+        }
+        CHECK_NEAR((sum - truth) / CODE, 0.0, 0.15);
+        if (stripe == 0)
+            CHECK((stored - truth) / CODE > 0.4);
+    }
+    photograph[3].is_test = false;
+    noise_release(&noise);
+}
+
 /* Draws have the variance of a look-up: 1 at a pixel's middle, a quarter (cubic: 0.41) between four, and texels that read
  * the same pixels have the same. */
 static void test_draw(void) {
@@ -108,6 +159,7 @@ static void test_draw(void) {
 int main(void) {
     test_photons();
     test_places_and_texture();
+    test_black();
     test_draw();
     for (int t = 0; t < PHOTOGRAPHS; t++)
         mem_free(photograph[t].pixel);

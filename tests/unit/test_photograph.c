@@ -61,8 +61,28 @@ static void test_cubic(void) {
     photograph_release(&p);
 }
 
+/* A black pixel reads as a little less than that, in shares of look-ups too; others, however dark, as they are. */
+static void test_black(void) {
+    struct photograph p = {.exposure = 0.5f, .gain = {1.0f, 2.0f, 1.0f}, .clip = 1.0f, .black = 0.25f,
+                           .camera = {.width = 4, .height = 4}};
+    p.pixel = mem_calloc(16, sizeof *p.pixel);
+    for (int i = 0; i < 16; i++)
+        p.pixel[i][2] = i % 4 == 3 ? H_SUBNORMAL : H025;
+    struct photograph_sample s;
+    rgb sharp;
+    CHECK(photograph_sample(&p, 1.5f, 1.5f, &s) && s.radiance.r == -0.5f && s.radiance.g == -0.25f && s.radiance.b == 0.5f);
+    CHECK(photograph_sample(&p, 3.5f, 1.5f, &s) && s.radiance.b == 0x1p-23f);
+    CHECK(photograph_sample_cubic(&p, 1.75f, 2.0f, &sharp));
+    CHECK_NEAR(sharp.r, -0.5, 1e-6);
+    p.pixel[0][0] = H025;
+    CHECK(photograph_sample(&p, 1.0f, 0.5f, &s));
+    CHECK_NEAR(s.radiance.r, 0.0, 1e-6);
+    photograph_release(&p);
+}
+
 int main(void) {
     test_cubic();
+    test_black();
     struct photograph p = make();
     struct photograph_sample s;
     CHECK(photograph_sample(&p, 1.5f, 0.5f, &s));
