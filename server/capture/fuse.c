@@ -141,3 +141,20 @@ void fused_release(struct fused *f) {
     mem_free(f->is_bound);
     *f = (struct fused){0};
 }
+
+rgb fused_around(const struct fused *f, const struct atlas *atlas, const struct inverse_uv *inverse, uint32_t texel,
+                 uint32_t around) {
+    uint32_t x0 = texel % f->width, y0 = texel / f->width, chart = atlas->chart_of_triangle[inverse->triangle[texel]];
+    rgb sum = {0.0f, 0.0f, 0.0f};
+    float count = 0.0f;
+    for (uint32_t y = y0 > around ? y0 - around : 0; y <= y0 + around && y < f->height; y++) {
+        for (uint32_t x = x0 > around ? x0 - around : 0; x <= x0 + around && x < f->width; x++) {
+            uint32_t at = y * f->width + x, triangle = inverse->triangle[at];
+            if (triangle == INVERSE_UV_NONE || atlas->chart_of_triangle[triangle] != chart || f->is_bound[at])
+                continue;
+            sum = rgb_mad(sum, f->count[at], fused_radiance(f, at));
+            count += f->count[at];
+        }
+    }
+    return count > 0.0f ? rgb_scale(sum, 1.0f / count) : sum;
+}

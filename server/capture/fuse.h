@@ -33,4 +33,9 @@ static inline rgb fused_radiance(const struct fused *f, uint32_t texel) {
     return rgb_from_half(f->radiance[texel]);
 }
 
+/* The mean of those texels of its chart at most `around` texels away each way that photographs measured, by their
+ * count: of one texel alone noise may be a third. 0 where there are none. */
+rgb fused_around(const struct fused *f, const struct atlas *atlas, const struct inverse_uv *inverse, uint32_t texel,
+                 uint32_t around);
+
 #endif

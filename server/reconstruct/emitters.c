@@ -16,6 +16,8 @@
 #define LEAST_LOOKS_MIXED 3
 #define RING_PIXELS 4.0f
 #define OUTSHINES 1.3f
+/* A saturated pixel must be so much brighter than all around it: a bar before a white sky is as white as the sky. */
+#define OUTSHINES_WHITE 1.05f
 /* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
 #define OWN_PART 0.25f
 /* Part of the looks that must have measured something for their median to count. */
@@ -85,12 +87,16 @@ static float median(struct channel_values *v, bool *is_bound) {
 /* Whether what a look of this class of distance from an edge shows is the surface's own. A bright
  * window may stand behind a thin frame: a pixel that mixes surfaces speaks only when it is clearly
  * brighter than all around it, one near an edge when it is no darker than its surroundings. */
-static bool outshines(const struct photograph *photo, float x, float y, rgb radiance, int edge) {
-    float own = rgb_mean(radiance);
+static bool outshines(const struct photograph *photo, const struct view *view, const struct photograph_sample *sample,
+                      int edge) {
+    float own = rgb_mean(sample->radiance);
     if (edge == 0)
         return true;
-    struct photograph_ring ring = photograph_ring(photo, x, y, RING_PIXELS);
-    return edge == VIEWS_EDGE ? own > OUTSHINES * ring.brightest : own * ring.count >= ring.sum;
+    struct photograph_ring ring = photograph_ring(photo, view->x, view->y, RING_PIXELS);
+    if (edge == VIEWS_EDGE)
+        return own > OUTSHINES * ring.brightest;
+    bool is_white = sample->saturated[0] || sample->saturated[1] || sample->saturated[2];
+    return own * ring.count >= (is_white ? OUTSHINES_WHITE : 1.0f) * ring.sum;
 }
 
 static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
@@ -106,7 +112,7 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
         int edge = views_edge(job->views, &view[k], at.triangle);
         if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
             continue;
-        if (!outshines(photo, view[k].x, view[k].y, sample.radiance, edge)) {
+        if (!outshines(photo, &view[k], &sample, edge)) {
             shown[edge].outshone_count++;
             continue;
         }

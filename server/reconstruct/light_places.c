@@ -10,6 +10,7 @@
 #include "server/render/sampler.h"
 
 #define WAYS 128 /* directions a point */
+#define AROUND 640 /* the texels around one, each way as far as this part of the atlas's width, tell what it shows */
 #define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
 /* Logarithms of base colour: what of it is odd counts up to this much. */
 #define ODD_MOST 1.0f
@@ -28,7 +29,8 @@ static void gather_place(void *user, size_t index, int thread) {
     struct light_place *p = &g->place[index];
     uint32_t texel = survey->texel[index];
     struct irradiance light;
-    *p = (struct light_place){.segment = reconstruction_segment(r, texel), .shown = fused_radiance(&r->fused, texel), .weight = 1.0f};
+    *p = (struct light_place){
+        .segment = reconstruction_segment(r, texel), .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / AROUND), .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
     irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);

@@ -17,18 +17,28 @@
 #define STRONGER 2.0f
 #define STRENGTHS 16
 #define NEARER 5
+/* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
+#define ROUNDS 4
 /* Points of which the median of a segment is taken. */
 #define MEDIAN_POINTS 512
+
+static void ask_all(struct missing_light *m) {
+    for (size_t i = 0; i < m->places->count; i++)
+        m->weight[i] = 1.0f;
+}
 
 void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches) {
     *m = (struct missing_light){.places = places, .white = white, .in_patches = in_patches};
     m->base = mem_array(places->count + 1, sizeof *m->base);
     m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
     m->spread = mem_array(places->count + 1, sizeof *m->spread);
+    m->weight = mem_array(places->count + 1, sizeof *m->weight);
+    ask_all(m);
     missing_light_renew(m);
 }
 
 void missing_light_release(struct missing_light *m) {
+    mem_free(m->weight);
     mem_free(m->spread);
     mem_free(m->sorted);
     mem_free(m->base);
@@ -83,7 +93,7 @@ void missing_light_renew(struct missing_light *m) {
 static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
     double within = oddity(m->base[i] - median, spread);
     double beyond = oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND);
-    return (double)m->places->place[i].weight * (within + beyond);
+    return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 
 /* How odd the base colours of a segment are. */
@@ -178,8 +188,26 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
     return best;
 }
 
-rgb missing_light_color(const struct missing_light *m) {
+static void ask_by_share(struct missing_light *m, float strength, int channel) {
+    for (size_t i = 0; i < m->places->count; i++) {
+        const struct light_place *p = &m->places->place[i];
+        float light = strength * p->lit, share = light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
+        m->weight[i] = share * share;
+    }
+}
+
+static float strength_by_share(struct missing_light *m, int channel) {
     double explained;
-    float r = missing_light_strength(m, 0, &explained), g = missing_light_strength(m, 1, &explained);
-    return rgb_make(r, g, missing_light_strength(m, 2, &explained));
+    float strength = missing_light_strength(m, channel, &explained);
+    for (int i = 0; i < ROUNDS && strength > 0.0f; i++) {
+        ask_by_share(m, strength, channel);
+        strength = missing_light_strength(m, channel, &explained);
+    }
+    ask_all(m);
+    return strength;
+}
+
+rgb missing_light_color(struct missing_light *m) {
+    float r = strength_by_share(m, 0), g = strength_by_share(m, 1);
+    return rgb_make(r, g, strength_by_share(m, 2));
 }

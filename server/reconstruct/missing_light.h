@@ -16,6 +16,7 @@ struct missing_light {
     float white;                       /* base colours beyond it are odd */
     bool in_patches;                   /* see missing_light_init */
     float *spread;                     /* [places->count] of a segment, at its first place; owned */
+    float *weight;                     /* [places->count] 1, or how far a place is asked; owned */
     float *base, *sorted;              /* [places->count] scratch; owned */
 };
 
@@ -32,8 +33,10 @@ void missing_light_renew(struct missing_light *m);
  * odd the places of all segments that are lit at all are with it goes to *explained, in places. */
 float missing_light_strength(const struct missing_light *m, int channel, double *explained);
 
-/* The same by channel, without asking what it explains. */
-rgb missing_light_color(const struct missing_light *m);
+/* The strength by channel of light that is known to be missing. A place counts by the square of the share of its light
+ * that it would be: what else is wrong with the light is alike over a whole wall, and a thousand places of it, to which
+ * a lamp in a corner brings a hundredth of their light, would agree about it. */
+rgb missing_light_color(struct missing_light *m);
 
 /* The share of a place's light that a strength of the one that is tried would be. */
 float missing_light_part(const struct light_place *p, float strength);

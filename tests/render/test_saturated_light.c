@@ -1,5 +1,6 @@
 /* saturated_light.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so is a sky;
- * where some photograph measured them, what they light is not asked. The same for any number of threads. */
+ * where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
+ * show as white is no lamp. The same for any number of threads. */
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/reconstruction.h"
 #include "tests/check.h"
@@ -52,6 +53,10 @@ static void test_lamp(struct parallel *pool) {
     }
     CHECK(IS_BRIEF || memcmp(&found[0], &found[1], sizeof found[0]) == 0);
     scene_release(&scene);
+}
+
+static vec3 look_at_window(int frame) {
+    return (vec3){1.0f + 2.0f * fmodf((float)frame * 0.618f, 1.0f), 2.0f, 0.0f};
 }
 
 /* Mean of the map where photographs look out. */
@@ -120,12 +125,42 @@ static void test_measured(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* A third of the photographs is exposed for the room, in the others the sky outshines the bar: none shows that it is not
+ * the bar which shines. */
+static void test_bar(struct parallel *pool) {
+    struct scene scene = {0};
+    struct image sky;
+    make_mesh_with_window(&scene.mesh);
+    for (size_t i = 4 * (size_t)(OBJECTS + 2); i < scene.mesh.vertex_count; i++) {
+        vec3 *p = &scene.mesh.position[i];
+        *p = (vec3){1.9f + 0.2f * (p->x - 1.5f), 1.25f + 1.5f * (p->z - 1.0f), -0.02f};
+    }
+    image_init_rgb(&sky, 64, 32);
+    for (size_t i = 0; i < 3 * 64 * 32; i++)
+        sky.pixel[i] = SKY_RADIANCE;
+    wall_color[LAMP] = rgb_gray(0.8f);
+    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_at_window, pool);
+    struct scene dark = {.photograph = scene.photograph, .photograph_count = 2 * FRAMES / 3};
+    struct scene bright = {.photograph = scene.photograph + 2 * FRAMES / 3, .photograph_count = FRAMES - 2 * FRAMES / 3};
+    saturate(&dark, CLIP);
+    saturate(&bright, 0.0625f);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++) {
+        CHECK_THAT(!r.evidence[s].unbound && !r.is_emitter[s], "segment %zu", s);
+    }
+    reconstruct_release(&r);
+    image_release(&sky);
+    scene_release(&scene);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     test_lamp(pool);
     if (!IS_BRIEF) {
         test_sky(pool);
         test_measured(pool);
+        test_bar(pool);
     }
     parallel_free(pool);
     return check_result();
