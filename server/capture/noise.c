@@ -206,13 +206,21 @@ static rgb deviation_by_brightness(const struct noise *noise, const struct photo
                     radiance.b * share_of(noise, photo, radiance.b, photo->gain.b));
 }
 
+static float scale_at(const struct noise *noise, uint32_t train, const struct camera *camera, float x, float y) {
+    uint32_t column = (uint32_t)clampf(x, 0.0f, (float)(camera->width - 1)) / NOISE_BLOCK;
+    uint32_t row = (uint32_t)clampf(y, 0.0f, (float)(camera->height - 1)) / NOISE_BLOCK;
+    return noise->scale[train][row * blocks(camera->width) + column];
+}
+
 rgb noise_deviation(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance) {
     const struct photograph *photo = &v->scene->photograph[v->train[view->train]];
-    const struct camera *camera = &photo->camera;
-    uint32_t x = (uint32_t)clampf(view->x, 0.0f, (float)(camera->width - 1));
-    uint32_t y = (uint32_t)clampf(view->y, 0.0f, (float)(camera->height - 1));
-    float scale = noise->scale[view->train][y / NOISE_BLOCK * blocks(camera->width) + x / NOISE_BLOCK];
+    float scale = scale_at(noise, view->train, &photo->camera, view->x, view->y);
     return rgb_scale(deviation_by_brightness(noise, photo, radiance), scale);
+}
+
+float noise_deviation_of_value(const struct noise *noise, uint32_t train, const struct camera *camera, float x, float y,
+                               float value) {
+    return value * noise->share[octave_of(value)] * scale_at(noise, train, camera, x, y);
 }
 
 float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,

@@ -36,6 +36,10 @@ void noise_release(struct noise *noise);
  * `radiance`. Above 0 where the radiance is. */
 rgb noise_deviation(const struct noise *noise, const struct views *views, const struct view *view, rgb radiance);
 
+/* The same at a place of a picture that stores `value` there, of that value. */
+float noise_deviation_of_value(const struct noise *noise, uint32_t train, const struct camera *camera, float x, float y,
+                               float value);
+
 /* What a look-up there counts beside others of the same point that should all tell `radiance`: the inverse of
  * its variance, as a share of the radiance squared, by noise and by light of other surfaces
  * (views_mixing). */

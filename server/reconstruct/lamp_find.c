@@ -124,7 +124,7 @@ static void add_lamp(struct search *s) {
     s->candidate[0] = s->candidate[--s->candidate_count];
     lamps_fit_one(&s->lamps, lamp);
     missing_light_renew(&s->lamps.missing);
-    segment_light_places(&s->lamps.light, &s->few, lamp->segment, SEGMENT_LIGHT_POINTS);
+    segment_light_places(&s->lamps.light, &s->few, lamp->segment[0], SEGMENT_LIGHT_POINTS);
     lamps_shine(&s->few, lamp->radiance);
 }
 
@@ -139,7 +139,7 @@ static void look_for_lamps(struct search *s) {
 static void report(const struct lamps *l) {
     cJSON *list = cJSON_AddArrayToObject(l->r->report, "hidden_lamps");
     for (size_t i = 0; i < l->count; i++)
-        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)l->r->segments.id[l->lamp[i].segment]));
+        cJSON_AddItemToArray(list, cJSON_CreateNumber((double)l->r->segments.id[l->lamp[i].segment[0]]));
 }
 
 void lamp_find(struct reconstruction *r, const struct views *views) {

@@ -17,6 +17,9 @@
 #define KEY_OPEN 31
 #define SKY_RAYS 128 /* a place */
 #define KEY_SKY 37   /* keeps these random numbers apart from others of the place */
+/* Segments may differ by such shares in area and in what photographs tell and still be alike. */
+#define ALIKE_AREA 0.02f
+#define ALIKE_RADIANCE 0.1f
 /* Where what is known of the sky is taken away, this part of a place's light stays at least. */
 #define LEFT 0.01f
 
@@ -58,23 +61,31 @@ static void darken(struct light_places *places) {
     }
 }
 
-static void light_lamp(struct lamps *l, struct lamp *lamp) {
-    if (lamp->segment == LAMPS_SKY) {
-        parallel_for(l->r->pool, l->places.count, light_by_sky, l);
-        darken(&l->places);
-    } else {
-        segment_light_places(&l->light, &l->places, lamp->segment, SEGMENT_LIGHT_POINTS);
-    }
-    lamp->lit = mem_array(l->places.count + 1, sizeof *lamp->lit);
+static void take_lit(struct lamps *l, const struct lamp *lamp) {
     for (size_t i = 0; i < l->places.count; i++)
-        lamp->lit[i] = l->places.place[i].lit;
+        l->places.place[i].lit = lamp->lit[i];
+}
+
+static void light_lamp(struct lamps *l, struct lamp *lamp) {
+    lamp->lit = mem_calloc(l->places.count + 1, sizeof *lamp->lit);
+    for (size_t k = 0; k < lamp->segment_count; k++) {
+        if (lamps_is_sky(lamp)) {
+            parallel_for(l->r->pool, l->places.count, light_by_sky, l);
+            darken(&l->places);
+        } else {
+            segment_light_places(&l->light, &l->places, lamp->segment[k], SEGMENT_LIGHT_POINTS);
+        }
+        for (size_t i = 0; i < l->places.count; i++)
+            lamp->lit[i] += l->places.place[i].lit;
+    }
+    take_lit(l, lamp);
     lamps_shine(&l->places, lamp->radiance);
 }
 
 struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance) {
     assert(l->count < LAMPS_MOST);
     struct lamp *lamp = &l->lamp[l->count++];
-    *lamp = (struct lamp){.segment = segment, .radiance = radiance};
+    *lamp = (struct lamp){.segment_count = 1, .segment = {segment}, .radiance = radiance};
     if (segment != LAMPS_SKY)
         l->without[segment] = true;
     if (l->places.place)
@@ -82,8 +93,33 @@ struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance) {
     return lamp;
 }
 
+static bool is_near(float a, float b, float share) {
+    return fabsf(a - b) <= share * fmaxf(a, b);
+}
+
+/* Of one size, and photographs show about as much of both and tell as little of the rest. */
+static bool is_alike(const struct lamps *l, const struct lamp *lamp, uint32_t segment) {
+    const struct emitter_evidence *e = &l->r->evidence[segment];
+    if (lamps_is_sky(lamp) || rgb_is_black(lamp->least) || lamp->segment_count == LAMPS_ALIKE_MOST ||
+        !is_near(l->light.area_m2[lamp->segment[0]], l->light.area_m2[segment], ALIKE_AREA))
+        return false;
+    for (int c = 0; c < 3; c++) {
+        if (lamp->told[c] == e->bound[c] || !is_near((&lamp->least.r)[c], (&e->least.r)[c], ALIKE_RADIANCE))
+            return false;
+    }
+    return true;
+}
+
 void lamps_add_bound(struct lamps *l, uint32_t segment) {
     const struct emitter_evidence *e = &l->r->evidence[segment];
+    for (size_t i = 0; i < l->count; i++) {
+        struct lamp *other = &l->lamp[i];
+        if (!is_alike(l, other, segment))
+            continue;
+        other->segment[other->segment_count++] = segment;
+        l->without[segment] = true;
+        return;
+    }
     struct lamp *lamp = lamps_add(l, segment, e->shown);
     lamp->least = e->least;
     for (int c = 0; c < 3; c++)
@@ -128,11 +164,6 @@ bool lamps_is_open(const struct lamps *l) {
 }
 
 /* --- how bright they are ----------------------------------------------------------------------------------- */
-
-static void take_lit(struct lamps *l, const struct lamp *lamp) {
-    for (size_t i = 0; i < l->places.count; i++)
-        l->places.place[i].lit = lamp->lit[i];
-}
 
 /* Makes it so much brighter than photographs tell, in the channels in which they do not. */
 static void set_radiance(struct lamp *lamp, rgb more) {
@@ -187,14 +218,15 @@ void lamps_hand_over(const struct lamps *l, size_t count) {
     struct reconstruction *r = l->r;
     for (size_t i = 0; i < count; i++) {
         const struct lamp *lamp = &l->lamp[i];
-        if (lamp->segment == LAMPS_SKY) {
+        if (lamps_is_sky(lamp))
             lamps_brighten_sky(r, lamp->radiance);
-            continue;
+        for (size_t k = 0; k < lamp->segment_count && !lamps_is_sky(lamp); k++) {
+            struct emitter_evidence *e = &r->evidence[lamp->segment[k]];
+            e->unbound = !rgb_is_black(lamp->least);
+            e->hidden = !e->unbound;
+            for (int c = 0; c < 3; c++)
+                (&e->shown.r)[c] = lamp->told[c] ? (&e->least.r)[c] : (&lamp->radiance.r)[c];
         }
-        struct emitter_evidence *e = &r->evidence[lamp->segment];
-        e->unbound = !rgb_is_black(lamp->least);
-        e->hidden = !e->unbound;
-        e->shown = lamp->radiance;
     }
 }
 
@@ -216,7 +248,7 @@ void lamps_refit(struct reconstruction *r, const struct views *views, const uint
     if (l.count > 0) {
         lamps_survey(&l, views, radiance);
         lamps_fit_all(&l, l.count);
-        if (l.lamp[0].segment == LAMPS_SKY)
+        if (lamps_is_sky(&l.lamp[0]))
             r->sky_factor = l.lamp[0].radiance;
     }
     lamps_hand_over(&l, l.count);

@@ -2,8 +2,9 @@
  *
  * Places all over the room are lit by what is known, and by these lamps: those that no photograph shows
  * (lamp_find.h), and those at which every photograph saturates (saturated_light.h). Each in turn, the others being as
- * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). Which lamps there
- * are is not decided here. */
+ * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). Segments at which
+ * photographs saturate and which are alike, a row of bulbs or panels, are one lamp: what they light hardly tells
+ * which of them it is. Which lamps there are is not decided here. */
 #ifndef UNBAKE_RECONSTRUCT_LAMPS_H
 #define UNBAKE_RECONSTRUCT_LAMPS_H
 
@@ -19,8 +20,12 @@
  * shows, which were filled in from them. Its radiance is a factor to what the map has. */
 #define LAMPS_SKY UINT32_MAX
 
+/* Segments that are one lamp. */
+#define LAMPS_ALIKE_MOST 16
+
 struct lamp {
-    uint32_t segment;
+    size_t segment_count;
+    uint32_t segment[LAMPS_ALIKE_MOST];
     rgb radiance;
     rgb least;    /* what photographs tell */
     bool told[3]; /* by channel: it is no more than that */
@@ -44,9 +49,11 @@ void lamps_release(struct lamps *l);
 /* Adds a segment of which photographs tell nothing; there must be room for it. After the survey it lights the places
  * from then on. */
 struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance);
-/* Before the survey: a segment at which photographs saturate, as r->evidence has it; the sky at which they do. */
+/* Before the survey: a segment at which photographs saturate, as r->evidence has it, to a lamp that is alike or as
+ * one of its own, for which there must be room; the sky at which they do. */
 void lamps_add_bound(struct lamps *l, uint32_t segment);
 void lamps_add_sky(struct lamps *l);
+static inline bool lamps_is_sky(const struct lamp *lamp) { return lamp->segment[0] == LAMPS_SKY; }
 
 /* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less. */
 void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]);

@@ -7,6 +7,7 @@
 #include "common/clock.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/capture/clip.h"
 #include "server/capture/orient.h"
 #include "server/capture/shown.h"
 #include "server/capture/views.h"
@@ -224,6 +225,7 @@ static enum status prepare(struct run *run, struct error *err) {
     calibrate(r, &run->views, run->hooks);
     noise_measure(&r->noise, &run->views);
     noise_tell_black(&r->noise, r->scene);
+    clip_mark(r->scene, &run->views, &r->noise, r->pool);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
     status = remap_surface(run, split_shining(run), err);

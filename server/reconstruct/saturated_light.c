@@ -86,11 +86,13 @@ static void report(const struct lamps *l, size_t count) {
     cJSON *list = cJSON_AddArrayToObject(l->r->report, "saturated_light");
     for (size_t i = 0; i < count; i++) {
         const struct lamp *lamp = &l->lamp[i];
-        cJSON *entry = cJSON_CreateObject();
-        if (lamp->segment != LAMPS_SKY)
-            json_add_number(entry, "object_id", (double)l->r->segments.id[lamp->segment]);
-        json_add_number(entry, "factor", (double)(rgb_mean(lamp->radiance) / rgb_mean(lamp->least)));
-        cJSON_AddItemToArray(list, entry);
+        for (size_t k = 0; k < lamp->segment_count; k++) {
+            cJSON *entry = cJSON_CreateObject();
+            if (!lamps_is_sky(lamp))
+                json_add_number(entry, "object_id", (double)l->r->segments.id[lamp->segment[k]]);
+            json_add_number(entry, "factor", (double)(rgb_mean(lamp->radiance) / rgb_mean(lamp->least)));
+            cJSON_AddItemToArray(list, entry);
+        }
     }
 }
 

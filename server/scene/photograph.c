@@ -15,6 +15,7 @@
 void photograph_release(struct photograph *photo) {
     mem_free(photo->name);
     mem_free(photo->pixel);
+    mem_free(photo->white);
     mem_free(photo->mask);
     *photo = (struct photograph){0};
 }
@@ -38,6 +39,14 @@ static inline float half_to_float(uint16_t half) {
 static inline float read_tap(const struct photograph *photo, uint16_t half) {
     float value = half_to_float(half);
     return value == 0.0f ? -photo->black : value;
+}
+
+/* Whether a channel saturates; what it reads is no less than the clip then. */
+static inline bool saturates(const struct photograph *photo, size_t at, int channel, float *tap) {
+    bool is_white = photo->white ? photo->white[at] >> channel & 1 : *tap >= photo->clip;
+    if (is_white)
+        *tap = fmaxf(*tap, photo->clip);
+    return is_white;
 }
 
 /* The two pixels and the weight of the second around place x of a row of `count` pixels. */
@@ -75,7 +84,7 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
             return false;
         for (int c = 0; c < 3; c++) {
             float tap = read_tap(photo, photo->pixel[at][c]);
-            sample->saturated[c] |= tap >= photo->clip;
+            sample->saturated[c] |= saturates(photo, at, c, &tap);
             value[c] += weight * tap;
         }
     }
@@ -104,7 +113,7 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
         float sum = 0.0f;
         for (int c = 0; c < 3; c++) {
             float tap = read_tap(photo, photo->pixel[at][c]);
-            if (!(tap < photo->clip))
+            if (saturates(photo, at, c, &tap) || !isfinite(tap))
                 return false;
             value[c] += wx[k % 4] * wy[k / 4] * tap;
             sum += tap;

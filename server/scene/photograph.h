@@ -30,6 +30,8 @@ struct photograph {
     float black;            /* a stored 0 reads as minus this value; 0 until noise is known, and for HDR */
     float clip;             /* value at which a pixel is saturated; INFINITY for HDR */
     uint16_t (*pixel)[3];   /* [height][width] linear half-precision values; owned */
+    uint8_t *white;         /* [height][width] bit c: channel c saturates, by what is around (clip.h); NULL: where its value
+                             * is at the clip; owned */
     uint8_t *mask;          /* [height][width] 0 where the pixel must not be used, or NULL; owned */
 };
 

@@ -25,6 +25,8 @@ static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f,
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
 static const rgb lamp_radiance = {9.0f, 8.0f, 6.0f};
+/* A test may have another object shine as the lamp does. */
+static size_t other_lamp = LAMP;
 /* A test may have the lamp show a picture: the radiance at a place of it over lamp_radiance. */
 static rgb (*lamp_picture)(vec3 place);
 
@@ -138,7 +140,7 @@ static inline void model_init(struct model *m, const struct mesh *mesh, uint32_t
 static inline void model_light(struct model *m, const struct mesh *mesh, rgb lamp, const struct image *environment,
                                struct parallel *pool) {
     struct error err = {0};
-    m->materials.emission[LAMP] = lamp;
+    m->materials.emission[LAMP] = m->materials.emission[other_lamp] = lamp;
     CHECK(world_init(&m->world, mesh, &m->segments, &m->atlas, &m->materials, environment, pool, &err) ==
           STATUS_OK);
 }

@@ -1,6 +1,6 @@
 /* saturated_light.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so is a sky;
  * where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
- * show as white is no lamp. The same for any number of threads. */
+ * show as white is no lamp. Of lamps that are alike none is brighter than the others. The same for any number of threads. */
 #include "server/reconstruct/emitters.h"
 #include "server/reconstruct/reconstruction.h"
 #include "tests/check.h"
@@ -110,6 +110,31 @@ static void test_sky(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* Two lamps side by side light the room much alike; one that is twice as bright would explain it as well. */
+static void test_pair(struct parallel *pool) {
+    struct scene scene = {0};
+    const int64_t lamp[2] = {LAMP, 5};
+    start_room(&scene.mesh, OBJECTS + 1);
+    add_quad(&scene.mesh, 4, (vec3){0, 0, 0}, (vec3){4, 0, 0}, (vec3){0, 3, 0});
+    add_quad(&scene.mesh, 4, (vec3){0, 0, 3}, (vec3){0, 3, 0}, (vec3){4, 0, 0});
+    for (int i = 0; i < 2; i++)
+        add_quad(&scene.mesh, lamp[i], (vec3){1.5f + 0.5f * (float)i, 2.9f, 1.0f}, (vec3){0.45f, 0, 0}, (vec3){0, 0, 1});
+    other_lamp = 5;
+    photograph_mesh(&scene, lamp_radiance, NULL, look_anywhere, pool);
+    other_lamp = LAMP;
+    saturate(&scene, CLIP);
+    struct reconstruction r;
+    shell_solve(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++) {
+        bool is_lamp = r.segments.id[s] == lamp[0] || r.segments.id[s] == lamp[1];
+        CHECK_THAT(r.is_emitter[s] == is_lamp, "segment %zu", s);
+        if (is_lamp)
+            CHECK_RGB(r.materials.emission[s], lamp_radiance, 0.2f);
+    }
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 /* A third of the photographs is exposed for the lamp. */
 static void test_measured(struct parallel *pool) {
     struct scene scene = {0};
@@ -146,9 +171,8 @@ static void test_bar(struct parallel *pool) {
     saturate(&bright, 0.0625f);
     struct reconstruction r;
     shell_solve(&scene, 0, &r);
-    for (size_t s = 0; s < r.segments.count; s++) {
+    for (size_t s = 0; s < r.segments.count; s++)
         CHECK_THAT(!r.evidence[s].unbound && !r.is_emitter[s], "segment %zu", s);
-    }
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);
@@ -160,6 +184,7 @@ int main(void) {
     if (!IS_BRIEF) {
         test_sky(pool);
         test_measured(pool);
+        test_pair(pool);
         test_bar(pool);
     }
     parallel_free(pool);

@@ -1,0 +1,80 @@
+/* clip.c -- see clip.h. */
+#include "server/capture/clip.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+
+#define WINDOW 2       /* pixels to either side */
+#define WINDOW_LEAST 9 /* pixels that must show the same surface */
+#define SATURATED_LEAST 0.1f
+#define DEVIATIONS 3.0f /* noise goes so far */
+
+struct clip_job {
+    const struct views *views;
+    const struct noise *noise;
+    struct photograph *photo;
+    uint32_t train;
+};
+
+/* What the pixels around one, which show the same surface and nothing else, tell of a channel. */
+struct around {
+    float count, saturated, below; /* `below`: the sum of the values that do not saturate */
+};
+
+static struct around look_around(const struct clip_job *job, long x0, long y0, int channel) {
+    const struct camera *camera = &job->photo->camera;
+    const uint8_t *owner = job->views->owner[job->train], *edge = job->views->edge[job->train];
+    uint8_t own = owner[y0 * (long)camera->width + x0];
+    struct around a = {0.0f, 0.0f, 0.0f};
+    for (long y = y0 > WINDOW ? y0 - WINDOW : 0; y <= y0 + WINDOW && y < (long)camera->height; y++) {
+        for (long x = x0 > WINDOW ? x0 - WINDOW : 0; x <= x0 + WINDOW && x < (long)camera->width; x++) {
+            size_t at = (size_t)(y * (long)camera->width + x);
+            if (owner[at] != own || edge[at] == VIEWS_EDGE || (job->photo->mask && !job->photo->mask[at]))
+                continue;
+            float value = image_float_from_half(job->photo->pixel[at][channel]);
+            bool saturates = value >= job->photo->clip;
+            a.count += 1.0f;
+            a.saturated += saturates;
+            a.below += saturates ? 0.0f : value;
+        }
+    }
+    return a;
+}
+
+static bool is_white(const struct clip_job *job, long x, long y, int channel) {
+    float clip = job->photo->clip;
+    float value = image_float_from_half(job->photo->pixel[y * (long)job->photo->camera.width + x][channel]);
+    struct around a = look_around(job, x, y, channel);
+    if (a.saturated == 0.0f || a.count < WINDOW_LEAST)
+        return value >= clip;
+    float noise = noise_deviation_of_value(job->noise, job->train, &job->photo->camera, (float)x, (float)y, clip);
+    float least = clip - DEVIATIONS * noise;
+    if (a.saturated >= SATURATED_LEAST * a.count)
+        return value >= least;
+    return value >= clip && a.below / (a.count - a.saturated) < least;
+}
+
+static void mark_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct clip_job *job = user;
+    uint32_t width = job->photo->camera.width;
+    for (uint32_t x = 0; x < width; x++) {
+        job->photo->white[row * width + x] = 0;
+        for (int c = 0; c < 3; c++)
+            job->photo->white[row * width + x] |= (uint8_t)(is_white(job, (long)x, (long)row, c) << c);
+    }
+}
+
+void clip_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool) {
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        struct photograph *photo = &scene->photograph[views->train[t]];
+        if (photo->is_hdr)
+            continue;
+        struct clip_job job = {views, noise, photo, t};
+        if (!photo->white)
+            photo->white = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->white);
+        parallel_for(pool, photo->camera.height, mark_row, &job);
+    }
+}
