@@ -329,8 +329,10 @@ void detail_finish(struct detail *d) {
     for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
         uint32_t texel = d->r->inverse.valid[i];
         struct measured *m = &d->measured[texel];
-        if (d->told[texel] > 0.0f)
-            rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->moved[texel][0])));
+        if (!(d->told[texel] > 0.0f))
+            continue;
+        rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->moved[texel][0])));
+        rgb_to_half(m->noise, rgb_scale(rgb_from_half(m->noise), 1.0f - d->told[texel]));
     }
 }
 

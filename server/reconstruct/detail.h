@@ -8,8 +8,8 @@
  *
  * Sharpening makes noise larger, too. A texel is drawn back to where it was by the share of noise in what it is off by,
  * told by one half of the photographs against the other (halves.h); where one half tells next to nothing it stays. The
- * draw of noise in `measured` stays as it is: it has all in which the photographs do not agree, their blur as well, and
- * so is more than the noise was. */
+ * draw of noise in `measured` has all in which the photographs did not agree, their blur as well: of it as much is
+ * taken away. (Noise drawn by pixels and sharpened alike in its place takes texture for noise.) */
 #ifndef UNBAKE_RECONSTRUCT_DETAIL_H
 #define UNBAKE_RECONSTRUCT_DETAIL_H
 
@@ -25,7 +25,7 @@ struct detail {
     const struct reconstruction *r;  /* borrowed, as the next three */
     const struct views *views;
     const uint16_t (*white)[3];      /* [height][width] what a white texel would send out; 0: not known */
-    struct measured *measured;       /* [height][width] value is written */
+    struct measured *measured;       /* [height][width] value and noise are written */
     /* Of each photograph, [train_count][pixels]; owned. */
     uint32_t **triangle;             /* that is shown; UINT32_MAX: the pixel is not asked */
     float **worth;                   /* inverse variance by noise, up to a factor; at most 1 */

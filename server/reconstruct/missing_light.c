@@ -13,9 +13,9 @@
 #define GLOSS 0.04f
 /* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
  * much stronger; then nearer and nearer to the best. */
-#define FAINTEST 0.1
+#define FAINTEST 0.01
 #define STRONGER 2.0f
-#define STRENGTHS 16
+#define STRENGTHS 20
 #define NEARER 5
 /* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
 #define ROUNDS 4

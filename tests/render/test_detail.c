@@ -119,15 +119,24 @@ static void find(struct capture *s, const struct views *views) {
     detail_release(&detail);
 }
 
+/* Of the draw of noise, over all texels. */
+static double noise_power(const struct capture *s) {
+    double power = 0.0;
+    for (size_t i = 0; i < s->texels; i++)
+        power += (double)rgb_dot(rgb_from_half(s->measured[i].noise), rgb_from_half(s->measured[i].noise));
+    return power;
+}
+
 static void test_paint(bool tiles, int threads, uint32_t *sum) {
     struct capture s;
     capture_init(&s, tiles, threads, 0.0f);
-    double before = error_of(&s.room, s.measured);
+    double before = error_of(&s.room, s.measured), noise = noise_power(&s);
     CHECK(detail_texels_a_pixel(&s.r, &s.room.views) > 1.0);
     find(&s, &s.room.views);
     double after = error_of(&s.room, s.measured);
     printf("%s: error %.4f, after %.4f\n", tiles ? "tiles" : "waves", before, after);
     CHECK(after < 0.9 * before);
+    CHECK_THAT(noise > 0.0 && noise_power(&s) < 0.5 * noise, "photographs disagree by their blur, which is gone");
     *sum = 0;
     for (size_t i = 0; i < s.texels; i++)
         *sum = rng_mix32(*sum ^ s.measured[i].value[0] ^ ((uint32_t)s.measured[i].value[2] << 16));
