@@ -8,7 +8,7 @@
 
 #define WINDOW 2       /* pixels to either side */
 #define WINDOW_LEAST 9 /* pixels that must show the same surface */
-#define SATURATED_LEAST 0.1f
+#define SATURATED_LEAST 0.3f
 #define DEVIATIONS 3.0f /* noise goes so far */
 
 struct clip_job {
