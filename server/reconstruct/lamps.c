@@ -214,19 +214,23 @@ void lamps_brighten_sky(struct reconstruction *r, rgb factor) {
     world_set_environment(&r->world, &r->environment.map, r->pool);
 }
 
+static void hand_over_segment(struct reconstruction *r, const struct lamp *lamp, uint32_t segment) {
+    struct emitter_evidence *e = &r->evidence[segment];
+    e->unbound = !rgb_is_black(lamp->least);
+    e->hidden = !e->unbound;
+    for (int c = 0; c < 3; c++)
+        (&e->shown.r)[c] = lamp->told[c] ? (&e->least.r)[c] : (&lamp->radiance.r)[c];
+}
+
 void lamps_hand_over(const struct lamps *l, size_t count) {
-    struct reconstruction *r = l->r;
     for (size_t i = 0; i < count; i++) {
         const struct lamp *lamp = &l->lamp[i];
-        if (lamps_is_sky(lamp))
-            lamps_brighten_sky(r, lamp->radiance);
-        for (size_t k = 0; k < lamp->segment_count && !lamps_is_sky(lamp); k++) {
-            struct emitter_evidence *e = &r->evidence[lamp->segment[k]];
-            e->unbound = !rgb_is_black(lamp->least);
-            e->hidden = !e->unbound;
-            for (int c = 0; c < 3; c++)
-                (&e->shown.r)[c] = lamp->told[c] ? (&e->least.r)[c] : (&lamp->radiance.r)[c];
+        if (lamps_is_sky(lamp)) {
+            lamps_brighten_sky(l->r, lamp->radiance);
+            continue;
         }
+        for (size_t k = 0; k < lamp->segment_count; k++)
+            hand_over_segment(l->r, lamp, lamp->segment[k]);
     }
 }
 

@@ -49,9 +49,14 @@ static float channel_of(rgb value, int channel) {
     return channel == MISSING_MEAN ? rgb_mean(value) : (&value.r)[channel];
 }
 
-float missing_light_part(const struct light_place *p, float strength) {
+/* The share of a place's light in a channel that a strength of the one that is tried would be. */
+static float part_of(const struct light_place *p, float strength, int channel) {
     float light = strength * p->lit;
-    return light > 0.0f ? light / (light + rgb_mean(p->white)) : 0.0f;
+    return light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
+}
+
+float missing_light_part(const struct light_place *p, float strength) {
+    return part_of(p, strength, MISSING_MEAN);
 }
 
 /* From 0, as usual, to 1, not to be explained (Geman and McClure). */
@@ -190,8 +195,7 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
 
 static void ask_by_share(struct missing_light *m, float strength, int channel) {
     for (size_t i = 0; i < m->places->count; i++) {
-        const struct light_place *p = &m->places->place[i];
-        float light = strength * p->lit, share = light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
+        float share = part_of(&m->places->place[i], strength, channel);
         m->weight[i] = share * share;
     }
 }
