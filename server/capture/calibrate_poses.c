@@ -5,19 +5,16 @@
 #include <string.h>
 
 #include "common/mem.h"
+#include "server/capture/pose_guests.h"
 #include "server/capture/pose_solver.h"
 
-#define ROUNDS 6             /* at each level */
+#define ROUNDS 12            /* at each level */
 #define LAST_ROUNDS 4        /* after the first judgement, at the finest level */
-#define COARSEST_PX 150      /* width of a picture below which it tells more lies than truth */
+#define COARSEST_PX 75       /* width of a picture below which it tells more lies than truth */
 #define STEP_PX 1.5          /* of a level, that a round moves a photograph at most */
 #define COMMON_SCALE 0.05    /* for comparing the agreement of all photographs */
 
-/* A correction is kept when the held-back tracks agree better by this share of their robust cost,
- * by this many standard errors, and moved by this much (rms). */
-#define LEAST_GAIN 0.02
-#define LEAST_SIGNIFICANCE 6.0
-#define LEAST_SHIFT_PX 0.15
+#define LEAST_SHIFT_PX 0.15  /* rms; less is not worth a correction */
 
 /* Root of the mean squared distance, in pixels, between the places of a frame's own tracks in two
  * cameras. */
@@ -26,11 +23,10 @@ static double shift_of(const struct pose_solver *s, size_t f, const struct camer
     double squares = 0.0;
     size_t count = 0;
     for (size_t i = 0; i < s->tracks->count[f]; i++) {
-        float xa, ya, xb, yb, depth_m;
-        vec3 point = s->tracks->track[f * s->tracks->capacity + i].point;
-        if (!camera_project(a, point, &xa, &ya, &depth_m) || !camera_project(b, point, &xb, &yb, &depth_m))
+        double square = pose_square_between(a, b, s->tracks->track[f * s->tracks->capacity + i].point);
+        if (isnan(square))
             continue;
-        squares += (double)((xa - xb) * (xa - xb) + (ya - yb) * (ya - yb));
+        squares += square;
         count++;
     }
     return count ? sqrt(squares / (double)count) : 0.0;
@@ -49,13 +45,7 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
 
 /* --- judgement ------------------------------------------------------------------------------------ */
 
-/* Evidence for a frame's correction: gains of robust cost over its held-back sights. */
-struct evidence {
-    double sum, squares, total;
-    size_t count;
-};
-
-static void collect_evidence(const struct pose_solver *s, struct evidence *evidence) {
+static void collect_evidence(const struct pose_solver *s, struct pose_evidence *evidence) {
     for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
         struct pose_sight *sight = s->sight + i * POSE_SIGHTS_MAX;
         for (size_t k = 0; k < pose_sight_count(s->track[i]); k++) {
@@ -71,25 +61,15 @@ static void collect_evidence(const struct pose_solver *s, struct evidence *evide
             if (!isfinite(old) || !isfinite(look))
                 continue;
             double cost = pose_robust((double)old - s->x[sight[k].offset] - look, frame->scale);
-            double gain = cost - pose_robust((double)value - s->x[sight[k].offset] - look, frame->scale);
-            struct evidence *e = &evidence[sight[k].frame];
-            e->sum += gain;
-            e->squares += gain * gain;
-            e->total += cost;
-            e->count++;
+            pose_evidence_add(&evidence[sight[k].frame], cost,
+                              pose_robust((double)value - s->x[sight[k].offset] - look, frame->scale));
         }
     }
 }
 
-static bool convinces(const struct evidence *e) {
-    double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
-    return e->count >= POSE_LEAST_SIGHTS / POSE_HELD_BACK_EVERY &&
-           e->sum > LEAST_SIGNIFICANCE * error && e->sum > LEAST_GAIN * e->total;
-}
-
 /* Puts back where they were the frames whose correction is small or does not convince. */
 static void judge(struct pose_solver *s, struct parallel *pool) {
-    struct evidence *evidence = mem_calloc(s->frames + 1, sizeof *evidence);
+    struct pose_evidence *evidence = mem_calloc(s->frames + 1, sizeof *evidence);
     s->level = 0;
     pose_linearise(s, pool);
     pose_reweight(s);
@@ -97,7 +77,7 @@ static void judge(struct pose_solver *s, struct parallel *pool) {
     for (size_t f = 0; f < s->frames; f++) {
         struct pose_frame *frame = &s->frame[f];
         frame->shift_px = frame->stays ? 0.0 : shift_of(s, f, &frame->before, &frame->now);
-        if (frame->shift_px < LEAST_SHIFT_PX || !convinces(&evidence[f]))
+        if (frame->shift_px < LEAST_SHIFT_PX || !pose_convinces(&evidence[f]))
             pose_put_back(s, f);
         frame->shift_px = frame->stays ? 0.0 : frame->shift_px;
     }
@@ -132,16 +112,13 @@ static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost
 
 /* Whether all photographs together agree clearly better than at first. */
 static bool all_convince(const double *before, const double *now, size_t count) {
-    struct evidence e = {0};
+    struct pose_evidence e = {0};
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(before[i]) || !isfinite(now[i]))
             continue;
-        e.sum += before[i] - now[i];
-        e.squares += (before[i] - now[i]) * (before[i] - now[i]);
-        e.total += before[i];
-        e.count++;
+        pose_evidence_add(&e, before[i], now[i]);
     }
-    return convinces(&e);
+    return pose_convinces(&e);
 }
 
 /* --- the whole -------------------------------------------------------------------------------- */
@@ -185,6 +162,8 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
         found->moved_count++;
     }
     found->shift_px = found->moved_count ? sqrt(squares / (double)found->moved_count) : 0.0;
+    if (found->moved_count > 0)
+        found->guests_moved = pose_guests(scene, &s, coarsest_level(tracks), pool, &found->guests_shift_px);
     pose_solver_release(&s);
 }
 

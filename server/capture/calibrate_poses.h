@@ -1,4 +1,4 @@
-/* calibrate_poses.h -- poses of photographs, corrected by a few pixels where that makes them agree.
+/* calibrate_poses.h -- poses of photographs, corrected by some pixels where that makes them agree.
  *
  * A photograph is moved (six degrees of freedom) so that at places of strong texture it shows what
  * the other photographs show there (Lucas & Kanade 1981; robust Gauss-Newton over all photographs at
@@ -15,11 +15,13 @@
 struct poses_found {
     size_t moved_count;
     double shift_px;  /* rms over the photographs that were moved, pixels */
+    size_t guests_moved; /* held-out ones */
+    double guests_shift_px;
     float *shift;     /* [train_count] rms over a photograph's tracks, 0 where it stays; owned */
 };
 
-/* Moves the cameras of training photographs. The tracks stay valid, but what views knows of depth
- * edges is then of the old poses. The same for any number of threads. */
+/* Moves the cameras of training photographs and, where any is moved, those of held-out ones (pose_guests.h). The tracks
+ * stay valid, but what views knows of depth edges is then of the old poses. The same for any number of threads. */
 void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct parallel *pool,
                      struct poses_found *found);
 void poses_found_release(struct poses_found *found);

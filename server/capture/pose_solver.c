@@ -8,6 +8,11 @@
 #define FIRST_SCALE 0.1      /* of residuals, before there are any */
 #define LEAST_SCALE 0.01     /* residuals below it are all as good */
 
+/* A correction is clearly better when what was held back agrees better by this share of its robust cost and by so many
+ * standard errors. */
+#define LEAST_GAIN 0.02
+#define LEAST_SIGNIFICANCE 6.0
+
 /* --- poses ----------------------------------------------------------------------------------- */
 
 static struct pose pose_of(const struct rigid *m) {
@@ -60,13 +65,21 @@ static double size_of(const double twist[POSE_UNKNOWNS]) {
     return sqrt(squares);
 }
 
-void pose_move(struct pose_solver *s, size_t f, double most) {
-    struct pose_frame *frame = &s->frame[f];
-    const double *twist = s->x + POSE_UNKNOWNS * f;
+void pose_frame_init(struct pose_frame *frame, const struct camera *camera) {
+    *frame = (struct pose_frame){.before = *camera, .now = *camera, .scale = FIRST_SCALE,
+                                 .pose = pose_of(&camera->camera_from_world)};
+}
+
+double pose_square_between(const struct camera *a, const struct camera *b, vec3 point) {
+    float xa, ya, xb, yb, depth_m;
+    if (!camera_project(a, point, &xa, &ya, &depth_m) || !camera_project(b, point, &xb, &yb, &depth_m))
+        return NAN;
+    return (double)((xa - xb) * (xa - xb) + (ya - yb) * (ya - yb));
+}
+
+void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], double most) {
     double size = size_of(twist), length = size > most ? most / size : 1.0;
     double w[3], v[3], focal = (double)frame->now.fx;
-    if (frame->stays)
-        return;
     for (int k = 0; k < 3; k++) {
         w[k] = length * twist[k] / focal;
         v[k] = length * twist[3 + k] * frame->depth_m / focal;
@@ -75,6 +88,11 @@ void pose_move(struct pose_solver *s, size_t f, double most) {
         frame->total[k] += length * twist[k];
     frame->pose = twisted(&frame->pose, w, v);
     set_pose(&frame->now, &frame->pose);
+}
+
+void pose_move(struct pose_solver *s, size_t f, double most) {
+    if (!s->frame[f].stays)
+        pose_twist(&s->frame[f], s->x + POSE_UNKNOWNS * f, most);
 }
 
 void pose_put_back(struct pose_solver *s, size_t f) {
@@ -117,8 +135,7 @@ static bool look_around(const struct pose_solver *s, const struct track *track, 
     return isfinite(patch->value);
 }
 
-/* Derivative of the value by the twist of its camera, from the slope g by pixels. */
-static bool derive(const struct pose_frame *frame, vec3 point, const float g[2], float d[POSE_UNKNOWNS]) {
+bool pose_derive(const struct pose_frame *frame, vec3 point, const float g[2], float d[POSE_UNKNOWNS]) {
     const struct camera *camera = &frame->now;
     vec3 p = rigid_point(&camera->camera_from_world, point);
     float x, y, depth_m, by_p[3];
@@ -141,6 +158,14 @@ static bool derive(const struct pose_frame *frame, vec3 point, const float g[2],
     return true;
 }
 
+/* The slope g by pixels of what changes by `along` per `right` and `down` of a track: g . place[i] = along[i]. */
+static bool slope_from(const float along[2], const float place[2][2], float g[2]) {
+    float det = place[0][0] * place[1][1] - place[0][1] * place[1][0];
+    g[0] = (along[0] * place[1][1] - along[1] * place[0][1]) / det;
+    g[1] = (along[1] * place[0][0] - along[0] * place[1][0]) / det;
+    return fabsf(det) > 1e-3f && isfinite(g[0]) && isfinite(g[1]);
+}
+
 static void linearise_track(void *user, size_t index, int thread) {
     (void)thread;
     const struct pose_solver *s = user;
@@ -160,17 +185,29 @@ static void linearise_track(void *user, size_t index, int thread) {
         along[1] += trust * patch[k].along[1];
         total += trust;
     }
+    for (int i = 0; i < 2; i++)
+        s->along[index][i] = total > 0.0f ? along[i] / total : NAN;
     for (size_t k = 0; k < pose_sight_count(track) && total > 0.0f; k++) {
-        /* The slope g by pixels has g . place[i] = along[i] / total. */
-        const float(*m)[2] = (const float(*)[2])patch[k].place;
-        if (!isfinite(sight[k].value))
-            continue;
-        float det = m[0][0] * m[1][1] - m[0][1] * m[1][0];
-        float g[2] = {(along[0] * m[1][1] - along[1] * m[0][1]) / (det * total),
-                      (along[1] * m[0][0] - along[0] * m[1][0]) / (det * total)};
-        if (!(fabsf(det) > 1e-3f) || !derive(&s->frame[sight[k].frame], track->point, g, sight[k].d))
+        float g[2];
+        if (isfinite(sight[k].value) && (!slope_from(s->along[index], patch[k].place, g) ||
+                                         !pose_derive(&s->frame[sight[k].frame], track->point, g, sight[k].d)))
             sight[k].value = NAN;
     }
+}
+
+bool pose_slope(const struct pose_solver *s, size_t track, const struct camera *camera, float g[2]) {
+    const struct track *t = s->track[track];
+    const vec3 direction[2] = {t->right, t->down};
+    float step = (float)(1 << s->level) / s->tracks->pyramid[s->owner[track]].scale, place[2][2];
+    for (int k = 0; k < 2; k++) {
+        float x[2], y[2], depth_m;
+        if (!camera_project(camera, vec3_mad(t->point, -step, direction[k]), &x[0], &y[0], &depth_m) ||
+            !camera_project(camera, vec3_mad(t->point, step, direction[k]), &x[1], &y[1], &depth_m))
+            return false;
+        place[k][0] = (x[1] - x[0]) / (2.0f * step);
+        place[k][1] = (y[1] - y[0]) / (2.0f * step);
+    }
+    return slope_from(s->along[track], (const float(*)[2])place, g);
 }
 
 void pose_linearise(struct pose_solver *s, struct parallel *pool) {
@@ -240,6 +277,12 @@ void pose_reweight(struct pose_solver *s) {
     mem_free(sum);
 }
 
+bool pose_convinces(const struct pose_evidence *e) {
+    double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
+    return e->count >= POSE_LEAST_SIGHTS / POSE_HELD_BACK_EVERY &&
+           e->sum > LEAST_SIGNIFICANCE * error && e->sum > LEAST_GAIN * e->total;
+}
+
 /* --- the whole ---------------------------------------------------------------------------- */
 
 static void init_sights(struct pose_solver *s, size_t index) {
@@ -267,16 +310,14 @@ void pose_solver_init(struct pose_solver *s, const struct tracks *tracks) {
     s->track = mem_array(s->frames * tracks->capacity + 1, sizeof *s->track);
     s->owner = mem_array(s->frames * tracks->capacity + 1, sizeof *s->owner);
     for (size_t f = 0; f < s->frames; f++) {
-        struct pose_frame *frame = &s->frame[f];
-        frame->before = frame->now = views->scene->photograph[views->train[f]].camera;
-        frame->pose = pose_of(&frame->before.camera_from_world);
-        frame->scale = FIRST_SCALE;
+        pose_frame_init(&s->frame[f], &views->scene->photograph[views->train[f]].camera);
         for (size_t i = 0; i < tracks->count[f]; i++) {
             s->owner[s->track_count] = (uint32_t)f;
             s->track[s->track_count++] = &tracks->track[f * tracks->capacity + i];
         }
     }
     s->sight = mem_calloc(s->track_count * POSE_SIGHTS_MAX + 1, sizeof *s->sight);
+    s->along = mem_calloc(s->track_count + 1, sizeof *s->along);
     for (size_t i = 0; i < s->track_count; i++)
         init_sights(s, i);
     for (size_t f = 0; f < s->frames; f++) {
@@ -291,5 +332,6 @@ void pose_solver_release(struct pose_solver *s) {
     mem_free(s->track);
     mem_free(s->owner);
     mem_free(s->sight);
+    mem_free(s->along);
 }
 

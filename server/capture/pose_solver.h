@@ -14,6 +14,7 @@
 #define UNBAKE_CAPTURE_POSE_SOLVER_H
 
 #include <math.h>
+#include <stdbool.h>
 
 #include "common/parallel.h"
 #include "server/capture/tracks.h"
@@ -56,6 +57,7 @@ struct pose_solver {
     const struct track **track; /* [track_count] */
     uint32_t *owner;            /* [track_count] the photograph it comes from */
     struct pose_sight *sight;        /* [track_count][POSE_SIGHTS_MAX], the owner's first */
+    float (*along)[2];          /* [track_count] how what it shows changes by its `right` and `down`, at this level */
     struct pose_frame *frame;        /* [frames] */
     double *x;                  /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
     int level;
@@ -68,6 +70,10 @@ void pose_solver_release(struct pose_solver *s);
 /* Values and derivatives of all sights with the cameras as they are now. */
 void pose_linearise(struct pose_solver *s, struct parallel *pool);
 
+/* The slope by pixels of what a track shows in any camera, as all photographs together have it after pose_linearise:
+ * reflections wander over it, texture does not. */
+bool pose_slope(const struct pose_solver *s, size_t track, const struct camera *camera, float g[2]);
+
 /* Weights of all sights and scales of all frames, by how well sights agree now. */
 void pose_reweight(struct pose_solver *s);
 
@@ -76,12 +82,39 @@ void pose_reweight(struct pose_solver *s);
 void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
                       double weight[POSE_SIGHTS_MAX]);
 
+/* What a frame's twist in all is held to 0 by, on the diagonal of the equations. */
+double pose_prior(const struct pose_frame *frame);
+
+/* Lower Cholesky factor of a positive matrix, in its place; and the solution of the equations that have it, in place of
+ * their right side. */
+void pose_factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]);
+void pose_substitute(const double factor[POSE_UNKNOWNS][POSE_UNKNOWNS], double x[POSE_UNKNOWNS]);
+
 /* Solves for x: twists by which frames should move, and offsets. */
 void pose_solve(struct pose_solver *s);
 
-/* Moves a frame by its twist in x, at most `most` pixels; or back to where it was at first, for good. */
+/* At a camera, from which it was not moved yet. */
+void pose_frame_init(struct pose_frame *frame, const struct camera *camera);
+
+/* Derivative of a frame's value at a point of the world by its twist, from its slope g by pixels; false where the point
+ * is not before the camera. */
+bool pose_derive(const struct pose_frame *frame, vec3 point, const float g[2], float d[POSE_UNKNOWNS]);
+
+/* Square of the distance, in pixels, between a point's places in two cameras; NAN where one does not see it. */
+double pose_square_between(const struct camera *a, const struct camera *b, vec3 point);
+
+/* Moves a frame by a twist, at most `most` pixels of it. */
+void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], double most);
+
+/* Moves a frame by its twist in x; or back to where it was at first, for good. */
 void pose_move(struct pose_solver *s, size_t f, double most);
 void pose_put_back(struct pose_solver *s, size_t f);
+
+/* Evidence for a frame's correction: gains of robust cost over what was held back. */
+struct pose_evidence {
+    double sum, squares, total;
+    size_t count;
+};
 
 static inline size_t pose_sight_count(const struct track *track) {
     return (size_t)track->other_count + 1;
@@ -96,5 +129,16 @@ static inline double pose_robust(double residual, double scale) {
     double e = residual / scale;
     return log1p(e * e);
 }
+
+/* What a correction makes of a robust cost. */
+static inline void pose_evidence_add(struct pose_evidence *e, double before, double now) {
+    e->sum += before - now;
+    e->squares += (before - now) * (before - now);
+    e->total += before;
+    e->count++;
+}
+
+/* Whether that is clearly better: by a part of it, and by many standard errors. */
+bool pose_convinces(const struct pose_evidence *e);
 
 #endif

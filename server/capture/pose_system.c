@@ -13,13 +13,13 @@
 #include "server/capture/conjugate.h"
 
 #define OFFSET_SIGMA 0.3
-#define PRIOR_PX 0.1         /* size of the prior: a photograph moves this far for hardly any evidence */
+#define PRIOR_PX 1.0         /* size of the prior: a photograph moves this far for hardly any evidence */
 #define PRIOR_LEAST_PX 0.2   /* below it the prior is a square */
 #define DAMPING 0.01
 #define CG_STEPS 40
 #define CG_TOLERANCE 1e-3
 
-static double prior_of(const struct pose_frame *frame) {
+double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
     return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
 }
@@ -70,7 +70,7 @@ static void multiply(const void *user, const double *x, double *out) {
     const struct pose_solver *s = system->solver;
     size_t twists = POSE_UNKNOWNS * s->frames;
     for (size_t i = 0; i < s->unknowns; i++)
-        out[i] = x[i] * (i < twists ? prior_of(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
+        out[i] = x[i] * (i < twists ? pose_prior(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
                                     : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
     for (size_t t = 0; t < s->track_count; t++) {
         const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
@@ -88,7 +88,7 @@ static void multiply(const void *user, const double *x, double *out) {
     project(s, out);
 }
 
-static void factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
+void pose_factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
     for (int i = 0; i < POSE_UNKNOWNS; i++) {
         for (int j = 0; j <= i; j++) {
             double sum = a[i][j];
@@ -96,6 +96,19 @@ static void factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
                 sum -= a[i][k] * a[j][k];
             a[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / a[j][j];
         }
+    }
+}
+
+void pose_substitute(const double a[POSE_UNKNOWNS][POSE_UNKNOWNS], double x[POSE_UNKNOWNS]) {
+    for (int i = 0; i < POSE_UNKNOWNS; i++) {
+        for (int k = 0; k < i; k++)
+            x[i] -= a[i][k] * x[k];
+        x[i] /= a[i][i];
+    }
+    for (int i = POSE_UNKNOWNS - 1; i >= 0; i--) {
+        for (int k = i + 1; k < POSE_UNKNOWNS; k++)
+            x[i] -= a[k][i] * x[k];
+        x[i] /= a[i][i];
     }
 }
 
@@ -117,9 +130,9 @@ static void preconditioner_init(struct preconditioner *p, const struct pose_solv
     for (size_t f = 0; f < s->frames; f++) {
         for (int i = 0; i < POSE_UNKNOWNS; i++) {
             damping[POSE_UNKNOWNS * f + (size_t)i] = DAMPING * p->block[f][i][i];
-            p->block[f][i][i] += prior_of(&s->frame[f]) + DAMPING * p->block[f][i][i];
+            p->block[f][i][i] += pose_prior(&s->frame[f]) + DAMPING * p->block[f][i][i];
         }
-        factorise(p->block[f]);
+        pose_factorise(p->block[f]);
     }
     for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
         p->diagonal[i] += 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA);
@@ -135,19 +148,9 @@ static void precondition(const void *user, const double *r, double *z) {
     const struct pose_solver *s = system->solver;
     const struct preconditioner *p = &system->preconditioner;
     for (size_t f = 0; f < s->frames; f++) {
-        const double(*a)[POSE_UNKNOWNS] = (const double(*)[POSE_UNKNOWNS])p->block[f];
         double *b = z + POSE_UNKNOWNS * f;
         memcpy(b, r + POSE_UNKNOWNS * f, POSE_UNKNOWNS * sizeof *b);
-        for (int i = 0; i < POSE_UNKNOWNS; i++) {
-            for (int k = 0; k < i; k++)
-                b[i] -= a[i][k] * b[k];
-            b[i] /= a[i][i];
-        }
-        for (int i = POSE_UNKNOWNS - 1; i >= 0; i--) {
-            for (int k = i + 1; k < POSE_UNKNOWNS; k++)
-                b[i] -= a[k][i] * b[k];
-            b[i] /= a[i][i];
-        }
+        pose_substitute((const double(*)[POSE_UNKNOWNS])p->block[f], b);
     }
     for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
         z[i] = r[i] / p->diagonal[i];
@@ -170,7 +173,7 @@ void pose_solve(struct pose_solver *s) {
     }
     memset(x, 0, twists * sizeof *x);
     for (size_t i = 0; i < twists; i++)
-        r[i] -= prior_of(&s->frame[i / POSE_UNKNOWNS]) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
+        r[i] -= pose_prior(&s->frame[i / POSE_UNKNOWNS]) * s->frame[i / POSE_UNKNOWNS].total[i % POSE_UNKNOWNS];
     project(s, r);
     conjugate_residual(&system, x, r);
     double goal = CG_TOLERANCE * CG_TOLERANCE * conjugate_dot(r, r, n);

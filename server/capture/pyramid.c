@@ -84,7 +84,8 @@ void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8
     for (uint32_t y = 0; y < h; y++)
         for (uint32_t x = 0; x < w; x++)
             raw[(size_t)y * w + x] = gray_of(photo, x, y, floor);
-    cut_edges(raw, w, h, shows);
+    if (shows)
+        cut_edges(raw, w, h, shows);
     while ((size_t)w * h > pixels && w > 1 && h > 1) {
         float *half = halve(raw, &w, &h);
         mem_free(raw);

@@ -1,4 +1,4 @@
-/* pyramid.h -- a photograph as logarithms of its gray radiance, at three scales, for comparing
+/* pyramid.h -- a photograph as logarithms of its gray radiance, at some scales, for comparing
  * photographs with each other.
  *
  * Logarithms make a wrong exposure an offset. Level 0 is the photograph (halved as often as its
@@ -16,7 +16,7 @@
 
 #include "server/scene/photograph.h"
 
-#define PYRAMID_LEVELS 3
+#define PYRAMID_LEVELS 5
 
 struct pyramid {
     float scale;  /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */
@@ -24,7 +24,7 @@ struct pyramid {
     float *value[PYRAMID_LEVELS]; /* [height][width] of each; owned */
 };
 
-/* `shows` [height][width] is what views.shows says of the photograph. Level 0 has at most `pixels` pixels.
+/* `shows` [height][width] is what views.shows says of the photograph; NULL: that is not known, and edges stay. Level 0 has at most `pixels` pixels.
  * `floor` is the radiance that is added before the logarithm. */
 void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
                   float floor);

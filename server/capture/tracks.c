@@ -20,17 +20,12 @@
 /* Radiance added before logarithms, as a share of the median. */
 #define FLOOR_SHARE 0.05f
 
-struct making {
-    struct tracks *tracks;
-    size_t pyramid_pixels;
-};
-
 static void make_pyramid(void *user, size_t t, int thread) {
     (void)thread;
-    const struct making *m = user;
-    const struct views *views = m->tracks->views;
-    pyramid_make(&m->tracks->pyramid[t], &views->scene->photograph[views->train[t]], views->shows[t],
-                 m->pyramid_pixels, FLOOR_SHARE * views->median_radiance);
+    struct tracks *tracks = user;
+    const struct views *views = tracks->views;
+    pyramid_make(&tracks->pyramid[t], &views->scene->photograph[views->train[t]], views->shows[t],
+                 tracks->pyramid_pixels, FLOOR_SHARE * views->median_radiance);
 }
 
 /* The place of strongest slope among a few random ones of a cell; false when none will do. */
@@ -99,8 +94,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
 
 static void make_tracks(void *user, size_t t, int thread) {
     (void)thread;
-    const struct making *m = user;
-    struct tracks *tracks = m->tracks;
+    struct tracks *tracks = user;
     const struct views *views = tracks->views;
     const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
     double aspect = (double)camera->width / (double)camera->height;
@@ -124,9 +118,13 @@ void tracks_make(struct tracks *t, const struct views *views, struct parallel *p
     t->count = mem_calloc(frames + 1, sizeof *t->count);
     t->track = mem_array(frames * t->capacity + 1, sizeof *t->track);
     size_t pixels = PYRAMID_TOTAL / (frames + 1);
-    struct making making = {t, pixels < PYRAMID_MOST ? pixels : PYRAMID_MOST};
-    parallel_for(pool, frames, make_pyramid, &making);
-    parallel_for(pool, frames, make_tracks, &making);
+    t->pyramid_pixels = pixels < PYRAMID_MOST ? pixels : PYRAMID_MOST;
+    parallel_for(pool, frames, make_pyramid, t);
+    parallel_for(pool, frames, make_tracks, t);
+}
+
+void tracks_pyramid(const struct tracks *t, const struct photograph *photo, struct pyramid *pyramid) {
+    pyramid_make(pyramid, photo, NULL, t->pyramid_pixels, FLOOR_SHARE * t->views->median_radiance);
 }
 
 void tracks_release(struct tracks *t) {

@@ -24,6 +24,7 @@ struct track {
 struct tracks {
     const struct views *views; /* borrowed */
     struct pyramid *pyramid;   /* [train_count]; owned */
+    size_t pyramid_pixels;     /* that level 0 of one may have */
     size_t capacity;           /* tracks a photograph, at most */
     size_t *count;             /* [train_count]; owned */
     struct track *track;       /* [train_count][capacity]; owned */
@@ -32,6 +33,8 @@ struct tracks {
 /* Does with bounded memory and time what it can: the more photographs, the fewer tracks and the
  * smaller a pyramid for each. The same for any number of threads. */
 void tracks_make(struct tracks *t, const struct views *views, struct parallel *pool);
+/* The pyramid of a photograph that contributes no tracks, for looking at those of others. To be released by the caller. */
+void tracks_pyramid(const struct tracks *t, const struct photograph *photo, struct pyramid *pyramid);
 void tracks_release(struct tracks *t);
 
 #endif

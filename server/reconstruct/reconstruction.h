@@ -68,6 +68,7 @@ struct reconstruction {
     rgb sky_factor;                  /* by which solve made saturated directions of it brighter still, or 1 */
     struct sun sun;                  /* that no photograph shows */
     double unseen_share;             /* of rays from surfaces: those that go where nothing is known */
+    bool exposures_drift, colors_drift; /* told exposures, white balance (calibrate.h) */
     bool sky_is_fitted;              /* what comes from there is told by surfaces (unseen_light.h), not filled in */
     struct noise noise;              /* of the photographs' pixels */
     struct fused fused;              /* what the photographs show of each texel */

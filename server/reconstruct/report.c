@@ -33,15 +33,16 @@ static void photograph_radiance(const struct photograph *photo, struct image *im
     }
 }
 
-/* The factor by which the render is brighter than the photograph, by the median of ratios. */
-static double fit_gain(const struct image *photograph, const struct image *render) {
+/* The factor by which the render is brighter than the photograph, in the sum of channels [first, end), by the median of
+ * ratios. */
+static double fit_gain(const struct image *photograph, const struct image *render, size_t first, size_t end) {
     size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
     double *ratio = mem_array(pixels, sizeof *ratio);
     for (size_t i = 0; i < pixels; i++) {
         double p = 0.0, r = 0.0;
-        for (int c = 0; c < 3; c++) {
-            p += (double)photograph->pixel[3 * i + (size_t)c];
-            r += (double)render->pixel[3 * i + (size_t)c];
+        for (size_t c = first; c < end; c++) {
+            p += (double)photograph->pixel[3 * i + c];
+            r += (double)render->pixel[3 * i + c];
         }
         if (isfinite(p) && isfinite(r) && p > 0.0 && r > 0.0)
             ratio[count++] = r / p;
@@ -51,10 +52,19 @@ static double fit_gain(const struct image *photograph, const struct image *rende
     return gain;
 }
 
-static void scale_image(struct image *image, double factor) {
-    size_t values = (size_t)image->width * image->height * image->channel_count;
-    for (size_t i = 0; i < values; i++)
-        image->pixel[i] *= (float)factor;
+/* Exposure and white balance of a held-out photograph, where its capture tells or keeps them as little as those of the
+ * others: as they fit the render best. */
+static void fit_light(const struct reconstruction *r, struct photograph *photo, struct held_out *view) {
+    double common = 1.0;
+    if (!photo->exposure_known || r->exposures_drift)
+        common = fit_gain(&view->photograph, &view->render, 0, 3);
+    photo->exposure /= (float)common;
+    for (size_t c = 0; c < 3; c++) {
+        double gain = r->colors_drift ? fit_gain(&view->photograph, &view->render, c, c + 1) : common;
+        (&photo->gain.r)[c] *= (float)(common / gain);
+        for (size_t i = 0; i < (size_t)view->photograph.width * view->photograph.height; i++)
+            view->photograph.pixel[3 * i + c] *= (float)gain;
+    }
 }
 
 /* A frame that saturates cannot tell how much brighter the room is than its clip. */
@@ -108,11 +118,7 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     photograph_radiance(photo, &view->photograph);
     struct image error, noise;
     render_radiance(r, &photo->camera, &path, &view->render, &error);
-    if (!photo->exposure_known) {
-        double gain = fit_gain(&view->photograph, &view->render);
-        scale_image(&view->photograph, gain);
-        photo->exposure /= (float)gain;
-    }
+    fit_light(r, photo, view);
     if (!photo->is_hdr)
         clip_image(&view->render, photo);
     double exposure = photo->is_hdr ? SHOWN_MEDIAN / median : (double)photo->exposure;

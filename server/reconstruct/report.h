@@ -7,7 +7,8 @@
 #include "server/reconstruct/reconstruction.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A held-out frame
- * of unknown exposure is compared at the exposure that fits it best. STATUS_CANCELLED when stopped. */
+ * of unknown exposure is compared at the exposure that fits it best, and where exposures or white balance were found to
+ * drift at its own. STATUS_CANCELLED when stopped. */
 enum status report_held_out(struct reconstruction *r, const struct views *views,
                             const struct reconstruct_hooks *hooks, struct error *err);
 

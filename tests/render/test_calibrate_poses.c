@@ -1,7 +1,8 @@
-/* calibrate_poses.h: cameras are moved by a few pixels and found again; a capture whose poses are right
+/* calibrate_poses.h: cameras are moved by some pixels and found again, held-out ones, too; a capture whose poses are right
  * is left alone. */
 #include "server/capture/calibrate_poses.h"
 
+#include "server/scene/rgb_half.h"
 #include "tests/render/painted_room.h"
 
 static struct poses_found run(struct painted *room, struct parallel *pool) {
@@ -48,6 +49,33 @@ static void test_misplaced(struct painted *room, float turn, float move, size_t 
     poses_found_release(&found);
 }
 
+/* What a held-out photograph shows moves its own camera, and no other. */
+static void test_held_out(struct painted *room) {
+    struct camera first[PAINTED_FRAMES];
+    for (int k = 0; k < 2; k++) {
+        double worst = 0.0;
+        misplace(room, 0.02f, 0.02f, 1);
+        for (uint32_t f = 0; f < PAINTED_FRAMES; f++) {
+            struct photograph *photo = &room->scene.photograph[f];
+            for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT && k == 1 && photo->is_test; i++)
+                rgb_to_half(photo->pixel[i], rgb_gray(1.5f + painted_random(f, i)));
+        }
+        struct poses_found found = run(room, room->pool);
+        for (uint32_t f = 0; f < PAINTED_FRAMES; f++) {
+            if (k == 0)
+                first[f] = room->scene.photograph[f].camera;
+            if (k == 0 && room->scene.photograph[f].is_test)
+                worst = fmax(worst, painted_frame_shift(room, f));
+            if (k == 1 && !room->scene.photograph[f].is_test)
+                CHECK(memcmp(&first[f], &room->scene.photograph[f].camera, sizeof first[f]) == 0);
+        }
+        printf("held out, %s: %zu moved by %.3f px, then off by %.3f px at most\n", k ? "noise" : "as taken",
+               found.guests_moved, found.guests_shift_px, worst);
+        CHECK(k == 0 ? found.guests_moved == 3 && worst < 0.4 : found.guests_moved == 0);
+        poses_found_release(&found);
+    }
+}
+
 static void test_threads(struct painted *room) {
     struct camera first[PAINTED_FRAMES];
     for (int k = 0; k < 2; k++) {
@@ -71,6 +99,8 @@ int main(void) {
     test_clean(&room);
     test_misplaced(&room, 0.02f, 0.02f, 1);
     test_misplaced(&room, 0.03f, 0.03f, 4);
+    test_misplaced(&room, 0.06f, 0.06f, 2);
+    test_held_out(&room);
     test_threads(&room);
     painted_release(&room);
     return check_result();

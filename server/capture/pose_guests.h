@@ -1,0 +1,17 @@
+/* pose_guests.h -- poses of held-out photographs, which are as wrong as those of others.
+ *
+ * Each is moved on its own until it shows tracks as those photographs see them that are reconstructed from (pose_solver.h,
+ * whose looks are kept). It has no say in these, nor in anything else that is learned: only where it is compared with
+ * the room is put right. */
+#ifndef UNBAKE_CAPTURE_POSE_GUESTS_H
+#define UNBAKE_CAPTURE_POSE_GUESTS_H
+
+#include "common/parallel.h"
+#include "server/capture/pose_solver.h"
+#include "server/scene/scene.h"
+
+/* Moves the cameras of held-out photographs, where that convinces; from `coarsest` on through all levels. Returns how
+ * many, and the rms over them of how far, in pixels. */
+size_t pose_guests(struct scene *scene, struct pose_solver *s, int coarsest, struct parallel *pool, double *shift_px);
+
+#endif
