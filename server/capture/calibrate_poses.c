@@ -8,13 +8,9 @@
 #include "server/capture/pose_guests.h"
 #include "server/capture/pose_solver.h"
 
-#define ROUNDS 12            /* at each level */
 #define LAST_ROUNDS 4        /* after the first judgement, at the finest level */
 #define COARSEST_PX 75       /* width of a picture below which it tells more lies than truth */
-#define STEP_PX 1.5          /* of a level, that a round moves a photograph at most */
 #define COMMON_SCALE 0.05    /* for comparing the agreement of all photographs */
-
-#define LEAST_SHIFT_PX 0.15  /* rms; less is not worth a correction */
 
 /* Root of the mean squared distance, in pixels, between the places of a frame's own tracks in two
  * cameras. */
@@ -39,7 +35,7 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
         pose_reweight(s);
         pose_solve(s);
         for (size_t f = 0; f < s->frames; f++)
-            pose_move(s, f, STEP_PX * (1 << level) / (double)s->tracks->pyramid[f].scale);
+            pose_move(s, f, POSE_STEP_PX * (1 << level) / (double)s->tracks->pyramid[f].scale);
     }
 }
 
@@ -77,7 +73,7 @@ static void judge(struct pose_solver *s, struct parallel *pool) {
     for (size_t f = 0; f < s->frames; f++) {
         struct pose_frame *frame = &s->frame[f];
         frame->shift_px = frame->stays ? 0.0 : shift_of(s, f, &frame->before, &frame->now);
-        if (frame->shift_px < LEAST_SHIFT_PX || !pose_convinces(&evidence[f]))
+        if (frame->shift_px < POSE_LEAST_SHIFT_PX || !pose_convinces(&evidence[f]))
             pose_put_back(s, f);
         frame->shift_px = frame->stays ? 0.0 : frame->shift_px;
     }
@@ -141,7 +137,7 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     double *before = mem_calloc(2 * held_back, sizeof *before), *now = before + held_back;
     costs_now(&s, pool, before);
     for (int level = coarsest_level(tracks); level >= 0; level--)
-        run_rounds(&s, level, ROUNDS, pool);
+        run_rounds(&s, level, POSE_ROUNDS, pool);
     costs_now(&s, pool, now);
     bool convincing = all_convince(before, now, held_back - 1);
     mem_free(before);

@@ -6,11 +6,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define ROUNDS 12            /* at each level */
-#define STEP_PX 1.5          /* of a level, that a round moves a photograph at most */
-#define DAMPING 0.01
 #define LEAST_SCALE 0.01     /* of residuals */
-#define LEAST_SHIFT_PX 0.15  /* rms */
 #define LEAST_COSINE 0.2f    /* at which a surface is seen */
 #define BEFORE_IT 0.01f      /* share of its distance by which what hides a point is nearer */
 
@@ -125,12 +121,12 @@ static void step(const struct guests *all, struct guest *g, const struct glance 
         b[i] += d[i] * off / weights;
         for (int j = 0; j <= i; j++)
             a[i][j] -= d[i] * d[j] / weights;
-        a[i][i] += DAMPING * a[i][i] + prior;
+        a[i][i] += POSE_DAMPING * a[i][i] + prior;
         b[i] -= prior * g->frame.total[i];
     }
     pose_factorise(a);
     pose_substitute((const double(*)[POSE_UNKNOWNS])a, b);
-    pose_twist(&g->frame, b, STEP_PX * (1 << all->level) / (double)g->pyramid.scale);
+    pose_twist(&g->frame, b, POSE_STEP_PX * (1 << all->level) / (double)g->pyramid.scale);
 }
 
 static void move(void *user, size_t index, int thread) {
@@ -139,7 +135,7 @@ static void move(void *user, size_t index, int thread) {
     struct guest *g = &all->guest[index];
     struct glance *glance = mem_array(g->count + 1, sizeof *glance);
     double *scratch = mem_array(g->count + 1, sizeof *scratch);
-    for (int round = 0; round < ROUNDS; round++) {
+    for (int round = 0; round < POSE_ROUNDS; round++) {
         size_t count = glance_at_all(all, g, glance);
         if (count < POSE_LEAST_SIGHTS)
             break;
@@ -196,7 +192,7 @@ static void judge(void *user, size_t index, int thread) {
         if (isfinite(before[k]) && isfinite(now[k]))
             pose_evidence_add(&e, before[k], now[k]);
     g->frame.shift_px = shift_of(all, g);
-    g->frame.stays = g->frame.shift_px < LEAST_SHIFT_PX || !pose_convinces(&e);
+    g->frame.stays = g->frame.shift_px < POSE_LEAST_SHIFT_PX || !pose_convinces(&e);
     mem_free(before);
 }
 

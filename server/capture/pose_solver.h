@@ -26,6 +26,10 @@
 #define POSE_SIGHTS_MAX (TRACK_OTHERS + 1)
 #define POSE_HELD_BACK_EVERY 3
 #define POSE_LEAST_SIGHTS 60 /* that must tell something, for a photograph to be moved */
+#define POSE_ROUNDS 12       /* at each level */
+#define POSE_STEP_PX 1.5     /* of a level, that a round moves a photograph at most */
+#define POSE_LEAST_SHIFT_PX 0.15 /* rms; less is not worth a correction */
+#define POSE_DAMPING 0.01    /* of the diagonal */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];

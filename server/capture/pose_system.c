@@ -15,7 +15,6 @@
 #define OFFSET_SIGMA 0.3
 #define PRIOR_PX 1.0         /* size of the prior: a photograph moves this far for hardly any evidence */
 #define PRIOR_LEAST_PX 0.2   /* below it the prior is a square */
-#define DAMPING 0.01
 #define CG_STEPS 40
 #define CG_TOLERANCE 1e-3
 
@@ -129,8 +128,8 @@ static void preconditioner_init(struct preconditioner *p, const struct pose_solv
     }
     for (size_t f = 0; f < s->frames; f++) {
         for (int i = 0; i < POSE_UNKNOWNS; i++) {
-            damping[POSE_UNKNOWNS * f + (size_t)i] = DAMPING * p->block[f][i][i];
-            p->block[f][i][i] += pose_prior(&s->frame[f]) + DAMPING * p->block[f][i][i];
+            damping[POSE_UNKNOWNS * f + (size_t)i] = POSE_DAMPING * p->block[f][i][i];
+            p->block[f][i][i] += pose_prior(&s->frame[f]) + POSE_DAMPING * p->block[f][i][i];
         }
         pose_factorise(p->block[f]);
     }
