@@ -106,7 +106,7 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
 
 static void say_places(const struct poses_found *poses, const struct blur_found *blur,
                        const struct reconstruct_hooks *hooks) {
-    char line[160], guests[80] = "";
+    char line[240], guests[80] = "";
     if (poses->guests_moved > 0)
         snprintf(guests, sizeof guests, "; of %zu that are held out, by %.2f px", poses->guests_moved,
                  poses->guests_shift_px);
