@@ -1,0 +1,50 @@
+/* report.h: where white balance wanders from photograph to photograph it does so in held-out ones, too, and these are
+ * compared with the room and not with each other's colours. */
+#include "server/reconstruct/reconstruct.h"
+#include "tests/render/shell.h"
+#include "tests/render/small_room.h"
+
+/* Multiplies each photograph by gains of its own, with a mean of about 1. */
+static void spoil(struct scene *scene) {
+    static const float gain[5][3] = {{1.2f, 1.0f, 0.85f}, {0.85f, 1.05f, 1.15f}, {1.0f, 0.9f, 1.1f},
+                                     {1.1f, 1.1f, 0.8f}, {0.8f, 1.0f, 1.25f}};
+    for (size_t i = 0; i < scene->photograph_count; i++) {
+        struct photograph *photo = &scene->photograph[i];
+        const float *g = gain[(i * 3 + i / 5) % 5];
+        for (size_t p = 0; p < (size_t)photo->camera.width * photo->camera.height; p++)
+            for (size_t c = 0; c < 3; c++)
+                photo->pixel[p][c] = image_half_from_float(image_float_from_half(photo->pixel[p][c]) * g[c]);
+    }
+}
+
+static double held_out_msre(struct scene *scene) {
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":32,"
+                                      "\"gather_samples\":64}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    double msre = 0.0;
+    CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
+    for (size_t i = 0; i < r.held_out_count; i++)
+        msre += r.held_out[i].msre / (double)r.held_out_count;
+    const cJSON *found = cJSON_GetObjectItem(r.report, "calibration");
+    printf("white balance drifts: %d, held-out MSRE %.4f\n",
+           cJSON_IsTrue(cJSON_GetObjectItem(found, "white_balance_drift")), msre);
+    CHECK(r.held_out_count > 0);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+    return msre;
+}
+
+int main(void) {
+    struct scene scene;
+    struct parallel *pool = parallel_new(0);
+    make_scene(&scene, pool);
+    parallel_free(pool);
+    double clean = held_out_msre(&scene);
+    spoil(&scene);
+    double spoiled = held_out_msre(&scene);
+    CHECK_THAT(spoiled < clean + 0.01, "held-out MSRE %.4f, of the clean capture %.4f", spoiled, clean);
+    scene_release(&scene);
+    return check_result();
+}
