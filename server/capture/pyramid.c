@@ -38,6 +38,8 @@ static float *halve(const float *from, uint32_t *width, uint32_t *height) {
 
 /* 1 2 1 in both directions, the border repeated. */
 static void smooth(float *value, uint32_t width, uint32_t height) {
+    if (width == 0 || height == 0)
+        return;
     float *above = mem_array(width, sizeof *above), *row = mem_array(width, sizeof *row);
     for (uint32_t y = 0; y < height; y++) {
         float *at = value + (size_t)y * width;

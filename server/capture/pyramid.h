@@ -3,9 +3,9 @@
  *
  * Logarithms make a wrong exposure an offset. Level 0 is the photograph (halved as often as its
  * budget asks) smoothed by the binomial 1 2 1 in both directions, so that a place between pixels
- * is not much smoother than one on a pixel; each further level has half the size. What a pixel
- * does not tell (masked, saturated, nearly black) and what lies within a few pixels of a depth
- * edge is NaN, and so is what was smoothed with it. Where surfaces meet without one behind the
+ * is not much smoother than one on a pixel; each further level has half the size, of a small
+ * picture no pixel at last. What a pixel does not tell (masked, saturated, nearly black) and what
+ * lies within a few pixels of a depth edge is NaN, and so is what was smoothed with it. Where surfaces meet without one behind the
  * other a picture's edge lies on them, and is kept. */
 #ifndef UNBAKE_CAPTURE_PYRAMID_H
 #define UNBAKE_CAPTURE_PYRAMID_H
