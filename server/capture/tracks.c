@@ -10,7 +10,7 @@
 #define TRACKS_TOTAL 50000
 #define TRACKS_LEAST 150
 #define TRACKS_MOST 600
-#define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0 together */
+#define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0 together, held-out photographs' too */
 #define PYRAMID_MOST ((size_t)640 * 480)
 #define PLACES_PER_CELL 8
 #define LEAST_COSINE 0.2f
@@ -117,7 +117,7 @@ void tracks_make(struct tracks *t, const struct views *views, struct parallel *p
     t->pyramid = mem_calloc(frames + 1, sizeof *t->pyramid);
     t->count = mem_calloc(frames + 1, sizeof *t->count);
     t->track = mem_array(frames * t->capacity + 1, sizeof *t->track);
-    size_t pixels = PYRAMID_TOTAL / (frames + 1);
+    size_t pixels = PYRAMID_TOTAL / (views->scene->photograph_count + 1);
     t->pyramid_pixels = pixels < PYRAMID_MOST ? pixels : PYRAMID_MOST;
     parallel_for(pool, frames, make_pyramid, t);
     parallel_for(pool, frames, make_tracks, t);
