@@ -1,14 +1,13 @@
 /* pose_guests.c -- see pose_guests.h. */
 #include "server/capture/pose_guests.h"
 
-#include <string.h>
+#include <math.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define LEAST_SCALE 0.01     /* of residuals */
-#define LEAST_COSINE 0.2f    /* at which a surface is seen */
-#define BEFORE_IT 0.01f      /* share of its distance by which what hides a point is nearer */
+#define LEAST_COSINE 0.2f /* at which a surface is seen */
+#define BEFORE_IT 0.01f   /* share of its distance by which what hides a point is nearer */
 
 /* A held-out photograph. */
 struct guest {
@@ -35,13 +34,12 @@ struct glance {
 
 /* --- what a guest sees ---------------------------------------------------------------------------- */
 
-static bool sees(const struct guest *g, const struct accel *accel, const struct track *track) {
+static bool sees(const struct guest *g, const struct accel *accel, const struct track *track, float *depth_m) {
     const struct camera *camera = &g->frame.before;
     vec3 origin = camera_origin(camera), to = vec3_sub(track->point, origin);
     vec3 normal = vec3_normalize(vec3_cross(track->right, track->down));
-    float x, y, depth_m, distance = vec3_length(to);
-    return camera_project(camera, track->point, &x, &y, &depth_m) && x >= 0.0f && y >= 0.0f &&
-           x < (float)camera->width && y < (float)camera->height &&
+    float x, y, distance = vec3_length(to);
+    return camera_project(camera, track->point, &x, &y, depth_m) &&
            fabsf(vec3_dot(to, normal)) > LEAST_COSINE * distance &&
            !accel_occluded(accel, origin, vec3_scale(to, 1.0f / distance), 0.0f, (1.0f - BEFORE_IT) * distance);
 }
@@ -54,12 +52,13 @@ static void meet(void *user, size_t index, int thread) {
     double depth_sum_m = 0.0;
     g->track = mem_array(s->track_count + 1, sizeof *g->track);
     for (size_t i = 0; i < s->track_count; i++) {
-        if (!sees(g, s->tracks->views->accel, s->track[i]))
+        float depth_m;
+        if (!sees(g, s->tracks->views->accel, s->track[i], &depth_m))
             continue;
-        depth_sum_m += (double)rigid_point(&g->frame.before.camera_from_world, s->track[i]->point).z;
+        depth_sum_m += (double)depth_m;
         g->track[g->count++] = (uint32_t)i;
     }
-    g->frame.depth_m = fabs(depth_sum_m) / fmax(1.0, (double)g->count);
+    g->frame.depth_m = depth_sum_m / fmax(1.0, (double)g->count);
 }
 
 /* --- moving it ------------------------------------------------------------------------------------ */
@@ -94,7 +93,7 @@ static double brightness(const struct glance *glance, size_t count, double *scra
 static double scale_of(const struct glance *glance, size_t count, double offset, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = fabs(glance[k].off - offset);
-    return fmax(LEAST_SCALE, 1.5 * quantile_double(scratch, count, 0.5));
+    return fmax(POSE_LEAST_SCALE, 1.5 * quantile_double(scratch, count, 0.5));
 }
 
 /* One step of the robust least squares, from which the offset is eliminated. */
@@ -148,8 +147,8 @@ static void move(void *user, size_t index, int thread) {
 /* --- judgement ------------------------------------------------------------------------------------ */
 
 /* The robust costs of the tracks that were held back, by place in g->track; NAN where there is none. Returns how many
- * there are. */
-static size_t costs(const struct guests *all, struct guest *g, const struct camera *camera, double scale, double *cost) {
+ * tracks, held back or not, are shown. */
+static size_t costs(const struct guests *all, const struct guest *g, const struct camera *camera, double scale, double *cost) {
     double *off = mem_array(2 * g->count + 1, sizeof *off), *scratch = off + g->count;
     size_t count = 0;
     for (size_t k = 0; k < g->count; k++) {

@@ -10,8 +10,9 @@
 #include "server/capture/pose_solver.h"
 #include "server/scene/scene.h"
 
-/* Moves the cameras of held-out photographs, where that convinces; from `coarsest` on through all levels. Returns how
- * many, and the rms over them of how far, in pixels. */
+/* Moves the cameras of held-out photographs, where that convinces; from level `coarsest` to the finest. Of the solver,
+ * whose frames are where they belong, only what is computed for a level is written. Returns how many were moved, and the
+ * rms over them of how far, in pixels. */
 size_t pose_guests(struct scene *scene, struct pose_solver *s, int coarsest, struct parallel *pool, double *shift_px);
 
 #endif

@@ -6,7 +6,6 @@
 #include "common/mem.h"
 
 #define FIRST_SCALE 0.1      /* of residuals, before there are any */
-#define LEAST_SCALE 0.01     /* residuals below it are all as good */
 
 /* A correction is clearly better when what was held back agrees better by this share of its robust cost and by so many
  * standard errors. */
@@ -272,7 +271,7 @@ void pose_reweight(struct pose_solver *s) {
     }
     for (size_t f = 0; f < s->frames; f++) {
         if (count[f] > 0.0)
-            s->frame[f].scale = fmax(LEAST_SCALE, 2.5 * sum[f] / count[f]);
+            s->frame[f].scale = fmax(POSE_LEAST_SCALE, 2.5 * sum[f] / count[f]);
     }
     mem_free(sum);
 }

@@ -30,6 +30,7 @@
 #define POSE_STEP_PX 1.5     /* of a level, that a round moves a photograph at most */
 #define POSE_LEAST_SHIFT_PX 0.15 /* rms; less is not worth a correction */
 #define POSE_DAMPING 0.01    /* of the diagonal */
+#define POSE_LEAST_SCALE 0.01 /* residuals below it are all as good */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];
