@@ -371,8 +371,7 @@ void environment_make_unseen(struct environment *e) {
     make_images(e, ENVIRONMENT_MIN_WIDTH);
 }
 
-/* The cell of the map in which a direction lies. */
-static size_t cell_of(const struct environment *e, vec3 direction) {
+size_t environment_cell(const struct environment *e, vec3 direction) {
     uint32_t width = e->map.width, height = e->map.height;
     double phi = atan2((double)direction.x, (double)-direction.z);
     double theta = acos(fmin(fmax((double)direction.y, -1.0), 1.0));
@@ -383,11 +382,11 @@ static size_t cell_of(const struct environment *e, vec3 direction) {
 }
 
 bool environment_is_seen(const struct environment *e, vec3 direction) {
-    return e->confidence.pixel[2 * cell_of(e, direction)] > 0.0f;
+    return e->confidence.pixel[2 * environment_cell(e, direction)] > 0.0f;
 }
 
 bool environment_is_told(const struct environment *e, vec3 direction) {
-    size_t cell = cell_of(e, direction);
+    size_t cell = environment_cell(e, direction);
     return e->confidence.pixel[2 * cell] > 0.0f && !(e->is_bound && e->is_bound[cell]);
 }
 

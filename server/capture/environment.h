@@ -48,6 +48,9 @@ bool environment_make(struct environment *e, const struct views *views, struct p
 void environment_make_unseen(struct environment *e);
 void environment_release(struct environment *e);
 
+/* The cell of the map, row * width + column, in which a unit direction lies. */
+size_t environment_cell(const struct environment *e, vec3 direction);
+
 /* Whether a photograph shows what is in a unit direction. */
 bool environment_is_seen(const struct environment *e, vec3 direction);
 

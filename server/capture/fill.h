@@ -14,4 +14,8 @@
  * the last row of what is filled have one value each. */
 void fill_sphere(struct image *map, const struct image *known);
 
+/* The angle in radians from each pixel of such a map to the nearest that is known, a little too long here and there.
+ * angle: [height][width]; INFINITY where nothing is known. */
+void fill_angles(const struct image *known, float *angle);
+
 #endif

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "common/mem.h"
+#include "server/capture/fill.h"
 #include "server/reconstruct/survey.h"
 #include "server/reconstruct/unseen_fit.h"
 #include "server/render/sampler.h"
@@ -14,6 +15,8 @@
 /* A point speaks of the unseen directions where they have this share of its rays; so many must. */
 #define SHARE_LEAST 0.1f
 #define LEAST_POINTS 64
+/* At this many radians from what is seen 1/e of what was filled in from there is kept. */
+#define NEAR 0.1f
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
@@ -24,7 +27,11 @@ struct unseen {
     size_t count;
     struct unseen_point *point;  /* [count] */
     double log_radiance[UNSEEN_CELLS];
+    float *angle;                /* [map height][map width] to what is seen; NULL where there is no map */
 };
+
+/* The share of what was filled in that is kept. */
+static float kept_of_filled(const struct unseen *u, size_t cell) { return expf(-u->angle[cell] / NEAR); }
 
 /* --- looking around ------------------------------------------------------------------------------- */
 
@@ -45,14 +52,16 @@ static void look_around(void *user, size_t index, int thread) {
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
     incident_trace(in, field, &at, key, 0, WAYS);
     for (size_t i = 0; i < WAYS; i++) {
-        bool has_map = r->environment.map.pixel != NULL;
-        if (!in->leaves[i] || (has_map && environment_is_seen(&r->environment, in->direction[i])))
+        if (!in->leaves[i])
             continue;
-        p->filled += rgb_mean(in->radiance[i]) / WAYS;
-        p->unseen += 1.0f / WAYS;
+        float share = 1.0f / WAYS; /* of the ray, that is unseen */
+        if (u->angle)
+            share *= 1.0f - kept_of_filled(u, environment_cell(&r->environment, in->direction[i]));
+        p->filled += share * rgb_mean(in->radiance[i]);
+        p->unseen += share;
         struct unseen_corners c = unseen_corners(in->direction[i]);
         for (int k = 0; k < 4; k++)
-            p->share[c.cell[k]] += c.weight[k] / WAYS;
+            p->share[c.cell[k]] += share * c.weight[k];
     }
     struct irradiance light;
     irradiance_gather(&light, in, field, &at, key, WAYS);
@@ -90,8 +99,9 @@ static void fill_in(const struct unseen *u) {
             double radiance = 0.0;
             for (int k = 0; k < 4; k++)
                 radiance += (double)c.weight[k] * exp(u->log_radiance[c.cell[k]]);
+            float kept = u->angle ? kept_of_filled(u, at) : 0.0f, *pixel = e->map.pixel + 3 * at;
             for (size_t channel = 0; channel < 3; channel++)
-                e->map.pixel[3 * at + channel] = (float)radiance;
+                pixel[channel] = kept * pixel[channel] + (1.0f - kept) * (float)radiance;
         }
     }
 }
@@ -120,6 +130,11 @@ static void relight(struct unseen *u) {
 void unseen_light_estimate(struct reconstruction *r, const struct views *views) {
     struct unseen u = {.r = r};
     cJSON *figures = cJSON_AddObjectToObject(r->report, "unseen_light");
+    const struct image *known = &r->environment.confidence;
+    if (r->environment.map.pixel) {
+        u.angle = mem_array((size_t)known->width * known->height, sizeof *u.angle);
+        fill_angles(known, u.angle);
+    }
     gather_points(&u, views);
     r->unseen_share = unseen_share(&u);
     keep_telling_points(&u);
@@ -131,5 +146,6 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     json_add_number(figures, "share_of_rays", r->unseen_share);
     json_add_number(figures, "base_color_without", base_color);
     json_add_bool(figures, "estimated", matters);
+    mem_free(u.angle);
     mem_free(u.point);
 }

@@ -493,6 +493,71 @@ static void test_orient(void) {
     image_release(&picture);
 }
 
+/* The same scene with the pixels masked that look out, but for those that look down to below a height (-1: none). */
+static void mask_open(struct scene *masked, struct scene *scene, float below) {
+    struct rig rig;
+    *masked = *scene;
+    masked->photograph = mem_array(scene->photograph_count, sizeof *masked->photograph);
+    memcpy(masked->photograph, scene->photograph, scene->photograph_count * sizeof *masked->photograph);
+    rig_init(&rig, scene, 1);
+    for (size_t t = 0; t < rig.views.train_count; t++) {
+        struct photograph *photo = &masked->photograph[rig.views.train[t]];
+        photo->mask = mem_array(WIDTH * HEIGHT, 1);
+        for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+            vec3 direction = {0.0f, 1.0f, 0.0f};
+            camera_direction(&photo->camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, &direction);
+            photo->mask[i] = rig.views.shows[t][i] != VIEWS_OPEN || direction.y < below;
+        }
+    }
+    rig_release(&rig);
+}
+
+static void forget_masked(struct scene *masked) {
+    for (size_t i = 0; i < masked->photograph_count; i++)
+        mem_free(masked->photograph[i].mask);
+    mem_free(masked->photograph);
+}
+
+/* Where photographs show the dim ground alone the sky above it is estimated, much brighter; beside what is seen the map
+ * goes on as that is. */
+static void test_beside_seen(const struct image *sky, struct parallel *pool) {
+    struct scene scene = {0}, parted;
+    struct image dusk;
+    image_init_rgb(&dusk, sky->width, sky->height);
+    for (size_t i = 0; i < (size_t)3 * sky->width * sky->height; i++)
+        dusk.pixel[i] = (i < (size_t)3 * sky->width * (sky->height / 2) ? 1.0f : 0.1f) * sky->pixel[i];
+    make_open_mesh(&scene.mesh, 2.4f);
+    photograph_mesh(&scene, rgb_gray(0.0f), &dusk, look_out_often, pool);
+    mask_open(&parted, &scene, -0.05f);
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    CHECK(shell_run(&parted, &s, 0, &shell, &r) == STATUS_OK);
+    const struct environment *e = &r.environment;
+    const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
+    double seen = 0.0, beside = 0.0, most = 0.0, count = 0.0;
+    for (size_t i = 0; i + e->map.width < (size_t)e->map.width * e->map.height; i++) {
+        size_t below = i + e->map.width;
+        most = fmax(most, (double)e->map.pixel[3 * i + 1]);
+        if (e->confidence.pixel[2 * i] > 0.0f || e->confidence.pixel[2 * below] == 0.0f)
+            continue;
+        beside += (double)e->map.pixel[3 * i + 1];
+        seen += (double)e->map.pixel[3 * below + 1];
+        count += 1.0;
+    }
+    printf("above the rim of what is seen: %.2f times as bright, over %.0f cells; at most %.2f\n", beside / seen, count, most);
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && count > 10.0);
+    CHECK(most > 15.0 * seen / count);
+    CHECK_THAT(beside < 9.0 * seen, "%g times", beside / seen); /* 20 where the estimate begins at the rim */
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+    forget_masked(&parted);
+    scene.mesh = parted.mesh; /* which has normals by now */
+    scene_release(&scene);
+    image_release(&dusk);
+}
+
 int main(void) {
     struct parallel *pool = parallel_new(0);
     struct image sky;
@@ -500,20 +565,7 @@ int main(void) {
     make_sky(&sky);
     make_open_mesh(&scene.mesh, 2.4f);
     photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_out_often, pool);
-    /* The same with all pixels masked that look out. */
-    struct rig rig;
-    masked = scene;
-    masked.photograph = mem_array(scene.photograph_count, sizeof *masked.photograph);
-    memcpy(masked.photograph, scene.photograph, scene.photograph_count * sizeof *masked.photograph);
-    rig_init(&rig, &scene, 1);
-    for (size_t t = 0; t < rig.views.train_count; t++) {
-        uint8_t *mask = mem_array(WIDTH * HEIGHT, 1);
-        for (size_t i = 0; i < WIDTH * HEIGHT; i++)
-            mask[i] = rig.views.shows[t][i] != VIEWS_OPEN;
-        masked.photograph[rig.views.train[t]].mask = mask;
-    }
-    rig_release(&rig);
-
+    mask_open(&masked, &scene, -1.0f);
     test_orient();
     test_recovers_sky(&scene);
     test_exposures(&scene, CYCLING);
@@ -525,10 +577,9 @@ int main(void) {
     test_nothing(&masked, pool);
     test_reach(pool, &sky);
     test_reconstruction(&scene, &masked, pool);
+    test_beside_seen(&sky, pool);
 
-    for (size_t f = 0; f < scene.photograph_count; f++)
-        mem_free(masked.photograph[f].mask);
-    mem_free(masked.photograph);
+    forget_masked(&masked);
     scene_release(&scene);
     image_release(&sky);
     parallel_free(pool);

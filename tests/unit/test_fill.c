@@ -1,0 +1,51 @@
+/* fill.h: the angle to what is known, held against that to each known pixel in turn: at the seam, beside the poles,
+ * far away. (fill_sphere: render/test_environment.) */
+#include "server/capture/fill.h"
+#include "common/mem.h"
+#include "common/vec.h"
+#include "tests/check.h"
+
+#define WIDTH 128
+#define HEIGHT 64
+#define KNOWN 4
+
+/* The direction of a pixel, the poles in the first and the last row. */
+static vec3 direction_of(size_t at) {
+    double phi = 2.0 * PI * ((double)(at % WIDTH) + 0.5) / WIDTH, theta = PI * (double)(at / WIDTH) / (HEIGHT - 1);
+    return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+}
+
+static double angle_between(size_t a, size_t b) {
+    vec3 d = vec3_sub(direction_of(a), direction_of(b));
+    return 2.0 * asin(fmin(0.5 * (double)vec3_length(d), 1.0));
+}
+
+int main(void) {
+    static const char *const channels[] = {"count", "spread"};
+    static const size_t known[KNOWN] = {5 * WIDTH + 100, 20 * WIDTH, 40 * WIDTH + 70, 62 * WIDTH + 3};
+    struct image map;
+    float *angle = mem_array(WIDTH * HEIGHT, sizeof *angle);
+    double most = 0.0, least = 10.0;
+    image_init(&map, WIDTH, HEIGHT, 2, channels);
+    fill_angles(&map, angle);
+    CHECK(isinf(angle[0]) && isinf(angle[WIDTH * HEIGHT - 1]));
+    for (size_t k = 0; k < KNOWN; k++)
+        map.pixel[2 * known[k]] = 1.0f;
+    fill_angles(&map, angle);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        double nearest = 10.0;
+        for (size_t k = 0; k < KNOWN; k++)
+            nearest = fmin(nearest, angle_between(i, known[k]));
+        if (nearest == 0.0)
+            CHECK(angle[i] == 0.0f);
+        else {
+            most = fmax(most, (double)angle[i] / nearest);
+            least = fmin(least, (double)angle[i] / nearest);
+        }
+    }
+    printf("angles: %.3f to %.3f times the true ones\n", least, most);
+    CHECK_THAT(least > 0.98 && most < 1.05, "%g to %g times the true ones", least, most);
+    image_release(&map);
+    mem_free(angle);
+    return check_result();
+}
