@@ -8,8 +8,7 @@
 /* What shows a place less sharply than this share of the best is not held against it: texture would be taken for
  * noise. Unless there is nothing else. */
 #define AS_SHARP 0.3f
-/* Ways to part photographs that are tried, until the lesser half has this part of the weight. */
-#define WAYS 32
+/* Ways to part photographs are tried until the lesser half has this part of the weight. */
 #define EVEN 0.25f
 
 /* A weighted mean, and its variance if its samples are as noisy as is expected. */
@@ -29,12 +28,8 @@ static void finish(struct mean *m) {
     m->variance /= m->weight * m->weight;
 }
 
-static int half_of(uint32_t source, int way) {
+int halves_of(uint32_t source, int way) {
     return (int)(rng_mix64(source) >> way & 1);
-}
-
-int halves_usual(uint32_t source) {
-    return half_of(source, 0);
 }
 
 /* The share of the weight that the lesser half has. */
@@ -42,7 +37,7 @@ static float lesser_part(const struct robust_sample *sample, size_t count, float
     float weight[2] = {0.0f, 0.0f};
     for (size_t i = 0; i < count; i++) {
         if (sample[i].sharp >= least_sharp)
-            weight[half_of(sample[i].source, way)] += sample[i].weight;
+            weight[halves_of(sample[i].source, way)] += sample[i].weight;
     }
     return fminf(weight[0], weight[1]) / (weight[0] + weight[1]);
 }
@@ -53,7 +48,7 @@ static bool draw_of(const struct robust_sample *sample, size_t count, float leas
     struct mean all = none, half[2] = {none, none};
     float best = 0.0f;
     int way = 0;
-    for (int w = 0; w < WAYS && best < EVEN; w++) {
+    for (int w = 0; w < HALVES_WAYS && best < EVEN; w++) {
         float part = lesser_part(sample, count, least_sharp, w);
         if (part > best)
             best = part, way = w;
@@ -63,7 +58,7 @@ static bool draw_of(const struct robust_sample *sample, size_t count, float leas
     for (size_t i = 0; i < count; i++) {
         add(&all, &sample[i]);
         if (sample[i].sharp >= least_sharp)
-            add(&half[half_of(sample[i].source, way)], &sample[i]);
+            add(&half[halves_of(sample[i].source, way)], &sample[i]);
     }
     finish(&all);
     finish(&half[0]);

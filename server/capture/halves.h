@@ -11,8 +11,9 @@
 
 #include "server/capture/robust.h"
 
-/* In which half a photograph is unless that would leave too little for the other. */
-int halves_usual(uint32_t source);
+/* In which half a photograph is, 0 or 1, in one of HALVES_WAYS ways to part them. */
+#define HALVES_WAYS 32
+int halves_of(uint32_t source, int way);
 
 /* Draws the error of the samples' mean by their weights. False, with `draw` as it was, where there is but one
  * source, or no noise is expected of any. */

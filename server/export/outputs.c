@@ -296,6 +296,29 @@ static enum status put_comparisons(struct export *e, struct error *err) {
 
 /* --- the report --------------------------------------------------------------------------- */
 
+/* Fills color[segment_count]: the mean base colour over the texels that photographs show, or, of a segment of which they
+ * show none, over all, which were filled in. texels[segment_count] gets how many a segment has. */
+static void average_segments(const struct export_input *in, double (*color)[3], size_t *texels) {
+    size_t *seen = mem_calloc(in->segments->count, sizeof *seen);
+    double(*seen_color)[3] = mem_calloc(in->segments->count, sizeof *seen_color);
+    for (size_t i = 0; i < in->inverse->valid_count; i++) {
+        uint32_t texel = in->inverse->valid[i], s = in->segments->of_triangle[in->inverse->triangle[texel]];
+        bool shown = in->confidence_count && in->confidence_count[texel] > 0.0f;
+        texels[s]++;
+        seen[s] += shown;
+        for (int c = 0; c < 3; c++) {
+            double value = (double)in->materials->base_color.texel[texel][c];
+            color[s][c] += value;
+            seen_color[s][c] += shown ? value : 0.0;
+        }
+    }
+    for (size_t s = 0; s < in->segments->count; s++)
+        for (int c = 0; c < 3 && texels[s] > 0; c++)
+            color[s][c] = seen[s] > 0 ? seen_color[s][c] / (double)seen[s] : color[s][c] / (double)texels[s];
+    mem_free(seen_color);
+    mem_free(seen);
+}
+
 /* One entry a segment: what was found, over how much surface. */
 static cJSON *describe_segments(const struct export_input *in) {
     size_t count = in->segments->count;
@@ -309,16 +332,9 @@ static cJSON *describe_segments(const struct export_input *in) {
         triangles[s]++;
         area[s] += 0.5 * (double)vec3_length(mesh_cross(in->mesh, t));
     }
-    for (size_t i = 0; i < in->inverse->valid_count; i++) {
-        uint32_t texel = in->inverse->valid[i];
-        uint32_t s = in->segments->of_triangle[in->inverse->triangle[texel]];
-        texels[s]++;
-        for (int c = 0; c < 3; c++)
-            color[s][c] += (double)in->materials->base_color.texel[texel][c];
-    }
+    average_segments(in, color, texels);
     cJSON *list = cJSON_CreateArray();
     for (size_t s = 0; s < count; s++) {
-        double weight = texels[s] ? 1.0 / (double)texels[s] : 0.0;
         rgb e = in->materials->emission[s];
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s); /* as scene.ply numbers it */
@@ -326,9 +342,7 @@ static cJSON *describe_segments(const struct export_input *in) {
         json_add_int(entry, "triangles", (int64_t)triangles[s]);
         json_add_int(entry, "texels", (int64_t)texels[s]);
         json_add_number(entry, "area_m2", area[s]);
-        json_add(entry, "mean_base_color",
-                 cJSON_CreateDoubleArray((double[]){color[s][0] * weight, color[s][1] * weight,
-                                                    color[s][2] * weight}, 3));
+        json_add(entry, "mean_base_color", cJSON_CreateDoubleArray(color[s], 3));
         json_add_number(entry, "roughness", (double)in->materials->roughness[s]);
         json_add_number(entry, "specular", (double)in->materials->specular[s]);
         json_add_bool(entry, "emitter", in->is_emitter[s]);

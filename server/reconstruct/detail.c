@@ -24,12 +24,13 @@
 #define OFF_MOST 0.2f
 /* Noise of a pixel, as a share of what it shows, is told from base colour and so much more: highlights are noisy, too. */
 #define SHEEN 0.1f
-/* The lesser half of the photographs of a texel must have this part of the weight. */
+/* Ways in which photographs are parted in halves; in those that count the lesser has this part of a texel's weight. */
+#define WAYS 4
 #define HALF_LEAST 0.15f
 /* Texels to either side over which it is averaged how far the halves agree, and what disagreement counts: it is in part
  * that one half is sharper than the other. */
 #define AROUND 4
-#define DISAGREEMENT 0.1f
+#define DISAGREEMENT 0.04f
 #define SHARE_LEAST 0.05f /* texels of which the photographs tell less stay as they are */
 /* Of whole numbers in sums: coarse, until the most pixels of a texel are known; then so that these have room. The
  * worth of pixels differs by orders of magnitude: counted coarsely the least would be lost, and steps be too long. */
@@ -37,6 +38,8 @@
 #define SUM_MOST 1e9f
 
 enum { RED, GREEN, BLUE, SUMS };
+enum { COUNT, OFF };            /* sums of another kind: pixels, and what they are off by */
+#define ALL_PHOTOGRAPHS (-1)    /* in place of a way to part them */
 
 /* One photograph that is gone through. */
 struct picture_job {
@@ -54,17 +57,13 @@ static size_t pixels_of(const struct detail *d, uint32_t train) {
     return (size_t)camera->width * camera->height;
 }
 
-/* Calls body for each row of each photograph. */
-static void for_rows(struct detail *d, void (*body)(void *user, size_t row, int thread)) {
-    for (uint32_t t = 0; t < d->views->train_count; t++) {
-        struct picture_job job = {.detail = d, .train = t};
-        parallel_for(d->r->pool, photograph_of(d, t)->camera.height, body, &job);
-    }
+/* Calls body for each row of a photograph. */
+static void for_rows(struct detail *d, uint32_t train, void (*body)(void *user, size_t row, int thread)) {
+    struct picture_job job = {.detail = d, .train = train};
+    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, body, &job);
 }
 
-static void for_texels(struct detail *d, void (*body)(void *user, size_t chunk, int thread)) {
-    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, body, d);
-}
+static size_t chunks_of(const struct detail *d) { return (d->r->inverse.valid_count + CHUNK - 1) / CHUNK; }
 
 /* The texels beneath a pixel that shows a triangle; false where too few of them are known. */
 static bool texels_beneath(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
@@ -165,58 +164,90 @@ static void flatten_row(void *user, size_t row, int thread) {
 
 /* --- how far photographs agree ------------------------------------------------------------------ */
 
-/* Adds to the texels beneath each pixel, by half, its worth; or what it is off by, times its worth. */
-static void add_halves(const struct picture_job *job, size_t row, bool counts) {
+static void clear_sums(struct detail *d) {
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+        for (int k = 0; k < SUMS; k++)
+            d->sum[d->r->inverse.valid[i]][k] = 0;
+}
+
+/* Adds to the texels beneath each pixel its worth, and what it is off by, times that. */
+static void weigh_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct picture_job *job = user;
     struct detail *d = job->detail;
     uint32_t width = photograph_of(d, job->train)->camera.width, train = job->train;
-    int half = halves_usual(train);
     struct footprint_texels t;
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
         if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
             continue;
-        float what = counts ? 1.0f : rgb_mean(rgb_from_half(d->off[train][at]));
-        for (size_t i = 0; i < t.count; i++)
-            add_to(&d->sum[t.texel[i]][half], d->sum_scale * d->worth[train][at] * what * t.share[i]);
+        float off = rgb_mean(rgb_from_half(d->off[train][at])), worth = d->sum_scale * d->worth[train][at];
+        for (size_t i = 0; i < t.count; i++) {
+            add_to(&d->sum[t.texel[i]][COUNT], worth * t.share[i]);
+            add_to(&d->sum[t.texel[i]][OFF], worth * t.share[i] * off);
+        }
     }
 }
 
-static void count_row(void *user, size_t row, int thread) {
-    (void)thread;
-    add_halves(user, row, true);
+/* Sums over all photographs, or those of the first half of a way to part them. */
+static void weigh(struct detail *d, int way, float scale) {
+    clear_sums(d);
+    d->sum_scale = scale;
+    for (uint32_t t = 0; t < d->views->train_count; t++)
+        if (way == ALL_PHOTOGRAPHS || halves_of(t, way) == 0)
+            for_rows(d, t, weigh_row);
 }
 
-static void halve_row(void *user, size_t row, int thread) {
-    (void)thread;
-    add_halves(user, row, false);
+/* What the halves tell of a texel, over the ways to part them: squares of the mean of what it is off by, and what both
+ * have in common of it. */
+struct agreement {
+    float square, common;
+};
+
+struct agreeing {
+    struct detail *detail;
+    float *off;                  /* [height][width] the sum over all photographs */
+    struct agreement *agreement; /* [height][width] */
+};
+
+static double scaled(const struct detail *d, size_t texel, int sum) {
+    return (double)d->sum[texel][sum] / (double)d->sum_scale;
 }
 
-/* Adds the square of the mean of what a texel is off by, and what both halves have in common of it; nothing where one
- * tells next to nothing. */
-static void add_agreement(const struct detail *d, size_t texel, double *square, double *common) {
-    const float *count = d->count[texel];
-    float all = count[0] + count[1];
-    if (!(all > 0.0f) || fminf(count[0], count[1]) < HALF_LEAST * all)
-        return;
-    double sum[2] = {(double)d->sum[texel][0], (double)d->sum[texel][1]}, mean = (sum[0] + sum[1]) / (double)all;
-    *square += mean * mean;
-    *common += sum[0] / (double)count[0] * (sum[1] / (double)count[1]);
+/* Adds what the halves of one way tell; nothing where one tells next to nothing. */
+static void agree_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct agreeing *a = user;
+    const struct detail *d = a->detail;
+    const struct inverse_uv *inverse = &d->r->inverse;
+    for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++) {
+        uint32_t texel = inverse->valid[i];
+        double all = (double)d->count[texel], count[2] = {scaled(d, texel, COUNT)}, off[2] = {scaled(d, texel, OFF)};
+        count[1] = all - count[0];
+        off[1] = (double)a->off[texel] - off[0];
+        if (!(all > 0.0) || fmin(count[0], count[1]) < HALF_LEAST * all)
+            continue;
+        double mean = (double)a->off[texel] / all;
+        a->agreement[texel].square += (float)(mean * mean);
+        a->agreement[texel].common += (float)(off[0] / count[0] * (off[1] / count[1]));
+    }
 }
 
 /* Of what a texel is off by, the share that is not noise. */
-static float share_told(const struct detail *d, uint32_t texel) {
+static float share_told(const struct agreeing *a, uint32_t texel) {
+    const struct detail *d = a->detail;
     long width = (long)d->r->inverse.width, height = (long)d->r->inverse.height;
     long x0 = (long)texel % width, y0 = (long)texel / width;
     double square = 0.0, common = 0.0;
-    add_agreement(d, texel, &square, &common);
-    if (!(square > 0.0))
+    if (!(a->agreement[texel].square > 0.0f))
         return 0.0f;
     for (long y = y0 - AROUND; y <= y0 + AROUND; y++) {
         for (long x = x0 - AROUND; x <= x0 + AROUND; x++) {
             size_t at = (size_t)(y * width + x);
-            if (x >= 0 && y >= 0 && x < width && y < height && at != texel &&
-                d->chart_of_texel[at] == d->chart_of_texel[texel])
-                add_agreement(d, at, &square, &common);
+            if (x < 0 || y < 0 || x >= width || y >= height || d->chart_of_texel[at] != d->chart_of_texel[texel])
+                continue;
+            square += (double)a->agreement[at].square;
+            common += (double)a->agreement[at].common;
         }
     }
     double noise = DISAGREEMENT * fmax(square - common, 0.0);
@@ -226,32 +257,38 @@ static float share_told(const struct detail *d, uint32_t texel) {
 
 static void share_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
-    struct detail *d = user;
+    const struct agreeing *a = user;
+    struct detail *d = a->detail;
     const struct inverse_uv *inverse = &d->r->inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
         if (d->chart_of_texel[inverse->valid[i]] != NONE)
-            d->told[inverse->valid[i]] = share_told(d, inverse->valid[i]);
+            d->told[inverse->valid[i]] = share_told(a, inverse->valid[i]);
 }
 
-static void clear_sums(struct detail *d) {
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        for (int k = 0; k < SUMS; k++)
-            d->sum[d->r->inverse.valid[i]][k] = 0;
-}
-
-/* Counts pixels by texel and half; returns the most of a texel. */
-static float count_pixels(struct detail *d, float scale) {
+/* Counts the pixels of each texel, and chooses the scale of sums for the most of one. */
+static void count_pixels(struct detail *d) {
     float most = 0.0f;
-    clear_sums(d);
-    d->sum_scale = scale;
-    for_rows(d, count_row);
-    for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
-        uint32_t texel = d->r->inverse.valid[i];
-        for (int half = 0; half < 2; half++)
-            d->count[texel][half] = (float)d->sum[texel][half] / scale;
-        most = fmaxf(most, d->count[texel][0] + d->count[texel][1]);
+    weigh(d, ALL_PHOTOGRAPHS, COUNT_SCALE);
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+        most = fmaxf(most, (float)scaled(d, d->r->inverse.valid[i], COUNT));
+    weigh(d, ALL_PHOTOGRAPHS, SUM_MOST / fmaxf(most, 1.0f));
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+        d->count[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], COUNT);
+}
+
+/* Finds what share of what each texel is off by the photographs agree on. The sums are those of all photographs, as
+ * count_pixels leaves them. */
+static void find_shares(struct detail *d, size_t texels) {
+    struct agreeing a = {d, mem_calloc_large(texels, sizeof *a.off), mem_calloc_large(texels, sizeof *a.agreement)};
+    for (size_t i = 0; i < d->r->inverse.valid_count; i++)
+        a.off[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], OFF);
+    for (int way = 0; way < WAYS; way++) {
+        weigh(d, way, d->sum_scale);
+        parallel_for(d->r->pool, chunks_of(d), agree_chunk, &a);
     }
-    return most;
+    parallel_for(d->r->pool, chunks_of(d), share_chunk, &a);
+    mem_free(a.agreement);
+    mem_free(a.off);
 }
 
 /* --- steps -------------------------------------------------------------------------------------- */
@@ -297,7 +334,7 @@ static float bounded(float moved, float start) {
 }
 
 static void move_texel(struct detail *d, uint32_t texel) {
-    float scale = 1.0f / (d->sum_scale * (d->count[texel][0] + d->count[texel][1]));
+    float scale = 1.0f / (d->sum_scale * d->count[texel]);
     const _Atomic int32_t *sum = d->sum[texel];
     rgb by = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
     rgb moved = rgb_scale(rgb_add(reached(d, texel), by), d->told[texel]);
@@ -318,8 +355,9 @@ static void move_chunk(void *user, size_t chunk, int thread) {
 
 void detail_step(struct detail *d) {
     clear_sums(d);
-    for_rows(d, step_row);
-    for_texels(d, move_chunk);
+    for (uint32_t t = 0; t < d->views->train_count; t++)
+        for_rows(d, t, step_row);
+    parallel_for(d->r->pool, chunks_of(d), move_chunk, d);
     float before = d->pace;
     d->pace = 0.5f * (1.0f + sqrtf(1.0f + 4.0f * before * before));
     d->onward = (before - 1.0f) / d->pace;
@@ -405,11 +443,8 @@ void detail_init(struct detail *d, const struct reconstruction *r, const struct 
     for (uint32_t t = 0; t < views->train_count; t++)
         make_picture(d, t);
     choose_pixels(d);
-    float most = count_pixels(d, COUNT_SCALE);
-    count_pixels(d, SUM_MOST / fmaxf(most, 1.0f));
-    clear_sums(d);
-    for_rows(d, halve_row);
-    for_texels(d, share_chunk);
+    count_pixels(d);
+    find_shares(d, texels);
     d->moved = mem_calloc_large(texels, sizeof *d->moved);
 }
 

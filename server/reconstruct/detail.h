@@ -7,7 +7,8 @@
  * and highlights, which are smooth, are not texture.
  *
  * Sharpening makes noise larger, too. A texel is drawn back to where it was by the share of noise in what it is off by,
- * told by one half of the photographs against the other (halves.h); where one half tells next to nothing it stays. The
+ * told by one half of the photographs against the other (halves.h), in several ways to part them: in a single one the
+ * only sharp photograph of a place may stand alone. Where one half always tells next to nothing a texel stays. The
  * draw of noise in `measured` has all in which the photographs did not agree, their blur as well: of it as much is
  * taken away. (Noise drawn by pixels and sharpened alike in its place takes texture for noise.) */
 #ifndef UNBAKE_RECONSTRUCT_DETAIL_H
@@ -33,7 +34,7 @@ struct detail {
     /* Of each texel, [height][width]; owned. */
     uint32_t *chart_of_texel;        /* UINT32_MAX where it is not known what it sends out */
     _Atomic int32_t (*sum)[3];       /* over pixels, by sum_scale */
-    float (*count)[2];               /* pixels, by their worth: of either half of the photographs */
+    float *count;                    /* pixels, by their worth */
     float *told;                     /* share of what it is off by that is not noise; 0: the texel stays */
     uint16_t (*moved)[2][3];         /* base colour: by the last step and by the one before */
     float sum_scale;

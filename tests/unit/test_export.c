@@ -136,13 +136,29 @@ static size_t occurrences(const char *text, const char *part) {
     return count;
 }
 
-static void test_report(const char *dir, size_t segments) {
+/* The mean base colour of a segment is that of what photographs show of it: what was filled in has no say. */
+static void test_means(const cJSON *segments, const struct export_input *in) {
+    double sum = 0.0, count = 0.0;
+    for (size_t i = 0; i < in->inverse->valid_count; i++) {
+        uint32_t texel = in->inverse->valid[i];
+        if (in->segments->of_triangle[in->inverse->triangle[texel]] != 0 || !(in->confidence_count[texel] > 0.0f))
+            continue;
+        sum += (double)in->materials->base_color.texel[texel][1];
+        count += 1.0;
+    }
+    const cJSON *mean = cJSON_GetObjectItem(cJSON_GetArrayItem(segments, 0), "mean_base_color");
+    CHECK(count > 0.0);
+    CHECK_NEAR(cJSON_GetNumberValue(cJSON_GetArrayItem(mean, 1)), sum / count, 1e-6);
+}
+
+static void test_report(const char *dir, const struct export_input *in) {
     struct error err;
     struct buf page;
     cJSON *report = NULL;
     char *path = file_join(dir, "report.json");
     CHECK(json_read(path, 1 << 24, &report, &err) == STATUS_OK);
-    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)segments);
+    CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "segments")) == (int)in->segments->count);
+    test_means(cJSON_GetObjectItem(report, "segments"), in);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 19);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
     cJSON_Delete(report);
@@ -307,6 +323,9 @@ int main(void) {
     float *count = mem_calloc(texels, sizeof *count), *spread = mem_calloc(texels, sizeof *spread);
     for (size_t i = 0; i < texels; i++)
         count[i] = (float)(i % 9), spread[i] = 0.1f;
+    for (size_t i = 0; i < room.inverse.valid_count; i++) /* what no photograph shows is filled in white */
+        for (int c = 0; c < 3 && count[room.inverse.valid[i]] == 0.0f; c++)
+            room.materials.base_color.texel[room.inverse.valid[i]][c] = 1.0f;
     bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
     struct image photograph;
     image_init_rgb(&photograph, 16, 12);
@@ -336,7 +355,7 @@ int main(void) {
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
     test_views(dir, &camera);
-    test_report(dir, room.segments.count);
+    test_report(dir, &in);
     test_environment(dir, &in, &heard);
     test_left_out(dir, pool);
     heard.refuse = true;
