@@ -172,13 +172,13 @@ void fill_sphere(struct image *map, const struct image *known) {
 struct nearest {
     uint32_t width, height;
     uint32_t *of; /* [height][width] NONE: not told yet */
-    vec3 *row;    /* [height] sine and cosine of the polar angle, in x and y */
-    vec3 *column; /* [width] of the azimuth */
+    vec2 *row;    /* [height] sine and cosine of the polar angle */
+    vec2 *column; /* [width] of the azimuth */
 };
 
 static float cosine_between(const struct nearest *n, uint32_t a, uint32_t b) {
-    vec3 row_a = n->row[a / n->width], row_b = n->row[b / n->width];
-    vec3 column_a = n->column[a % n->width], column_b = n->column[b % n->width];
+    vec2 row_a = n->row[a / n->width], row_b = n->row[b / n->width];
+    vec2 column_a = n->column[a % n->width], column_b = n->column[b % n->width];
     float turn = column_a.x * column_b.x + column_a.y * column_b.y;
     return row_a.x * row_b.x * turn + row_a.y * row_b.y;
 }
@@ -203,17 +203,25 @@ static void tell_row(struct nearest *n, uint32_t y, uint32_t before) {
         tell(n, here + i % w, here + (i - 1) % w);
 }
 
+/* Radians to the nearest known pixel. */
+static float angle_at(const struct nearest *n, uint32_t pixel) {
+    uint32_t known = n->of[pixel];
+    if (known == NONE)
+        return INFINITY;
+    return known == pixel ? 0.0f : acosf(clampf(cosine_between(n, known, pixel), -1.0f, 1.0f));
+}
+
 static void nearest_init(struct nearest *n, const struct image *known) {
     size_t pixels = (size_t)known->width * known->height;
     *n = (struct nearest){known->width, known->height, mem_array(pixels, sizeof *n->of),
                           mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
     for (uint32_t y = 0; y < n->height; y++) {
         double theta = PI * y / (n->height - 1);
-        n->row[y] = (vec3){(float)sin(theta), (float)cos(theta), 0.0f};
+        n->row[y] = (vec2){(float)sin(theta), (float)cos(theta)};
     }
     for (uint32_t x = 0; x < n->width; x++) {
         double phi = 2.0 * PI * x / n->width;
-        n->column[x] = (vec3){(float)sin(phi), (float)cos(phi), 0.0f};
+        n->column[x] = (vec2){(float)sin(phi), (float)cos(phi)};
     }
     for (size_t i = 0; i < pixels; i++)
         n->of[i] = known->pixel[i * known->channel_count] > 0.0f ? (uint32_t)i : NONE;
@@ -227,7 +235,7 @@ void fill_angles(const struct image *known, float *angle) {
     for (uint32_t y = n.height; y-- > 0;)
         tell_row(&n, y, y + 1 < n.height ? y + 1 : y);
     for (uint32_t i = 0; i < n.width * n.height; i++)
-        angle[i] = n.of[i] == NONE ? INFINITY : n.of[i] == i ? 0.0f : acosf(clampf(cosine_between(&n, n.of[i], i), -1.0f, 1.0f));
+        angle[i] = angle_at(&n, i);
     mem_free(n.of);
     mem_free(n.row);
     mem_free(n.column);

@@ -148,7 +148,8 @@ static void move(void *user, size_t index, int thread) {
 
 /* The robust costs of the tracks that were held back, by place in g->track; NAN where there is none. Returns how many
  * tracks, held back or not, are shown. */
-static size_t costs(const struct guests *all, const struct guest *g, const struct camera *camera, double scale, double *cost) {
+static size_t costs(const struct guests *all, const struct guest *g, const struct camera *camera, double scale,
+                    double *cost) {
     double *off = mem_array(2 * g->count + 1, sizeof *off), *scratch = off + g->count;
     size_t count = 0;
     for (size_t k = 0; k < g->count; k++) {

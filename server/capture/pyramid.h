@@ -5,8 +5,8 @@
  * budget asks) smoothed by the binomial 1 2 1 in both directions, so that a place between pixels
  * is not much smoother than one on a pixel; each further level has half the size, of a small
  * picture no pixel at last. What a pixel does not tell (masked, saturated, nearly black) and what
- * lies within a few pixels of a depth edge is NaN, and so is what was smoothed with it. Where surfaces meet without one behind the
- * other a picture's edge lies on them, and is kept. */
+ * lies within a few pixels of a depth edge is NaN, and so is what was smoothed with it. Where surfaces meet without one
+ * behind the other a picture's edge lies on them, and is kept. */
 #ifndef UNBAKE_CAPTURE_PYRAMID_H
 #define UNBAKE_CAPTURE_PYRAMID_H
 
@@ -24,8 +24,8 @@ struct pyramid {
     float *value[PYRAMID_LEVELS]; /* [height][width] of each; owned */
 };
 
-/* `shows` [height][width] is what views.shows says of the photograph; NULL: that is not known, and edges stay. Level 0 has at most `pixels` pixels.
- * `floor` is the radiance that is added before the logarithm. */
+/* `shows` [height][width] is what views.shows says of the photograph; NULL: that is not known, and edges stay. Level 0
+ * has at most `pixels` pixels. `floor` is the radiance that is added before the logarithm. */
 void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
                   float floor);
 void pyramid_release(struct pyramid *p);

@@ -545,7 +545,8 @@ static void test_beside_seen(const struct image *sky, struct parallel *pool) {
         seen += (double)e->map.pixel[3 * below + 1];
         count += 1.0;
     }
-    printf("above the rim of what is seen: %.2f times as bright, over %.0f cells; at most %.2f\n", beside / seen, count, most);
+    printf("above the rim of what is seen: %.2f times as bright, over %.0f cells; at most %.2f\n", beside / seen, count,
+           most);
     CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && count > 10.0);
     CHECK(most > 15.0 * seen / count);
     CHECK_THAT(beside < 9.0 * seen, "%g times", beside / seen); /* 20 where the estimate begins at the rim */
