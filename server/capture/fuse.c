@@ -73,10 +73,11 @@ static void look_all(const struct fuse_job *job, const struct surface_point *p, 
     const struct views *v = job->views;
     l->count = l->measured = l->clean = 0;
     for (uint32_t t = 0; t < v->train_count && l->count < MAX_LOOKS; t++) {
+        const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (views_sees(v, t, p->position, p->normal, &view) &&
-            photograph_sample(&v->scene->photograph[v->train[t]], view.x, view.y, &s)) {
+        if (views_sees(v, t, p->position, p->normal, &view) && !photograph_sparks(photo, view.x, view.y) &&
+            photograph_sample(photo, view.x, view.y, &s)) {
             l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
             add_look(l, &s, &view, view.weight * views_trust(v, &view, p->triangle),
                      views_mixing(v, &view, p->triangle, s.radiance), LOG_FLOOR * v->median_radiance);

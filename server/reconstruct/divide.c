@@ -123,11 +123,11 @@ static void look_all(const struct divide *d, uint32_t texel, struct incident *sc
     if (!light_at(d, texel, &at, light))
         return;
     for (uint32_t t = 0; t < d->views->train_count && looks->count < MEASURED_LOOKS; t++) {
+        const struct photograph *photo = &d->r->scene->photograph[d->views->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (views_sees(d->views, t, at.position, at.normal, &view) &&
-            photograph_sample(&d->r->scene->photograph[d->views->train[t]], view.x, view.y, &s) &&
-            !s.saturated[0] && !s.saturated[1] && !s.saturated[2])
+        if (views_sees(d->views, t, at.position, at.normal, &view) && !photograph_sparks(photo, view.x, view.y) &&
+            photograph_sample(photo, view.x, view.y, &s) && !s.saturated[0] && !s.saturated[1] && !s.saturated[2])
             add_look(d, texel, &at, light, &view, s.radiance, scratch, looks);
     }
 }

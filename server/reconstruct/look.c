@@ -39,8 +39,8 @@ void look_batch_clear(struct look_batch *b) {
 }
 
 /* Sets up the paths of look number `at`, whose first sample has number `sample_number`. False when
- * one cannot be used: out of the picture, masked, or in a pixel that mixes surfaces while the
- * texel's centre is not in one. */
+ * one cannot be used: out of the picture, masked, a pixel that shines by chance, or one that mixes surfaces while the
+ * texel's centre is not in such a one. */
 static bool connect(struct look_batch *b, size_t at, const struct view *view, uint32_t texel,
                     uint64_t iteration, uint32_t sample_number) {
     const struct reconstruction *r = b->r;
@@ -61,7 +61,7 @@ static bool connect(struct look_batch *b, size_t at, const struct view *view, ui
         vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
         size_t path = at * (size_t)b->samples + (size_t)i;
         if (!camera_project(&photo->camera, point, &place.x, &place.y, &depth_m) ||
-            (clean && !views_clean(b->views, &place)) ||
+            (clean && !views_clean(b->views, &place)) || photograph_sparks(photo, place.x, place.y) ||
             !photograph_sample(photo, place.x, place.y, &b->reference[path]))
             return false;
         vec3 origin = camera_origin(&photo->camera);

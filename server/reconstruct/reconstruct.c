@@ -10,6 +10,7 @@
 #include "server/capture/clip.h"
 #include "server/capture/orient.h"
 #include "server/capture/shown.h"
+#include "server/capture/sparks.h"
 #include "server/capture/views.h"
 #include "server/reconstruct/calibrate.h"
 #include "server/reconstruct/emission_pattern.h"
@@ -226,6 +227,7 @@ static enum status prepare(struct run *run, struct error *err) {
     noise_measure(&r->noise, &run->views);
     noise_tell_black(&r->noise, r->scene);
     clip_mark(r->scene, &run->views, &r->noise, r->pool);
+    sparks_mark(r->scene, &run->views, &r->noise, r->pool);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
     status = remap_surface(run, split_shining(run), err);

@@ -8,14 +8,11 @@
 
 #include "common/mem.h"
 
-/* A pixel that is so much brighter than any around it is a spark of noise; the dark ring that a cubic gives it
- * would be taken for texture. */
-#define SPARK 2.0f
-
 void photograph_release(struct photograph *photo) {
     mem_free(photo->name);
     mem_free(photo->pixel);
     mem_free(photo->white);
+    mem_free(photo->spark);
     mem_free(photo->mask);
     *photo = (struct photograph){0};
 }
@@ -98,31 +95,38 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     return true;
 }
 
+bool photograph_sparks(const struct photograph *photo, float x, float y) {
+    size_t column[2], row[2];
+    float wx, wy;
+    taps(x, photo->camera.width, column, &wx);
+    taps(y, photo->camera.height, row, &wy);
+    for (int k = 0; k < 4 && photo->spark; k++) {
+        float weight = (k & 1 ? wx : 1.0f - wx) * (k & 2 ? wy : 1.0f - wy);
+        if (weight > 0.0f && photo->spark[row[k >> 1] * photo->camera.width + column[k & 1]])
+            return true;
+    }
+    return false;
+}
+
 bool photograph_sample_cubic(const struct photograph *photo, float x, float y, rgb *radiance) {
     long width = (long)photo->camera.width, height = (long)photo->camera.height;
     long column = (long)floorf(x - 0.5f) - 1, row = (long)floorf(y - 0.5f) - 1;
     if (column < 0 || row < 0 || column + 4 > width || row + 4 > height)
         return false;
-    float wx[4], wy[4], value[3] = {0.0f, 0.0f, 0.0f}, most = 0.0f, second = 0.0f;
+    float wx[4], wy[4], value[3] = {0.0f, 0.0f, 0.0f};
     photograph_cubic(x - 0.5f - (float)(column + 1), wx);
     photograph_cubic(y - 0.5f - (float)(row + 1), wy);
     for (long k = 0; k < 16; k++) {
         size_t at = (size_t)((row + k / 4) * width + column + k % 4);
-        if (photo->mask && photo->mask[at] == 0)
+        if ((photo->mask && photo->mask[at] == 0) || (photo->spark && photo->spark[at]))
             return false;
-        float sum = 0.0f;
         for (int c = 0; c < 3; c++) {
             float tap = read_tap(photo, photo->pixel[at][c]);
             if (saturates(photo, at, c, &tap) || !isfinite(tap))
                 return false;
             value[c] += wx[k % 4] * wy[k / 4] * tap;
-            sum += tap;
         }
-        second = fmaxf(second, fminf(most, sum));
-        most = fmaxf(most, sum);
     }
-    if (most > SPARK * second)
-        return false;
     if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
         return false;
     float scale = 1.0f / (photo->exposure * photograph_falloff(photo, x, y));

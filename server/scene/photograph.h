@@ -32,6 +32,7 @@ struct photograph {
     uint16_t (*pixel)[3];   /* [height][width] linear half-precision values; owned */
     uint8_t *white;         /* [height][width] bit c: channel c saturates, by what is around (clip.h); NULL: where its value
                              * is at the clip; owned */
+    bool *spark;            /* [height][width] it shines by chance (sparks.h); NULL: not asked; owned */
     uint8_t *mask;          /* [height][width] 0 where the pixel must not be used, or NULL; owned */
 };
 
@@ -63,9 +64,12 @@ static inline float photograph_trust(const struct photograph *photo) {
 bool photograph_sample(const struct photograph *photo, float x, float y,
                        struct photograph_sample *sample);
 
+/* Whether one of the pixels that such a look-up reads shines by chance. */
+bool photograph_sparks(const struct photograph *photo, float x, float y);
+
 /* Cubic look-up (Keys 1981, a = -1/2), which does not blur by another pixel's width as a bilinear one
  * does and passes on twice its noise. False when one of the 4 x 4 taps is outside, masked, saturated, not
- * finite, or far brighter than all others. */
+ * finite, or shines by chance: the dark ring that it would get would be taken for texture. */
 bool photograph_sample_cubic(const struct photograph *photo, float x, float y, rgb *radiance);
 
 /* Its four weights along a row or column, for a place `t` in [0, 1) from the second tap to the third. */

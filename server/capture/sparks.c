@@ -1,0 +1,59 @@
+/* sparks.c -- see sparks.h. */
+#include "server/capture/sparks.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+
+#define BRIGHTER 2.0f   /* than the brightest pixel around */
+#define DEVIATIONS 4.0f /* of noise, by which it is brighter */
+
+struct sparks_job {
+    const struct noise *noise;
+    struct photograph *photo;
+    uint32_t train;
+};
+
+/* The stored value of a pixel, mean of the channels. */
+static float value_at(const struct photograph *photo, size_t at) {
+    const uint16_t *pixel = photo->pixel[at];
+    return (image_float_from_half(pixel[0]) + image_float_from_half(pixel[1]) + image_float_from_half(pixel[2])) / 3.0f;
+}
+
+/* The brightest pixel around one. */
+static float brightest_beside(const struct photograph *photo, long x0, long y0) {
+    long width = (long)photo->camera.width, height = (long)photo->camera.height;
+    float brightest = 0.0f;
+    for (long y = y0 > 0 ? y0 - 1 : 0; y <= y0 + 1 && y < height; y++)
+        for (long x = x0 > 0 ? x0 - 1 : 0; x <= x0 + 1 && x < width; x++)
+            if (x != x0 || y != y0)
+                brightest = fmaxf(brightest, value_at(photo, (size_t)(y * width + x)));
+    return brightest;
+}
+
+static bool is_spark(const struct sparks_job *job, long x, long y) {
+    const struct camera *camera = &job->photo->camera;
+    float value = value_at(job->photo, (size_t)(y * (long)camera->width + x));
+    float beside = brightest_beside(job->photo, x, y);
+    return value > BRIGHTER * beside &&
+           value - beside > DEVIATIONS * noise_deviation_of_value(job->noise, job->train, camera, (float)x, (float)y, beside);
+}
+
+static void mark_row(void *user, size_t row, int thread) {
+    (void)thread;
+    const struct sparks_job *job = user;
+    uint32_t width = job->photo->camera.width;
+    for (uint32_t x = 0; x < width; x++)
+        job->photo->spark[row * width + x] = is_spark(job, (long)x, (long)row);
+}
+
+void sparks_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool) {
+    for (uint32_t t = 0; t < views->train_count; t++) {
+        struct photograph *photo = &scene->photograph[views->train[t]];
+        struct sparks_job job = {noise, photo, t};
+        if (!photo->spark)
+            photo->spark = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->spark);
+        parallel_for(pool, photo->camera.height, mark_row, &job);
+    }
+}
