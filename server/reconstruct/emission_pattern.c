@@ -2,6 +2,7 @@
 #include "server/reconstruct/emission_pattern.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -20,6 +21,7 @@
 #define DARKEST_PART 0.02
 /* Looks differ by this much in their logarithm before one counts half. */
 #define OUTLIER_SCALE 0.3f
+#define SAME_PICTURE 0.7f /* and no more of what most looks at a changing screen show */
 #define LOG_FLOOR 0.01f /* of what the segment shows, where a logarithm is taken */
 #define CHUNK 64 /* texels a work item */
 
@@ -48,16 +50,19 @@ struct finder {
 
 /* --- what is shown --------------------------------------------------------------------------------- */
 
+/* Weighed by the noise of what the segment shows in the mean: by its own a bright place would outweigh dark ones beside
+ * it, of which a larger share is noise, wherever neighbours are averaged. */
 static struct robust_sample look_of(const struct emitter *e, const struct view *view, float mixing, rgb shown,
                                     bool sharp, rgb fused) {
     const struct finder *f = e->finder;
-    rgb value = rgb_scale(shown, e->scale);
+    rgb value = rgb_scale(shown, e->scale), typical = f->r->evidence[e->segment].least;
+    float times_typical = rgb_mean(value);
     rgb noise = rgb_scale(noise_deviation(&f->r->noise, f->views, view, fused), e->scale);
     return (struct robust_sample){
         .value = value,
         .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
         .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
-        .weight = view->weight * noise_weight(&f->r->noise, f->views, view, fused, mixing),
+        .weight = view->weight * noise_weight(&f->r->noise, f->views, view, typical, mixing * times_typical * times_typical),
         .source = view->train,
         .sharp = view->weight,
         .noise = rgb_scale(noise, noise_draw(view, sharp)),
@@ -97,9 +102,32 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
         looks->look[looks->count++] = bound;
 }
 
+static int by_gray(const void *a, const void *b) {
+    float x = ((const struct robust_sample *)a)->gray, y = ((const struct robust_sample *)b)->gray;
+    return (x > y) - (x < y);
+}
+
+/* Of a screen whose picture changed what most looks show: what the others do is no noise of it. */
+static void keep_most(struct measured_looks *looks) {
+    float half = 0.0f, below = 0.0f;
+    size_t middle = 0, kept = 0;
+    qsort(looks->look, looks->count, sizeof *looks->look, by_gray);
+    for (size_t i = 0; i < looks->count; i++)
+        half += 0.5f * looks->look[i].weight;
+    while (middle + 1 < looks->count && (below += looks->look[middle].weight) < half)
+        middle++;
+    float median = looks->look[middle].gray;
+    for (size_t i = 0; i < looks->count; i++)
+        if (fabsf(looks->look[i].gray - median) < SAME_PICTURE)
+            looks->look[kept++] = looks->look[i];
+    looks->count = kept;
+}
+
 static void measure_texel(const struct emitter *e, uint32_t texel) {
     struct measured_looks looks;
     look_all(e, texel, &looks);
+    if (looks.count > 0 && e->finder->r->evidence[e->segment].changes > 0.0f)
+        keep_most(&looks);
     if (looks.count > 0)
         e->finder->measured[texel] = measured_mean(&looks, OUTLIER_SCALE, rgb_gray(0.0f));
 }

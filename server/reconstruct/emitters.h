@@ -24,6 +24,7 @@ struct emitter_evidence {
     bool unbound;  /* such a lamp: `shown` is told by what it lights (saturated_light.h) */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */
+    float changes; /* share of its surface whose light changed between photographs (changing_light.h) */
     float doubt; /* radiance that a white surface there would send of unseen sky (sky_doubt.h) */
 };
 

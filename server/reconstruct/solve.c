@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "server/gather/probes.h"
 #include "server/reconstruct/by_segment.h"
+#include "server/reconstruct/changing_light.h"
 #include "server/reconstruct/detail.h"
 #include "server/reconstruct/divide.h"
 #include "server/reconstruct/emission_pattern.h"
@@ -37,6 +38,8 @@
 #define EMITTER_SHARE_UNSEEN 0.25f
 /* Where no photograph shows the sky it may be brighter than it was taken for by so many times that. */
 #define SKY_DOUBT 1.0f
+/* Share of a segment whose light must have changed. */
+#define EMITTER_CHANGES 0.1f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
 #define SLICE_PROBES 1024 /* work between two questions whether to stop */
 #define SLICE_TEXELS 65536
@@ -204,7 +207,6 @@ struct decision {
 };
 
 static void decide(void *user, size_t segment, int thread) {
-    (void)thread;
     const struct decision *d = user;
     struct reconstruction *r = d->solve->r;
     struct emitter_evidence *e = &r->evidence[segment];
@@ -213,7 +215,9 @@ static void decide(void *user, size_t segment, int thread) {
     float needed = (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) + EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
     e->share = shown > 0.0f ? clampf(1.0f - arrived / shown, 0.0f, 1.0f) : 0.0f;
     e->doubt = e->share > needed && !r->sky_is_fitted ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
-    r->is_emitter[segment] = e->hidden || shown - arrived - SKY_DOUBT * e->doubt > needed * shown;
+    e->changes = changing_light(&d->solve->divide, d->texels.texel + first, count, thread);
+    r->is_emitter[segment] = e->hidden || e->changes > EMITTER_CHANGES ||
+                             shown - arrived - SKY_DOUBT * e->doubt > needed * shown;
 }
 
 static void decide_emitters(struct solve *s) {

@@ -137,7 +137,7 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
 
 struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px) {
     static const float along[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
-    struct photograph_ring ring = {0.0f, 0.0f, 0.0f};
+    struct photograph_ring ring = {.darkest = INFINITY};
     for (int i = 0; i < 8; i++) {
         struct photograph_sample at;
         float px = x + radius_px * along[i][0], py = y + radius_px * along[i][1];
@@ -146,6 +146,7 @@ struct photograph_ring photograph_ring(const struct photograph *photo, float x, 
             continue;
         float brightness = rgb_mean(at.radiance);
         ring.brightest = fmaxf(ring.brightest, brightness);
+        ring.darkest = fminf(ring.darkest, brightness);
         ring.sum += brightness;
         ring.count += 1.0f;
     }

@@ -83,7 +83,7 @@ static inline void photograph_cubic(float t, float weight[4]) {
 /* How bright (mean of the channels) the picture is at eight places around one; those outside of it or masked
  * do not count. */
 struct photograph_ring {
-    float brightest, sum, count;
+    float brightest, darkest, sum, count; /* without any the darkest is infinite, all others 0 */
 };
 struct photograph_ring photograph_ring(const struct photograph *photo, float x, float y, float radius_px);
 
