@@ -39,7 +39,7 @@
 /* Where no photograph shows the sky it may be brighter than it was taken for by so many times that. */
 #define SKY_DOUBT 1.0f
 /* Share of a segment whose light must have changed. */
-#define EMITTER_CHANGES 0.1f
+#define EMITTER_CHANGES 0.08f
 #define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
 #define SLICE_PROBES 1024 /* work between two questions whether to stop */
 #define SLICE_TEXELS 65536
