@@ -20,8 +20,12 @@ struct robust_sample {
 };
 
 /* Lowers the weights of those of count > 0 samples that are off the weighted median of `gray`: to half
- * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples. Returns the sum of the weights. */
+ * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples. Returns
+ * the sum of the weights. */
 float robust_weigh(struct robust_sample *sample, size_t count, float scale);
+
+/* Keeps those of count > 0 samples whose `gray` is less than `within` off its weighted median, sorted; returns how many. */
+size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
 /* The mean of count > 0 samples after robust_weigh. */
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale);

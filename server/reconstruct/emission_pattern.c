@@ -2,7 +2,6 @@
 #include "server/reconstruct/emission_pattern.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "common/mem.h"
 #include "common/quantile.h"
@@ -21,7 +20,7 @@
 #define DARKEST_PART 0.02
 /* Looks differ by this much in their logarithm before one counts half. */
 #define OUTLIER_SCALE 0.3f
-#define SAME_PICTURE 0.7f /* and no more of what most looks at a changing screen show */
+#define SAME_PICTURE 0.7f /* and no more, of what most looks at a changing screen show */
 #define LOG_FLOOR 0.01f /* of what the segment shows, where a logarithm is taken */
 #define CHUNK 64 /* texels a work item */
 
@@ -102,32 +101,12 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
         looks->look[looks->count++] = bound;
 }
 
-static int by_gray(const void *a, const void *b) {
-    float x = ((const struct robust_sample *)a)->gray, y = ((const struct robust_sample *)b)->gray;
-    return (x > y) - (x < y);
-}
-
-/* Of a screen whose picture changed what most looks show: what the others do is no noise of it. */
-static void keep_most(struct measured_looks *looks) {
-    float half = 0.0f, below = 0.0f;
-    size_t middle = 0, kept = 0;
-    qsort(looks->look, looks->count, sizeof *looks->look, by_gray);
-    for (size_t i = 0; i < looks->count; i++)
-        half += 0.5f * looks->look[i].weight;
-    while (middle + 1 < looks->count && (below += looks->look[middle].weight) < half)
-        middle++;
-    float median = looks->look[middle].gray;
-    for (size_t i = 0; i < looks->count; i++)
-        if (fabsf(looks->look[i].gray - median) < SAME_PICTURE)
-            looks->look[kept++] = looks->look[i];
-    looks->count = kept;
-}
-
 static void measure_texel(const struct emitter *e, uint32_t texel) {
     struct measured_looks looks;
     look_all(e, texel, &looks);
+    /* Of a screen whose picture changed what most looks show: what the others do is no noise of it. */
     if (looks.count > 0 && e->finder->r->evidence[e->segment].changes > 0.0f)
-        keep_most(&looks);
+        looks.count = robust_keep(looks.look, looks.count, SAME_PICTURE);
     if (looks.count > 0)
         e->finder->measured[texel] = measured_mean(&looks, OUTLIER_SCALE, rgb_gray(0.0f));
 }
