@@ -10,7 +10,8 @@ shift
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
 slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
-render/test_environment render/test_sun render/test_split api/test_resume api/test_readme chaos/test_start_faults chaos/test_worker_calls"
+render/test_environment render/test_sky_room render/test_sparks_left_out render/test_sun render/test_split
+api/test_resume api/test_readme chaos/test_start_faults chaos/test_worker_calls"
 # The thread sanitizer has nothing to find in one thread either.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
 gradient/test_path render/test_calibrate_light render/test_calibrate_poses render/test_gloss render/test_saturated_light

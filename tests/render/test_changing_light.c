@@ -88,7 +88,7 @@ static void test(enum paint paint, int threads, struct parallel *pool) {
 
 int main(void) {
     struct parallel *pool = parallel_new(0);
-    test(CHANGING, 1, pool);
+    test(CHANGING, 2, pool);
     if (!IS_BRIEF) {
         test(STILL, 0, pool);
         test(GLOSSY, 0, pool);

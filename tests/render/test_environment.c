@@ -1,86 +1,10 @@
-/* environment.h, fill.h, reach.h, relight.h: a room with a window, lit by a sky alone. The sky is
- * found in the photographs, lights the room, and can be replaced. */
-#include "common/file.h"
+/* environment.h, fill.h, reach.h, relight.h: the sky behind a window is found in the photographs, whatever their
+ * exposures and faults; samples go where its light finds a way in. */
 #include "common/rng.h"
 #include "common/sha256.h"
 #include "server/capture/environment.h"
 #include "server/evaluate/relight.h"
-#include "server/export/outputs.h"
-#include "server/reconstruct/reconstruct.h"
-#include "tests/render/shell.h"
-#include "tests/render/small_room.h"
-
-#define SKY_WIDTH 256
-
-/* Blue above, brown below, a sun of some degrees in view of the window (which looks along -z). */
-static rgb sky_at(vec3 d) {
-    vec3 sun = vec3_normalize((vec3){-0.1f, 0.25f, -1.0f});
-    if (vec3_dot(d, sun) > 0.992f)
-        return (rgb){120.0f, 110.0f, 90.0f};
-    float up = 0.5f + 0.5f * d.y;
-    return d.y > 0.0f ? (rgb){6.0f - 3.0f * up, 7.0f - 2.0f * up, 8.0f + 2.0f * d.x}
-                      : (rgb){2.0f, 1.5f + 0.5f * d.x, 1.0f};
-}
-
-static vec3 direction_of(const struct image *map, uint32_t x, uint32_t y) {
-    double phi = 2.0 * PI * ((double)x + 0.5) / map->width;
-    double theta = PI * (double)y / (double)(map->height - 1);
-    return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
-}
-
-static void make_sky(struct image *sky) {
-    image_init_rgb(sky, SKY_WIDTH, SKY_WIDTH / 2);
-    for (uint32_t i = 0; i < sky->width * sky->height; i++) {
-        rgb value = sky_at(direction_of(sky, i % sky->width, i / sky->width));
-        memcpy(sky->pixel + 3 * i, &value, sizeof value);
-    }
-}
-
-/* The small room with a window of `width` x 1.4 m in the wall at z = 0. */
-static void make_open_mesh(struct mesh *m, float width) {
-    make_mesh(m);
-    m->position = mem_realloc_array(m->position, 4 * (OBJECTS + 3), sizeof *m->position);
-    m->index = mem_realloc_array(m->index, 2 * (OBJECTS + 3), sizeof *m->index);
-    m->face = mem_realloc_array(m->face, 2 * (OBJECTS + 3), sizeof *m->face);
-    m->object_id = mem_realloc_array(m->object_id, 2 * (OBJECTS + 3), sizeof *m->object_id);
-    /* What was the wall becomes the part below the window. */
-    float left = 2.0f - 0.5f * width, right = 2.0f + 0.5f * width;
-    m->position[4 * 4 + 2].y = m->position[4 * 4 + 3].y = 0.8f;
-    add_quad(m, 4, (vec3){0, 2.2f, 0}, (vec3){4, 0, 0}, (vec3){0, 0.8f, 0});
-    add_quad(m, 4, (vec3){0, 0.8f, 0}, (vec3){left, 0, 0}, (vec3){0, 1.4f, 0});
-    add_quad(m, 4, (vec3){right, 0.8f, 0}, (vec3){4 - right, 0, 0}, (vec3){0, 1.4f, 0});
-}
-
-/* Every other camera looks through the window. */
-static vec3 look_out_often(int frame) {
-    vec3 anywhere = look_anywhere(frame);
-    return frame % 2 ? anywhere : (vec3){0.8f + 0.6f * anywhere.x, 0.8f + 0.5f * anywhere.y, -0.5f};
-}
-
-/* What environment_make needs of a scene. */
-struct rig {
-    struct scene *scene;
-    struct segments segments;
-    struct accel *accel;
-    struct views views;
-    struct parallel *pool;
-};
-
-static void rig_init(struct rig *r, struct scene *scene, int threads) {
-    struct error err;
-    r->scene = scene;
-    r->pool = parallel_new(threads);
-    segments_from_object_id(&r->segments, &scene->mesh);
-    CHECK(accel_new(&r->accel, &scene->mesh, r->pool, &err) == STATUS_OK);
-    views_init(&r->views, scene, &r->segments, r->accel, r->pool);
-}
-
-static void rig_release(struct rig *r) {
-    views_release(&r->views);
-    accel_free(r->accel);
-    segments_release(&r->segments);
-    parallel_free(r->pool);
-}
+#include "tests/render/open_room.h"
 
 static void digest(const struct environment *e, char hex[SHA256_HEX_SIZE]) {
     struct sha256 sha;
@@ -353,117 +277,6 @@ static void test_reach(struct parallel *pool, const struct image *sky) {
     mesh_release(&mesh);
 }
 
-/* --- a whole reconstruction ------------------------------------------------------------------- */
-
-/* Root mean square error of the walls' base colour over what two photographs see; how many segments
- * were found to emit. */
-static double wall_error(const struct reconstruction *r, int *emitters) {
-    double sum = 0.0, count = 0.0;
-    *emitters = 0;
-    for (int o = 0; o < OBJECTS; o++)
-        *emitters += !rgb_is_black(r->materials.emission[o]);
-    for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i], segment = r->segments.of_triangle[r->inverse.triangle[texel]];
-        const float *t = r->materials.base_color.texel[texel];
-        const rgb *c = &wall_color[segment];
-        if (r->fused.count[texel] < 2.0f || segment == LAMP)
-            continue;
-        sum += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) + pow((double)(t[2] - c->b), 2);
-        count += 3.0;
-    }
-    return sqrt(sum / count);
-}
-
-static void write_outputs(const char *dir, const struct reconstruction *r) {
-    struct export_comparison comparison[FRAMES];
-    struct error err;
-    for (size_t i = 0; i < r->held_out_count; i++)
-        comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
-                                                   &r->held_out[i].render, r->held_out[i].camera};
-    struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
-                              r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
-                              &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}};
-    CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
-}
-
-static double mean_of(const struct image *image) {
-    double sum = 0.0;
-    size_t values = (size_t)image->width * image->height * 3;
-    for (size_t i = 0; i < values; i++)
-        sum += (double)image->pixel[i] / (double)values;
-    return sum;
-}
-
-/* From the folder alone: the report's view again; darkness; twice the light; another sky. */
-static void test_relight(const struct reconstruction *r, struct parallel *pool) {
-    char dir[] = "/tmp/unbake-relight-XXXXXX";
-    struct relight_settings s = relight_default_settings();
-    struct image image;
-    struct error err;
-    CHECK(mkdtemp(dir) != NULL);
-    write_outputs(dir, r);
-    s.view = "2";
-    CHECK_THAT(relight(dir, &s, pool, &image, &err) == STATUS_OK, "%s", err.message);
-    double plain = mean_of(&image);
-    CHECK_NEAR(plain / mean_of(&r->held_out[2].render), 1.0, 0.05);
-    image_release(&image);
-    s.environment_scale = 2.0f;
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
-    CHECK_NEAR(mean_of(&image) / plain, 2.0, 0.05); /* nothing but the sky shines here */
-    image_release(&image);
-    s.environment = "none";
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK && mean_of(&image) == 0.0);
-    image_release(&image);
-    char *red = file_join(dir, "red.exr");
-    static float pixel[16 * 8 * 3];
-    for (int i = 0; i < 16 * 8; i++)
-        pixel[3 * i] = 5.0f;
-    struct image sky = {16, 8, 3, (char[3][64]){"R", "G", "B"}, pixel};
-    CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
-    s.environment = red;
-    s.lights = false;
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
-    CHECK(image.pixel[0] > 0.0f && image.pixel[1] == 0.0f && image.pixel[2] == 0.0f);
-    image_release(&image);
-    s.view = "99";
-    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_NOT_FOUND);
-    mem_free(red);
-    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
-}
-
-static void test_reconstruction(struct scene *scene, struct scene *masked, struct parallel *pool) {
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":250,\"report_samples\":32,"
-                                       "\"texels_per_iteration\":512,\"max_depth\":8}");
-    struct shell shell = {.polls_until_stop = -1};
-    struct reconstruction r;
-    int emitters;
-    CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
-    double with = wall_error(&r, &emitters);
-    printf("base colour off by %.4f, %d emitters\n", with, emitters);
-    CHECK_THAT(with < 0.1, "base colour off by %g", with);
-    CHECK(emitters == 0 && cJSON_GetObjectItem(r.report, "environment") != NULL);
-    CHECK(cJSON_IsFalse(cJSON_GetObjectItem(cJSON_GetObjectItem(r.report, "unseen_light"), "estimated")));
-    test_relight(&r, pool);
-    reconstruct_release(&r);
-    shell_release(&shell);
-
-    /* Where the openings are masked the light is estimated from what it does to the surfaces: nothing is
-     * called an emitter, and base colours come out not much worse. */
-    masked->mesh = scene->mesh; /* which has normals by now */
-    shell = (struct shell){.polls_until_stop = -1};
-    CHECK(shell_run(masked, &s, 0, &shell, &r) == STATUS_OK);
-    double without = wall_error(&r, &emitters);
-    const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
-    printf("sky unseen: base colour off by %.4f, %d emitters, %.3f of the rays\n", without, emitters, r.unseen_share);
-    CHECK_THAT(without < 0.2 && emitters == 0, "base colour off by %g, %d emitters", without, emitters);
-    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && r.unseen_share > 0.02);
-    reconstruct_release(&r);
-    shell_release(&shell);
-    settings_release(&s);
-}
-
-/* --- relight_orient ----------------------------------------------------------------------------- */
-
 /* A single bright patch, looked for in the room's frame. */
 static vec3 brightest(const struct image *map) {
     size_t best = 0;
@@ -493,72 +306,6 @@ static void test_orient(void) {
     image_release(&picture);
 }
 
-/* The same scene with the pixels masked that look out, but for those that look down to below a height (-1: none). */
-static void mask_open(struct scene *masked, struct scene *scene, float below) {
-    struct rig rig;
-    *masked = *scene;
-    masked->photograph = mem_array(scene->photograph_count, sizeof *masked->photograph);
-    memcpy(masked->photograph, scene->photograph, scene->photograph_count * sizeof *masked->photograph);
-    rig_init(&rig, scene, 1);
-    for (size_t t = 0; t < rig.views.train_count; t++) {
-        struct photograph *photo = &masked->photograph[rig.views.train[t]];
-        photo->mask = mem_array(WIDTH * HEIGHT, 1);
-        for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
-            vec3 direction = {0.0f, 1.0f, 0.0f};
-            camera_direction(&photo->camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, &direction);
-            photo->mask[i] = rig.views.shows[t][i] != VIEWS_OPEN || direction.y < below;
-        }
-    }
-    rig_release(&rig);
-}
-
-static void forget_masked(struct scene *masked) {
-    for (size_t i = 0; i < masked->photograph_count; i++)
-        mem_free(masked->photograph[i].mask);
-    mem_free(masked->photograph);
-}
-
-/* Where photographs show the dim ground alone the sky above it is estimated, much brighter; beside what is seen the map
- * goes on as that is. */
-static void test_beside_seen(const struct image *sky, struct parallel *pool) {
-    struct scene scene = {0}, parted;
-    struct image dusk;
-    image_init_rgb(&dusk, sky->width, sky->height);
-    for (size_t i = 0; i < (size_t)3 * sky->width * sky->height; i++)
-        dusk.pixel[i] = (i < (size_t)3 * sky->width * (sky->height / 2) ? 1.0f : 0.1f) * sky->pixel[i];
-    make_open_mesh(&scene.mesh, 2.4f);
-    photograph_mesh(&scene, rgb_gray(0.0f), &dusk, look_out_often, pool);
-    mask_open(&parted, &scene, -0.05f);
-    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1}");
-    struct shell shell = {.polls_until_stop = -1};
-    struct reconstruction r;
-    CHECK(shell_run(&parted, &s, 0, &shell, &r) == STATUS_OK);
-    const struct environment *e = &r.environment;
-    const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
-    double seen = 0.0, beside = 0.0, most = 0.0, count = 0.0;
-    for (size_t i = 0; i + e->map.width < (size_t)e->map.width * e->map.height; i++) {
-        size_t below = i + e->map.width;
-        most = fmax(most, (double)e->map.pixel[3 * i + 1]);
-        if (e->confidence.pixel[2 * i] > 0.0f || e->confidence.pixel[2 * below] == 0.0f)
-            continue;
-        beside += (double)e->map.pixel[3 * i + 1];
-        seen += (double)e->map.pixel[3 * below + 1];
-        count += 1.0;
-    }
-    printf("above the rim of what is seen: %.2f times as bright, over %.0f cells; at most %.2f\n", beside / seen, count,
-           most);
-    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && count > 10.0);
-    CHECK(most > 15.0 * seen / count);
-    CHECK_THAT(beside < 9.0 * seen, "%g times", beside / seen); /* 20 where the estimate begins at the rim */
-    reconstruct_release(&r);
-    shell_release(&shell);
-    settings_release(&s);
-    forget_masked(&parted);
-    scene.mesh = parted.mesh; /* which has normals by now */
-    scene_release(&scene);
-    image_release(&dusk);
-}
-
 int main(void) {
     struct parallel *pool = parallel_new(0);
     struct image sky;
@@ -577,9 +324,6 @@ int main(void) {
     test_wrong_poses(&scene);
     test_nothing(&masked, pool);
     test_reach(pool, &sky);
-    test_reconstruction(&scene, &masked, pool);
-    test_beside_seen(&sky, pool);
-
     forget_masked(&masked);
     scene_release(&scene);
     image_release(&sky);

@@ -1,0 +1,173 @@
+/* A whole reconstruction of a room that is lit by a sky alone: it lights the room and can be replaced (relight.h); where no
+ * photograph shows it, it is estimated (unseen_light.h). */
+#include "common/file.h"
+#include "server/evaluate/relight.h"
+#include "server/export/outputs.h"
+#include "server/reconstruct/reconstruct.h"
+#include "tests/render/open_room.h"
+#include "tests/render/shell.h"
+
+/* Root mean square error of the walls' base colour over what two photographs see; how many segments
+ * were found to emit. */
+static double wall_error(const struct reconstruction *r, int *emitters) {
+    double sum = 0.0, count = 0.0;
+    *emitters = 0;
+    for (int o = 0; o < OBJECTS; o++)
+        *emitters += !rgb_is_black(r->materials.emission[o]);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = r->segments.of_triangle[r->inverse.triangle[texel]];
+        const float *t = r->materials.base_color.texel[texel];
+        const rgb *c = &wall_color[segment];
+        if (r->fused.count[texel] < 2.0f || segment == LAMP)
+            continue;
+        sum += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) + pow((double)(t[2] - c->b), 2);
+        count += 3.0;
+    }
+    return sqrt(sum / count);
+}
+
+static void write_outputs(const char *dir, const struct reconstruction *r) {
+    struct export_comparison comparison[FRAMES];
+    struct error err;
+    for (size_t i = 0; i < r->held_out_count; i++)
+        comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
+                                                   &r->held_out[i].render, r->held_out[i].camera};
+    struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
+                              r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
+                              &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}};
+    CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
+}
+
+static double mean_of(const struct image *image) {
+    double sum = 0.0;
+    size_t values = (size_t)image->width * image->height * 3;
+    for (size_t i = 0; i < values; i++)
+        sum += (double)image->pixel[i] / (double)values;
+    return sum;
+}
+
+/* From the folder alone: the report's view again; darkness; twice the light; another sky. */
+static void test_relight(const struct reconstruction *r, struct parallel *pool) {
+    char dir[] = "/tmp/unbake-relight-XXXXXX";
+    struct relight_settings s = relight_default_settings();
+    struct image image;
+    struct error err;
+    CHECK(mkdtemp(dir) != NULL);
+    write_outputs(dir, r);
+    s.view = "2";
+    CHECK_THAT(relight(dir, &s, pool, &image, &err) == STATUS_OK, "%s", err.message);
+    double plain = mean_of(&image);
+    CHECK_NEAR(plain / mean_of(&r->held_out[2].render), 1.0, 0.05);
+    image_release(&image);
+    s.environment_scale = 2.0f;
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    CHECK_NEAR(mean_of(&image) / plain, 2.0, 0.05); /* nothing but the sky shines here */
+    image_release(&image);
+    s.environment = "none";
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK && mean_of(&image) == 0.0);
+    image_release(&image);
+    char *red = file_join(dir, "red.exr");
+    static float pixel[16 * 8 * 3];
+    for (int i = 0; i < 16 * 8; i++)
+        pixel[3 * i] = 5.0f;
+    struct image sky = {16, 8, 3, (char[3][64]){"R", "G", "B"}, pixel};
+    CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
+    s.environment = red;
+    s.lights = false;
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_OK);
+    CHECK(image.pixel[0] > 0.0f && image.pixel[1] == 0.0f && image.pixel[2] == 0.0f);
+    image_release(&image);
+    s.view = "99";
+    CHECK(relight(dir, &s, pool, &image, &err) == STATUS_NOT_FOUND);
+    mem_free(red);
+    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+}
+
+static void test_reconstruction(struct scene *scene, struct scene *masked, struct parallel *pool) {
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":250,\"report_samples\":32,"
+                                       "\"texels_per_iteration\":512,\"max_depth\":8}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    int emitters;
+    CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
+    double with = wall_error(&r, &emitters);
+    printf("base colour off by %.4f, %d emitters\n", with, emitters);
+    CHECK_THAT(with < 0.1, "base colour off by %g", with);
+    CHECK(emitters == 0 && cJSON_GetObjectItem(r.report, "environment") != NULL);
+    CHECK(cJSON_IsFalse(cJSON_GetObjectItem(cJSON_GetObjectItem(r.report, "unseen_light"), "estimated")));
+    test_relight(&r, pool);
+    reconstruct_release(&r);
+    shell_release(&shell);
+
+    /* Where the openings are masked the light is estimated from what it does to the surfaces: nothing is
+     * called an emitter, and base colours come out not much worse. */
+    masked->mesh = scene->mesh; /* which has normals by now */
+    shell = (struct shell){.polls_until_stop = -1};
+    CHECK(shell_run(masked, &s, 0, &shell, &r) == STATUS_OK);
+    double without = wall_error(&r, &emitters);
+    const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
+    printf("sky unseen: base colour off by %.4f, %d emitters, %.3f of the rays\n", without, emitters, r.unseen_share);
+    CHECK_THAT(without < 0.2 && emitters == 0, "base colour off by %g, %d emitters", without, emitters);
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && r.unseen_share > 0.02);
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+}
+
+/* Where photographs show the dim ground alone the sky above it is estimated, much brighter; beside what is seen the map
+ * goes on as that is. */
+static void test_beside_seen(const struct image *sky, struct parallel *pool) {
+    struct scene scene = {0}, parted;
+    struct image dusk;
+    image_init_rgb(&dusk, sky->width, sky->height);
+    for (size_t i = 0; i < (size_t)3 * sky->width * sky->height; i++)
+        dusk.pixel[i] = (i < (size_t)3 * sky->width * (sky->height / 2) ? 1.0f : 0.1f) * sky->pixel[i];
+    make_open_mesh(&scene.mesh, 2.4f);
+    photograph_mesh(&scene, rgb_gray(0.0f), &dusk, look_out_often, pool);
+    mask_open(&parted, &scene, -0.05f);
+    struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":1}");
+    struct shell shell = {.polls_until_stop = -1};
+    struct reconstruction r;
+    CHECK(shell_run(&parted, &s, 0, &shell, &r) == STATUS_OK);
+    const struct environment *e = &r.environment;
+    const cJSON *unseen = cJSON_GetObjectItem(r.report, "unseen_light");
+    double seen = 0.0, beside = 0.0, most = 0.0, count = 0.0;
+    for (size_t i = 0; i + e->map.width < (size_t)e->map.width * e->map.height; i++) {
+        size_t below = i + e->map.width;
+        most = fmax(most, (double)e->map.pixel[3 * i + 1]);
+        if (e->confidence.pixel[2 * i] > 0.0f || e->confidence.pixel[2 * below] == 0.0f)
+            continue;
+        beside += (double)e->map.pixel[3 * i + 1];
+        seen += (double)e->map.pixel[3 * below + 1];
+        count += 1.0;
+    }
+    printf("above the rim of what is seen: %.2f times as bright, over %.0f cells; at most %.2f\n", beside / seen, count,
+           most);
+    CHECK(cJSON_IsTrue(cJSON_GetObjectItem(unseen, "estimated")) && count > 10.0);
+    CHECK(most > 15.0 * seen / count);
+    CHECK_THAT(beside < 9.0 * seen, "%g times", beside / seen); /* 20 where the estimate begins at the rim */
+    reconstruct_release(&r);
+    shell_release(&shell);
+    settings_release(&s);
+    forget_masked(&parted);
+    scene.mesh = parted.mesh; /* which has normals by now */
+    scene_release(&scene);
+    image_release(&dusk);
+}
+
+int main(void) {
+    struct parallel *pool = parallel_new(0);
+    struct image sky;
+    struct scene scene = {0}, masked;
+    make_sky(&sky);
+    make_open_mesh(&scene.mesh, 2.4f);
+    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_out_often, pool);
+    mask_open(&masked, &scene, -1.0f);
+    test_reconstruction(&scene, &masked, pool);
+    test_beside_seen(&sky, pool);
+    forget_masked(&masked);
+    scene_release(&scene);
+    image_release(&sky);
+    parallel_free(pool);
+    return check_result();
+}
