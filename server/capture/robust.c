@@ -12,21 +12,10 @@ static int compare_gray(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Sorts the samples and returns the weighted median of `gray`. */
-static float median_of(struct robust_sample *sample, size_t count) {
-    float half = 0.0f, below = 0.0f;
-    size_t middle = 0;
-    qsort(sample, count, sizeof *sample, compare_gray);
-    for (size_t i = 0; i < count; i++)
-        half += 0.5f * sample[i].weight;
-    while (middle + 1 < count && (below += sample[middle].weight) < half)
-        middle++;
-    return sample[middle].gray;
-}
-
 size_t robust_keep(struct robust_sample *sample, size_t count, float within) {
-    float median = median_of(sample, count);
     size_t kept = 0;
+    qsort(sample, count, sizeof *sample, compare_gray);
+    float median = sample[count / 2].gray;
     for (size_t i = 0; i < count; i++)
         if (fabsf(sample[i].gray - median) < within)
             sample[kept++] = sample[i];
@@ -34,7 +23,14 @@ size_t robust_keep(struct robust_sample *sample, size_t count, float within) {
 }
 
 float robust_weigh(struct robust_sample *sample, size_t count, float scale) {
-    float median = median_of(sample, count), weights = 0.0f;
+    float half = 0.0f, below = 0.0f, weights = 0.0f;
+    size_t middle = 0;
+    qsort(sample, count, sizeof *sample, compare_gray);
+    for (size_t i = 0; i < count; i++)
+        half += 0.5f * sample[i].weight;
+    while (middle + 1 < count && (below += sample[middle].weight) < half)
+        middle++;
+    float median = sample[middle].gray;
     for (size_t i = 0; i < count; i++) {
         float off = sample[i].gray - median, usual = EFFICIENT * sample[i].deviation;
         sample[i].weight /= 1.0f + off * off / (scale * scale + usual * usual);

@@ -24,7 +24,8 @@ struct robust_sample {
  * the sum of the weights. */
 float robust_weigh(struct robust_sample *sample, size_t count, float scale);
 
-/* Keeps those of count > 0 samples whose `gray` is less than `within` off its weighted median, sorted; returns how many. */
+/* Keeps those of count > 0 samples whose `gray` is less than `within` off its median, whatever their weights: what most of
+ * them show. Sorts the samples; returns how many are kept. */
 size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
 /* The mean of count > 0 samples after robust_weigh. */

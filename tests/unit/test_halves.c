@@ -94,7 +94,19 @@ static void test_outlier(void) {
     }
 }
 
+/* What most show is kept, though others weigh more. */
+static void test_keep(void) {
+    const float value[] = {0.9f, 0.02f, 1.1f, 0.03f, 1.0f};
+    struct robust_sample sample[5];
+    for (uint32_t i = 0; i < 5; i++)
+        sample[i] = (struct robust_sample){.gray = logf(value[i]), .weight = value[i] < 0.5f ? 10.0f : 1.0f, .source = i};
+    CHECK(robust_keep(sample, 5, 0.7f) == 3);
+    CHECK(sample[0].source == 0 && sample[1].source == 4 && sample[2].source == 2);
+    CHECK(robust_keep(sample, 1, 0.7f) == 1);
+}
+
 int main(void) {
+    test_keep();
     test_variance(true);
     test_variance(false);
     test_what_they_share();
