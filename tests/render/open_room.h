@@ -1,4 +1,5 @@
-/* open_room.h -- the small room with a window, lit by a sky: for tests of what comes from outside. */
+/* open_room.h -- the small room with a window, lit by a sky: for tests of what comes from outside. Owns the room, its
+ * photographs and the sky; reconstructs nothing. */
 #ifndef UNBAKE_TESTS_RENDER_OPEN_ROOM_H
 #define UNBAKE_TESTS_RENDER_OPEN_ROOM_H
 
@@ -102,6 +103,28 @@ static inline void forget_masked(struct scene *masked) {
         mem_free(masked->photograph[i].spark); /* found in its own reconstruction */
     }
     mem_free(masked->photograph);
+}
+
+/* The room under that sky, which alone lights it, and the same with all masked that look out. */
+struct open_room {
+    struct parallel *pool;
+    struct image sky;
+    struct scene scene, masked;
+};
+
+static inline void open_room_init(struct open_room *room) {
+    *room = (struct open_room){.pool = parallel_new(0)};
+    make_sky(&room->sky);
+    make_open_mesh(&room->scene.mesh, 2.4f);
+    photograph_mesh(&room->scene, rgb_gray(0.0f), &room->sky, look_out_often, room->pool);
+    mask_open(&room->masked, &room->scene, -1.0f);
+}
+
+static inline void open_room_release(struct open_room *room) {
+    forget_masked(&room->masked);
+    scene_release(&room->scene);
+    image_release(&room->sky);
+    parallel_free(room->pool);
 }
 
 #endif

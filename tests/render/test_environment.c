@@ -307,26 +307,18 @@ static void test_orient(void) {
 }
 
 int main(void) {
-    struct parallel *pool = parallel_new(0);
-    struct image sky;
-    struct scene scene = {0}, masked;
-    make_sky(&sky);
-    make_open_mesh(&scene.mesh, 2.4f);
-    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_out_often, pool);
-    mask_open(&masked, &scene, -1.0f);
+    struct open_room room;
+    open_room_init(&room);
     test_orient();
-    test_recovers_sky(&scene);
-    test_exposures(&scene, CYCLING);
-    test_exposures(&scene, ONLY_LONG);
-    test_exposures(&scene, PARTED);
-    test_night(&scene);
-    test_outliers(&scene);
-    test_wrong_poses(&scene);
-    test_nothing(&masked, pool);
-    test_reach(pool, &sky);
-    forget_masked(&masked);
-    scene_release(&scene);
-    image_release(&sky);
-    parallel_free(pool);
+    test_recovers_sky(&room.scene);
+    test_exposures(&room.scene, CYCLING);
+    test_exposures(&room.scene, ONLY_LONG);
+    test_exposures(&room.scene, PARTED);
+    test_night(&room.scene);
+    test_outliers(&room.scene);
+    test_wrong_poses(&room.scene);
+    test_nothing(&room.masked, room.pool);
+    test_reach(room.pool, &room.sky);
+    open_room_release(&room);
     return check_result();
 }

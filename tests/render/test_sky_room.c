@@ -156,18 +156,10 @@ static void test_beside_seen(const struct image *sky, struct parallel *pool) {
 }
 
 int main(void) {
-    struct parallel *pool = parallel_new(0);
-    struct image sky;
-    struct scene scene = {0}, masked;
-    make_sky(&sky);
-    make_open_mesh(&scene.mesh, 2.4f);
-    photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_out_often, pool);
-    mask_open(&masked, &scene, -1.0f);
-    test_reconstruction(&scene, &masked, pool);
-    test_beside_seen(&sky, pool);
-    forget_masked(&masked);
-    scene_release(&scene);
-    image_release(&sky);
-    parallel_free(pool);
+    struct open_room room;
+    open_room_init(&room);
+    test_reconstruction(&room.scene, &room.masked, room.pool);
+    test_beside_seen(&room.sky, room.pool);
+    open_room_release(&room);
     return check_result();
 }
