@@ -223,6 +223,10 @@ float noise_deviation_of_value(const struct noise *noise, uint32_t train, const 
     return value * noise->share[octave_of(value)] * scale_at(noise, train, camera, x, y);
 }
 
+float noise_deviation_of_black(const struct noise *noise) {
+    return noise->black / BLACK_DEVIATIONS;
+}
+
 float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
                    float mixing) {
     float deviation = rgb_mean(noise_deviation(noise, v, view, radiance)), mean = rgb_mean(radiance);

@@ -40,6 +40,9 @@ rgb noise_deviation(const struct noise *noise, const struct views *views, const 
 float noise_deviation_of_value(const struct noise *noise, uint32_t train, const struct camera *camera, float x, float y,
                                float value);
 
+/* The same of black, where 8 bits have noise as well; of those alone. */
+float noise_deviation_of_black(const struct noise *noise);
+
 /* What a look-up there counts beside others of the same point that should all tell `radiance`: the inverse of
  * its variance, as a share of the radiance squared, by noise and by light of other surfaces
  * (views_mixing). */

@@ -1,8 +1,8 @@
 /* pose_guests.h -- poses of held-out photographs, which are as wrong as those of others.
  *
  * Each is moved on its own until it shows tracks as those photographs see them that are reconstructed from
- * (pose_solver.h, whose looks are kept). It has no say in these, nor in anything else that is learned: only where it is compared with
- * the room is put right. */
+ * (pose_solver.h, whose looks are kept). It has no say in these, nor in anything else that is learned: only where it
+ * is compared with the room is put right. */
 #ifndef UNBAKE_CAPTURE_POSE_GUESTS_H
 #define UNBAKE_CAPTURE_POSE_GUESTS_H
 

@@ -20,12 +20,12 @@ struct robust_sample {
 };
 
 /* Lowers the weights of those of count > 0 samples that are off the weighted median of `gray`: to half
- * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples. Returns
- * the sum of the weights. */
+ * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples.
+ * Returns the sum of the weights. */
 float robust_weigh(struct robust_sample *sample, size_t count, float scale);
 
-/* Keeps those of count > 0 samples whose `gray` is less than `within` off its median, whatever their weights: what most of
- * them show. Sorts the samples; returns how many are kept. */
+/* Keeps those of count > 0 samples whose `gray` is less than `within` off its median, whatever their weights: what most
+ * of them show. Sorts the samples; returns how many are kept. */
 size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
 /* The mean of count > 0 samples after robust_weigh. */

@@ -32,12 +32,17 @@ static float brightest_beside(const struct photograph *photo, long x0, long y0) 
     return brightest;
 }
 
+/* Standard deviation of a pixel that should show a value; of 8 bits it is no less than that of black. */
+static float deviation_of(const struct sparks_job *job, long x, long y, float value) {
+    const struct photograph *photo = job->photo;
+    float of_value = noise_deviation_of_value(job->noise, job->train, &photo->camera, (float)x, (float)y, value);
+    return photo->is_hdr ? of_value : fmaxf(of_value, noise_deviation_of_black(job->noise));
+}
+
 static bool is_spark(const struct sparks_job *job, long x, long y) {
-    const struct camera *camera = &job->photo->camera;
-    float value = value_at(job->photo, (size_t)(y * (long)camera->width + x));
+    float value = value_at(job->photo, (size_t)(y * (long)job->photo->camera.width + x));
     float beside = brightest_beside(job->photo, x, y);
-    return value > BRIGHTER * beside &&
-           value - beside > DEVIATIONS * noise_deviation_of_value(job->noise, job->train, camera, (float)x, (float)y, beside);
+    return value > BRIGHTER * beside && value - beside > DEVIATIONS * deviation_of(job, x, y, beside);
 }
 
 static void mark_row(void *user, size_t row, int thread) {

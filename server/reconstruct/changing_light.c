@@ -33,7 +33,8 @@
 enum kind { TELLS_NOTHING, TELLS_BLACK, TELLS_LIT };
 
 /* What a photograph tells of a place where white paint would show `white`. */
-static enum kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white, float *shown) {
+static enum kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white,
+                         float *shown) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[view->train]];
     struct photograph_sample s;
     if (views_edge(d->views, view, triangle) > 0 || !photograph_sample(photo, view->x, view->y, &s))
@@ -53,7 +54,8 @@ static bool may_be_highlight(const struct divide *d, const struct surface_point 
     static const struct highlight_levels levels = {3, 1, {0.1f, 0.3f, 0.6f}, {SPECULAR}};
     struct highlight highlight;
     float brightest = 0.0f;
-    highlight_gather(&highlight, &d->scratch[thread], d->field, at, views_direction(d->views, train, at->position), &levels,
+    vec3 wo = views_direction(d->views, train, at->position);
+    highlight_gather(&highlight, &d->scratch[thread], d->field, at, wo, &levels,
                      sampler_key(KEY_CHANGING, texel, train), SAMPLES, SAMPLES / 2);
     for (size_t i = 0; i < levels.roughness_count; i++)
         brightest = fmaxf(brightest, rgb_mean(highlight.radiance[i][0]));

@@ -10,8 +10,9 @@
 
 #include "server/reconstruct/divide.h"
 
-/* The share of texel[count], all of one segment, that changed so, by some of them that several photographs see; `thread`
- * picks of d->scratch. Exposures, noise and what photographs show together (fused) are to be known. */
+/* The share of texel[count], all of one segment, that changed so, by some of them that several photographs see;
+ * `thread` picks of d->scratch. Exposures, noise and what photographs show together (fused) are to be known; what emits
+ * is decided elsewhere. */
 float changing_light(const struct divide *d, const uint32_t *texel, size_t count, int thread);
 
 #endif

@@ -61,7 +61,8 @@ static struct robust_sample look_of(const struct emitter *e, const struct view *
         .value = value,
         .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
         .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
-        .weight = view->weight * noise_weight(&f->r->noise, f->views, view, typical, mixing * times_typical * times_typical),
+        .weight = view->weight *
+                  noise_weight(&f->r->noise, f->views, view, typical, mixing * times_typical * times_typical),
         .source = view->train,
         .sharp = view->weight,
         .noise = rgb_scale(noise, noise_draw(view, sharp)),

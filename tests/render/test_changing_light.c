@@ -27,7 +27,8 @@ static float depth_in_picture(float y, float z) {
 static void add_picture(struct photograph *photo) {
     vec3 from = camera_origin(&photo->camera), d;
     for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
-        if (!camera_direction(&photo->camera, (float)(i % WIDTH) + 0.5f, (float)(i / WIDTH) + 0.5f, &d) || !(d.x < 0.0f))
+        float x = (float)(i % WIDTH) + 0.5f, y = (float)(i / WIDTH) + 0.5f;
+        if (!camera_direction(&photo->camera, x, y, &d) || !(d.x < 0.0f))
             continue;
         float far = -from.x / d.x;
         for (int c = 0; c < 3 && depth_in_picture(from.y + far * d.y, from.z + far * d.z) > 0.0f; c++)

@@ -1,5 +1,5 @@
-/* A whole reconstruction of a room that is lit by a sky alone: it lights the room and can be replaced (relight.h); where no
- * photograph shows it, it is estimated (unseen_light.h). */
+/* A whole reconstruction of a room that is lit by a sky alone: it lights the room and can be replaced (relight.h);
+ * where no photograph shows it, it is estimated (unseen_light.h). */
 #include "common/file.h"
 #include "server/evaluate/relight.h"
 #include "server/export/outputs.h"
