@@ -16,7 +16,7 @@
 /* Of what white paint would show: black is less, lit is more. */
 #define BLACK 0.25f
 #define LIT 0.6f
-/* A photograph tells of black where its noise there is less than this part of it. */
+/* A photograph tells of black where it could show what is lit, and its noise is less than this part of black. */
 #define NOISE_MOST 0.25f
 /* All around a place must be black or lit as well: poses are off by pixels, and edges of paint are not to be taken for
  * changes. Within a picture it is darker here and there. */
@@ -44,7 +44,8 @@ static enum kind kind_of(const struct divide *d, const struct view *view, uint32
     if (*shown > LIT * white && ring.darkest > RING_LIT * white)
         return TELLS_LIT;
     float noise = rgb_mean(noise_deviation(d->noise, d->views, view, rgb_gray(BLACK * white)));
-    bool is_black = *shown < BLACK * white && ring.brightest < BLACK * white && noise < NOISE_MOST * BLACK * white;
+    bool is_black = *shown < BLACK * white && ring.brightest < BLACK * white &&
+                    rgb_mean(s.clip_radiance) > LIT * white && noise < NOISE_MOST * BLACK * white;
     return is_black ? TELLS_BLACK : TELLS_NOTHING;
 }
 

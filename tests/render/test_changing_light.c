@@ -1,5 +1,6 @@
 /* changing_light.h: a black wall that shows a picture in half of the photographs, dimmer than white paint would be, is
- * found to emit, and where; one that mirrors the lamp is not, nor one on which the same is painted. */
+ * found to emit, and where; one that mirrors the lamp is not, nor one on which the same is painted, not even where half
+ * of the photographs saturate far below it. */
 #include "server/reconstruct/emitters.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
@@ -7,9 +8,9 @@
 #define SCREEN 2        /* the wall at x = 0 */
 #define NEAR_M 0.4f     /* the picture leaves so much of the wall free all around */
 #define PICTURE 0.3f    /* radiance; white paint there would show .32 */
-#define INSIDE_M 0.3f   /* so far from the picture's rim it is looked at */
+#define CLIP 0.0625f    /* exact as a half */
 
-enum paint { STILL, CHANGING, GLOSSY };
+enum paint { STILL, CHANGING, GLOSSY, CLIPPED };
 
 /* Three of five photographs show the wall, the others anything: a wall that none shows may be a lamp. */
 static vec3 look_at_screen(int frame) {
@@ -36,6 +37,17 @@ static void add_picture(struct photograph *photo) {
     }
 }
 
+static void clip(struct photograph *photo) {
+    photo->is_hdr = false;
+    photo->clip = CLIP;
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        for (int c = 0; c < 3; c++) {
+            float value = image_float_from_half(photo->pixel[i][c]);
+            photo->pixel[i][c] = image_half_from_float(fminf(value, CLIP));
+        }
+    }
+}
+
 static void make_screen(struct scene *scene, enum paint paint, struct parallel *pool) {
     *scene = (struct scene){0};
     make_mesh(&scene->mesh);
@@ -43,9 +55,12 @@ static void make_screen(struct scene *scene, enum paint paint, struct parallel *
     wall_roughness[SCREEN] = paint == GLOSSY ? 0.2f : 1.0f;
     wall_specular[SCREEN] = paint == GLOSSY ? 1.0f : 0.0f;
     photograph_mesh(scene, lamp_radiance, NULL, look_at_screen, pool);
-    for (size_t f = 0; f < scene->photograph_count; f++)
-        if (paint == STILL || (paint == CHANGING && f % 4 != 0))
+    for (size_t f = 0; f < scene->photograph_count; f++) {
+        if (paint == STILL || paint == CLIPPED || (paint == CHANGING && f % 4 != 0))
             add_picture(&scene->photograph[f]);
+        if (paint == CLIPPED && f % 2 != 0)
+            clip(&scene->photograph[f]);
+    }
 }
 
 /* What the wall emits in the mean, in the picture and beside it. */
@@ -93,6 +108,7 @@ int main(void) {
     if (!IS_BRIEF) {
         test(STILL, 0, pool);
         test(GLOSSY, 0, pool);
+        test(CLIPPED, 0, pool);
     }
     parallel_free(pool);
     return check_result();
