@@ -31,3 +31,27 @@ double quantile_double(double *value, size_t count, double share) {
     qsort(value, count, sizeof *value, ascending_double);
     return value[index_of(count, share)];
 }
+
+/* Of two that are equal, the bound is the larger. */
+static int ascending_bounded(const void *a, const void *b) {
+    const struct bounded *x = a, *y = b;
+    if (x->value != y->value)
+        return x->value < y->value ? -1 : 1;
+    return x->is_bound - y->is_bound;
+}
+
+bool quantile_bounded_median(struct bounded *value, size_t count, float *median) {
+    double larger = 1.0; /* the share of all values that is larger than those looked at */
+    qsort(value, count, sizeof *value, ascending_bounded);
+    *median = count > 0 ? value[count - 1].value : 0.0f;
+    for (size_t i = 0; i < count; i++) {
+        if (value[i].is_bound)
+            continue;
+        larger *= 1.0 - 1.0 / (double)(count - i);
+        if (larger < 0.5) {
+            *median = value[i].value;
+            return true;
+        }
+    }
+    return false;
+}

@@ -163,25 +163,25 @@ static void divide_texel(struct divide *d, uint32_t texel, struct incident *scra
         d->measured[texel] = mean_of(&looks, &light);
 }
 
-struct divide_range {
+struct divide_list {
     struct divide *divide;
-    size_t first, count;
+    const uint32_t *texel;
+    size_t count;
 };
 
 static void divide_chunk(void *user, size_t chunk, int thread) {
-    const struct divide_range *range = user;
-    struct divide *d = range->divide;
-    size_t begin = chunk * CHUNK, end = begin + CHUNK < range->count ? begin + CHUNK : range->count;
+    const struct divide_list *list = user;
+    struct divide *d = list->divide;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK < list->count ? begin + CHUNK : list->count;
     for (size_t i = begin; i < end; i++) {
-        uint32_t texel = d->r->inverse.valid[range->first + i];
-        if (stand_in(d, texel) == texel)
-            divide_texel(d, texel, &d->scratch[thread]);
+        if (stand_in(d, list->texel[i]) == list->texel[i])
+            divide_texel(d, list->texel[i], &d->scratch[thread]);
     }
 }
 
-void divide_texels(struct divide *d, size_t first, size_t count) {
-    struct divide_range range = {d, first, count};
-    parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &range);
+void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
+    struct divide_list list = {d, texel, count};
+    parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
 }
 
 struct white_job {

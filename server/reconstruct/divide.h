@@ -33,9 +33,8 @@ struct divide {
 /* How many directions are enough for the highlights of texels of which a pixel covers so many. */
 size_t divide_highlight_samples(double texels_a_pixel);
 
-/* Measures the valid texels [first, first + count), by their place in inverse.valid. Emitters, whose own
- * light hides it, get a neutral base colour. */
-void divide_texels(struct divide *d, size_t first, size_t count);
+/* Measures so many valid texels. Emitters, whose own light hides it, get a neutral base colour. */
+void divide_texels(struct divide *d, const uint32_t *texel, size_t count);
 
 /* What a white diffuse surface at the texel sends towards its normal; false where it is not valid. */
 bool divide_white(const struct divide *d, uint32_t texel, rgb *white);

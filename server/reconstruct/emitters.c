@@ -20,8 +20,6 @@
 #define OUTSHINES_WHITE 1.05f
 /* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
 #define OWN_PART 0.25f
-/* Part of the looks that must have measured something for their median to count. */
-#define MEASURED_PART 0.1f
 /* Part of the shown radiance that must be beyond reflection. Specular reflection and noise stay
  * below it on all but mirrors; a lamp whose own light is less than half of what falls on it is
  * missed. */
@@ -52,12 +50,10 @@ struct evidence_job {
     struct emitter_evidence *evidence;
 };
 
-/* Values of one channel: those that were measured, and of the saturated ones, which are lower
- * bounds, the largest. */
+/* Values of one channel; of the saturated ones, the lower bounds. */
 struct channel_values {
-    float value[TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
-    size_t count, saturated_count;
-    float bound;
+    struct bounded value[TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
+    size_t count;
 };
 
 /* What the looks of one class of distance from an edge (views_edge) show. */
@@ -67,21 +63,7 @@ struct shown_values {
 };
 
 static void add_value(struct channel_values *v, float radiance, bool saturated) {
-    if (!saturated) {
-        v->value[v->count++] = radiance;
-        return;
-    }
-    v->saturated_count++;
-    v->bound = fmaxf(v->bound, radiance);
-}
-
-/* The median of what was measured; where nearly everything is saturated, the bound. (With cycling
- * exposures a lamp is measured by a third of the frames, a wall's highlight saturates in a few.) */
-static float median(struct channel_values *v, bool *is_bound) {
-    *is_bound = (float)v->count < MEASURED_PART * (float)(v->count + v->saturated_count);
-    if (*is_bound)
-        return v->bound;
-    return quantile(v->value, v->count, 0.5);
+    v->value[v->count++] = (struct bounded){radiance, saturated};
 }
 
 /* Whether what a look of this class of distance from an edge shows is the surface's own. A bright
@@ -135,11 +117,10 @@ static void observe_segment(void *user, size_t segment, int thread) {
     /* The looks farthest from edges, as soon as there are some. */
     struct shown_values *best = shown;
     for (int edge = 1; edge <= VIEWS_EDGE; edge++) {
-        const struct channel_values *red = &best->channel[0];
-        if (red->count + red->saturated_count < LEAST_LOOKS)
+        if (best->channel[0].count < LEAST_LOOKS)
             best = &shown[edge];
     }
-    size_t told = best->channel[0].count + best->channel[0].saturated_count;
+    size_t told = best->channel[0].count;
     size_t least = best == &shown[VIEWS_EDGE] ? LEAST_LOOKS_MIXED : 1;
     bool is_own = told >= least && (float)told >= OWN_PART * (float)(told + best->outshone_count);
     if (!is_own)
@@ -147,9 +128,10 @@ static void observe_segment(void *user, size_t segment, int thread) {
     struct emitter_evidence *e = &job->evidence[segment];
     e->seen = is_own;
     e->mixed = best == &shown[VIEWS_EDGE];
-    float value[3];
+    float value[3] = {0};
     for (int c = 0; c < 3; c++)
-        value[c] = median(&best->channel[c], &e->bound[c]);
+        e->bound[c] = best->channel[c].count > 0 &&
+                      !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
     e->least = rgb_make(value[0], value[1], value[2]);
     if (!e->unbound)
         e->shown = e->least;

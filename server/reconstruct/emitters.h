@@ -20,7 +20,7 @@ struct emitter_evidence {
     bool seen;   /* some photograph shows it, and not what is beside or behind it */
     bool mixed;  /* it was only seen in pixels that mix surfaces */
     bool hidden; /* a lamp that no photograph shows: `shown` is told by what it lights (lamp_find.h) */
-    bool bound[3]; /* by channel: nearly all that shows it saturates, and `least` is a lower bound */
+    bool bound[3]; /* by channel: half of what shows it saturates or more, and `least` is a lower bound */
     bool unbound;  /* such a lamp: `shown` is told by what it lights (saturated_light.h) */
     rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
     float share; /* part of `shown` that base colour 1 could not reflect */

@@ -104,12 +104,17 @@ static void find_odd(struct light_places *s) {
     mem_free(sorted);
 }
 
-void light_places_init(struct light_places *s, const struct survey *survey) {
-    *s = (struct light_places){.count = survey->count, .place = mem_array(survey->count + 1, sizeof *s->place)};
-    parallel_for(survey->r->pool, s->count, gather_place, &(struct gathering){survey, s->place});
+void light_places_take(struct light_places *s, struct light_place *place, size_t count) {
+    *s = (struct light_places){.count = count, .place = place};
     qsort(s->place, s->count, sizeof *s->place, by_segment);
     floor_light(s);
     find_odd(s);
+}
+
+void light_places_init(struct light_places *s, const struct survey *survey) {
+    struct light_place *place = mem_array(survey->count + 1, sizeof *place);
+    parallel_for(survey->r->pool, survey->count, gather_place, &(struct gathering){survey, place});
+    light_places_take(s, place, survey->count);
 }
 
 void light_places_thin(struct light_places *thin, const struct light_places *s, size_t most) {

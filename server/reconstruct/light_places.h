@@ -33,6 +33,8 @@ struct light_places {
 /* Takes over what a survey tells, of so many points at best. */
 #define LIGHT_PLACES 16384
 void light_places_init(struct light_places *places, const struct survey *survey);
+/* From place[count] of which segment, at, shown, white and weight are known, in any order; takes it over. */
+void light_places_take(struct light_places *places, struct light_place *place, size_t count);
 /* `most` of them, evenly spread. */
 void light_places_thin(struct light_places *thin, const struct light_places *places, size_t most);
 /* Leaves out segments of which most is brighter than white: lamps, for all one knows. */

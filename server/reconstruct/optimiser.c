@@ -34,6 +34,7 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "emission.adam", o->emission.adam.record, adam_bytes(&o->emission.adam));
     optimiser_keep(o, "emission.evidence", r->evidence, segments * sizeof *r->evidence);
     optimiser_keep(o, "environment.factor", &r->sky_factor, sizeof r->sky_factor);
+    optimiser_keep(o, "sun.irradiance", &r->sun.irradiance, sizeof r->sun.irradiance);
     optimiser_keep(o, "emission.is_emitter", r->is_emitter, segments * sizeof *r->is_emitter);
 }
 

@@ -290,6 +290,7 @@ static enum status run_resumable(struct run *run, struct error *err) {
     if (was_solved)
         emission_pattern_restore(run->r, &run->views);
     if (run->r->sun.is_there) {
+        sun_report(run->r);
         sun_draw(&run->r->sun, &run->r->environment);
         light_by_environment(run->r);
     }

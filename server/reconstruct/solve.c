@@ -16,6 +16,7 @@
 #include "server/reconstruct/gloss.h"
 #include "server/reconstruct/lamps.h"
 #include "server/reconstruct/sky_doubt.h"
+#include "server/reconstruct/sun_refit.h"
 
 #define PASSES 2
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
@@ -112,7 +113,7 @@ static bool divide_all(struct solve *s) {
     double begin_sec = clock_sec();
     for (size_t first = 0; first < valid; first += SLICE_TEXELS) {
         size_t count = valid - first < SLICE_TEXELS ? valid - first : SLICE_TEXELS;
-        divide_texels(&s->divide, first, count);
+        divide_texels(&s->divide, s->r->inverse.valid + first, count);
         if (!advance(s, RAYS_A_TEXEL * (double)count))
             return false;
         double done = (double)(first + count);
@@ -299,6 +300,8 @@ static bool solve_pass(struct solve *s, int pass) {
     if (pass > 0)
         gloss_fit(s->r, s->views, &s->probes, &s->field);
     s->divide.stride = pass == 0 ? COARSE_STRIDE : 1;
+    if (pass > 0)
+        sun_refit(&s->divide);
     if (!divide_all(s))
         return false;
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))

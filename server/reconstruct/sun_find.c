@@ -227,8 +227,10 @@ static void report(const struct search *s, double explains) {
     json_add_bool(figures, "found", r->sun.is_there);
     json_add_number(figures, "explains", explains);
     json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->places.count, 1.0));
-    if (!r->sun.is_there)
-        return;
+}
+
+void sun_report(const struct reconstruction *r) {
+    cJSON *figures = cJSON_GetObjectItem(r->report, "sun");
     cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
     for (int c = 0; c < 3; c++) {
         cJSON_AddItemToArray(direction, cJSON_CreateNumber((double)(&r->sun.direction.x)[c]));

@@ -17,4 +17,7 @@
  * what was found ("sun"). The same for any number of threads. */
 void sun_find(struct reconstruction *r, const struct views *views);
 
+/* Adds to the report where the sun that was found stands and how strong it is by now. */
+void sun_report(const struct reconstruction *r);
+
 #endif
