@@ -22,13 +22,13 @@ size_t robust_keep(struct robust_sample *sample, size_t count, float within) {
     return kept;
 }
 
-float robust_weigh(struct robust_sample *sample, size_t count, float scale) {
+float robust_weigh(struct robust_sample *sample, size_t count, float trust, float scale) {
     float half = 0.0f, below = 0.0f, weights = 0.0f;
     size_t middle = 0;
     qsort(sample, count, sizeof *sample, compare_gray);
     for (size_t i = 0; i < count; i++)
-        half += 0.5f * sample[i].weight;
-    while (middle + 1 < count && (below += sample[middle].weight) < half)
+        half += 0.5f * powf(sample[i].weight, trust);
+    while (middle + 1 < count && (below += powf(sample[middle].weight, trust)) < half)
         middle++;
     float median = sample[middle].gray;
     for (size_t i = 0; i < count; i++) {
@@ -40,7 +40,7 @@ float robust_weigh(struct robust_sample *sample, size_t count, float scale) {
 }
 
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale) {
-    float weights = robust_weigh(sample, count, scale);
+    float weights = robust_weigh(sample, count, 1.0f, scale);
     rgb sum = {0.0f, 0.0f, 0.0f};
     for (size_t i = 0; i < count; i++)
         sum = rgb_mad(sum, sample[i].weight, sample[i].value);

@@ -19,16 +19,16 @@ struct robust_sample {
     float mixing;
 };
 
-/* Lowers the weights of those of count > 0 samples that are off the weighted median of `gray`: to half
- * at a distance of `scale`, or further off where noise alone goes that far (Cauchy's weight). Sorts the samples.
- * Returns the sum of the weights. */
-float robust_weigh(struct robust_sample *sample, size_t count, float scale);
+/* Lowers the weights of those of count > 0 samples that are off the median of `gray`, weighed by their weights to the
+ * power `trust` in [0, 1]: to half at a distance of `scale`, or further off where noise alone goes that far (Cauchy's
+ * weight). Sorts the samples. Returns the sum of the weights. */
+float robust_weigh(struct robust_sample *sample, size_t count, float trust, float scale);
 
 /* Keeps those of count > 0 samples whose `gray` is less than `within` off its median, whatever their weights: what most
  * of them show. Sorts the samples; returns how many are kept. */
 size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
-/* The mean of count > 0 samples after robust_weigh. */
+/* The mean of count > 0 samples after robust_weigh with a trust of 1. */
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale);
 
 #endif

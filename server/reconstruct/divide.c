@@ -24,8 +24,10 @@
  * much in themselves. */
 #define OUTLIER_SCALE 0.3f
 #define OUTLIER_FLOOR 0.03f
-/* A look has half its weight where this part of it is highlight. */
+/* A look has half its weight where this part of it is highlight, if the base colour is what is typical of its segment;
+ * no segment is taken for darker than this. */
 #define HIGHLIGHT_PART 0.2f
+#define DARKEST_TYPICAL 0.02f
 /* Base colour by which looks are weighed. Were it a texel's own, bright texels would count for more than
  * dark ones wherever neighbours are averaged, and dark tiles between white joints turn grey. */
 #define TYPICAL_BASE_COLOR 0.5f
@@ -97,7 +99,7 @@ static void add_look(const struct divide *d, uint32_t texel, const struct surfac
                          sampler_key(KEY_DIVIDE, texel, view->train), d->highlight_samples,
                          d->highlight_samples / 2);
         gloss = highlight.radiance[0][0];
-        float both = fmaxf(rgb_mean(typical) + rgb_mean(gloss), 0.01f * median);
+        float both = fmaxf(d->typical[segment] * rgb_mean(white) + rgb_mean(gloss), 0.01f * median);
         float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
@@ -209,6 +211,23 @@ void divide_white_all(const struct divide *d, uint16_t (*white)[3]) {
     parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, white_chunk, &job);
 }
 
+/* Means over what photographs show of each segment. */
+static void find_typical(struct divide *d) {
+    const struct reconstruction *r = d->r;
+    double(*sum)[2] = mem_calloc(r->segments.count, sizeof *sum);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        sum[segment][0] += (double)rgb_mean(texel_color(r, texel));
+        sum[segment][1] += 1.0;
+    }
+    for (size_t i = 0; i < r->segments.count; i++)
+        if (sum[i][1] > 0.0)
+            d->typical[i] = fmaxf((float)(sum[i][0] / sum[i][1]), DARKEST_TYPICAL);
+    mem_free(sum);
+}
+
 /* What was measured as it is, and the priors where nothing was. */
 static void keep_noise(struct divide *d, const struct color_prior *prior) {
     struct reconstruction *r = d->r;
@@ -280,5 +299,6 @@ void divide_finish(struct divide *d, uint16_t (*radiance)[3]) {
     else
         keep_noise(d, prior);
     mem_free(prior);
+    find_typical(d);
     send_all(d, radiance);
 }

@@ -26,6 +26,7 @@ struct divide {
     bool denoises;                    /* else base colour is as measured */
     size_t highlight_samples;         /* directions for one highlight (divide_highlight_samples) */
     uint32_t stride;                  /* one texel is measured for its chart in every stride x stride */
+    float *typical;                   /* [segment_count] base colour, by the last divide_finish; .5 before */
     struct incident *scratch;         /* [threads] */
     struct measured *measured;        /* [height][width] what the photographs tell of each texel */
 };

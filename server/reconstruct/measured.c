@@ -4,8 +4,11 @@
 #include "common/image.h"
 #include "server/capture/halves.h"
 
+/* Of the logarithm of a look's weight: a single sharp look into a highlight must not outvote all others. */
+#define TRUST 0.5f
+
 struct measured measured_mean(struct measured_looks *looks, float scale, rgb common_noise) {
-    struct measured m = {.weight = robust_weigh(looks->look, looks->count, scale)};
+    struct measured m = {.weight = robust_weigh(looks->look, looks->count, TRUST, scale)};
     rgb value = {0.0f, 0.0f, 0.0f}, noise = value;
     float mixing = 0.0f;
     for (size_t i = 0; i < looks->count; i++) {

@@ -272,7 +272,9 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
         .highlight_samples = divide_highlight_samples(s->texels_a_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
+    s->divide.typical = mem_array(r->segments.count, sizeof *s->divide.typical);
     for (size_t i = 0; i < r->segments.count; i++) {
+        s->divide.typical[i] = NEUTRAL_BASE_COLOR;
         r->materials.roughness[i] = 1.0f;
         r->materials.specular[i] = 0.0f;
     }
@@ -280,6 +282,7 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
 }
 
 static void solve_release(struct solve *s) {
+    mem_free(s->divide.typical);
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
