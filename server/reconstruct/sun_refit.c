@@ -9,6 +9,9 @@
 #include "server/render/bsdf.h"
 #include "server/scene/surface.h"
 
+/* By so much a channel changes at most: what asks for more is no polish. */
+#define CHANGE_MOST 2.0f
+
 static bool tells(const struct divide *d, uint32_t texel) {
     const struct reconstruction *r = d->r;
     return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && !r->is_emitter[reconstruction_segment(r, texel)];
@@ -78,7 +81,11 @@ void sun_refit(struct divide *d) {
         return;
     find_places(d, &places);
     missing_light_init(&missing, &places, PLACE_WHITE, true);
-    d->r->sun.irradiance = rgb_scale(missing_light_color(&missing), BSDF_PI);
+    rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI), *sun = &d->r->sun.irradiance;
+    for (int c = 0; c < 3; c++) {
+        float before = (&sun->r)[c];
+        (&sun->r)[c] = clampf((&fitted.r)[c], before / CHANGE_MOST, before * CHANGE_MOST);
+    }
     missing_light_release(&missing);
     light_places_release(&places);
 }

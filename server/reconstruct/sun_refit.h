@@ -8,8 +8,8 @@
 
 #include "server/reconstruct/divide.h"
 
-/* Gives r->sun, if it is there, the irradiance by which base colours are most alike, highlights taken off. Measures
- * some texels (divide.h). The same for any number of threads. */
+/* Gives r->sun, if it is there, the irradiance by which base colours are most alike, highlights taken off, within
+ * a factor of what it has. Measures some texels (divide.h). The same for any number of threads. */
 void sun_refit(struct divide *d);
 
 #endif

@@ -1,14 +1,15 @@
 """Makes a furnished room with its truth, to measure fidelity beyond the rooms of the test data.
 
-Not unseen any more: constants of gloss.c and sun_find.c were chosen on these rooms, too; on the last only SKY_DOUBT of
-solve.c was.
+Not unseen any more: constants of gloss.c, sun_find.c and measured.c were chosen on these rooms, too; on the last only
+SKY_DOUBT of solve.c was.
 
 usage: furnished_room.py kitchen|parlour|bedroom|lounge|study|cafe OUT [SPP]
 
 OUT becomes a bundle like those of the test data, which `FIDELITY_ROOMS=OUT make fidelity` takes: 72
-training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb; SPP samples a pixel, 256), HDR and
-8-bit at cycling exposures, and the truth of the held-out ones. Needs Debian's sweethome3d-furniture, whose
-models it uses; nothing of them is kept here.
+training and 8 held-out frames of 320 x 240 by Mitsuba 3 (llvm_ad_rgb, an hour on two cores; with
+MITSUBA_VARIANT=cuda_ad_rgb a minute on a large GPU; SPP samples a pixel, 256), HDR and 8-bit at cycling
+exposures, and the truth of the held-out ones. Needs Debian's sweethome3d-furniture, whose models it uses;
+nothing of them is kept here.
 
   kitchen   closed; four spots at the ceiling and a strip lamp, polished tiles, much steel
   parlour   two windows under a sky that the sun has just left, a lamp, a lit screen, wallpaper, books
@@ -24,7 +25,7 @@ import sys
 import mitsuba as mi
 import numpy as np
 
-mi.set_variant("llvm_ad_rgb")
+mi.set_variant(os.environ.get("MITSUBA_VARIANT", "llvm_ad_rgb"))
 
 from furniture import (METAL, POLISHED, SATIN, Catalogue, box, join, material, picture, planks, quad, sphere, stripes,  # noqa: E402
                        tiles)
