@@ -300,11 +300,11 @@ static bool solve_pass(struct solve *s, int pass) {
     if (!gather(s, pass))
         return false;
     decide_emitters(s);
-    if (pass > 0)
-        gloss_fit(s->r, s->views, &s->probes, &s->field);
     s->divide.stride = pass == 0 ? COARSE_STRIDE : 1;
-    if (pass > 0)
+    if (pass > 0) {
+        gloss_fit(s->r, s->views, &s->probes, &s->field);
         sun_refit(&s->divide);
+    }
     if (!divide_all(s))
         return false;
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))

@@ -2,7 +2,8 @@
  *
  * sun_find.h compares what the sun lights with the rest of its segment, before anything is known of gloss. A polished
  * floor mirrors walls and windows; that makes its shade look lighter, and bluer, than its wood is, and the sun that
- * lights the rest of it weaker and yellower than it is. */
+ * lights the rest of it weaker and yellower than it is. Whether there is a sun, where and how wide, stays as it was
+ * found. */
 #ifndef UNBAKE_RECONSTRUCT_SUN_REFIT_H
 #define UNBAKE_RECONSTRUCT_SUN_REFIT_H
 

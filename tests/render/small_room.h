@@ -202,6 +202,18 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
     model_release(&truth);
 }
 
+/* As a photograph shows it that saturates at `clip`, exact as a half. */
+static inline void saturate_photograph(struct photograph *photo, float clip) {
+    photo->is_hdr = false;
+    photo->clip = clip;
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        for (size_t c = 0; c < 3; c++) {
+            float value = image_float_from_half(photo->pixel[i][c]);
+            photo->pixel[i][c] = image_half_from_float(fminf(value, clip));
+        }
+    }
+}
+
 static inline void make_scene(struct scene *scene, struct parallel *pool) {
     *scene = (struct scene){0};
     make_mesh(&scene->mesh);

@@ -37,17 +37,6 @@ static void add_picture(struct photograph *photo) {
     }
 }
 
-static void clip(struct photograph *photo) {
-    photo->is_hdr = false;
-    photo->clip = CLIP;
-    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
-        for (int c = 0; c < 3; c++) {
-            float value = image_float_from_half(photo->pixel[i][c]);
-            photo->pixel[i][c] = image_half_from_float(fminf(value, CLIP));
-        }
-    }
-}
-
 static void make_screen(struct scene *scene, enum paint paint, struct parallel *pool) {
     *scene = (struct scene){0};
     make_mesh(&scene->mesh);
@@ -59,7 +48,7 @@ static void make_screen(struct scene *scene, enum paint paint, struct parallel *
         if (paint == STILL || paint == CLIPPED || (paint == CHANGING && f % 4 != 0))
             add_picture(&scene->photograph[f]);
         if (paint == CLIPPED && f % 2 != 0)
-            clip(&scene->photograph[f]);
+            saturate_photograph(&scene->photograph[f], CLIP);
     }
 }
 

@@ -12,17 +12,8 @@
 
 /* As a camera with so much room above its exposure has them. */
 static void saturate(struct scene *scene, float clip) {
-    for (size_t f = 0; f < scene->photograph_count; f++) {
-        struct photograph *photo = &scene->photograph[f];
-        photo->is_hdr = false;
-        photo->clip = clip;
-        for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
-            for (size_t c = 0; c < 3; c++) {
-                float value = image_float_from_half(photo->pixel[i][c]);
-                photo->pixel[i][c] = image_half_from_float(fminf(value, clip));
-            }
-        }
-    }
+    for (size_t f = 0; f < scene->photograph_count; f++)
+        saturate_photograph(&scene->photograph[f], clip);
 }
 
 static void check_floor(const struct reconstruction *r) {
