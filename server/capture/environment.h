@@ -9,7 +9,7 @@
  * a direction; the map then holds their median, and `spread` says by how much they disagree.
  * A direction that is only seen by frames which saturate below what others tell of the sky counts as unseen.
  * Light is known only in the directions in which some photograph looks out; the rest is filled
- * in smoothly from its surroundings and is a guess, but for a sun, which is looked for by what it lights
+ * in smoothly from its surroundings (fill.h) and is a guess, but for a sun, which is looked for by what it lights
  * (sun_find.h). */
 #ifndef UNBAKE_CAPTURE_ENVIRONMENT_H
 #define UNBAKE_CAPTURE_ENVIRONMENT_H

@@ -10,12 +10,8 @@
 /* What spreads is at most this many times the typical known luminance. */
 #define SPREAD_LIMIT 4.0
 #define SWEEPS 32
-
-/* One level of the pyramid: colours and how well they are known, 0 to 1. */
-struct level {
-    uint32_t width, height;
-    float (*value)[4]; /* [height][width]; owned */
-};
+/* A row counts for another by the distance to the power of minus this: hardly beyond the nearest that are known. */
+#define ROW_FALLOFF 8.0
 
 static float sine_of_row(uint32_t row, uint32_t height) {
     return (float)sin(PI * ((double)row + 0.5) / (double)height);
@@ -35,18 +31,63 @@ static double typical_luminance(const struct image *map, const struct image *kno
     return (sum / weight) * (sum / weight);
 }
 
-static void start_finest(struct level *l, const struct image *map, const struct image *known) {
-    double limit = SPREAD_LIMIT * typical_luminance(map, known);
+/* A colour, no brighter than the limit. */
+static rgb below_limit(const struct image *map, size_t pixel, double limit) {
+    const float *p = map->pixel + 3 * pixel;
+    rgb color = rgb_make(p[0], p[1], p[2]);
+    double luminance = (double)rgb_luminance(color);
+    return luminance > limit ? rgb_scale(color, (float)(limit / luminance)) : color;
+}
+
+/* --- what is alike around the horizon --------------------------------------------------------------- */
+
+/* Of each row a colour: the mean of what is known in it and, where little or nothing is, in the rows around it, by
+ * their distance (Shepard 1968). [height]; the caller's. */
+static rgb *row_colors(const struct image *map, const struct image *known, double limit) {
+    uint32_t width = map->width, height = map->height;
+    double(*sum)[4] = mem_calloc(height, sizeof *sum); /* by solid angle: red, green, blue, all */
+    rgb *color = mem_array(height, sizeof *color);
+    for (size_t i = 0; i < (size_t)width * height; i++) {
+        if (!(known->pixel[i * known->channel_count] > 0.0f))
+            continue;
+        rgb c = below_limit(map, i, limit);
+        double angle = (double)sine_of_row((uint32_t)(i / width), height), *s = sum[i / width];
+        s[0] += angle * (double)c.r;
+        s[1] += angle * (double)c.g;
+        s[2] += angle * (double)c.b;
+        s[3] += angle;
+    }
+    for (uint32_t y = 0; y < height; y++) {
+        double total[4] = {0.0};
+        for (uint32_t of = 0; of < height; of++) {
+            double rows = fmax(fabs((double)of - (double)y), 0.5), nearness = pow(rows, -ROW_FALLOFF);
+            for (int k = 0; k < 4; k++)
+                total[k] += nearness * sum[of][k];
+        }
+        color[y] = rgb_make((float)(total[0] / total[3]), (float)(total[1] / total[3]), (float)(total[2] / total[3]));
+    }
+    mem_free(sum);
+    return color;
+}
+
+/* --- the rest --------------------------------------------------------------------------------------- */
+
+/* One level of the pyramid: by how much colours differ from their row's, and how well that is known, 0 to 1. */
+struct level {
+    uint32_t width, height;
+    float (*value)[4]; /* [height][width]; owned */
+};
+
+static void start_finest(struct level *l, const struct image *map, const struct image *known, const rgb *row_color,
+                         double limit) {
     *l = (struct level){map->width, map->height, NULL};
     l->value = mem_calloc((size_t)l->width * l->height, sizeof *l->value);
     for (size_t i = 0; i < (size_t)l->width * l->height; i++) {
-        const float *p = map->pixel + 3 * i;
         if (!(known->pixel[i * known->channel_count] > 0.0f))
             continue;
-        double luminance = (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
-        float scale = luminance > limit ? (float)(limit / luminance) : 1.0f;
+        rgb differs = rgb_sub(below_limit(map, i, limit), row_color[i / l->width]);
         for (int c = 0; c < 3; c++)
-            l->value[i][c] = scale * p[c];
+            l->value[i][c] = (&differs.r)[c];
         l->value[i][3] = 1.0f;
     }
 }
@@ -146,7 +187,9 @@ static void fill_coarsest(struct level *l) {
 void fill_sphere(struct image *map, const struct image *known) {
     struct level level[32];
     int count = 1;
-    start_finest(&level[0], map, known);
+    double limit = SPREAD_LIMIT * typical_luminance(map, known);
+    rgb *row_color = row_colors(map, known, limit);
+    start_finest(&level[0], map, known, row_color, limit);
     for (; level[count - 1].height > 1; count++)
         pull(&level[count - 1], &level[count]);
     fill_coarsest(&level[count - 1]);
@@ -159,9 +202,10 @@ void fill_sphere(struct image *map, const struct image *known) {
     }
     for (size_t i = 0; i < (size_t)map->width * map->height; i++)
         for (size_t c = 0; c < 3 && level[0].value[i][3] < 1.0f; c++)
-            map->pixel[3 * i + c] = level[0].value[i][c];
+            map->pixel[3 * i + c] = fmaxf(level[0].value[i][c] + (&row_color[i / map->width].r)[c], 0.0f);
     for (int i = 0; i < count; i++)
         mem_free(level[i].value);
+    mem_free(row_color);
 }
 
 /* --- how far what is known is ----------------------------------------------------------------------- */

@@ -1,9 +1,10 @@
 /* fill.h -- filling in a latitude-longitude map where nothing is known.
  *
- * Pull-push (Gortler et al. 1996, The Lumigraph, section 3.4) by solid angle, around the seam, then
- * diffusion with the sphere's metric: next to what is known the fill continues it, far from it
- * it is the mean of what is known. Highlights do not spread: a sun at the rim of a window would
- * otherwise light half of the sky. */
+ * What is far is alike around the horizon: sky above, ground below. Each row has the mean of what is known of it, a
+ * row of which nothing is that of the nearest. What is known differs from that; the difference is spread by pull-push
+ * (Gortler et al. 1996, The Lumigraph, section 3.4) by solid angle, around the seam, then by diffusion with the
+ * sphere's metric: next to what is known the fill continues it, far from it it is the row's. Highlights do not
+ * spread: a sun at the rim of a window would otherwise light half of the sky. */
 #ifndef UNBAKE_CAPTURE_FILL_H
 #define UNBAKE_CAPTURE_FILL_H
 

@@ -1,5 +1,6 @@
 /* fill.h: the angle to what is known, held against that to each known pixel in turn: at the seam, beside the poles,
- * far away. (fill_sphere: render/test_environment.) */
+ * far away; and behind one's back a sky above and ground below, as a window shows them. (Next to what is known:
+ * render/test_environment.) */
 #include "server/capture/fill.h"
 #include "common/mem.h"
 #include "common/vec.h"
@@ -20,7 +21,7 @@ static double angle_between(size_t a, size_t b) {
     return 2.0 * asin(fmin(0.5 * (double)vec3_length(d), 1.0));
 }
 
-int main(void) {
+static void check_angles(void) {
     static const char *const channels[] = {"count", "spread"};
     static const size_t known[KNOWN] = {5 * WIDTH + 100, 20 * WIDTH, 40 * WIDTH + 70, 62 * WIDTH + 3};
     struct image map;
@@ -47,5 +48,46 @@ int main(void) {
     CHECK_THAT(least > 0.98 && most < 1.05, "%g to %g times the true ones", least, most);
     image_release(&map);
     mem_free(angle);
+}
+
+/* --- the horizon ---------------------------------------------------------------------------------- */
+
+static rgb sky_or_ground(size_t row) {
+    return row < HEIGHT / 2 ? (rgb){4.0f, 4.8f, 6.0f} : (rgb){1.2f, 1.1f, 0.8f};
+}
+
+/* The farthest from what is there, as a part of it, of the rows that a window shows (10 to 30 degrees high and deep)
+ * and of those beyond. */
+static void check_horizon(void) {
+    static const char *const channels[] = {"count"};
+    struct image map, known;
+    float beside = 0.0f, beyond = 0.0f;
+    image_init_rgb(&map, WIDTH, HEIGHT);
+    image_init(&known, WIDTH, HEIGHT, 1, channels);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        size_t x = i % WIDTH, y = i / WIDTH;
+        known.pixel[i] = x < WIDTH / 8 && y >= HEIGHT / 2 - 10 && y < HEIGHT / 2 + 10;
+        rgb color = sky_or_ground(y);
+        for (size_t c = 0; c < 3; c++)
+            map.pixel[3 * i + c] = known.pixel[i] > 0.0f ? (&color.r)[c] : 0.0f;
+    }
+    fill_sphere(&map, &known);
+    for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
+        size_t y = i / WIDTH;
+        rgb color = sky_or_ground(y);
+        float *worst = y >= HEIGHT / 2 - 10 && y < HEIGHT / 2 + 10 ? &beside : &beyond;
+        for (size_t c = 0; c < 3; c++)
+            *worst = fmaxf(*worst, fabsf(map.pixel[3 * i + c] / (&color.r)[c] - 1.0f));
+    }
+    printf("a sky and its ground: %.2f off in rows of which a part is known, %.2f beyond\n", (double)beside,
+           (double)beyond);
+    CHECK_THAT(beside < 0.05f && beyond < 0.5f, "%g, %g", (double)beside, (double)beyond);
+    image_release(&map);
+    image_release(&known);
+}
+
+int main(void) {
+    check_angles();
+    check_horizon();
     return check_result();
 }
