@@ -27,11 +27,11 @@
 #define EXPLAINS_OPEN 0.28
 /* Or, one of several lamps, this share only, if nearly all of what it lights more than all others do is odd without it
  * and as usual with it: of so many places at least it leaves this part of what is odd at most (of kitchen's lamps
- * .17 to .26, of other segments .6 and more). */
+ * .17 to .26; of other segments .6 and more, where a sun is still to be found .36). */
 #define EXPLAINS_ONE_OF_MANY 0.03
 #define MAINLY 0.5f
 #define MAINLY_PLACES 30.0
-#define LEAVES 0.45
+#define LEAVES 0.3
 
 /* A segment of which nothing was seen. */
 struct candidate {
