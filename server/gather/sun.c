@@ -14,20 +14,28 @@
 /* Places over a pixel of the map, along each side. */
 #define GRID 8
 
-/* Ray `i` of so many: a sunflower's seeds, evenly over the disc. */
-static vec3 disc_direction(const struct sun *sun, int i, int rays) {
+/* In the disc, so far from its middle as a part of its radius. */
+static vec3 disc_direction(const struct sun *sun, float angle, float part) {
     vec3 across, up;
     vec3_frame(sun->direction, &across, &up);
-    float r = rays == 1 ? 0.0f : tanf(sun->radius_rad) * sqrtf(((float)i + 0.5f) / (float)rays);
-    float angle = GOLDEN_ANGLE * (float)i;
+    float r = tanf(sun->radius_rad) * part;
     vec3 d = vec3_mad(sun->direction, r * cosf(angle), across);
     return vec3_normalize(vec3_mad(d, r * sinf(angle), up));
+}
+
+vec3 sun_toward(const struct sun *sun, vec2 u) {
+    return disc_direction(sun, 2.0f * BSDF_PI * u.x, sqrtf(u.y));
+}
+
+/* Ray `i` of so many: a sunflower's seeds, evenly over the disc. */
+static vec3 seed_direction(const struct sun *sun, int i, int rays) {
+    return disc_direction(sun, GOLDEN_ANGLE * (float)i, rays == 1 ? 0.0f : sqrtf(((float)i + 0.5f) / (float)rays));
 }
 
 static int count_open(const struct sun *sun, const struct accel *accel, const struct surface_point *at, int rays) {
     int open = 0;
     for (int i = 0; i < rays; i++) {
-        vec3 d = disc_direction(sun, i, rays);
+        vec3 d = seed_direction(sun, i, rays);
         open += vec3_dot(d, at->normal) > 0.0f &&
                 !accel_occluded(accel, accel_offset(at->position, at->normal, d), d, 0.0f, INFINITY);
     }

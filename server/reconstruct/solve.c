@@ -7,6 +7,7 @@
 #include "common/clock.h"
 #include "common/mem.h"
 #include "server/gather/probes.h"
+#include "server/gather/sun_mirrored.h"
 #include "server/reconstruct/by_segment.h"
 #include "server/reconstruct/changing_light.h"
 #include "server/reconstruct/detail.h"
@@ -304,6 +305,8 @@ static bool solve_pass(struct solve *s, int pass) {
     if (pass > 0) {
         gloss_fit(s->r, s->views, &s->probes, &s->field);
         sun_refit(&s->divide);
+        sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
+                         (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
     if (!divide_all(s))
         return false;

@@ -1,0 +1,195 @@
+/* sun_mirrored.c -- see sun_mirrored.h. */
+#include "server/gather/sun_mirrored.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/render/bsdf.h"
+#include "server/render/sampler.h"
+#include "server/scene/surface.h"
+
+/* Rays in all, about; and from one texel at most. */
+#define RAYS 1000000
+#define RAYS_A_TEXEL 64
+#define CHUNK 1024 /* texels a work item */
+/* What is rougher sends so widely that photographs show it. */
+#define ROUGHEST 0.5f
+#define KEY_MIRRORED 0x3a11u
+/* Light that grazes a probe's surface is taken to come from at least so far above it: its amount stays. */
+#define LEAST_COSINE 0.05f
+enum { PAIR_DISC, PAIR_LOBE };
+
+/* What a ray brings, and where to; no probe: nowhere. */
+struct photon {
+    uint32_t probe;
+    vec3 direction; /* unit, of the ray */
+    rgb flux;       /* times square metres */
+};
+
+struct mirrored {
+    struct probes *probes;
+    const struct sun *sun;
+    const struct world *world;
+    const struct mesh *mesh;
+    const struct inverse_uv *inverse;
+    uint64_t seed;
+    bool *lit;               /* [valid_count] a polished texel in the sun */
+    size_t count, rays;      /* lit texels that send rays, and of each */
+    uint32_t *texel;         /* [count] */
+    float stands_for;        /* texels, each of them */
+    struct photon *photon;   /* [count][rays] */
+};
+
+/* Square metres that a texel of a triangle covers. */
+static float texel_area(const struct mirrored *m, uint32_t triangle) {
+    const vec2 *c = m->world->atlas->corner[triangle];
+    const uint32_t *i = m->mesh->index[triangle];
+    vec3 a = m->mesh->position[i[0]], b = m->mesh->position[i[1]], d = m->mesh->position[i[2]];
+    float texels = fabsf((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
+    return texels > 0.0f ? vec3_length(vec3_cross(vec3_sub(b, a), vec3_sub(d, a))) / texels : 0.0f;
+}
+
+/* The probe of a texel's block and chart. */
+static uint32_t probe_at(const struct mirrored *m, uint32_t x, uint32_t y, uint32_t chart) {
+    const struct probes *p = m->probes;
+    size_t block = (size_t)(y / p->spacing) * p->columns + x / p->spacing;
+    uint32_t k = p->first[block];
+    while (k < p->first[block + 1] && p->probe[k].chart != chart)
+        k++;
+    return k < p->first[block + 1] ? k : UINT32_MAX;
+}
+
+/* --- from the sun ---------------------------------------------------------------------------------- */
+
+static bool find_point(const struct mirrored *m, uint32_t texel, struct surface_point *at) {
+    return surface_at_texel(m->mesh, m->world->atlas, m->inverse, texel, at);
+}
+
+static bool is_polished(const struct materials *materials, uint32_t segment) {
+    return materials->specular[segment] > 0.0f && materials->roughness[segment] <= ROUGHEST;
+}
+
+static void find_lit(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct mirrored *m = user;
+    for (size_t i = chunk * CHUNK; i < m->inverse->valid_count && i < (chunk + 1) * CHUNK; i++) {
+        uint32_t texel = m->inverse->valid[i], segment = m->world->triangle[m->inverse->triangle[texel]].segment;
+        struct surface_point at;
+        m->lit[i] = is_polished(m->world->materials, segment) && find_point(m, texel, &at) &&
+                    sun_visible(m->sun, m->world->accel, &at, 1) > 0.0f;
+    }
+}
+
+/* Which texels send rays, evenly spread where there are many, and how many each. */
+static void choose_texels(struct mirrored *m) {
+    size_t lit = 0, met = 0;
+    for (size_t i = 0; i < m->inverse->valid_count; i++)
+        lit += m->lit[i];
+    size_t wanted = lit < RAYS ? lit : RAYS;
+    m->texel = mem_array(wanted + 1, sizeof *m->texel);
+    for (size_t i = 0; i < m->inverse->valid_count && m->count < wanted; i++) {
+        if (m->lit[i] && met++ == m->count * lit / wanted)
+            m->texel[m->count++] = m->inverse->valid[i];
+    }
+    if (m->count == 0)
+        return;
+    m->rays = RAYS / m->count < RAYS_A_TEXEL ? RAYS / m->count : RAYS_A_TEXEL;
+    m->stands_for = (float)lit / (float)m->count;
+}
+
+static vec3 to_frame(const vec3 frame[3], vec3 d) {
+    return (vec3){vec3_dot(d, frame[0]), vec3_dot(d, frame[1]), vec3_dot(d, frame[2])};
+}
+
+static vec3 from_frame(const vec3 frame[3], vec3 d) {
+    return vec3_mad(vec3_mad(vec3_scale(frame[0], d.x), d.y, frame[1]), d.z, frame[2]);
+}
+
+/* One ray of the lobe: the part of the light that goes with it; 0 where it would go into the surface. */
+static float send(const struct mirrored *m, const struct surface_point *at, uint32_t segment, uint32_t key,
+                  uint32_t ray, vec3 *direction) {
+    const struct materials *materials = m->world->materials;
+    vec3 frame[3] = {[2] = at->shading};
+    vec3_frame(at->shading, &frame[0], &frame[1]);
+    vec3 wo = to_frame(frame, sun_toward(m->sun, sampler_pair(key, ray, PAIR_DISC)));
+    if (!(wo.z > 0.0f))
+        return 0.0f;
+    struct bsdf b = bsdf_make(rgb_gray(0.0f), materials->roughness[segment], materials->specular[segment], wo.z);
+    vec2 u = sampler_pair(key, ray, PAIR_LOBE);
+    b.specular_chance = 1.0f;
+    vec3 wi = bsdf_sample(&b, wo, 0.0f, u.x, u.y);
+    struct bsdf_value value = bsdf_eval(&b, wo, wi);
+    *direction = from_frame(frame, wi);
+    bool leaves = value.pdf > 0.0f && vec3_dot(*direction, at->normal) > 0.0f;
+    return leaves ? value.specular / value.pdf * wo.z : 0.0f;
+}
+
+static void send_texel(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct mirrored *m = user;
+    const struct world *world = m->world;
+    uint32_t texel = m->texel[index], key = sampler_key(m->seed, texel, KEY_MIRRORED);
+    uint32_t triangle = m->inverse->triangle[texel], segment = world->triangle[triangle].segment;
+    rgb sent = rgb_scale(m->sun->irradiance, texel_area(m, triangle) * m->stands_for / (float)m->rays);
+    struct surface_point at;
+    find_point(m, texel, &at);
+    for (uint32_t i = 0; i < m->rays; i++) {
+        struct photon *photon = &m->photon[index * m->rays + i];
+        struct accel_hit hit;
+        *photon = (struct photon){.probe = UINT32_MAX};
+        float part = send(m, &at, segment, key, i, &photon->direction);
+        if (!(part > 0.0f) || !accel_intersect(world->accel, accel_offset(at.position, at.normal, photon->direction),
+                                               photon->direction, 0.0f, INFINITY, &hit) ||
+            !(vec3_dot(world->triangle[hit.triangle].normal, photon->direction) < 0.0f))
+            continue;
+        vec2 place = atlas_point(world->atlas, hit.triangle, hit.b1, hit.b2);
+        photon->probe = probe_at(m, (uint32_t)clampf(place.x, 0.0f, (float)(world->atlas->width - 1)),
+                                 (uint32_t)clampf(place.y, 0.0f, (float)(world->atlas->height - 1)),
+                                 world->atlas->chart_of_triangle[hit.triangle]);
+        photon->flux = rgb_scale(sent, part);
+    }
+}
+
+/* --- to the probes ---------------------------------------------------------------------------------- */
+
+/* Square metres that each probe stands for. [probe count]; the caller's. */
+static float *probe_areas(const struct mirrored *m) {
+    float *area = mem_calloc(m->probes->count + 1, sizeof *area);
+    for (size_t i = 0; i < m->inverse->valid_count; i++) {
+        uint32_t texel = m->inverse->valid[i], triangle = m->inverse->triangle[texel];
+        area[probe_at(m, texel % m->inverse->width, texel / m->inverse->width,
+                      m->world->atlas->chart_of_triangle[triangle])] += texel_area(m, triangle);
+    }
+    return area;
+}
+
+static void share_out(const struct mirrored *m) {
+    float *area = probe_areas(m);
+    for (size_t i = 0; i < m->count * m->rays; i++) {
+        const struct photon *photon = &m->photon[i];
+        if (photon->probe == UINT32_MAX || !(area[photon->probe] > 0.0f))
+            continue;
+        struct probe *probe = &m->probes->probe[photon->probe];
+        vec3 toward = vec3_neg(photon->direction);
+        float facing = fmaxf(vec3_dot(toward, probe->shading), LEAST_COSINE);
+        irradiance_add(&probe->light, probe->shading, toward,
+                       rgb_scale(photon->flux, 1.0f / (facing * area[photon->probe])));
+    }
+    mem_free(area);
+}
+
+void sun_mirrored_add(struct probes *probes, const struct sun *sun, const struct world *world, const struct mesh *mesh,
+                      const struct inverse_uv *inverse, uint64_t seed, struct parallel *pool) {
+    struct mirrored m = {.probes = probes, .sun = sun, .world = world, .mesh = mesh, .inverse = inverse, .seed = seed};
+    if (!sun->is_there)
+        return;
+    m.lit = mem_calloc(inverse->valid_count, sizeof *m.lit);
+    parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, find_lit, &m);
+    choose_texels(&m);
+    m.photon = mem_array(m.count * m.rays + 1, sizeof *m.photon);
+    parallel_for(pool, m.count, send_texel, &m);
+    share_out(&m);
+    mem_free(m.photon);
+    mem_free(m.texel);
+    mem_free(m.lit);
+}
