@@ -10,8 +10,8 @@
 /* What spreads is at most this many times the typical known luminance. */
 #define SPREAD_LIMIT 4.0
 #define SWEEPS 32
-/* A row counts for another by the distance to the power of minus this: hardly beyond the nearest that are known. */
-#define ROW_FALLOFF 8.0
+/* A row counts for another by the distance to the power of minus this: a tenth farther than the nearest a tenth of it. */
+#define ROW_FALLOFF 24.0
 
 static float sine_of_row(uint32_t row, uint32_t height) {
     return (float)sin(PI * ((double)row + 0.5) / (double)height);

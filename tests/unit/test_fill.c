@@ -81,7 +81,7 @@ static void check_horizon(void) {
     }
     printf("a sky and its ground: %.2f off in rows of which a part is known, %.2f beyond\n", (double)beside,
            (double)beyond);
-    CHECK_THAT(beside < 0.05f && beyond < 0.5f, "%g, %g", (double)beside, (double)beyond);
+    CHECK_THAT(beside < 0.05f && beyond < 0.1f, "%g, %g", (double)beside, (double)beyond);
     image_release(&map);
     image_release(&known);
 }
