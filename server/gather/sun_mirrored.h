@@ -7,12 +7,19 @@
 #ifndef UNBAKE_GATHER_SUN_MIRRORED_H
 #define UNBAKE_GATHER_SUN_MIRRORED_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "common/parallel.h"
 #include "server/gather/probes.h"
 #include "server/gather/sun.h"
 #include "server/render/world.h"
 #include "server/scene/inverse_uv.h"
+#include "server/scene/materials.h"
 #include "server/scene/mesh.h"
+
+/* Whether a segment is polished enough: what is rougher sends so widely that photographs show it. */
+bool sun_is_mirrored_by(const struct materials *materials, uint32_t segment);
 
 /* Adds it to the light at all probes, by roughness and specular as they are in world->materials. The same for any
  * number of threads. */

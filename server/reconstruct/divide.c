@@ -7,6 +7,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/gather/highlight.h"
+#include "server/gather/sun_mirrored.h"
 #include "server/reconstruct/color_prior.h"
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
@@ -45,15 +46,23 @@ size_t divide_highlight_samples(double texels_a_pixel) {
     return (size_t)fmin(fmax(samples, SAMPLES_LEAST), SAMPLES_MOST);
 }
 
-static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
-                     struct irradiance *light) {
+/* All but the sun's. */
+static bool light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
+                              struct irradiance *light) {
     const struct reconstruction *r = d->r;
     struct probe_mix mix;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, at))
         return false;
     probes_mix(d->probes, &r->atlas, &r->fused, texel, at, &mix);
     probes_irradiance(d->probes, &mix, light);
-    sun_add_light(&r->sun, r->world.accel, at, light);
+    return true;
+}
+
+static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
+                     struct irradiance *light) {
+    if (!light_without_sun(d, texel, at, light))
+        return false;
+    sun_add_light(&d->r->sun, d->r->world.accel, at, light);
     return true;
 }
 
@@ -139,10 +148,14 @@ static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
     return rgb_make(from[0], from[1], from[2]);
 }
 
-static struct measured mean_of(struct measured_looks *looks, const struct irradiance *light) {
+/* What arrives, from everywhere. */
+static rgb irradiance_sum(const struct irradiance *light) {
     const float *sum = light->moment[0];
-    rgb arrived = rgb_make(sum[0], sum[1], sum[2]);
-    return measured_mean(looks, OUTLIER_SCALE, divide_channels(light->noise, arrived, FLT_MIN));
+    return rgb_make(sum[0], sum[1], sum[2]);
+}
+
+static struct measured mean_of(struct measured_looks *looks, const struct irradiance *light) {
+    return measured_mean(looks, OUTLIER_SCALE, divide_channels(light->noise, irradiance_sum(light), FLT_MIN));
 }
 
 /* The texel that is measured in place of this one. */
@@ -184,6 +197,38 @@ static void divide_chunk(void *user, size_t chunk, int thread) {
 void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
     struct divide_list list = {d, texel, count};
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
+}
+
+struct matt_job {
+    const struct divide *divide;
+    struct fused *matt;
+};
+
+static void matt_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct matt_job *job = user;
+    const struct divide *d = job->divide;
+    const struct inverse_uv *inverse = &d->r->inverse;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
+    for (size_t i = begin; i < end; i++) {
+        uint32_t texel = inverse->valid[i];
+        const struct measured *m = &d->measured[texel];
+        rgb white;
+        if (stand_in(d, texel) != texel || !(m->weight > 0.0f) || !divide_white(d, texel, &white))
+            continue;
+        job->matt->count[texel] = m->weight;
+        rgb_to_half(job->matt->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MOST), white));
+    }
+}
+
+void divide_matt(const struct divide *d, struct fused *matt) {
+    size_t texels = (size_t)d->r->atlas.width * d->r->atlas.height;
+    *matt = (struct fused){.width = d->r->atlas.width, .height = d->r->atlas.height};
+    matt->radiance = mem_calloc_large(texels, sizeof *matt->radiance);
+    matt->count = mem_calloc_large(texels, sizeof *matt->count);
+    matt->is_bound = mem_calloc_large(texels, sizeof *matt->is_bound);
+    struct matt_job job = {d, matt};
+    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, matt_chunk, &job);
 }
 
 struct white_job {
@@ -251,21 +296,24 @@ struct sending {
 
 /* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors
  * aslant and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
- * expected there: beside a window a thin frame would else shine like it. */
+ * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_mirrored.h's. */
 static void send_out(const struct sending *job, uint32_t texel) {
     const struct divide *d = job->divide;
     const struct measured *m = &d->measured[texel];
     uint32_t segment = reconstruction_segment(d->r, texel);
     struct surface_point at;
     struct irradiance light;
-    if (d->r->is_emitter[segment] || !light_at(d, texel, &at, &light))
+    if (d->r->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
         return;
+    rgb evenly = irradiance_sum(&light);
+    sun_add_light(&d->r->sun, d->r->world.accel, &at, &light);
+    if (!sun_is_mirrored_by(&d->r->materials, segment))
+        evenly = irradiance_sum(&light);
     float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
     rgb measured = rgb_clamp(measured_value(m), 0.0f, MOST), expected = texel_color(d->r, texel);
     rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
     rgb white = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
-    const float *arrived = light.moment[0];
-    rgb gloss = rgb_scale(rgb_make(arrived[0], arrived[1], arrived[2]), job->gloss_albedo[segment] * (1.0f / BSDF_PI));
+    rgb gloss = rgb_scale(evenly, job->gloss_albedo[segment] * (1.0f / BSDF_PI));
     rgb_to_half(job->radiance[texel], rgb_add(rgb_mul(base, white), gloss));
 }
 

@@ -147,7 +147,7 @@ void lamp_find(struct reconstruction *r, const struct views *views) {
     lamps_init(&s.lamps, r, views);
     find_candidates(&s, views);
     if (s.candidate_count > 0) {
-        lamps_survey(&s.lamps, views, NULL);
+        lamps_survey(&s.lamps, views, NULL, NULL);
         light_places_thin(&s.few, &s.lamps.places, FEW_PLACES);
         s.is_open = lamps_is_open(&s.lamps);
         look_for_lamps(&s);

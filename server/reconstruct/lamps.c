@@ -132,10 +132,10 @@ void lamps_add_sky(struct lamps *l) {
     lamp->least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b);
 }
 
-void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]) {
+void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3], const struct fused *shown) {
     struct survey survey;
     survey_init(&survey, l->r, views, radiance, l->without, LIGHT_PLACES);
-    light_places_init(&l->places, &survey);
+    light_places_init(&l->places, &survey, shown);
     survey_release(&survey);
     for (size_t i = 0; i < l->places.count; i++) {
         struct light_place *p = &l->places.place[i];
@@ -238,10 +238,18 @@ static bool is_brightened(const struct environment *e) {
     return e->map.pixel && rgb_mean(e->brightened) > 1.0f;
 }
 
-void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]) {
+bool lamps_are_estimated(const struct reconstruction *r) {
+    bool any = false;
+    for (size_t i = 0; i < r->segments.count; i++)
+        any = any || r->evidence[i].hidden || r->evidence[i].unbound;
+    return any;
+}
+
+void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3],
+                 const struct fused *shown) {
     struct lamps l;
     lamps_init(&l, r, views);
-    if (is_brightened(&r->environment))
+    if (!shown && is_brightened(&r->environment))
         lamps_add_sky(&l);
     for (size_t i = 0; i < r->segments.count && l.count < LAMPS_MOST; i++) {
         if (r->evidence[i].hidden)
@@ -250,7 +258,7 @@ void lamps_refit(struct reconstruction *r, const struct views *views, const uint
             lamps_add_bound(&l, (uint32_t)i);
     }
     if (l.count > 0) {
-        lamps_survey(&l, views, radiance);
+        lamps_survey(&l, views, radiance, shown);
         lamps_fit_all(&l, l.count);
         if (lamps_is_sky(&l.lamp[0]))
             r->sky_factor = l.lamp[0].radiance;

@@ -55,8 +55,9 @@ void lamps_add_bound(struct lamps *l, uint32_t segment);
 void lamps_add_sky(struct lamps *l);
 static inline bool lamps_is_sky(const struct lamp *lamp) { return lamp->segment[0] == LAMPS_SKY; }
 
-/* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less. */
-void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3]);
+/* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less.
+ * `shown` is as in light_places_init. */
+void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3], const struct fused *shown);
 
 /* Whether one looks out of the room from the places in directions that no photograph shows: the sky may as well be what
  * is missing there (unseen_light.h). */
@@ -73,10 +74,14 @@ void lamps_fit_all(struct lamps *l, size_t count);
 /* Makes r->evidence and r->environment of the first `count` what they are by now. */
 void lamps_hand_over(const struct lamps *l, size_t count);
 
-/* Fits all lamps again that were handed over before, with what texels send out, those too that no photograph shows:
- * radiance[height][width], half precision. The world is without emitters after it. The factor by which
- * the sky changes is noted in r->sky_factor. */
-void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3]);
+/* Whether there are lamps that were handed over. */
+bool lamps_are_estimated(const struct reconstruction *r);
+
+/* Fits all of them again, with what texels send out, those too that no photograph shows: radiance[height][width], half
+ * precision; `shown` is as in lamps_survey. Where that is NULL the sky is fitted again as well, and the factor by which
+ * it changes noted in r->sky_factor. The world is without emitters after it. */
+void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3],
+                 const struct fused *shown);
 
 /* Changes the environment, and the world's, by such a factor. */
 void lamps_brighten_sky(struct reconstruction *r, rgb factor);

@@ -19,8 +19,17 @@
 
 struct gathering {
     const struct survey *survey;
+    const struct fused *shown; /* or NULL */
     struct light_place *place; /* [survey->count] */
 };
+
+/* What photographs show of a point. */
+static rgb shown_of(const struct gathering *g, size_t index) {
+    const struct reconstruction *r = g->survey->r;
+    uint32_t texel = g->survey->texel[index], around = r->atlas.width / AROUND;
+    rgb shown = g->shown ? fused_around(g->shown, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
+    return rgb_is_black(shown) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : shown;
+}
 
 static void gather_place(void *user, size_t index, int thread) {
     const struct gathering *g = user;
@@ -30,7 +39,7 @@ static void gather_place(void *user, size_t index, int thread) {
     uint32_t texel = survey->texel[index];
     struct irradiance light;
     *p = (struct light_place){
-        .segment = reconstruction_segment(r, texel), .shown = fused_around(&r->fused, &r->atlas, &r->inverse, texel, r->atlas.width / AROUND), .weight = 1.0f};
+        .segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
     irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
@@ -111,9 +120,9 @@ void light_places_take(struct light_places *s, struct light_place *place, size_t
     find_odd(s);
 }
 
-void light_places_init(struct light_places *s, const struct survey *survey) {
+void light_places_init(struct light_places *s, const struct survey *survey, const struct fused *shown) {
     struct light_place *place = mem_array(survey->count + 1, sizeof *place);
-    parallel_for(survey->r->pool, survey->count, gather_place, &(struct gathering){survey, place});
+    parallel_for(survey->r->pool, survey->count, gather_place, &(struct gathering){survey, shown, place});
     light_places_take(s, place, survey->count);
 }
 

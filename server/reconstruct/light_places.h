@@ -30,9 +30,10 @@ struct light_places {
     struct light_place *place; /* [count] by segment; owned */
 };
 
-/* Takes over what a survey tells, of so many points at best. */
+/* Takes over what a survey tells, of so many points at best. What photographs show of them is what `shown` has around
+ * each or, where it has nothing or is NULL, what was fused there. */
 #define LIGHT_PLACES 16384
-void light_places_init(struct light_places *places, const struct survey *survey);
+void light_places_init(struct light_places *places, const struct survey *survey, const struct fused *shown);
 /* From place[count] of which segment, at, shown, white and weight are known, in any order; takes it over. */
 void light_places_take(struct light_places *places, struct light_place *place, size_t count);
 /* `most` of them, evenly spread. */

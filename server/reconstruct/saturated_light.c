@@ -105,7 +105,7 @@ void saturated_light_estimate(struct reconstruction *r, const struct views *view
         lamps_add_sky(&lamps);
     add_segments(&lamps);
     if (lamps.count > 0) {
-        lamps_survey(&lamps, views, NULL);
+        lamps_survey(&lamps, views, NULL, NULL);
         brighter = brighten(&lamps);
         lamps_fit_all(&lamps, brighter);
     }

@@ -19,13 +19,14 @@
 #include "server/reconstruct/sky_doubt.h"
 #include "server/reconstruct/sun_refit.h"
 
-#define PASSES 2
+/* The first tells what each place sends out, the second what is glossy in that light, the last all. */
+enum { PASS_LIGHT, PASS_GLOSS, PASS_ALL, PASSES };
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
 #define SPACING_AT_2048 8
 #define LEAST_SPACING 4
-/* Part of gather_samples that the first pass takes, which needs to tell lamps from walls only. */
-#define FIRST_PASS_PART 0.25
-/* It measures one texel in so many squared: only what no photograph sees is taken from it. So does the last where the
+/* Part of gather_samples that all passes but the last take. */
+#define EARLY_PASS_PART 0.25
+/* They measure one texel in so many squared: only what texels send out is taken from them. So does the last where the
  * time limit is too short for all of them. */
 #define COARSE_STRIDE 2
 #define TRIED 0.03 /* of all texels: so many tell how long they will take */
@@ -75,7 +76,7 @@ static bool advance(struct solve *s, double work) {
 
 static size_t samples_of(const struct solve *s, int pass) {
     double samples = settings_number(s->r->settings, "gather_samples");
-    return (size_t)(pass + 1 == PASSES ? samples : ceil(samples * FIRST_PASS_PART));
+    return (size_t)(pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART));
 }
 
 static void plan_work(struct solve *s) {
@@ -291,23 +292,38 @@ static void solve_release(struct solve *s) {
     mem_free(s->radiance);
 }
 
+/* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
+ * once gloss is known. */
+static void refit_lamps(struct solve *s, int pass) {
+    const uint16_t(*radiance)[3] = (const uint16_t(*)[3])s->radiance;
+    struct fused matt;
+    if (pass == PASS_GLOSS) {
+        lamps_refit(s->r, s->views, radiance, NULL);
+    } else if (lamps_are_estimated(s->r)) {
+        divide_matt(&s->divide, &matt);
+        lamps_refit(s->r, s->views, radiance, &matt);
+        fused_release(&matt);
+    }
+}
+
 static bool solve_pass(struct solve *s, int pass) {
-    if (pass == 0) {
+    if (pass == PASS_LIGHT) {
         emitters_light_bright(s->r, s->views, s->r->evidence);
     } else {
-        lamps_refit(s->r, s->views, (const uint16_t(*)[3])s->radiance);
+        refit_lamps(s, pass);
         set_lights(s);
     }
     if (!gather(s, pass))
         return false;
     decide_emitters(s);
-    s->divide.stride = pass == 0 ? COARSE_STRIDE : 1;
-    if (pass > 0) {
+    if (pass != PASS_LIGHT) {
         gloss_fit(s->r, s->views, &s->probes, &s->field);
+        s->divide.stride = 1;
         sun_refit(&s->divide);
         sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
                          (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
+    s->divide.stride = pass == PASS_ALL ? 1 : COARSE_STRIDE;
     if (!divide_all(s))
         return false;
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
@@ -336,7 +352,7 @@ static void report(const struct solve *s) {
     cJSON *figures = cJSON_AddObjectToObject(s->r->report, "solve");
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
-    json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASSES - 1));
+    json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASS_ALL));
     json_add(figures, "segments", segment_list(s->r));
     json_add_int(figures, "measured_one_texel_in", (int64_t)s->divide.stride * (int64_t)s->divide.stride);
     json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);

@@ -244,7 +244,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     double explains = 0.0;
     struct survey survey;
     survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
-    light_places_init(&s.places, &survey);
+    light_places_init(&s.places, &survey, NULL);
     survey_release(&survey);
     light_places_leave_out_lamps(&s.places);
     missing_light_init(&s.missing, &s.places, PLACE_WHITE, true);

@@ -46,6 +46,37 @@ static void test_lamp(struct parallel *pool) {
     scene_release(&scene);
 }
 
+/* What dark, polished wood shows is white highlight for a good part, and makes the lamp bluer than it is until that is
+ * known. */
+static void test_polished_wood(struct parallel *pool) {
+    struct scene scene = {0};
+    struct reconstruction r;
+    const int wood[] = {FLOOR, 2, 4};
+    rgb paint[OBJECTS];
+    memcpy(paint, wall_color, sizeof paint);
+    for (size_t i = 0; i < 3; i++) {
+        wall_color[wood[i]] = rgb_make(0.12f, 0.06f, 0.03f);
+        wall_roughness[wood[i]] = 0.3f;
+        wall_specular[wood[i]] = 1.0f;
+    }
+    make_scene(&scene, pool);
+    memcpy(wall_color, paint, sizeof paint);
+    for (size_t i = 0; i < 3; i++)
+        wall_roughness[wood[i]] = 1.0f, wall_specular[wood[i]] = 0.0f;
+    saturate(&scene, CLIP);
+    shell_solve(&scene, 0, &r);
+    for (size_t s = 0; s < r.segments.count; s++) {
+        CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+        rgb found = r.materials.emission[s];
+        if (r.is_emitter[s])
+            printf("on polished wood: %.2f %.2f %.2f\n", (double)found.r, (double)found.g, (double)found.b);
+        if (r.is_emitter[s])
+            CHECK_RGB(found, lamp_radiance, 0.15f);
+    }
+    reconstruct_release(&r);
+    scene_release(&scene);
+}
+
 static vec3 look_at_window(int frame) {
     return (vec3){1.0f + 2.0f * fmodf((float)frame * 0.618f, 1.0f), 2.0f, 0.0f};
 }
@@ -173,6 +204,7 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     test_lamp(pool);
     if (!IS_BRIEF) {
+        test_polished_wood(pool);
         test_sky(pool);
         test_measured(pool);
         test_pair(pool);
