@@ -76,6 +76,14 @@ static inline void vec3_frame(vec3 n, vec3 *s, vec3 *t) {
     *t = (vec3){b, sign + n.y * n.y * a, -n.y};
 }
 
+/* Between the world and an orthonormal frame. */
+static inline vec3 vec3_to_frame(const vec3 frame[3], vec3 d) {
+    return vec3_make(vec3_dot(frame[0], d), vec3_dot(frame[1], d), vec3_dot(frame[2], d));
+}
+static inline vec3 vec3_from_frame(const vec3 frame[3], vec3 d) {
+    return vec3_mad(vec3_mad(vec3_scale(frame[0], d.x), d.y, frame[1]), d.z, frame[2]);
+}
+
 /* A rigid motion: y = rotation * x + translation, rows of the rotation first. */
 struct rigid {
     float rotation[3][3];

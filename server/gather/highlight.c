@@ -13,14 +13,6 @@ enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
 #define ALBEDO_SAMPLES 1024 /* a viewer and a direction each */
 #define KEY_ALBEDO 11
 
-static vec3 to_local(const vec3 frame[3], vec3 d) {
-    return vec3_make(vec3_dot(frame[0], d), vec3_dot(frame[1], d), vec3_dot(frame[2], d));
-}
-
-static vec3 to_world(const vec3 frame[3], vec3 d) {
-    return vec3_mad(vec3_mad(vec3_scale(frame[0], d.x), d.y, frame[1]), d.z, frame[2]);
-}
-
 /* A sampler and evaluator of the specular lobe alone. */
 static struct bsdf lobe_of(float roughness) {
     struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, 1.0f, 1.0f);
@@ -55,7 +47,7 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
     vec3 frame[3];
     frame[2] = at->shading;
     vec3_frame(at->shading, &frame[0], &frame[1]);
-    vec3 wo = to_local(frame, wo_world);
+    vec3 wo = vec3_to_frame(frame, wo_world);
     if (!(wo.z > 1e-3f))
         return;
     if (!lights_any(field->world->lights))
@@ -69,12 +61,12 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
         eta[m] = bsdf_eta(levels->specular[m]);
     for (size_t i = 0; i < samples; i++) {
         vec2 u = sampler_pair(key, (uint32_t)(i / levels_used), PAIR_HALF + (uint32_t)(i % levels_used));
-        in->direction[i] = to_world(frame, bsdf_sample(&lobe[i % levels_used], wo, 0.0f, u.x, u.y));
+        in->direction[i] = vec3_from_frame(frame, bsdf_sample(&lobe[i % levels_used], wo, 0.0f, u.x, u.y));
     }
     incident_trace(in, field, at, key, 0, samples);
     incident_sample_lights(in, field, at, key, 0, samples, light_samples);
     for (size_t i = 0; i < samples + light_samples; i++) {
-        vec3 wi = to_local(frame, in->direction[i]);
+        vec3 wi = vec3_to_frame(frame, in->direction[i]);
         if (wi.z > 0.0f && !rgb_is_black(in->radiance[i]))
             add(h, levels, lobe, eta, wo, wi, in->radiance[i], (float)samples / (float)levels_used,
                 (float)light_samples * in->light_pdf[i]);

@@ -96,21 +96,13 @@ static void choose_texels(struct mirrored *m) {
     m->stands_for = (float)lit / (float)m->count;
 }
 
-static vec3 to_frame(const vec3 frame[3], vec3 d) {
-    return (vec3){vec3_dot(d, frame[0]), vec3_dot(d, frame[1]), vec3_dot(d, frame[2])};
-}
-
-static vec3 from_frame(const vec3 frame[3], vec3 d) {
-    return vec3_mad(vec3_mad(vec3_scale(frame[0], d.x), d.y, frame[1]), d.z, frame[2]);
-}
-
 /* One ray of the lobe: the part of the light that goes with it; 0 where it would go into the surface. */
 static float send(const struct mirrored *m, const struct surface_point *at, uint32_t segment, uint32_t key,
                   uint32_t ray, vec3 *direction) {
     const struct materials *materials = m->world->materials;
     vec3 frame[3] = {[2] = at->shading};
     vec3_frame(at->shading, &frame[0], &frame[1]);
-    vec3 wo = to_frame(frame, sun_toward(m->sun, sampler_pair(key, ray, PAIR_DISC)));
+    vec3 wo = vec3_to_frame(frame, sun_toward(m->sun, sampler_pair(key, ray, PAIR_DISC)));
     if (!(wo.z > 0.0f))
         return 0.0f;
     struct bsdf b = bsdf_make(rgb_gray(0.0f), materials->roughness[segment], materials->specular[segment], wo.z);
@@ -118,7 +110,7 @@ static float send(const struct mirrored *m, const struct surface_point *at, uint
     b.specular_chance = 1.0f;
     vec3 wi = bsdf_sample(&b, wo, 0.0f, u.x, u.y);
     struct bsdf_value value = bsdf_eval(&b, wo, wi);
-    *direction = from_frame(frame, wi);
+    *direction = vec3_from_frame(frame, wi);
     bool leaves = value.pdf > 0.0f && vec3_dot(*direction, at->normal) > 0.0f;
     return leaves ? value.specular / value.pdf * wo.z : 0.0f;
 }
@@ -162,33 +154,50 @@ static float *probe_areas(const struct mirrored *m) {
     return area;
 }
 
-static void share_out(const struct mirrored *m) {
-    float *area = probe_areas(m);
-    for (size_t i = 0; i < m->count * m->rays; i++) {
-        const struct photon *photon = &m->photon[i];
-        if (photon->probe == UINT32_MAX || !(area[photon->probe] > 0.0f))
-            continue;
-        struct probe *probe = &m->probes->probe[photon->probe];
-        vec3 toward = vec3_neg(photon->direction);
-        float facing = fmaxf(vec3_dot(toward, probe->shading), LEAST_COSINE);
-        irradiance_add(&probe->light, probe->shading, toward,
-                       rgb_scale(photon->flux, 1.0f / (facing * area[photon->probe])));
+/* What arrives at all of the surface, square metres times the mean of the channels. */
+static double all_flux(const struct probes *probes, const float *area) {
+    double sum = 0.0;
+    for (size_t k = 0; k < probes->count; k++) {
+        const float *arrives = probes->probe[k].light.moment[0];
+        sum += (double)(area[k] * rgb_mean(rgb_make(arrives[0], arrives[1], arrives[2])));
     }
-    mem_free(area);
+    return sum;
 }
 
-void sun_mirrored_add(struct probes *probes, const struct sun *sun, const struct world *world, const struct mesh *mesh,
-                      const struct inverse_uv *inverse, uint64_t seed, struct parallel *pool) {
+static void bring(struct probe *probe, const struct photon *photon, float area) {
+    vec3 toward = vec3_neg(photon->direction);
+    float facing = fmaxf(vec3_dot(toward, probe->shading), LEAST_COSINE);
+    irradiance_add(&probe->light, probe->shading, toward, rgb_scale(photon->flux, 1.0f / (facing * area)));
+}
+
+/* Returns the share that it is. */
+static double share_out(const struct mirrored *m) {
+    float *area = probe_areas(m);
+    double before = all_flux(m->probes, area);
+    for (size_t i = 0; i < m->count * m->rays; i++) {
+        const struct photon *photon = &m->photon[i];
+        if (photon->probe != UINT32_MAX && area[photon->probe] > 0.0f)
+            bring(&m->probes->probe[photon->probe], photon, area[photon->probe]);
+    }
+    double after = all_flux(m->probes, area);
+    mem_free(area);
+    return after > 0.0 ? (after - before) / after : 0.0;
+}
+
+double sun_mirrored_add(struct probes *probes, const struct sun *sun, const struct world *world,
+                        const struct mesh *mesh, const struct inverse_uv *inverse, uint64_t seed,
+                        struct parallel *pool) {
     struct mirrored m = {.probes = probes, .sun = sun, .world = world, .mesh = mesh, .inverse = inverse, .seed = seed};
     if (!sun->is_there)
-        return;
+        return 0.0;
     m.lit = mem_calloc(inverse->valid_count, sizeof *m.lit);
     parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, find_lit, &m);
     choose_texels(&m);
     m.photon = mem_array(m.count * m.rays + 1, sizeof *m.photon);
     parallel_for(pool, m.count, send_texel, &m);
-    share_out(&m);
+    double share = share_out(&m);
     mem_free(m.photon);
     mem_free(m.texel);
     mem_free(m.lit);
+    return share;
 }

@@ -57,6 +57,7 @@ struct solve {
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
     double texels_a_pixel;   /* detail_texels_a_pixel */
+    double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
     double begin_sec;
     double work_done, work_total;
 };
@@ -320,8 +321,8 @@ static bool solve_pass(struct solve *s, int pass) {
         gloss_fit(s->r, s->views, &s->probes, &s->field);
         s->divide.stride = 1;
         sun_refit(&s->divide);
-        sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
-                         (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
+        s->mirrored_share = sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
+                                             (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
     s->divide.stride = pass == PASS_ALL ? 1 : COARSE_STRIDE;
     if (!divide_all(s))
@@ -353,6 +354,7 @@ static void report(const struct solve *s) {
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
     json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASS_ALL));
+    json_add_number(figures, "mirrored_sun_share_of_light", s->mirrored_share);
     json_add(figures, "segments", segment_list(s->r));
     json_add_int(figures, "measured_one_texel_in", (int64_t)s->divide.stride * (int64_t)s->divide.stride);
     json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);

@@ -61,6 +61,11 @@ static float irradiance_in_map(const struct environment *e, vec3 direction) {
     return sum;
 }
 
+static double mirrored_share(const struct reconstruction *r) {
+    const cJSON *solve = cJSON_GetObjectItem(r->report, "solve");
+    return cJSON_GetNumberValue(cJSON_GetObjectItem(solve, "mirrored_sun_share_of_light"));
+}
+
 static void test_sun(struct parallel *pool) {
     struct scene scene = {0};
     struct image sky;
@@ -84,6 +89,7 @@ static void test_sun(struct parallel *pool) {
         rgb patch = color_of_patch(&r);
         CHECK_NEAR(patch.r, wall_color[FLOOR].r, 0.15f * wall_color[FLOOR].r);
         CHECK_NEAR(patch.b, wall_color[FLOOR].b, 0.15f * wall_color[FLOOR].b);
+        CHECK(mirrored_share(&r) == 0.0);
         for (size_t s = 0; s < r.segments.count; s++)
             CHECK_THAT(!r.is_emitter[s] || r.segments.id[s] == LAMP, "segment %zu", s);
         reconstruct_release(&r);
@@ -136,6 +142,8 @@ static void test_polished_floor(struct parallel *pool) {
     CHECK(r.sun.is_there);
     CHECK_NEAR(r.sun.irradiance.r, expected, 0.15f * expected);
     CHECK_NEAR(r.sun.irradiance.b, r.sun.irradiance.r, 0.1f * expected);
+    double mirrored = mirrored_share(&r);
+    CHECK_THAT(mirrored > 0.002 && mirrored < 0.05, "%g", mirrored);
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);

@@ -54,10 +54,11 @@ static void yard_release(struct yard *y) {
 /* Mean and standard deviation of the irradiance at an object's probes; inside: not within 20 cm of its rim. */
 struct arrives {
     double mean[3], deviation;
+    double share; /* of all light, of which there is no other */
 };
 
 static struct arrives arrives_at(const struct yard *y, const struct probes *probes, int64_t object) {
-    struct arrives a = {{0.0, 0.0, 0.0}, 0.0};
+    struct arrives a = {{0.0, 0.0, 0.0}, 0.0, 0.0};
     double count = 0.0, squares = 0.0;
     for (size_t i = 0; i < probes->count; i++) {
         struct surface_point at;
@@ -84,8 +85,9 @@ static struct arrives mirrored(struct yard *y, float roughness, float specular, 
     y->materials.roughness[0] = roughness;
     y->materials.specular[0] = specular;
     probes_init(&probes, SPACING, &y->mesh, &y->atlas, &y->inverse, &y->fused);
-    sun_mirrored_add(&probes, &sun, &y->world, &y->mesh, &y->inverse, 1, pool);
+    double share = sun_mirrored_add(&probes, &sun, &y->world, &y->mesh, &y->inverse, 1, pool);
     struct arrives a = arrives_at(y, &probes, object);
+    a.share = share;
     probes_release(&probes);
     parallel_free(pool);
     return a;
@@ -118,7 +120,7 @@ int main(void) {
     struct arrives matt = mirrored(&y, 0.1f, 0.0f, WALL, 0);
     struct arrives one = mirrored(&y, 0.3f, 1.0f, WALL, 1), several = mirrored(&y, 0.3f, 1.0f, WALL, 3);
     CHECK_THAT(aside.mean[0] < 0.01, "%g", aside.mean[0]);
-    CHECK(rough.mean[0] == 0.0 && matt.mean[0] == 0.0);
+    CHECK(rough.mean[0] == 0.0 && matt.mean[0] == 0.0 && matt.share == 0.0 && one.share == 1.0);
     CHECK(one.mean[0] > 0.1 && one.mean[0] == several.mean[0]);
     yard_release(&y);
     parallel_free(pool);
