@@ -19,7 +19,8 @@
 #include "server/reconstruct/sky_doubt.h"
 #include "server/reconstruct/sun_refit.h"
 
-/* The first tells what each place sends out, the second what is glossy in that light, the last all. */
+/* The first tells what each place sends out, the second what is glossy in that light, the last all. The second is left
+ * out where most light is an estimate (unseen_light.h), which is off by more than it puts right. */
 enum { PASS_LIGHT, PASS_GLOSS, PASS_ALL, PASSES };
 /* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
 #define SPACING_AT_2048 8
@@ -80,10 +81,13 @@ static size_t samples_of(const struct solve *s, int pass) {
     return (size_t)(pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART));
 }
 
+static bool is_left_out(const struct solve *s, int pass) { return pass == PASS_GLOSS && s->r->sky_is_fitted; }
+
 static void plan_work(struct solve *s) {
     for (int pass = 0; pass < PASSES; pass++)
-        s->work_total += (double)s->probes.count * (double)samples_of(s, pass) +
-                         RAYS_A_TEXEL * (double)s->r->inverse.valid_count;
+        if (!is_left_out(s, pass))
+            s->work_total += (double)s->probes.count * (double)samples_of(s, pass) +
+                             RAYS_A_TEXEL * (double)s->r->inverse.valid_count;
     s->work_total += DETAIL_STEPS * RAYS_A_DETAIL * (double)s->r->inverse.valid_count;
 }
 
@@ -298,7 +302,7 @@ static void solve_release(struct solve *s) {
 static void refit_lamps(struct solve *s, int pass) {
     const uint16_t(*radiance)[3] = (const uint16_t(*)[3])s->radiance;
     struct fused matt;
-    if (pass == PASS_GLOSS) {
+    if (pass == PASS_GLOSS || is_left_out(s, PASS_GLOSS)) {
         lamps_refit(s->r, s->views, radiance, NULL);
     } else if (lamps_are_estimated(s->r)) {
         divide_matt(&s->divide, &matt);
@@ -367,7 +371,7 @@ enum status solve_run(struct reconstruction *r, const struct views *views,
     solve_init(&s, r, views, hooks);
     emitters_observe(r, views, r->evidence);
     for (int pass = 0; pass < PASSES && going; pass++)
-        going = solve_pass(&s, pass);
+        going = is_left_out(&s, pass) || solve_pass(&s, pass);
     if (going) {
         set_emission(&s);
         report(&s);

@@ -20,6 +20,9 @@
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
+/* Where more of all rays than this leave the room that way, light is a guess for the most part, and what surfaces say is
+ * a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at most). */
+#define MOSTLY_UNSEEN 0.3
 
 struct unseen {
     struct reconstruction *r;
@@ -139,7 +142,8 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     r->unseen_share = unseen_share(&u);
     keep_telling_points(&u);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
-    bool matters = u.count >= LEAST_POINTS && base_color > IMPOSSIBLE_BASE_COLOR;
+    bool matters = u.count >= LEAST_POINTS &&
+                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
     if (matters)
         relight(&u);
     r->sky_is_fitted = matters;
