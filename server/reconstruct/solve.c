@@ -355,6 +355,7 @@ static void report(const struct solve *s) {
     for (size_t i = 0; i < s->r->inverse.valid_count; i++)
         known += s->divide.measured[s->r->inverse.valid[i]].weight > 0.0f;
     cJSON *figures = cJSON_AddObjectToObject(s->r->report, "solve");
+    json_add_int(figures, "passes", is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES);
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
     json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASS_ALL));
