@@ -88,6 +88,14 @@ void probes_release(struct probes *p) {
     *p = (struct probes){0};
 }
 
+uint32_t probes_at(const struct probes *p, uint32_t x, uint32_t y, uint32_t chart) {
+    size_t block = (size_t)(y / p->spacing) * p->columns + x / p->spacing;
+    uint32_t k = p->first[block];
+    while (k < p->first[block + 1] && p->probe[k].chart != chart)
+        k++;
+    return k < p->first[block + 1] ? k : UINT32_MAX;
+}
+
 struct gather_job {
     struct probes *probes;
     const struct light_field *field;

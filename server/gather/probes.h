@@ -33,6 +33,9 @@ struct probes {
     uint32_t *first;         /* [columns * rows + 1] first probe of a block; owned */
 };
 
+/* The number of the probe that stands in the block of texel (x, y) for a chart; UINT32_MAX: none. */
+uint32_t probes_at(const struct probes *p, uint32_t x, uint32_t y, uint32_t chart);
+
 /* The probes that speak for a texel; weights sum to 1. */
 #define PROBES_AROUND 9
 struct probe_mix {

@@ -42,20 +42,8 @@ struct mirrored {
 /* Square metres that a texel of a triangle covers. */
 static float texel_area(const struct mirrored *m, uint32_t triangle) {
     const vec2 *c = m->world->atlas->corner[triangle];
-    const uint32_t *i = m->mesh->index[triangle];
-    vec3 a = m->mesh->position[i[0]], b = m->mesh->position[i[1]], d = m->mesh->position[i[2]];
     float texels = fabsf((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
-    return texels > 0.0f ? vec3_length(vec3_cross(vec3_sub(b, a), vec3_sub(d, a))) / texels : 0.0f;
-}
-
-/* The probe of a texel's block and chart. */
-static uint32_t probe_at(const struct mirrored *m, uint32_t x, uint32_t y, uint32_t chart) {
-    const struct probes *p = m->probes;
-    size_t block = (size_t)(y / p->spacing) * p->columns + x / p->spacing;
-    uint32_t k = p->first[block];
-    while (k < p->first[block + 1] && p->probe[k].chart != chart)
-        k++;
-    return k < p->first[block + 1] ? k : UINT32_MAX;
+    return texels > 0.0f ? vec3_length(mesh_cross(m->mesh, triangle)) / texels : 0.0f;
 }
 
 /* --- from the sun ---------------------------------------------------------------------------------- */
@@ -134,9 +122,9 @@ static void send_texel(void *user, size_t index, int thread) {
             !(vec3_dot(world->triangle[hit.triangle].normal, photon->direction) < 0.0f))
             continue;
         vec2 place = atlas_point(world->atlas, hit.triangle, hit.b1, hit.b2);
-        photon->probe = probe_at(m, (uint32_t)clampf(place.x, 0.0f, (float)(world->atlas->width - 1)),
-                                 (uint32_t)clampf(place.y, 0.0f, (float)(world->atlas->height - 1)),
-                                 world->atlas->chart_of_triangle[hit.triangle]);
+        photon->probe = probes_at(m->probes, (uint32_t)clampf(place.x, 0.0f, (float)(world->atlas->width - 1)),
+                                  (uint32_t)clampf(place.y, 0.0f, (float)(world->atlas->height - 1)),
+                                  world->atlas->chart_of_triangle[hit.triangle]);
         photon->flux = rgb_scale(sent, part);
     }
 }
@@ -148,8 +136,8 @@ static float *probe_areas(const struct mirrored *m) {
     float *area = mem_calloc(m->probes->count + 1, sizeof *area);
     for (size_t i = 0; i < m->inverse->valid_count; i++) {
         uint32_t texel = m->inverse->valid[i], triangle = m->inverse->triangle[texel];
-        area[probe_at(m, texel % m->inverse->width, texel / m->inverse->width,
-                      m->world->atlas->chart_of_triangle[triangle])] += texel_area(m, triangle);
+        area[probes_at(m->probes, texel % m->inverse->width, texel / m->inverse->width,
+                       m->world->atlas->chart_of_triangle[triangle])] += texel_area(m, triangle);
     }
     return area;
 }

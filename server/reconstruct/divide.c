@@ -199,26 +199,40 @@ void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
 }
 
+/* What is done for each valid texel, in any order. */
+struct each {
+    const struct divide *divide;
+    void (*of)(const void *job, uint32_t texel);
+    const void *job;
+};
+
+static void each_chunk(void *user, size_t chunk, int thread) {
+    (void)thread;
+    const struct each *each = user;
+    const struct inverse_uv *inverse = &each->divide->r->inverse;
+    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
+    for (size_t i = begin; i < end; i++)
+        each->of(each->job, inverse->valid[i]);
+}
+
+static void each_valid(const struct divide *d, void (*of)(const void *job, uint32_t texel), const void *job) {
+    struct each each = {d, of, job};
+    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, each_chunk, &each);
+}
+
 struct matt_job {
     const struct divide *divide;
     struct fused *matt;
 };
 
-static void matt_chunk(void *user, size_t chunk, int thread) {
-    (void)thread;
+static void matt_texel(const void *user, uint32_t texel) {
     const struct matt_job *job = user;
-    const struct divide *d = job->divide;
-    const struct inverse_uv *inverse = &d->r->inverse;
-    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
-    for (size_t i = begin; i < end; i++) {
-        uint32_t texel = inverse->valid[i];
-        const struct measured *m = &d->measured[texel];
-        rgb white;
-        if (stand_in(d, texel) != texel || !(m->weight > 0.0f) || !divide_white(d, texel, &white))
-            continue;
-        job->matt->count[texel] = m->weight;
-        rgb_to_half(job->matt->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MOST), white));
-    }
+    const struct measured *m = &job->divide->measured[texel];
+    rgb white;
+    if (stand_in(job->divide, texel) != texel || !(m->weight > 0.0f) || !divide_white(job->divide, texel, &white))
+        return;
+    job->matt->count[texel] = m->weight;
+    rgb_to_half(job->matt->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MOST), white));
 }
 
 void divide_matt(const struct divide *d, struct fused *matt) {
@@ -227,8 +241,7 @@ void divide_matt(const struct divide *d, struct fused *matt) {
     matt->radiance = mem_calloc_large(texels, sizeof *matt->radiance);
     matt->count = mem_calloc_large(texels, sizeof *matt->count);
     matt->is_bound = mem_calloc_large(texels, sizeof *matt->is_bound);
-    struct matt_job job = {d, matt};
-    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, matt_chunk, &job);
+    each_valid(d, matt_texel, &(struct matt_job){d, matt});
 }
 
 struct white_job {
@@ -236,24 +249,17 @@ struct white_job {
     uint16_t (*white)[3];
 };
 
-static void white_chunk(void *user, size_t chunk, int thread) {
-    (void)thread;
+static void white_texel(const void *user, uint32_t texel) {
     const struct white_job *job = user;
     const struct divide *d = job->divide;
-    const struct inverse_uv *inverse = &d->r->inverse;
-    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
-    for (size_t i = begin; i < end; i++) {
-        uint32_t texel = inverse->valid[i];
-        rgb white;
-        bool known = d->measured[texel].weight > 0.0f && divide_white(d, texel, &white) &&
-                     fminf(white.r, fminf(white.g, white.b)) > DARK * d->views->median_radiance;
-        rgb_to_half(job->white[texel], known ? white : rgb_gray(0.0f));
-    }
+    rgb white;
+    bool known = d->measured[texel].weight > 0.0f && divide_white(d, texel, &white) &&
+                 fminf(white.r, fminf(white.g, white.b)) > DARK * d->views->median_radiance;
+    rgb_to_half(job->white[texel], known ? white : rgb_gray(0.0f));
 }
 
 void divide_white_all(const struct divide *d, uint16_t (*white)[3]) {
-    struct white_job job = {d, white};
-    parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, white_chunk, &job);
+    each_valid(d, white_texel, &(struct white_job){d, white});
 }
 
 /* Means over what photographs show of each segment. */
@@ -295,9 +301,11 @@ struct sending {
 };
 
 /* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors
- * aslant and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
- * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_mirrored.h's. */
-static void send_out(const struct sending *job, uint32_t texel) {
+ * aslant and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to
+ * be expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is
+ * sun_mirrored.h's. */
+static void send_out(const void *user, uint32_t texel) {
+    const struct sending *job = user;
     const struct divide *d = job->divide;
     const struct measured *m = &d->measured[texel];
     uint32_t segment = reconstruction_segment(d->r, texel);
@@ -317,22 +325,12 @@ static void send_out(const struct sending *job, uint32_t texel) {
     rgb_to_half(job->radiance[texel], rgb_add(rgb_mul(base, white), gloss));
 }
 
-static void send_chunk(void *user, size_t chunk, int thread) {
-    (void)thread;
-    const struct sending *job = user;
-    const struct inverse_uv *inverse = &job->divide->r->inverse;
-    size_t begin = chunk * CHUNK, end = begin + CHUNK < inverse->valid_count ? begin + CHUNK : inverse->valid_count;
-    for (size_t i = begin; i < end; i++)
-        send_out(job, inverse->valid[i]);
-}
-
 static void send_all(const struct divide *d, uint16_t (*radiance)[3]) {
     const struct reconstruction *r = d->r;
     float *gloss_albedo = mem_array(r->segments.count, sizeof *gloss_albedo);
     for (size_t i = 0; i < r->segments.count; i++)
         gloss_albedo[i] = highlight_albedo(r->materials.roughness[i], r->materials.specular[i]);
-    struct sending job = {d, gloss_albedo, radiance};
-    parallel_for(r->pool, (r->inverse.valid_count + CHUNK - 1) / CHUNK, send_chunk, &job);
+    each_valid(d, send_out, &(struct sending){d, gloss_albedo, radiance});
     mem_free(gloss_albedo);
 }
 

@@ -38,7 +38,7 @@ size_t divide_highlight_samples(double texels_a_pixel);
 void divide_texels(struct divide *d, const uint32_t *texel, size_t count);
 
 /* *matt: what all texels that were measured show towards their normals without their highlights; of all others count is
- * 0. To be released by the caller. */
+ * 0. Its spread is NULL. To be released by the caller. */
 void divide_matt(const struct divide *d, struct fused *matt);
 
 /* What a white diffuse surface at the texel sends towards its normal; false where it is not valid. */

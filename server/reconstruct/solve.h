@@ -3,8 +3,8 @@
  * The photographs tell what every surface sends out (fuse.h), so one bounce tells what arrives
  * (probes.h); from both follow, in closed form or by a search over few numbers, which segments emit
  * (emitters.h), how glossy they are (gloss.h) and their base colour (divide.h). What no photograph
- * saw is filled in and sends out light from then on. Done twice: the second time with the
- * emitters known and more rays.
+ * saw is filled in and sends out light from then on. Done three times: then with the emitters known,
+ * and gloss, and at last of every texel and with more rays.
  *
  * The order of ideas is that of FIPT (Wu et al. 2023) and TexIR (Li et al. 2023); in texture space,
  * with the exact Disney lobes and without a network. */

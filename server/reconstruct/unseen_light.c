@@ -20,8 +20,8 @@
 /* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
 #define IMPOSSIBLE_BASE_COLOR 1.5
 #define NOT_IMPOSSIBLE 0.8
-/* Where more of all rays than this leave the room that way, light is a guess for the most part, and what surfaces say is
- * a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at most). */
+/* Where more of all rays than this leave the room that way, light is a guess for the most part, and what surfaces say
+ * is a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at most). */
 #define MOSTLY_UNSEEN 0.3
 
 struct unseen {

@@ -6,10 +6,11 @@
  * surfaces themselves: at each of some thousand points what the photographs show is base colour times
  * (light that is known + light that is not), and base colours are hardly ever above that of white paint
  * and differ little within a segment. Where the guess leaves a fifth of the points whiter than anything
- * can be, or most light is guessed, it is replaced, by the coarse map of the unseen directions that makes the base colours so, most
- * probably (robust Gauss-Newton on its logarithm). Within some degrees of what is seen the guess stays, the less the
- * further away: what goes on behind a hole of the mesh is like what photographs show of it. Of the colour of the rest
- * nothing can be known apart from that of the surfaces: photographs are balanced to make light white. */
+ * can be, or most light is guessed, it is replaced by the coarse map of the unseen directions that makes
+ * the base colours so, most probably (robust Gauss-Newton on its logarithm). Within some degrees of what is
+ * seen the guess stays, the less the further away: what goes on behind a hole of the mesh is like what
+ * photographs show of it. Of the colour of the rest nothing can be known apart from that of the surfaces:
+ * photographs are balanced to make light white. */
 #ifndef UNBAKE_RECONSTRUCT_UNSEEN_LIGHT_H
 #define UNBAKE_RECONSTRUCT_UNSEEN_LIGHT_H
 

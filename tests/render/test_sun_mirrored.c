@@ -13,28 +13,20 @@
 
 struct yard {
     struct mesh mesh;
-    struct segments segments;
-    struct atlas atlas;
-    struct inverse_uv inverse;
-    struct materials materials;
-    struct world world;
+    struct model model;
     struct fused fused; /* every texel is seen */
 };
 
 /* A floor of 4 x 3 m, a wall along its far end, and one beside it, along the sun's way. */
 static void yard_init(struct yard *y, struct parallel *pool) {
-    struct error err;
     *y = (struct yard){0};
     start_room(&y->mesh, OBJECTS);
     y->mesh.triangle_count = 2; /* the floor alone */
     y->mesh.vertex_count = 4;
     add_quad(&y->mesh, WALL, (vec3){4, 0, 0}, (vec3){0, 0, 3}, (vec3){0, 3, 0});
     add_quad(&y->mesh, ASIDE, (vec3){0, 0, -0.5f}, (vec3){4, 0, 0}, (vec3){0, 3, 0});
-    segments_from_object_id(&y->segments, &y->mesh);
-    CHECK(atlas_make(&y->atlas, &y->mesh, &y->segments, SIDE, 0.0f, &err) == STATUS_OK);
-    inverse_uv_make(&y->inverse, &y->atlas, y->mesh.triangle_count, pool);
-    materials_init(&y->materials, &y->inverse, y->segments.count, rgb_gray(0.5f), 1.0f, 0.0f);
-    CHECK(world_init(&y->world, &y->mesh, &y->segments, &y->atlas, &y->materials, NULL, pool, &err) == STATUS_OK);
+    model_init(&y->model, &y->mesh, SIDE, 0.5f, pool);
+    model_light(&y->model, &y->mesh, rgb_gray(0.0f), NULL, pool);
     y->fused.width = y->fused.height = SIDE;
     y->fused.count = mem_array(SIDE * SIDE, sizeof *y->fused.count);
     for (size_t i = 0; i < SIDE * SIDE; i++)
@@ -43,11 +35,7 @@ static void yard_init(struct yard *y, struct parallel *pool) {
 
 static void yard_release(struct yard *y) {
     fused_release(&y->fused);
-    world_release(&y->world);
-    materials_release(&y->materials);
-    inverse_uv_release(&y->inverse);
-    atlas_release(&y->atlas);
-    segments_release(&y->segments);
+    model_release(&y->model);
     mesh_release(&y->mesh);
 }
 
@@ -62,7 +50,7 @@ static struct arrives arrives_at(const struct yard *y, const struct probes *prob
     double count = 0.0, squares = 0.0;
     for (size_t i = 0; i < probes->count; i++) {
         struct surface_point at;
-        CHECK(surface_at_texel(&y->mesh, &y->atlas, &y->inverse, probes->probe[i].texel, &at));
+        CHECK(surface_at_texel(&y->mesh, &y->model.atlas, &y->model.inverse, probes->probe[i].texel, &at));
         vec3 p = at.position;
         if (y->mesh.object_id[at.triangle] != object || p.y < 0.2f || p.y > 2.8f ||
             (object == WALL && (p.z < 0.2f || p.z > 2.8f)))
@@ -82,10 +70,10 @@ static struct arrives mirrored(struct yard *y, float roughness, float specular, 
     struct sun sun = {true, vec3_normalize((vec3){-1, 1, 0}), 0.005f, {10.0f, 8.0f, 5.0f}};
     struct parallel *pool = parallel_new(threads);
     struct probes probes;
-    y->materials.roughness[0] = roughness;
-    y->materials.specular[0] = specular;
-    probes_init(&probes, SPACING, &y->mesh, &y->atlas, &y->inverse, &y->fused);
-    double share = sun_mirrored_add(&probes, &sun, &y->world, &y->mesh, &y->inverse, 1, pool);
+    y->model.materials.roughness[0] = roughness;
+    y->model.materials.specular[0] = specular;
+    probes_init(&probes, SPACING, &y->mesh, &y->model.atlas, &y->model.inverse, &y->fused);
+    double share = sun_mirrored_add(&probes, &sun, &y->model.world, &y->mesh, &y->model.inverse, 1, pool);
     struct arrives a = arrives_at(y, &probes, object);
     a.share = share;
     probes_release(&probes);
