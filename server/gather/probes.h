@@ -13,7 +13,7 @@
 
 #include "common/parallel.h"
 #include "server/capture/fuse.h"
-#include "server/gather/incident.h"
+#include "server/gather/irradiance.h"
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/mesh.h"

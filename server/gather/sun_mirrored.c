@@ -12,7 +12,6 @@
 #define RAYS 1000000
 #define RAYS_A_TEXEL 64
 #define CHUNK 1024 /* texels a work item */
-#define ROUGHEST 0.5f
 #define KEY_MIRRORED 0x3a11u
 /* Light that grazes a probe's surface is taken to come from at least so far above it: its amount stays. */
 #define LEAST_COSINE 0.05f
@@ -52,17 +51,13 @@ static bool find_point(const struct mirrored *m, uint32_t texel, struct surface_
     return surface_at_texel(m->mesh, m->world->atlas, m->inverse, texel, at);
 }
 
-bool sun_is_mirrored_by(const struct materials *materials, uint32_t segment) {
-    return materials->specular[segment] > 0.0f && materials->roughness[segment] <= ROUGHEST;
-}
-
 static void find_lit(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct mirrored *m = user;
     for (size_t i = chunk * CHUNK; i < m->inverse->valid_count && i < (chunk + 1) * CHUNK; i++) {
         uint32_t texel = m->inverse->valid[i], segment = m->world->triangle[m->inverse->triangle[texel]].segment;
         struct surface_point at;
-        m->lit[i] = sun_is_mirrored_by(m->world->materials, segment) && find_point(m, texel, &at) &&
+        m->lit[i] = materials_is_polished(m->world->materials, segment) && find_point(m, texel, &at) &&
                     sun_visible(m->sun, m->world->accel, &at, 1) > 0.0f;
     }
 }

@@ -18,11 +18,8 @@
 #include "server/scene/materials.h"
 #include "server/scene/mesh.h"
 
-/* Whether a segment is polished enough: what is rougher sends so widely that photographs show it. */
-bool sun_is_mirrored_by(const struct materials *materials, uint32_t segment);
-
-/* Adds it to the light at all probes, by roughness and specular as they are in world->materials. Returns the share that
- * it is of all light that arrives at the surface. The same for any number of threads. */
+/* Adds it to the light at all probes, by roughness and specular of polished segments as world->materials has them.
+ * Returns the share that it is of all light that arrives at the surface. The same for any number of threads. */
 double sun_mirrored_add(struct probes *probes, const struct sun *sun, const struct world *world,
                         const struct mesh *mesh, const struct inverse_uv *inverse, uint64_t seed,
                         struct parallel *pool);

@@ -13,6 +13,7 @@
 #include "server/capture/noise.h"
 #include "server/capture/views.h"
 #include "server/gather/incident.h"
+#include "server/gather/irradiance.h"
 #include "server/gather/probes.h"
 #include "server/reconstruct/denoise.h"
 #include "server/reconstruct/reconstruction.h"
@@ -47,8 +48,8 @@ bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
 /* The same for all texels that were measured, to white, [height][width]; 0 where it is too dark to divide by. */
 void divide_white_all(const struct divide *d, uint16_t (*white)[3]);
 
-/* After all texels: writes r->materials.base_color, and to radiance, [height][width], what texels of all but emitters
- * send out in the mean over viewers. */
-void divide_finish(struct divide *d, uint16_t (*radiance)[3]);
+/* After all texels: writes r->materials.base_color, and for a light_field radiance[height][width], what texels of all
+ * but emitters send out in the mean over viewers, and lobe[segment_count], what they mirror. */
+void divide_finish(struct divide *d, uint16_t (*radiance)[3], struct incident_lobe *lobe);
 
 #endif

@@ -132,9 +132,9 @@ void lamps_add_sky(struct lamps *l) {
     lamp->least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b);
 }
 
-void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3], const struct fused *shown) {
+void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field, const struct fused *shown) {
     struct survey survey;
-    survey_init(&survey, l->r, views, radiance, l->without, LIGHT_PLACES);
+    survey_init(&survey, l->r, views, field, l->without, LIGHT_PLACES);
     light_places_init(&l->places, &survey, shown);
     survey_release(&survey);
     for (size_t i = 0; i < l->places.count; i++) {
@@ -245,7 +245,7 @@ bool lamps_are_estimated(const struct reconstruction *r) {
     return any;
 }
 
-void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3],
+void lamps_refit(struct reconstruction *r, const struct views *views, const struct light_field *field,
                  const struct fused *shown) {
     struct lamps l;
     lamps_init(&l, r, views);
@@ -258,7 +258,7 @@ void lamps_refit(struct reconstruction *r, const struct views *views, const uint
             lamps_add_bound(&l, (uint32_t)i);
     }
     if (l.count > 0) {
-        lamps_survey(&l, views, radiance, shown);
+        lamps_survey(&l, views, field, shown);
         lamps_fit_all(&l, l.count);
         if (lamps_is_sky(&l.lamp[0]))
             r->sky_factor = l.lamp[0].radiance;

@@ -57,7 +57,7 @@ static inline bool lamps_is_sky(const struct lamp *lamp) { return lamp->segment[
 
 /* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less.
  * `shown` is as in light_places_init. */
-void lamps_survey(struct lamps *l, const struct views *views, const uint16_t (*radiance)[3], const struct fused *shown);
+void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field, const struct fused *shown);
 
 /* Whether one looks out of the room from the places in directions that no photograph shows: the sky may as well be what
  * is missing there (unseen_light.h). */
@@ -77,10 +77,10 @@ void lamps_hand_over(const struct lamps *l, size_t count);
 /* Whether there are lamps that were handed over. */
 bool lamps_are_estimated(const struct reconstruction *r);
 
-/* Fits all of them again, with what texels send out, those too that no photograph shows: radiance[height][width], half
- * precision; `shown` is as in lamps_survey. Where that is NULL the sky is fitted again as well, and the factor by which
- * it changes noted in r->sky_factor. The world is without emitters after it. */
-void lamps_refit(struct reconstruction *r, const struct views *views, const uint16_t (*radiance)[3],
+/* Fits all of them again, with what texels send out, those too that no photograph shows, as `field` has it; `shown` is as
+ * in lamps_survey. Where that is NULL the sky is fitted again as well, and the factor by which it changes noted in
+ * r->sky_factor. The world is without emitters after it. */
+void lamps_refit(struct reconstruction *r, const struct views *views, const struct light_field *field,
                  const struct fused *shown);
 
 /* Changes the environment, and the world's, by such a factor. */

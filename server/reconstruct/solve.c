@@ -56,6 +56,7 @@ struct solve {
     struct probes probes;
     struct divide divide;
     uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
+    struct incident_lobe *lobe; /* [segment_count] polished ones, of what radiance leaves out; owned */
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
     double texels_a_pixel;   /* detail_texels_a_pixel */
     double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
@@ -269,8 +270,9 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
     s->radiance = mem_calloc_large(texels, sizeof *s->radiance);
     memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
+    s->lobe = mem_calloc(r->segments.count, sizeof *s->lobe);
     s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
-    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance, s->lobe, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_a_pixel = detail_texels_a_pixel(r, views);
     s->divide = (struct divide){
@@ -293,6 +295,7 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
+    mem_free(s->lobe);
     mem_free(s->patterned);
     mem_free(s->radiance);
 }
@@ -300,13 +303,12 @@ static void solve_release(struct solve *s) {
 /* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
  * once gloss is known. */
 static void refit_lamps(struct solve *s, int pass) {
-    const uint16_t(*radiance)[3] = (const uint16_t(*)[3])s->radiance;
     struct fused matt;
     if (pass == PASS_GLOSS || is_left_out(s, PASS_GLOSS)) {
-        lamps_refit(s->r, s->views, radiance, NULL);
+        lamps_refit(s->r, s->views, &s->field, NULL);
     } else if (lamps_are_estimated(s->r)) {
         divide_matt(&s->divide, &matt);
-        lamps_refit(s->r, s->views, radiance, &matt);
+        lamps_refit(s->r, s->views, &s->field, &matt);
         fused_release(&matt);
     }
 }
@@ -333,7 +335,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
         return false;
-    divide_finish(&s->divide, s->radiance);
+    divide_finish(&s->divide, s->radiance, s->lobe);
     return true;
 }
 

@@ -45,12 +45,14 @@ static void light_bright(struct reconstruction *r, const struct views *views, co
     mem_free(evidence);
 }
 
+/* Segments of `without` are as bright as they are by now, to those who see them in a mirror. */
 static void leave_out(struct survey *s, const bool *without) {
     const struct reconstruction *r = s->r;
+    s->field.only_mirrored = without;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
-        uint32_t texel = r->inverse.valid[i];
-        if (without[reconstruction_segment(r, texel)])
-            memset(s->radiance[texel], 0, sizeof s->radiance[texel]);
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        if (without[segment])
+            rgb_to_half(s->radiance[texel], r->evidence[segment].shown);
     }
 }
 
@@ -76,15 +78,17 @@ static void choose_points(struct survey *s, const bool *without, size_t points) 
 }
 
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
-                 const uint16_t (*radiance)[3], const bool *without, size_t points) {
+                 const struct light_field *field, const bool *without, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
-    memcpy(s->radiance, radiance ? radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
-    if (!radiance)
+    memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
+    if (!field)
         fill_radiance(s);
+    s->field = (struct light_field){.world = &r->world, .radiance = (const uint16_t(*)[3])s->radiance};
+    if (field)
+        s->field.lobe = field->lobe;
     if (without)
         leave_out(s, without);
-    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance};
     light_bright(r, views, without);
     choose_points(s, without, points);
     s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);

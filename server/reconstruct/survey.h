@@ -19,12 +19,12 @@ struct survey {
     struct incident *scratch;   /* [threads] */
 };
 
-/* radiance[height][width], half precision, is what all texels send out; NULL: what was fused, and of texels that no
- * photograph shows the mean of their segment, or of the room. What was seen must be fused. Until survey_release whatever
+/* `field` has what all texels send out, and what they mirror; NULL: what was fused, and of texels that no photograph
+ * shows the mean of their segment, or of the room. What was seen must be fused. Until survey_release whatever
  * outshines the room is a light of the world: small lamps must be looked for. Segments of without[segment_count] (NULL:
- * none) send out nothing. At most `points` points. */
+ * none; borrowed) send out nothing, but what polished surfaces mirror of them is known. At most `points` points. */
 void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
-                 const uint16_t (*radiance)[3], const bool *without, size_t points);
+                 const struct light_field *field, const bool *without, size_t points);
 void survey_release(struct survey *s);
 
 #endif

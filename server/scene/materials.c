@@ -3,6 +3,8 @@
 
 #include "common/mem.h"
 
+#define POLISHED 0.5f /* roughness, at most */
+
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count,
                     rgb base_color, float roughness, float specular) {
     texture_init(&m->base_color, inverse, base_color);
@@ -24,6 +26,10 @@ void materials_release(struct materials *m) {
     mem_free(m->emission);
     materials_drop_emission_pattern(m);
     *m = (struct materials){0};
+}
+
+bool materials_is_polished(const struct materials *m, uint32_t segment) {
+    return m->specular[segment] > 0.0f && m->roughness[segment] <= POLISHED;
 }
 
 void materials_start_emission_pattern(struct materials *m) {

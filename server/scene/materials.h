@@ -3,6 +3,7 @@
 #ifndef UNBAKE_SCENE_MATERIALS_H
 #define UNBAKE_SCENE_MATERIALS_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -25,6 +26,10 @@ struct materials {
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count,
                     rgb base_color, float roughness, float specular); /* no emission */
 void materials_release(struct materials *m);
+
+/* Whether a segment mirrors mostly in one direction; what is rougher sends its gloss so widely that photographs show
+ * it. */
+bool materials_is_polished(const struct materials *m, uint32_t segment);
 
 /* Gives the materials a pattern that is nowhere told yet, or takes theirs away. Pages of the former take no memory
  * until they are written. */

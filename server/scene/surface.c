@@ -1,14 +1,14 @@
 /* surface.c -- see surface.h. */
 #include "server/scene/surface.h"
 
-static vec3 shading_normal(const struct mesh *mesh, const struct surface_point *p) {
+vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float b2, vec3 normal) {
     if (!mesh->normal)
-        return p->normal;
-    const uint32_t *v = mesh->index[p->triangle];
-    vec3 n = vec3_scale(mesh->normal[v[0]], 1.0f - p->b1 - p->b2);
-    n = vec3_mad(n, p->b1, mesh->normal[v[1]]);
-    n = vec3_normalize(vec3_mad(n, p->b2, mesh->normal[v[2]]));
-    return vec3_dot(n, p->normal) > 0.0f ? n : p->normal;
+        return normal;
+    const uint32_t *v = mesh->index[triangle];
+    vec3 n = vec3_scale(mesh->normal[v[0]], 1.0f - b1 - b2);
+    n = vec3_mad(n, b1, mesh->normal[v[1]]);
+    n = vec3_normalize(vec3_mad(n, b2, mesh->normal[v[2]]));
+    return vec3_dot(n, normal) > 0.0f ? n : normal;
 }
 
 bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
@@ -17,7 +17,7 @@ bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct
         return false;
     p->position = mesh_point(mesh, p->triangle, p->b1, p->b2);
     p->normal = vec3_normalize(mesh_cross(mesh, p->triangle));
-    p->shading = shading_normal(mesh, p);
+    p->shading = surface_shading(mesh, p->triangle, p->b1, p->b2, p->normal);
     return true;
 }
 

@@ -19,6 +19,9 @@ struct surface_point {
                     * interpolated one leans behind the surface */
 };
 
+/* The shading normal at a place of a triangle that has such a geometric normal. */
+vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float b2, vec3 normal);
+
 /* The point of the surface at the texel's centre; false when the texel is not valid. */
 bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas,
                       const struct inverse_uv *inverse, uint32_t texel, struct surface_point *point);

@@ -4,6 +4,7 @@
  * standard errors of both sides. */
 #include "server/gather/highlight.h"
 #include "server/gather/incident.h"
+#include "server/gather/irradiance.h"
 #include "server/render/bsdf.h"
 #include "server/render/path.h"
 #include "server/render/sampler.h"
@@ -116,7 +117,7 @@ static void set_floor(struct fixture *f, float base, float roughness, float spec
 }
 
 static void test_diffuse(struct fixture *f) {
-    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
     struct irradiance light;
     irradiance_gather(&light, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
@@ -132,7 +133,7 @@ static void test_diffuse(struct fixture *f) {
 
 /* The mean over viewers is that of many of them. */
 static void test_viewers(struct fixture *f) {
-    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
     struct irradiance light;
     vec3 frame[3] = {[2] = f->at.shading};
@@ -172,7 +173,7 @@ static void test_albedo(void) {
 
 static void test_highlights(struct fixture *f) {
     static const struct highlight_levels levels = {4, 2, {0.1f, 0.3f, 0.5f, 1.0f}, {0.25f, 1.0f}};
-    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
     for (float cosine = 0.3f; cosine < 1.0f; cosine += 0.5f) {
         struct highlight mean = {0}, one;
@@ -193,12 +194,8 @@ static void test_highlights(struct fixture *f) {
     mem_free(scratch);
 }
 
-/* The same light from what the texels are said to send out, with the lamp alone as an emitter. */
-static void test_field(struct fixture *f) {
-    struct incident *scratch = mem_alloc(sizeof *scratch);
-    struct irradiance emitted, measured;
-    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance};
-    irradiance_gather(&emitted, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
+/* Walls are no lights any more, their texels send out the same. */
+static void hand_to_field(struct fixture *f) {
     for (size_t i = 0; i < f->inverse.valid_count; i++) {
         uint32_t texel = f->inverse.valid[i];
         const rgb *e = &f->materials.emission[f->segments.of_triangle[f->inverse.triangle[texel]]];
@@ -209,6 +206,15 @@ static void test_field(struct fixture *f) {
     for (int o = 0; o < LAMP; o++)
         f->materials.emission[o] = rgb_gray(0.0f);
     world_update_lights(&f->world);
+}
+
+/* The same light from what the texels are said to send out, with the lamp alone as an emitter. */
+static void test_field(struct fixture *f) {
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance emitted, measured;
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance, NULL, NULL};
+    irradiance_gather(&emitted, scratch, &field, &f->at, sampler_key(1, 2, 3), GATHERED);
+    hand_to_field(f);
     irradiance_gather(&measured, scratch, &field, &f->at, sampler_key(1, 2, 4), GATHERED);
     check_close(irradiance_diffuse(&measured, f->at.shading, 0.5f, viewer(0.7f)),
                 irradiance_diffuse(&emitted, f->at.shading, 0.5f, viewer(0.7f)), 0.01f, "measured light", 0.0f);
@@ -236,7 +242,7 @@ static void test_back(void) {
         if (object != 0 && object != LAMP)
             memset(g.materials.base_color.texel[texel], 0, 3 * sizeof(float));
     }
-    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance};
+    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
     struct irradiance light;
     irradiance_gather(&light, scratch, &field, &g.at, sampler_key(1, 2, 3), GATHERED);
@@ -244,6 +250,60 @@ static void test_back(void) {
     check_close(gathered, trace_depth(&g, viewer(0.7f), 3), 0.05f, "under a back", 0.0f);
     mem_free(scratch);
     fixture_release(&g);
+}
+
+/* Makes the floor white about f->at, where it is looked at, and all else black. */
+static void set_spot(struct fixture *f) {
+    set_floor(f, 0.0f, 0.5f, 0.0f);
+    for (size_t i = 0; i < f->inverse.valid_count; i++) {
+        uint32_t texel = f->inverse.valid[i];
+        struct surface_point p;
+        surface_at_texel(&f->mesh, &f->atlas, &f->inverse, texel, &p);
+        float *color = f->materials.base_color.texel[texel];
+        if (vec3_length(vec3_sub(p.position, f->at.position)) < 0.15f)
+            color[0] = color[1] = color[2] = 1.0f;
+    }
+}
+
+#define MIRRORS 2
+
+static rgb gather_diffuse(const struct fixture *f, const struct light_field *field) {
+    struct incident *scratch = mem_alloc(sizeof *scratch);
+    struct irradiance light;
+    irradiance_gather(&light, scratch, field, &f->at, sampler_key(1, 2, 3), GATHERED);
+    mem_free(scratch);
+    return irradiance_diffuse(&light, f->at.shading, 0.5f, viewer(0.7f));
+}
+
+/* Two black, polished walls mirror what all others send out, and each other: as lights, if lobes are as wide as they are
+ * taken to be for those, and else as their texels are said to. */
+static void test_mirrors(struct fixture *f, float roughness, bool are_lights) {
+    static const uint32_t mirror[MIRRORS] = {1, 3};
+    struct incident_lobe lobe[OBJECTS] = {0};
+    struct light_field field = {&f->world, (const uint16_t(*)[3])f->radiance, lobe, NULL};
+    set_spot(f);
+    for (int i = 0; i < MIRRORS; i++) {
+        f->materials.emission[mirror[i]] = rgb_gray(0.0f);
+        f->materials.roughness[mirror[i]] = roughness;
+        f->materials.specular[mirror[i]] = 1.0f;
+    }
+    f->materials.emission[LAMP] = rgb_gray(0.0f);
+    world_update_lights(&f->world);
+    rgb traced = rgb_sub(trace_depth(f, viewer(0.7f), 6), trace(f, viewer(0.7f)));
+    if (!are_lights)
+        hand_to_field(f);
+    rgb matt = gather_diffuse(f, &field);
+    for (int i = 0; i < MIRRORS; i++)
+        lobe[mirror[i]] = (struct incident_lobe){roughness, 1.0f};
+    rgb mirrored = rgb_sub(gather_diffuse(f, &field), matt);
+    printf("%.4f and, mirrored, %.4f (%.4f)\n", (double)rgb_mean(matt), (double)rgb_mean(mirrored),
+           (double)rgb_mean(traced));
+    check_close(mirrored, traced, 0.04f, "mirrored, roughness", roughness);
+    for (int i = 0; i < MIRRORS; i++) {
+        f->materials.roughness[mirror[i]] = 1.0f;
+        f->materials.specular[mirror[i]] = 0.0f;
+    }
+    light_walls(f);
 }
 
 /* The room turned inside out around its floor, which is then inside a body: whatever is said of the floor itself,
@@ -265,7 +325,7 @@ static void test_inside(void) {
     for (size_t i = 0; i < g.inverse.valid_count; i++)
         for (int c = 0; c < 3; c++)
             g.radiance[g.inverse.valid[i]][c] = image_half_from_float(3.0f);
-    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance};
+    struct light_field field = {&g.world, (const uint16_t(*)[3])g.radiance, NULL, NULL};
     struct incident *scratch = mem_alloc(sizeof *scratch);
     struct irradiance light;
     irradiance_gather(&light, scratch, &field, &g.at, sampler_key(1, 2, 3), GATHERED);
@@ -284,6 +344,8 @@ int main(void) {
     test_albedo();
     test_back();
     test_inside();
+    test_mirrors(&f, 0.5f, true);
+    test_mirrors(&f, 0.2f, false);
     test_highlights(&f);
     test_field(&f);
     fixture_release(&f);

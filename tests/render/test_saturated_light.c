@@ -7,6 +7,7 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
+#define CEILING 1
 #define CLIP 1.5f
 #define SKY_RADIANCE 8.0f
 
@@ -73,6 +74,8 @@ static void test_polished_wood(struct parallel *pool) {
         if (r.is_emitter[s])
             CHECK_RGB(found, lamp_radiance, 0.15f);
     }
+    /* The lamp is mirrored up to it. */
+    CHECK_RGB(shell_mean_color(&r, CEILING), wall_color[CEILING], 0.04f);
     reconstruct_release(&r);
     scene_release(&scene);
 }

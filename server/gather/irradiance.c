@@ -1,0 +1,154 @@
+/* irradiance.c -- see irradiance.h. */
+#include "server/gather/irradiance.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "server/render/bsdf.h"
+#include "server/render/light.h"
+#include "server/render/sampler.h"
+
+enum { PAIR_WAY }; /* before those of incident.c */
+/* A place is inside a body when all of so many rays meet a back, asked a few at a time. */
+#define ENCLOSED_RAYS 32
+#define ENCLOSED_STEP 4
+
+/* The weights of the moments for light from w at cosine c. */
+static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
+    float f = c * bsdf_schlick(c);
+    const float value[IRRADIANCE_MOMENTS] = {
+        c,          c * w.x,       c * w.y,       c * w.z,       f,             f * w.x,       f * w.y,
+        f * w.z,    f * w.x * w.x, f * w.y * w.y, f * w.z * w.z, f * w.x * w.y, f * w.x * w.z, f * w.y * w.z};
+    memcpy(basis, value, sizeof value);
+}
+
+/* Whether a place is inside a body, where no light comes and from where none gets out. Going on from back to back there
+ * costs many rays, and what is once taken for light among them never fades. */
+static bool is_enclosed(struct incident *in, const struct light_field *field, const struct surface_point *at,
+                        const vec3 frame[3], uint32_t key) {
+    const struct world *world = field->world;
+    for (uint32_t first = 0; first < ENCLOSED_RAYS; first += ENCLOSED_STEP) {
+        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
+            vec3 direction = incident_cosine_direction(frame, sampler_pair(key, first + i, PAIR_WAY));
+            in->ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
+        }
+        accel_intersect_many(world->accel, ENCLOSED_STEP, in->ray, in->hit);
+        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
+            uint32_t met = in->hit[i].triangle;
+            if (met == ACCEL_NONE || vec3_dot(world->triangle[met].normal, in->ray[i].direction) < 0.0f)
+                return false;
+        }
+    }
+    return true;
+}
+
+void irradiance_gather(struct irradiance *irradiance, struct incident *in,
+                       const struct light_field *field, const struct surface_point *at, uint32_t key,
+                       size_t samples) {
+    const size_t ways_a_chunk = INCIDENT_CHUNK * 2 / 3;
+    vec3 frame[3];
+    frame[2] = at->shading;
+    vec3_frame(at->shading, &frame[0], &frame[1]);
+    if (is_enclosed(in, field, at, frame, key)) {
+        *irradiance = (struct irradiance){0};
+        return;
+    }
+    size_t light_samples = lights_any(field->world->lights) ? samples / 2 : 0;
+    double sum[IRRADIANCE_MOMENTS][3] = {{0}};
+    rgb noise = {0.0f, 0.0f, 0.0f};
+    size_t lights_done = 0;
+    for (size_t done = 0; done < samples; done += ways_a_chunk) {
+        size_t ways = samples - done < ways_a_chunk ? samples - done : ways_a_chunk;
+        size_t lit = light_samples * (done + ways) / samples - lights_done;
+        for (size_t i = 0; i < ways; i++)
+            in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
+        incident_trace(in, field, at, key, (uint32_t)done, ways);
+        incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
+        float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
+        for (size_t i = 0; i < ways + lit; i++) {
+            float c = vec3_dot(in->direction[i], at->shading);
+            if (!(c > 0.0f))
+                continue;
+            float density = (float)samples * c * (1.0f / BSDF_PI) + (float)light_samples * in->light_pdf[i];
+            float basis[IRRADIANCE_MOMENTS];
+            moment_basis(in->direction[i], c, basis);
+            rgb l = rgb_scale(in->radiance[i], 1.0f / density);
+            bool early = i < ways ? done + i < samples / 2 : lights_done + i - ways < light_samples / 2;
+            noise = rgb_mad(noise, early ? c : -c, l);
+            for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+                chunk[m][0] += basis[m] * l.r;
+                chunk[m][1] += basis[m] * l.g;
+                chunk[m][2] += basis[m] * l.b;
+            }
+        }
+        for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
+            for (int c = 0; c < 3; c++)
+                sum[m][c] += (double)chunk[m][c];
+        lights_done += lit;
+    }
+    irradiance->noise = noise;
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
+        for (int c = 0; c < 3; c++)
+            irradiance->moment[m][c] = (float)sum[m][c];
+}
+
+void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux) {
+    float basis[IRRADIANCE_MOMENTS], c = vec3_dot(direction, shading);
+    if (!(c > 0.0f))
+        return;
+    moment_basis(direction, c, basis);
+    for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
+        irradiance->moment[m][0] += basis[m] * flux.r;
+        irradiance->moment[m][1] += basis[m] * flux.g;
+        irradiance->moment[m][2] += basis[m] * flux.b;
+    }
+}
+
+/* The moments of a channel along d: of m = w . d, F m and F m^2. */
+struct along {
+    float m, fm, fmm;
+};
+
+static struct along along(const float (*q)[3], vec3 d, int c) {
+    return (struct along){
+        q[1][c] * d.x + q[2][c] * d.y + q[3][c] * d.z,
+        q[5][c] * d.x + q[6][c] * d.y + q[7][c] * d.z,
+        q[8][c] * d.x * d.x + q[9][c] * d.y * d.y + q[10][c] * d.z * d.z +
+            2.0f * (q[11][c] * d.x * d.y + q[12][c] * d.x * d.z + q[13][c] * d.y * d.z)};
+}
+
+/* bsdf_diffuse written out by powers of F(wi) and m = wi . wo: with cos_d^2 = (1 + m) / 2, its
+ * rr is roughness (1 + m). */
+rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo) {
+    const float(*q)[3] = irradiance->moment;
+    float fo = bsdf_schlick(fmaxf(vec3_dot(shading, wo), 0.0f)), r = roughness;
+    float lambert = 1.0f - 0.5f * fo;
+    /* Factors of 1 and m without F(wi), then of 1, m and m^2 with it. */
+    float one = lambert + r * fo, m1 = r * fo;
+    float f0 = -0.5f * lambert + r * (1.0f - fo) + r * r * fo;
+    float f1 = r * (1.0f - fo) + 2.0f * r * r * fo, f2 = r * r * fo;
+    float out[3];
+    for (int c = 0; c < 3; c++) {
+        struct along a = along(q, wo, c);
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * a.m + f0 * q[4][c] + f1 * a.fm + f2 * a.fmm) * (1.0f / BSDF_PI));
+    }
+    return rgb_make(out[0], out[1], out[2]);
+}
+
+/* The terms of irradiance_diffuse under a viewer's density cos / pi, in which 1, wo, F(wo), F(wo) wo have means
+ * 1, 2/3 n, 1/21, 1/84 n, and F(wo) wo wo^T is 1/252 along n and 11/504 across it. */
+rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness) {
+    const float(*q)[3] = irradiance->moment;
+    const vec3 n = shading;
+    float r = roughness, off = r - 0.5f;
+    float one = 1.0f + off * (1.0f / 21.0f), m1 = r * (1.0f / 84.0f);
+    float f0 = off + off * off * (1.0f / 21.0f), f1 = r * (2.0f / 3.0f) + 2.0f * r * off * (1.0f / 84.0f);
+    float sideways = r * r * (11.0f / 504.0f), upwards = r * r * (1.0f / 252.0f);
+    float out[3];
+    for (int c = 0; c < 3; c++) {
+        struct along a = along(q, n, c);
+        float f2 = sideways * (q[4][c] - a.fmm) + upwards * a.fmm;
+        out[c] = fmaxf(0.0f, (one * q[0][c] + m1 * a.m + f0 * q[4][c] + f1 * a.fm + f2) * (1.0f / BSDF_PI));
+    }
+    return rgb_make(out[0], out[1], out[2]);
+}
