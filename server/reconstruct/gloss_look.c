@@ -15,8 +15,8 @@
 #define TRIES 16 /* texels tried for one that is looked at */
 #define VIEWS_ASKED 40 /* of which those far from edges are taken */
 /* Directions a photograph and place of the patch: of each roughness level, and of the lights. */
-#define SAMPLES_A_LEVEL 2
-#define LIGHT_SAMPLES 10
+#define SAMPLES_A_LEVEL 1
+#define LIGHT_SAMPLES 5
 #define KEY_GLOSS 17 /* keeps these random numbers apart from others of the texel */
 #define PATCH 5 /* places a side at which photographs are read */
 #define PATCHES_A_SIDE 14.0 /* for which a segment, were it square, must have room */

@@ -52,11 +52,11 @@ struct solve {
     struct reconstruction *r;
     const struct views *views;
     const struct reconstruct_hooks *hooks;
-    struct light_field field;
+    struct divide_sent sent;   /* by the last pass; at first what was fused; owned */
+    struct light_field field;  /* for light: rays that are mirrored go on */
+    struct light_field evenly; /* for highlights: all is sent alike in all directions */
     struct probes probes;
     struct divide divide;
-    uint16_t (*radiance)[3]; /* [height][width] what texels send out, measured or filled in */
-    struct incident_lobe *lobe; /* [segment_count] polished ones, of what radiance leaves out; owned */
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
     double texels_a_pixel;   /* detail_texels_a_pixel */
     double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
@@ -268,15 +268,18 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
-    s->radiance = mem_calloc_large(texels, sizeof *s->radiance);
-    memcpy(s->radiance, r->fused.radiance, texels * sizeof *s->radiance);
-    s->lobe = mem_calloc(r->segments.count, sizeof *s->lobe);
+    s->sent = (struct divide_sent){mem_calloc_large(texels, sizeof *s->sent.all),
+                                   mem_calloc_large(texels, sizeof *s->sent.unmirrored),
+                                   mem_calloc(r->segments.count, sizeof *s->sent.lobe)};
+    memcpy(s->sent.all, r->fused.radiance, texels * sizeof *s->sent.all);
+    memcpy(s->sent.unmirrored, r->fused.radiance, texels * sizeof *s->sent.unmirrored);
     s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
-    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->radiance, s->lobe, NULL};
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.unmirrored, s->sent.lobe, NULL};
+    s->evenly = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.all, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_a_pixel = detail_texels_a_pixel(r, views);
     s->divide = (struct divide){
-        .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise,
+        .r = r, .views = views, .probes = &s->probes, .field = &s->evenly, .noise = &r->noise,
         .denoises = settings_bool(r->settings, "denoise"),
         .highlight_samples = divide_highlight_samples(s->texels_a_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
@@ -295,9 +298,10 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
-    mem_free(s->lobe);
     mem_free(s->patterned);
-    mem_free(s->radiance);
+    mem_free(s->sent.lobe);
+    mem_free(s->sent.unmirrored);
+    mem_free(s->sent.all);
 }
 
 /* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
@@ -324,7 +328,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
-        gloss_fit(s->r, s->views, &s->probes, &s->field);
+        gloss_fit(s->r, s->views, &s->probes, &s->evenly);
         s->divide.stride = 1;
         sun_refit(&s->divide);
         s->mirrored_share = sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
@@ -335,7 +339,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
         return false;
-    divide_finish(&s->divide, s->radiance, s->lobe);
+    divide_finish(&s->divide, &s->sent);
     return true;
 }
 
