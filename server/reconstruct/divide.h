@@ -22,7 +22,7 @@ struct divide {
     struct reconstruction *r;         /* borrowed, as all below; r->materials.base_color is written */
     const struct views *views;
     const struct probes *probes;
-    const struct light_field *field;
+    const struct light_field *field;  /* for highlights */
     const struct noise *noise;
     bool denoises;                    /* else base colour is as measured */
     size_t highlight_samples;         /* directions for one highlight (divide_highlight_samples) */
