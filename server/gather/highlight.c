@@ -13,13 +13,6 @@ enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
 #define ALBEDO_SAMPLES 1024 /* a viewer and a direction each */
 #define KEY_ALBEDO 11
 
-/* A sampler and evaluator of the specular lobe alone. */
-static struct bsdf lobe_of(float roughness) {
-    struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, 1.0f, 1.0f);
-    b.specular_chance = 1.0f;
-    return b;
-}
-
 /* Adds one direction of arriving light to all levels. */
 static void add(struct highlight *h, const struct highlight_levels *levels, const struct bsdf *lobe,
                 const float *eta, vec3 wo, vec3 wi, rgb light, float samples_a_level, float light_density) {
@@ -56,7 +49,7 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
     float eta[HIGHLIGHT_SPECULARS];
     size_t levels_used = levels->roughness_count;
     for (size_t k = 0; k < levels_used; k++)
-        lobe[k] = lobe_of(levels->roughness[k]);
+        lobe[k] = bsdf_lobe(levels->roughness[k], 1.0f);
     for (size_t m = 0; m < levels->specular_count; m++)
         eta[m] = bsdf_eta(levels->specular[m]);
     for (size_t i = 0; i < samples; i++) {
@@ -74,7 +67,7 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
 }
 
 float highlight_albedo(float roughness, float specular) {
-    struct bsdf lobe = lobe_of(roughness);
+    struct bsdf lobe = bsdf_lobe(roughness, 1.0f);
     float eta = bsdf_eta(specular), sum = 0.0f;
     uint32_t key = sampler_key(KEY_ALBEDO, 0, 0);
     for (uint32_t i = 0; i < ALBEDO_SAMPLES && specular > 0.0f; i++) {

@@ -131,12 +131,6 @@ struct reflected {
     float lobe, wide, density;
 };
 
-static struct bsdf lobe_alone(float roughness, float specular) {
-    struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, specular, 1.0f);
-    b.specular_chance = 1.0f;
-    return b;
-}
-
 static struct reflected reflect(const struct mirror *m, vec3 wi) {
     struct bsdf_value lobe = bsdf_eval(&m->lobe, m->wo, wi), wide = bsdf_eval(&m->wide, m->wo, wi);
     return (struct reflected){lobe.specular, wide.specular, 0.5f * (lobe.pdf + wide.pdf)};
@@ -180,8 +174,8 @@ static void pass_mirror(struct under_way *u, const struct accel_ray *ray, const 
     const struct incident_lobe *lobe = &u->field->lobe[t->segment];
     struct mirror m = {position_at(t, ray, hit), t->normal,
                        .frame[2] = surface_shading(world->mesh, hit->triangle, hit->b1, hit->b2, t->normal),
-                       .lobe = lobe_alone(lobe->roughness, lobe->specular),
-                       .wide = lobe_alone(fmaxf(lobe->roughness, WIDE_ROUGHNESS), lobe->specular)};
+                       .lobe = bsdf_lobe(lobe->roughness, lobe->specular),
+                       .wide = bsdf_lobe(fmaxf(lobe->roughness, WIDE_ROUGHNESS), lobe->specular)};
     vec3_frame(m.frame[2], &m.frame[0], &m.frame[1]);
     m.wo = vec3_to_frame(m.frame, vec3_neg(ray->direction));
     if (!(m.wo.z > LEAST_COSINE))

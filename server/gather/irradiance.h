@@ -1,4 +1,7 @@
-/* irradiance.h -- all light that arrives at a point of the surface (incident.h), as its diffuse lobe needs it. */
+/* irradiance.h -- all light that arrives at a point of the surface, as its diffuse lobe needs it.
+ *
+ * Sums over what rays find (incident.h), which it draws about the normal; what surfaces send out and where rays go on is
+ * decided there, and what is between such points in probes.h. */
 #ifndef UNBAKE_GATHER_IRRADIANCE_H
 #define UNBAKE_GATHER_IRRADIANCE_H
 

@@ -88,9 +88,8 @@ static float send(const struct mirrored *m, const struct surface_point *at, uint
     vec3 wo = vec3_to_frame(frame, sun_toward(m->sun, sampler_pair(key, ray, PAIR_DISC)));
     if (!(wo.z > 0.0f))
         return 0.0f;
-    struct bsdf b = bsdf_make(rgb_gray(0.0f), materials->roughness[segment], materials->specular[segment], wo.z);
+    struct bsdf b = bsdf_lobe(materials->roughness[segment], materials->specular[segment]);
     vec2 u = sampler_pair(key, ray, PAIR_LOBE);
-    b.specular_chance = 1.0f;
     vec3 wi = bsdf_sample(&b, wo, 0.0f, u.x, u.y);
     struct bsdf_value value = bsdf_eval(&b, wo, wi);
     *direction = vec3_from_frame(frame, wi);

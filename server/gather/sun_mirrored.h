@@ -1,9 +1,9 @@
 /* sun_mirrored.h -- sunlight that polished surfaces throw onto others.
  *
- * The light at probes is read off what surfaces were seen to send, and these are taken to send the same in all
- * directions; a polished floor in the sun sends most in one, in which hardly a photograph looks. That light is followed
- * from the sun: rays from each texel that it reaches, by the specular lobe, and what they bring is shared out over the
- * piece of surface that a probe stands for (photons: Jensen 1996, with the probes' blocks for bins). */
+ * Rays from probes go on from polished surfaces (incident.h), but the sun is so small that hardly one would meet it. So
+ * that light is followed from the sun: rays from each polished texel that it reaches, by the specular lobe, and what they
+ * bring is shared out over the piece of surface that a probe stands for (photons: Jensen 1996, with the probes' blocks
+ * for bins). Lamps and sky are left to those other rays. */
 #ifndef UNBAKE_GATHER_SUN_MIRRORED_H
 #define UNBAKE_GATHER_SUN_MIRRORED_H
 

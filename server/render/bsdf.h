@@ -95,6 +95,13 @@ static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specu
     return b;
 }
 
+/* The specular lobe alone: there is no base, and sampling takes nothing else. */
+static inline struct bsdf bsdf_lobe(float roughness, float specular) {
+    struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, specular, 1.0f);
+    b.specular_chance = 1.0f;
+    return b;
+}
+
 /* GGX terms that eval, pdf and derivatives share; h need not be normalised. */
 struct bsdf_ggx {
     float cos_d;  /* wo . h = wi . h */

@@ -1,6 +1,6 @@
 /* Light gathered at a point (incident.h, highlight.h) against the path tracer, which is itself held
  * against an independent renderer: what a white diffuse surface and what the specular lobes send to
- * a viewer, under a lamp and walls that send out a given light. Fixed seeds; the bounds are several
+ * a viewer, under a lamp and walls that send out a given light, or mirror it. Fixed seeds; the bounds are several
  * standard errors of both sides. */
 #include "server/gather/highlight.h"
 #include "server/gather/incident.h"

@@ -9,8 +9,8 @@
 #define EGGSHELL 3
 #define SATIN 4
 
-/* *ceiling: its mean base colour. */
-static void solve(struct scene *scene, float roughness[OBJECTS], float specular[OBJECTS], rgb *ceiling) {
+/* Returns the mean base colour of the ceiling. */
+static rgb solve(struct scene *scene, float roughness[OBJECTS], float specular[OBJECTS]) {
     struct settings s = shell_settings("{\"texture_size\":256,\"iterations\":1,\"report_samples\":1,"
                                        "\"gather_samples\":512}");
     struct shell shell = {.polls_until_stop = -1};
@@ -22,18 +22,18 @@ static void solve(struct scene *scene, float roughness[OBJECTS], float specular[
         printf("object %zu: %.3f %.3f, true %.3f %.3f\n", i, (double)roughness[i], (double)specular[i],
                (double)wall_roughness[i], (double)wall_specular[i]);
     }
-    *ceiling = shell_mean_color(&r, CEILING);
+    rgb ceiling = shell_mean_color(&r, CEILING);
     const cJSON *solved = cJSON_GetObjectItem(r.report, "solve");
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(solved, "measured_one_texel_in")) == 1.0);
     reconstruct_release(&r);
     shell_release(&shell);
     settings_release(&s);
+    return ceiling;
 }
 
 static void test_told(struct scene *scene) {
     float roughness[OBJECTS], specular[OBJECTS];
-    rgb ceiling;
-    solve(scene, roughness, specular, &ceiling);
+    rgb ceiling = solve(scene, roughness, specular);
     /* Were what the floor and the satin wall mirror sent evenly to all sides it would be .777. */
     CHECK_NEAR(rgb_mean(ceiling), rgb_mean(wall_color[CEILING]), 0.012);
     for (size_t i = 0; i < LAMP; i++) {
@@ -49,7 +49,6 @@ static void test_told(struct scene *scene) {
 
 static void test_hardly_told(struct scene *scene) {
     float roughness[OBJECTS], specular[OBJECTS];
-    rgb ceiling;
     for (size_t f = 0; f < scene->photograph_count; f++) {
         for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
             float factor = 1.0f + NOISE * (2.0f * rng_to_float((uint32_t)rng_key(7, f, i)) - 1.0f);
@@ -59,7 +58,7 @@ static void test_hardly_told(struct scene *scene) {
             }
         }
     }
-    solve(scene, roughness, specular, &ceiling);
+    solve(scene, roughness, specular);
     CHECK(roughness[FLOOR] > 0.2f && roughness[FLOOR] < 0.75f && specular[FLOOR] > 0.2f && specular[FLOOR] < 0.45f);
     CHECK(roughness[CEILING] > roughness[FLOOR] && specular[CEILING] < specular[FLOOR]);
 }
