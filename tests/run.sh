@@ -10,16 +10,17 @@ shift
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
 slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
-render/test_calibrate_poses render/test_environment render/test_gloss render/test_held_out_light render/test_short
-render/test_sky_room render/test_sparks_left_out render/test_sun render/test_split api/test_resume api/test_readme
+render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_gloss
+render/test_held_out_light render/test_saturated_light render/test_short render/test_sky_room
+render/test_sparks_left_out render/test_sun render/test_split api/test_resume api/test_readme
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill"
 # The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
 # api/test_webhooks, of a small room, do not tell.
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
 gradient/test_path render/test_calibrate_light render/test_changing_light render/test_detail
-render/test_emission_pattern render/test_emitters render/test_hidden_lamp render/test_saturated_light
-render/test_sky_doubt unit/test_evaluate api/test_metrics api/test_http_faults api/test_client_commands
-chaos/test_clock chaos/test_power_cut chaos/test_disk_faults chaos/test_memory_faults
+render/test_emitters render/test_hidden_lamp render/test_sky_doubt unit/test_evaluate api/test_metrics
+api/test_http_faults api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
+chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 
 # One test: prints its line in one piece and adds its outcome to $outcomes.

@@ -47,7 +47,7 @@ daemon_end TERM
 receive
 daemon_start
 for host in 127.0.0.1 localhost '[::1]' 0.0.0.0; do
-    UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --webhook "http://$host:${hook##*:}/" --watch -q
+    UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --set method=listing1 --webhook "http://$host:${hook##*:}/" --watch -q
 done
 wait_for 60 sh -c "[ \$(grep -c 'an address of a private network' '$work/log') -ge 4 ]"
 equal "$(told | wc -l)" 0 "messages to private addresses"
