@@ -47,17 +47,6 @@ static bool is_light(const struct world *world, const struct world_triangle *t) 
     return world->lights->area_density[t->segment] > 0.0f;
 }
 
-/* What the place of a front sends towards where the ray came from. */
-static rgb sent_back(const struct light_field *field, const struct world_triangle *t, const struct accel_ray *ray,
-                     const struct accel_hit *hit) {
-    rgb mean = rgb_from_half(field->radiance[texel_at(field->world, hit)]);
-    if (!field->lobe)
-        return mean;
-    vec3 shading = surface_shading(field->world->mesh, hit->triangle, hit->b1, hit->b2, t->normal);
-    float cosine = fmaxf(-vec3_dot(shading, ray->direction), 0.0f);
-    return rgb_scale(mean, bsdf_diffuse_towards(field->lobe[t->segment].roughness, cosine));
-}
-
 /* What a ray finds that meets nothing, or a front, and the density of the light sampler there. */
 static rgb find(const struct light_field *field, const struct accel_ray *ray, const struct accel_hit *hit,
                 float *light_pdf) {
@@ -69,7 +58,7 @@ static rgb find(const struct light_field *field, const struct accel_ray *ray, co
     }
     const struct world_triangle *t = &world->triangle[hit->triangle];
     if (!is_light(world, t))
-        return sent_back(field, t, ray, hit);
+        return rgb_from_half(field->radiance[texel_at(world, hit)]);
     *light_pdf = lights_pdf_segment(world->lights, t->segment, hit->distance_m, -vec3_dot(t->normal, ray->direction));
     vec2 at = place_at(world, hit);
     return materials_emission(world->materials, t->segment, at.x, at.y);

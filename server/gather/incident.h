@@ -2,12 +2,11 @@
  *
  * A ray that leaves the point meets another surface, and what that surface sends back was
  * photographed: no path needs to go on, and no material need be known (Wu et al. 2023, Li et
- * al. 2023). Once materials are known, what a surface sends is spread over directions as its diffuse lobe
- * would spread even light; polished ones are read without what they mirror, and the ray goes on from there by the
- * specular lobe, and a light is sampled, for which the lobe is widened. A ray goes on from the back of a surface, too,
- * which is in no photograph (a wall without thickness has one): it has the front's base colour. Light from
- * emitters and from the environment is sampled as such as well; the two ways are combined by the balance
- * heuristic (Veach 1997). */
+ * al. 2023). Surfaces are taken to send the same in all directions, polished ones without what they
+ * mirror: from there the ray goes on by the specular lobe, once it is known, and a light is sampled,
+ * for which the lobe is widened. A ray goes on from the back of a surface, too, which is in no photograph (a wall without thickness has one): it has the front's base
+ * colour. Light from emitters and from the environment is sampled as such as well; the two ways are
+ * combined by the balance heuristic (Veach 1997). */
 #ifndef UNBAKE_GATHER_INCIDENT_H
 #define UNBAKE_GATHER_INCIDENT_H
 
@@ -21,19 +20,16 @@
 
 #define INCIDENT_CHUNK 2048 /* directions at once */
 
-/* How a segment sends more to some sides than to others: the roughness of its diffuse lobe, and that of a specular one
- * by which it mirrors besides; none where specular is 0. */
+/* The specular lobe of a segment; none where specular is 0. */
 struct incident_lobe {
     float roughness, specular;
 };
-#define INCIDENT_EVEN 0.5f /* the roughness at which the diffuse lobe sends about the same to all sides */
 
 /* What light rays find. Emitters show `world->materials->emission`, constant over a segment. */
 struct light_field {
     const struct world *world;        /* borrowed, all */
-    const uint16_t (*radiance)[3];    /* [atlas height][width] half precision: what texels send out in the mean over
-                                       * directions, those that mirror without that */
-    const struct incident_lobe *lobe; /* [segment_count]; NULL: all send the same to all sides */
+    const uint16_t (*radiance)[3];    /* [atlas height][width] half precision: what texels send out */
+    const struct incident_lobe *lobe; /* [segment_count] by which they mirror besides, emitters not; NULL: none does */
     const bool *only_mirrored;        /* [segment_count] black but to those who see them in a mirror; NULL: none */
 };
 

@@ -45,15 +45,23 @@ size_t divide_highlight_samples(double texels_a_pixel) {
     return (size_t)fmin(fmax(samples, SAMPLES_LEAST), SAMPLES_MOST);
 }
 
-static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
-                     struct irradiance *light) {
+/* All but the sun's. */
+static bool light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
+                              struct irradiance *light) {
     const struct reconstruction *r = d->r;
     struct probe_mix mix;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, at))
         return false;
     probes_mix(d->probes, &r->atlas, &r->fused, texel, at, &mix);
     probes_irradiance(d->probes, &mix, light);
-    sun_add_light(&r->sun, r->world.accel, at, light);
+    return true;
+}
+
+static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
+                     struct irradiance *light) {
+    if (!light_without_sun(d, texel, at, light))
+        return false;
+    sun_add_light(&d->r->sun, d->r->world.accel, at, light);
     return true;
 }
 
@@ -287,13 +295,13 @@ static void keep_noise(struct divide *d, const struct color_prior *prior) {
 
 struct sending {
     const struct divide *divide;
-    const float *gloss_albedo; /* [segment_count] of what they send evenly; polished ones: 0 */
+    const float *gloss_albedo; /* [segment_count] */
     const struct divide_sent *sent;
 };
 
-/* What a texel sends out, in the mean over viewers, and without what it mirrors. (What photographs show of it is
- * brighter: they look at floors aslant and at walls towards the light.) As far as they may have told of other surfaces
- * its base colour is what is to be expected there: beside a window a thin frame would else shine like it. */
+/* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors aslant
+ * and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
+ * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_mirrored.h's. */
 static void send_out(const void *user, uint32_t texel) {
     const struct sending *job = user;
     const struct divide *d = job->divide;
@@ -301,14 +309,21 @@ static void send_out(const void *user, uint32_t texel) {
     uint32_t segment = reconstruction_segment(d->r, texel);
     struct surface_point at;
     struct irradiance light;
-    if (d->r->is_emitter[segment] || !light_at(d, texel, &at, &light))
+    if (d->r->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
         return;
+    bool mirrors = job->sent->lobe[segment].specular > 0.0f;
+    rgb evenly = irradiance_sum(&light);
+    sun_add_light(&d->r->sun, d->r->world.accel, &at, &light);
+    if (!mirrors)
+        evenly = irradiance_sum(&light);
     float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
     rgb measured = rgb_clamp(measured_value(m), 0.0f, MOST), expected = texel_color(d->r, texel);
     rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
     rgb white = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
-    rgb gloss = rgb_scale(irradiance_sum(&light), job->gloss_albedo[segment] * (1.0f / BSDF_PI));
-    rgb_to_half(job->sent->radiance[texel], rgb_add(rgb_mul(base, white), gloss));
+    rgb matt = rgb_mul(base, white);
+    rgb all = rgb_mad(matt, job->gloss_albedo[segment] * (1.0f / BSDF_PI), evenly);
+    rgb_to_half(job->sent->all[texel], all);
+    rgb_to_half(job->sent->unmirrored[texel], mirrors ? matt : all);
 }
 
 static void send_all(const struct divide *d, const struct divide_sent *sent) {
@@ -317,8 +332,8 @@ static void send_all(const struct divide *d, const struct divide_sent *sent) {
     for (uint32_t i = 0; i < r->segments.count; i++) {
         float roughness = r->materials.roughness[i], specular = r->materials.specular[i];
         bool mirrors = materials_is_polished(&r->materials, i) && !r->is_emitter[i];
-        gloss_albedo[i] = mirrors ? 0.0f : highlight_albedo(roughness, specular);
-        sent->lobe[i] = (struct incident_lobe){r->is_emitter[i] ? INCIDENT_EVEN : roughness, mirrors ? specular : 0.0f};
+        gloss_albedo[i] = highlight_albedo(roughness, specular);
+        sent->lobe[i] = (struct incident_lobe){roughness, mirrors ? specular : 0.0f};
     }
     each_valid(d, send_out, &(struct sending){d, gloss_albedo, sent});
     mem_free(gloss_albedo);

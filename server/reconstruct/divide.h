@@ -48,10 +48,11 @@ bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
 /* The same for all texels that were measured, to white, [height][width]; 0 where it is too dark to divide by. */
 void divide_white_all(const struct divide *d, uint16_t (*white)[3]);
 
-/* What texels send out, as a light_field has it. */
+/* What texels send out, half precision: in the mean over viewers; and, as a light_field has it, without what polished
+ * segments mirror, and the lobes by which they do. */
 struct divide_sent {
-    uint16_t (*radiance)[3];    /* [height][width] half precision */
-    struct incident_lobe *lobe; /* [segment_count] */
+    uint16_t (*all)[3], (*unmirrored)[3]; /* [height][width] */
+    struct incident_lobe *lobe;           /* [segment_count] */
 };
 
 /* After all texels: writes r->materials.base_color, and to `sent` what texels of all but emitters send out. */

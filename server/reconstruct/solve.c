@@ -53,7 +53,8 @@ struct solve {
     const struct views *views;
     const struct reconstruct_hooks *hooks;
     struct divide_sent sent;   /* by the last pass; at first what was fused; owned */
-    struct light_field field;  /* of that; all is sent evenly until gloss is known */
+    struct light_field field;  /* for light: rays that are mirrored go on */
+    struct light_field evenly; /* for highlights: all is sent alike in all directions */
     struct probes probes;
     struct divide divide;
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
@@ -267,15 +268,18 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
-    s->sent = (struct divide_sent){mem_calloc_large(texels, sizeof *s->sent.radiance),
+    s->sent = (struct divide_sent){mem_calloc_large(texels, sizeof *s->sent.all),
+                                   mem_calloc_large(texels, sizeof *s->sent.unmirrored),
                                    mem_calloc(r->segments.count, sizeof *s->sent.lobe)};
-    memcpy(s->sent.radiance, r->fused.radiance, texels * sizeof *s->sent.radiance);
+    memcpy(s->sent.all, r->fused.radiance, texels * sizeof *s->sent.all);
+    memcpy(s->sent.unmirrored, r->fused.radiance, texels * sizeof *s->sent.unmirrored);
     s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
-    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.radiance, NULL, NULL};
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.unmirrored, s->sent.lobe, NULL};
+    s->evenly = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.all, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_a_pixel = detail_texels_a_pixel(r, views);
     s->divide = (struct divide){
-        .r = r, .views = views, .probes = &s->probes, .field = &s->field, .noise = &r->noise,
+        .r = r, .views = views, .probes = &s->probes, .field = &s->evenly, .noise = &r->noise,
         .denoises = settings_bool(r->settings, "denoise"),
         .highlight_samples = divide_highlight_samples(s->texels_a_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
@@ -296,7 +300,8 @@ static void solve_release(struct solve *s) {
     probes_release(&s->probes);
     mem_free(s->patterned);
     mem_free(s->sent.lobe);
-    mem_free(s->sent.radiance);
+    mem_free(s->sent.unmirrored);
+    mem_free(s->sent.all);
 }
 
 /* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
@@ -323,7 +328,7 @@ static bool solve_pass(struct solve *s, int pass) {
         return false;
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
-        gloss_fit(s->r, s->views, &s->probes, &s->field);
+        gloss_fit(s->r, s->views, &s->probes, &s->evenly);
         s->divide.stride = 1;
         sun_refit(&s->divide);
         s->mirrored_share = sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
@@ -335,7 +340,6 @@ static bool solve_pass(struct solve *s, int pass) {
     if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
         return false;
     divide_finish(&s->divide, &s->sent);
-    s->field.lobe = pass == PASS_LIGHT ? NULL : s->sent.lobe; /* gloss is known from the next on */
     return true;
 }
 

@@ -133,16 +133,6 @@ static inline float bsdf_diffuse(float roughness, float cos_d, float cos_o, floa
     return cos_i * (1.0f / BSDF_PI) * (lambert + retro);
 }
 
-/* What the diffuse lobe sends towards a direction of light that arrives evenly from everywhere, over its mean over
- * directions by the cosine: a smooth surface sends less aslant, a rough one more. Within .02. */
-static inline float bsdf_diffuse_towards(float roughness, float cos_o) {
-    const float fi = 1.0f / 21.0f; /* bsdf_schlick in the mean over what arrives */
-    float fo = bsdf_schlick(cos_o), lambert = (1.0f - 0.5f * fo) * (1.0f - 0.5f * fi);
-    /* cos_d^2 is 1/2 + cos_o/3 in the mean over what arrives, 1/2 + cos_o/8 over what of it is weighted by fi. */
-    float retro = roughness * (fo * (1.0f + cos_o * (2.0f / 3.0f)) + fi * (1.0f + cos_o * 0.25f));
-    return (lambert + retro) / ((1.0f - 0.5f * fi) * (1.0f - 0.5f * fi) + roughness * (1.0f / 9.0f));
-}
-
 /* Zero for wi at or below the horizon. */
 static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi) {
     float cos_i = bsdf_max(wi.z, 1e-12f); /* keeps the arithmetic finite below the horizon */
