@@ -11,21 +11,26 @@
 
 #define WAIT_MAX_SEC 300
 
-/* Fills *what from the query and the fields, up to where it begins: ?after=, Last-Event-ID or the
- * newest event; *is_resumed when the client named a place. NULL, or the refusal. */
+/* Fills *what from the query and the fields, up to where it begins: Last-Event-ID, ?after= or the
+ * newest event; *is_resumed when the client named a place. NULL, or the refusal.
+ * An EventSource reconnects with the URL that it was made with and adds Last-Event-ID, so that one is newer. */
 static struct response *read_request(struct api *api, const struct request *r, struct subscription *what,
                                      bool *is_resumed) {
     const char *accept = request_field(r, "Accept"), *follow = target_query(&r->target, "follow");
     const char *query = target_query(&r->target, "after"), *wait = target_query(&r->target, "wait");
-    const char *place = query ? query : request_field(r, "Last-Event-ID");
+    const char *last_id = request_field(r, "Last-Event-ID");
+    bool has_last_id = last_id && *last_id; /* an empty one is no id (HTML, 9.2.3) */
+    const char *place = has_last_id ? last_id : query;
     int64_t follows = 1, wait_sec = 0, newest = 0;
     struct error err;
     if (follow && !field_number(follow, 0, 1, &follows))
         return problem(r, 400, "follow must be 0 or 1");
     if (wait && !field_number(wait, 1, WAIT_MAX_SEC, &wait_sec))
         return problem(r, 400, "wait must be a number of seconds from 1 to %d", WAIT_MAX_SEC);
-    if (place && !field_number(place, 0, INT64_MAX, &what->after))
-        return problem(r, 400, "%s is not the id of an event", query ? "after" : "Last-Event-ID");
+    if (query && !field_number(query, 0, INT64_MAX, &what->after))
+        return problem(r, 400, "after is not the id of an event");
+    if (has_last_id && !field_number(last_id, 0, INT64_MAX, &what->after))
+        return problem(r, 400, "Last-Event-ID is not the id of an event");
     if (!place && store_event_last(api->store, what->job_id, &what->after, &err) != STATUS_OK)
         return problem_from(r, &err);
     if (place && store_event_newest(api->store, &newest, &err) != STATUS_OK)

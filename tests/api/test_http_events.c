@@ -216,6 +216,88 @@ static void check_reconnects(struct rig *rig) {
     CHECK_THAT(metrics == STORM_EVENTS, "%d of %d events, %d connections", metrics, STORM_EVENTS, connections);
 }
 
+/* What an EventSource keeps over its connections to one URL (HTML, 9.2). */
+struct event_source {
+    const char *path;
+    char last_id[24]; /* "": none yet */
+    int64_t newest;   /* id of the last event that was not a snapshot */
+    int events, repeated, connections;
+};
+
+/* One connection, read to its end or cut after `most` bytes; its status. */
+static int source_connect(struct rig *rig, struct event_source *source, size_t most) {
+    char fields[96] = "Accept: text/event-stream\r\n", chunk[512];
+    struct buf reply;
+    size_t used = strlen(fields);
+    if (*source->last_id)
+        snprintf(fields + used, sizeof fields - used, "Last-Event-ID: %s\r\n", source->last_id);
+    int fd = rig_connect(rig);
+    char *text = mem_printf("GET %s HTTP/1.1\r\nHost: localhost\r\n%s\r\n", source->path, fields);
+    rig_send(fd, text, strlen(text));
+    mem_free(text);
+    buf_init(&reply, 1 << 24);
+    rig_receive(fd, &reply, "\r\n\r\n");
+    for (ssize_t got = 1; rig_status(&reply) == 200 && got > 0 && reply.length < most &&
+                          !strstr(buf_text(&reply), "\r\n0\r\n\r\n");) {
+        got = recv(fd, chunk, sizeof chunk, 0);
+        buf_append(&reply, chunk, got > 0 ? (size_t)got : 0);
+    }
+    close(fd);
+    source->connections++;
+    text = unchunk(&reply);
+    for (char *at = text, *end; (at = strstr(at, "id: ")) && (end = strstr(at, "\n\n")); at = end) {
+        int64_t id = strtoll(at + 4, NULL, 10);
+        snprintf(source->last_id, sizeof source->last_id, "%lld", (long long)id);
+        *end++ = '\0';
+        if (strstr(at, "\"snapshot\":true"))
+            continue;
+        source->events++;
+        source->repeated += id <= source->newest;
+        source->newest = id > source->newest ? id : source->newest;
+    }
+    mem_free(text);
+    int status = rig_status(&reply);
+    buf_release(&reply);
+    return status;
+}
+
+/* A page asks for everything with ?after=0, once: its EventSource comes back with the same URL and what
+ * it saw last, after each cut and after the end, where 204 tells it to stay away. */
+static void check_event_source(struct rig *rig) {
+    struct error err;
+    int64_t job = rig_job(rig);
+    int attempt = rig_run_job(rig, job);
+    for (int i = 0; i < 100; i++)
+        add_metric(rig, job, attempt, i);
+    rig_must(store_job_succeed(rig->store, job, attempt, &err), &err, "store_job_succeed");
+    char path[64], fields[64];
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events?after=0", (long long)job);
+    struct event_source source = {.path = path};
+    int status = 200;
+    while (status == 200 && source.connections < 100)
+        status = source_connect(rig, &source, (size_t)3000 + 500 * (size_t)source.connections);
+    CHECK_THAT(status == 204, "still %d after %d connections", status, source.connections);
+    /* queued, running, the metrics, succeeded */
+    CHECK_THAT(source.events == 103 && source.repeated == 0, "%d events, %d of them again", source.events,
+               source.repeated);
+
+    /* Of all jobs, where nothing ends. */
+    struct event_source all = {.path = "/v1/events?after=0&follow=0"};
+    for (int i = 0; i < 3; i++)
+        CHECK(source_connect(rig, &all, SIZE_MAX) == 200);
+    CHECK_THAT(all.events >= 103 && all.repeated == 0, "%d events, %d of them again", all.events, all.repeated);
+
+    /* An empty one is none; both must be well formed. */
+    struct buf reply;
+    snprintf(fields, sizeof fields, "Last-Event-ID: %lld\r\n", (long long)source.newest);
+    CHECK(rig_get(rig, path, fields, &reply) == 204);
+    buf_release(&reply);
+    CHECK(rig_get(rig, path, "Last-Event-ID:\r\n", &reply) == 200 && strstr(buf_text(&reply), "\"step\":0,"));
+    buf_release(&reply);
+    CHECK(rig_get(rig, "/v1/events?after=x", fields, &reply) == 400);
+    buf_release(&reply);
+}
+
 /* Streams that the clients have closed count until the daemon has seen that. */
 static void await_no_streams(const struct rig *rig) {
     for (bool is_none = false; !is_none; usleep(5000)) {
@@ -283,6 +365,7 @@ int main(void) {
     check_past(&rig);
     check_ndjson(&rig);
     check_reconnects(&rig);
+    check_event_source(&rig);
     check_many(&rig);
     return check_result();
 }
