@@ -3,7 +3,7 @@
  * Pixels are float, interleaved, top row first. Readers accept what an uploaded bundle may
  * hold, so every size is capped (IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS) before memory is asked
  * for, and damage is STATUS_INPUT with a sentence, never a crash. Thread-safe: no shared
- * state. exr.c is the only include of OpenEXRCore, png.c of libpng, jpeg.c of libjpeg. */
+ * state. exr_*.c are the only include of OpenEXRCore, png.c of libpng, jpeg.c of libjpeg. */
 #ifndef UNBAKE_COMMON_IMAGE_H
 #define UNBAKE_COMMON_IMAGE_H
 

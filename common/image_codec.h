@@ -1,4 +1,4 @@
-/* image_codec.h -- what the codecs (exr.c, hdr.c, jpeg.c, png.c) share with image_read.c, which
+/* image_codec.h -- what the codecs (exr_*.c, hdr.c, jpeg.c, png.c) share with image_read.c, which
  * chooses among them; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded

@@ -1,130 +1,26 @@
-/* exr.c -- OpenEXR pictures by the C library OpenEXRCore (openexr.com/en/latest/OpenEXRCoreAPI).
+/* exr_read.c -- OpenEXR pictures by the C library OpenEXRCore (openexr.com/en/latest/OpenEXRCoreAPI).
  *
  * Invariants:
  *  1. A file's sizes are checked against image.h's limits and against the file's own length
  *     before pixels are asked for: a chunk takes at least 8 bytes of table and compresses at
  *     most MAX_RATIO : 1, so a small file cannot ask for a large picture.
  *  2. Every chunk lies inside the data window (checked), so the library writes only into our
- *     pixels.
- *  3. Written bytes depend on the pixels alone: no time, no host, no thread order. */
-#include <errno.h>
-#include <fcntl.h>
+ *     pixels. */
 #include <limits.h>
-#include <openexr.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-#include "common/image_codec.h"
+#include "common/exr_stream.h"
+#include "common/exr_unzip.h"
 #include "common/mem.h"
 
-/* What the library may ask for at once; a chunk of the largest picture stays below. */
-#define MAX_ALLOCATION ((size_t)2 << 30)
 /* Deflate reaches 1032 : 1, after PXR24 has dropped a byte of four. */
 #define MAX_RATIO 1536
-
-/* What the library's callbacks reach through the context. */
-struct stream {
-    struct image_source *source; /* reading */
-    int fd;                      /* writing */
-    int io_error;                /* errno of the first refused write */
-    char message[256];           /* reading: the library's first complaint */
-};
-
-static void *limited_alloc(size_t bytes) {
-    return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL;
-}
-
-/* Copies text from the file, so that it fits into a message: whatever is not ASCII is "?". */
-static const char *printable(const char *text, char *out, size_t size) {
-    size_t i = 0;
-    for (; text[i] && i < size - 1; i++)
-        out[i] = text[i] >= ' ' && text[i] <= '~' ? text[i] : '?';
-    out[i] = '\0';
-    return out;
-}
-
-static void note_error(exr_const_context_t context, exr_result_t code, const char *message) {
-    (void)code;
-    void *user = NULL;
-    exr_get_user_data(context, &user);
-    struct stream *stream = user;
-    if (stream && stream->message[0] == '\0' && message)
-        printable(message, stream->message, sizeof stream->message);
-}
-
-/* While it writes, the library holds its lock when it reports, and asking it for the stream
- * would wait for that lock for ever. */
-static void drop_error(exr_const_context_t context, exr_result_t code, const char *message) {
-    (void)context;
-    (void)code;
-    (void)message;
-}
-
-static int64_t stream_read(exr_const_context_t context, void *user, void *buffer, uint64_t size,
-                           uint64_t offset, exr_stream_error_func_ptr_t report) {
-    (void)context;
-    (void)report;
-    struct stream *stream = user;
-    return (int64_t)image_source_read(stream->source, offset, buffer, (size_t)size);
-}
-
-static int64_t stream_size(exr_const_context_t context, void *user) {
-    (void)context;
-    struct stream *stream = user;
-    return (int64_t)stream->source->size;
-}
-
-static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer,
-                            uint64_t size, uint64_t offset, exr_stream_error_func_ptr_t report) {
-    (void)context;
-    (void)report;
-    struct stream *stream = user;
-    uint64_t done = 0;
-    while (done < size) {
-        ssize_t wrote = pwrite(stream->fd, (const char *)buffer + done, (size_t)(size - done),
-                               (off_t)(offset + done));
-        if (wrote < 0 && errno == EINTR)
-            continue;
-        if (wrote <= 0) {
-            stream->io_error = wrote < 0 ? errno : EIO;
-            return -1;
-        }
-        done += (uint64_t)wrote;
-    }
-    return (int64_t)done;
-}
-
-static exr_context_initializer_t initializer(struct stream *stream,
-                                             exr_error_handler_cb_t on_error) {
-    exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    init.error_handler_fn = on_error;
-    init.alloc_fn = limited_alloc;
-    init.free_fn = mem_free;
-    init.user_data = stream;
-    init.read_fn = stream_read;
-    init.size_fn = stream_size;
-    init.write_fn = stream_write;
-    init.max_image_width = init.max_image_height = IMAGE_MAX_SIDE;
-    init.max_tile_width = init.max_tile_height = IMAGE_MAX_SIDE;
-    init.zip_level = 4; /* twice as fast as zlib's default for 0 to 3 % more bytes */
-    /* A table of chunks that was never written means a writer that died: refuse the file
-     * rather than guess. */
-    init.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
-    return init;
-}
-
-static enum status refuse(const struct stream *stream, exr_result_t code, struct error *err) {
-    return error_set(err, STATUS_INPUT, "%s: damaged EXR: %s", stream->source->name,
-                     stream->message[0] ? stream->message : exr_get_default_error_message(code));
-}
-
-/* ---------------------------------------------------------------------------- reading */
 
 /* One file being read. */
 struct reader {
     exr_context_t context;
-    struct stream *stream;
+    struct exr_stream *stream;
     int part;
     exr_storage_t storage;
     exr_compression_t compression;
@@ -166,7 +62,7 @@ static enum status choose_part(struct reader *r, struct error *err) {
             break;
     }
     if (code != EXR_ERR_SUCCESS)
-        return refuse(r->stream, code, err);
+        return exr_stream_refuse(r->stream, code, err);
     if (r->part < 0)
         return error_set(err, STATUS_INPUT,
                          "%s: the EXR holds only deep data; a flat picture was expected",
@@ -185,7 +81,7 @@ static enum status check_channels(const struct reader *r, struct error *err) {
     for (int i = 0; i < list->num_channels; i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[i];
         char name[sizeof ((struct image *)NULL)->channel[0]];
-        printable(entry->name.str, name, sizeof name);
+        exr_stream_printable(entry->name.str, name, sizeof name);
         if (entry->x_sampling != 1 || entry->y_sampling != 1)
             return error_set(err, STATUS_INPUT,
                              "%s: channel %s is subsampled %d x %d (luminance/chroma EXR); only "
@@ -247,7 +143,7 @@ static enum status check_plausible(const struct reader *r, struct error *err) {
     int32_t chunk_count = 0;
     exr_result_t code = exr_get_chunk_count(r->context, r->part, &chunk_count);
     if (code != EXR_ERR_SUCCESS)
-        return refuse(r->stream, code, err);
+        return exr_stream_refuse(r->stream, code, err);
     uint64_t pixel_bytes = 0;
     for (int i = 0; i < r->list->num_channels; i++)
         pixel_bytes += r->list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
@@ -273,7 +169,7 @@ static enum status read_header(struct reader *r, struct image *image, struct ima
     if (code == EXR_ERR_SUCCESS)
         code = exr_get_compression(r->context, r->part, &r->compression);
     if (code != EXR_ERR_SUCCESS)
-        return refuse(r->stream, code, err);
+        return exr_stream_refuse(r->stream, code, err);
     status = check_channels(r, err);
     if (status != STATUS_OK)
         return status;
@@ -307,6 +203,7 @@ struct destination {
     const int *target;                /* [channel_count] channel of the picture */
     size_t pixel_stride, line_stride; /* floats */
     float *corner;
+    bool is_zip;
 };
 
 static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t stride, float *to) {
@@ -324,8 +221,20 @@ static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t 
         }
 }
 
+/* A chunk holds line after line, in each the channels' rows one after the other. */
+static void unpack_lines(const exr_decode_pipeline_t *pipeline, const struct destination *d, const uint8_t *from) {
+    size_t width = (size_t)pipeline->chunk.width;
+    for (int y = 0; y < pipeline->chunk.height; y++)
+        for (int i = 0; i < pipeline->channel_count; i++) {
+            const exr_coding_channel_info_t *channel = &pipeline->channels[i];
+            unpack_row(from, channel->data_type, width, d->pixel_stride,
+                       d->corner + (size_t)y * d->line_stride + d->target[i]);
+            from += width * (size_t)channel->bytes_per_element;
+        }
+}
+
 /* In place of the library's own unpacking, which in 3.1.5 mixes up the channels of interleaved
- * RGBA halves. A chunk holds line after line, in each the channels' rows one after the other. */
+ * RGBA halves. */
 static exr_result_t unpack(exr_decode_pipeline_t *pipeline) {
     const struct destination *d = pipeline->decoding_user_data;
     const uint8_t *from = pipeline->unpacked_buffer;
@@ -334,13 +243,13 @@ static exr_result_t unpack(exr_decode_pipeline_t *pipeline) {
         line_bytes += width * (size_t)pipeline->channels[i].bytes_per_element;
     if (!from || line_bytes * (size_t)pipeline->chunk.height != pipeline->chunk.unpacked_size)
         return EXR_ERR_CORRUPT_CHUNK;
-    for (int y = 0; y < pipeline->chunk.height; y++)
-        for (int i = 0; i < pipeline->channel_count; i++) {
-            const exr_coding_channel_info_t *channel = &pipeline->channels[i];
-            unpack_row(from, channel->data_type, width, d->pixel_stride,
-                       d->corner + (size_t)y * d->line_stride + d->target[i]);
-            from += width * (size_t)channel->bytes_per_element;
-        }
+    uint64_t size = pipeline->chunk.unpacked_size;
+    bool is_raw = pipeline->chunk.packed_size == size;
+    uint8_t *unzipped = d->is_zip && is_raw ? mem_alloc((size_t)size) : NULL;
+    if (unzipped && exr_unzip(from, (size_t)size, unzipped))
+        from = unzipped;
+    unpack_lines(pipeline, d, from);
+    mem_free(unzipped);
     return EXR_ERR_SUCCESS;
 }
 
@@ -367,7 +276,9 @@ static exr_result_t decode_chunk(const struct reader *r, exr_decode_pipeline_t *
     struct destination destination = {.target = r->target,
                                       .pixel_stride = stride,
                                       .line_stride = line_stride,
-                                      .corner = image->pixel + y * line_stride + x * stride};
+                                      .corner = image->pixel + y * line_stride + x * stride,
+                                      .is_zip = r->compression == EXR_COMPRESSION_ZIP ||
+                                                r->compression == EXR_COMPRESSION_ZIPS};
     pipeline->decoding_user_data = &destination;
     pipeline->unpack_and_convert_fn = unpack;
     return exr_decoding_run(r->context, r->part, pipeline);
@@ -435,7 +346,7 @@ static enum status decode(const struct reader *r, struct image *image, struct er
                                                         : decode_scanlines(r, &pipeline, image);
     exr_decoding_destroy(r->context, &pipeline);
     if (code != EXR_ERR_SUCCESS)
-        return refuse(r->stream, code, err);
+        return exr_stream_refuse(r->stream, code, err);
     if (r->grey >= 0)
         copy_grey(image);
     return STATUS_OK;
@@ -458,110 +369,15 @@ static enum status read_pixels(const struct reader *r, struct image *image, stru
 
 enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
-    struct stream stream = {.source = source, .fd = -1};
+    struct exr_stream stream = {.source = source, .fd = -1};
     struct reader r = {.stream = &stream};
-    exr_context_initializer_t init = initializer(&stream, note_error);
+    exr_context_initializer_t init = exr_stream_reader(&stream);
     exr_result_t code = exr_start_read(&r.context, source->name, &init);
     if (code != EXR_ERR_SUCCESS)
-        return refuse(&stream, code, err);
+        return exr_stream_refuse(&stream, code, err);
     enum status status = read_header(&r, image, info, err);
     if (status == STATUS_OK && !probe)
         status = read_pixels(&r, image, err);
     exr_finish(&r.context);
-    return status;
-}
-
-/* ---------------------------------------------------------------------------- writing */
-
-enum { TILE_SIDE = 64 };
-
-static exr_result_t write_header(exr_context_t context, const struct image *image,
-                                 enum image_exr_type type, bool tiled) {
-    int part = 0;
-    exr_result_t code = exr_add_part(context, NULL,
-                                     tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
-    if (code == EXR_ERR_SUCCESS)
-        code = exr_initialize_required_attr_simple(context, part, (int32_t)image->width,
-                                                   (int32_t)image->height, EXR_COMPRESSION_ZIP);
-    if (code == EXR_ERR_SUCCESS && tiled)
-        code = exr_set_tile_descriptor(context, part, TILE_SIDE, TILE_SIDE, EXR_TILE_ONE_LEVEL,
-                                       EXR_TILE_ROUND_DOWN);
-    for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
-        code = exr_add_channel(context, part, image->channel[c],
-                               type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
-                               EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
-    return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
-}
-
-static exr_result_t encode_chunk(exr_context_t context, exr_encode_pipeline_t *pipeline,
-                                 const exr_chunk_info_t *chunk, uint32_t x, uint32_t y,
-                                 const struct image *image) {
-    bool first = pipeline->channels == NULL;
-    exr_result_t code = first ? exr_encoding_initialize(context, 0, chunk, pipeline)
-                              : exr_encoding_update(context, 0, chunk, pipeline);
-    if (code != EXR_ERR_SUCCESS)
-        return code;
-    size_t stride = image->channel_count * sizeof(float);
-    const float *corner = image->pixel + ((size_t)y * image->width + x) * image->channel_count;
-    for (int i = 0; i < pipeline->channel_count; i++) {
-        exr_coding_channel_info_t *channel = &pipeline->channels[i];
-        int from = image_channel(image, channel->channel_name);
-        channel->encode_from_ptr = (const uint8_t *)(corner + from);
-        channel->user_bytes_per_element = sizeof(float);
-        channel->user_data_type = EXR_PIXEL_FLOAT;
-        channel->user_pixel_stride = (int32_t)stride;
-        channel->user_line_stride = (int32_t)(stride * image->width);
-    }
-    if (first)
-        code = exr_encoding_choose_default_routines(context, 0, pipeline);
-    return code == EXR_ERR_SUCCESS ? exr_encoding_run(context, 0, pipeline) : code;
-}
-
-static exr_result_t write_chunks(exr_context_t context, const struct image *image, bool tiled) {
-    exr_encode_pipeline_t pipeline = EXR_ENCODE_PIPELINE_INITIALIZER;
-    int32_t lines = TILE_SIDE;
-    exr_result_t code = EXR_ERR_SUCCESS;
-    if (!tiled)
-        code = exr_get_scanlines_per_chunk(context, 0, &lines);
-    uint32_t step_x = tiled ? TILE_SIDE : image->width, step_y = (uint32_t)lines;
-    for (uint32_t y = 0; code == EXR_ERR_SUCCESS && y < image->height; y += step_y)
-        for (uint32_t x = 0; code == EXR_ERR_SUCCESS && x < image->width; x += step_x) {
-            exr_chunk_info_t chunk;
-            if (tiled)
-                code = exr_write_tile_chunk_info(context, 0, (int)(x / TILE_SIDE),
-                                                 (int)(y / TILE_SIDE), 0, 0, &chunk);
-            else
-                code = exr_write_scanline_chunk_info(context, 0, (int)y, &chunk);
-            if (code == EXR_ERR_SUCCESS)
-                code = encode_chunk(context, &pipeline, &chunk, x, y, image);
-        }
-    exr_encoding_destroy(context, &pipeline);
-    return code;
-}
-
-enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
-                            bool tiled, struct error *err) {
-    struct stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640)};
-    if (stream.fd < 0)
-        return error_set_errno(err, errno, "cannot create %s", path);
-    exr_context_initializer_t init = initializer(&stream, drop_error);
-    exr_context_t context;
-    exr_result_t code = exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, &init);
-    if (code == EXR_ERR_SUCCESS) {
-        code = write_header(context, image, type, tiled);
-        if (code == EXR_ERR_SUCCESS)
-            code = write_chunks(context, image, tiled);
-        exr_result_t finish = exr_finish(&context); /* writes the table of chunks */
-        if (code == EXR_ERR_SUCCESS)
-            code = finish;
-    }
-    enum status status = STATUS_OK;
-    if (stream.io_error)
-        status = error_set_errno(err, stream.io_error, "cannot write %s", path);
-    else if (code != EXR_ERR_SUCCESS)
-        status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path,
-                           exr_get_default_error_message(code));
-    if (close(stream.fd) != 0 && status == STATUS_OK)
-        status = error_set_errno(err, errno, "cannot close %s", path);
     return status;
 }

@@ -1,0 +1,28 @@
+/* exr_stream.h -- how OpenEXRCore reaches files and memory, for exr_read.c, exr_write.c and exr_check.c; private to them. */
+#ifndef UNBAKE_COMMON_EXR_STREAM_H
+#define UNBAKE_COMMON_EXR_STREAM_H
+
+#include <openexr.h>
+
+#include "common/image_codec.h"
+
+/* What the library's callbacks reach through the context. */
+struct exr_stream {
+    struct image_source *source; /* reading */
+    int fd;                      /* writing */
+    int io_error;                /* errno of the first refused write */
+    char message[256];           /* reading: the library's first complaint */
+};
+
+/* Copies text from the file, so that it fits into a message: whatever is not ASCII is "?". */
+const char *exr_stream_printable(const char *text, char *out, size_t size);
+
+/* For exr_start_read of stream->source. */
+exr_context_initializer_t exr_stream_reader(struct exr_stream *stream);
+/* For exr_start_write to stream->fd. */
+exr_context_initializer_t exr_stream_writer(struct exr_stream *stream);
+
+/* STATUS_INPUT with what the library has to complain of. */
+enum status exr_stream_refuse(const struct exr_stream *stream, exr_result_t code, struct error *err);
+
+#endif
