@@ -9,23 +9,25 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 
-/* "64 to 16384 texels", "auto|given", "true or false" */
-static void print_range(struct table *t, size_t column, const cJSON *setting) {
+void setting_values(struct buf *out, const cJSON *setting) {
     const char *type = member_text(setting, "type"), *unit = member_text(setting, "unit");
     const cJSON *choices = member_items(setting, "choices"), *choice;
-    struct buf text;
-    buf_init(&text, 4096);
     if (choices)
         cJSON_ArrayForEach(choice, choices)
-            buf_printf(&text, "%s%s", text.length ? ", " : "",
+            buf_printf(out, "%s%s", choice == choices->child ? "" : ", ",
                        cJSON_IsString(choice) ? choice->valuestring : "");
     else if (cJSON_HasObjectItem(setting, "minimum"))
-        buf_printf(&text, "%.16g to %.16g%s%s", member_number(setting, "minimum", 0.0),
+        buf_printf(out, "%.16g to %.16g%s%s", member_number(setting, "minimum", 0.0),
                    member_number(setting, "maximum", 0.0), *unit ? " " : "", unit);
     else
-        buf_puts(&text, strcmp(type, "bool") == 0 ? "true, false" : type);
-    table_set(t, column, COLOUR_NONE, "%s", buf_text(&text));
-    buf_release(&text);
+        buf_puts(out, strcmp(type, "bool") == 0 ? "true, false" : type);
+}
+
+void setting_default(struct buf *out, const cJSON *setting) {
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(setting, "default");
+    char *text = cJSON_IsString(value) ? mem_strdup(value->valuestring) : json_text(value);
+    buf_puts(out, text);
+    mem_free(text);
 }
 
 static void print_settings(struct client *c, const cJSON *items) {
@@ -34,14 +36,18 @@ static void print_settings(struct client *c, const cJSON *items) {
     const cJSON *setting;
     table_init(&t, 4, headings);
     cJSON_ArrayForEach(setting, items) {
-        const cJSON *value = cJSON_GetObjectItemCaseSensitive(setting, "default");
-        char *text = cJSON_IsString(value) ? mem_strdup(value->valuestring) : json_text(value);
+        struct buf values, initial;
+        buf_init(&values, 4096);
+        buf_init(&initial, 4096);
+        setting_values(&values, setting);
+        setting_default(&initial, setting);
         table_row(&t);
         table_set(&t, 0, COLOUR_NONE, "%s", member_text(setting, "name"));
-        table_set(&t, 1, COLOUR_NONE, "%s", text);
-        print_range(&t, 2, setting);
+        table_set(&t, 1, COLOUR_NONE, "%s", buf_text(&initial));
+        table_set(&t, 2, COLOUR_NONE, "%s", buf_text(&values));
         table_set(&t, 3, COLOUR_NONE, "%s", member_text(setting, "help"));
-        mem_free(text);
+        buf_release(&values);
+        buf_release(&initial);
     }
     table_print(&t, &c->out);
     table_release(&t);

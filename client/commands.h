@@ -56,6 +56,10 @@ int logout_run(struct client *c, const struct options *o);
 int manual_run(struct client *c, const struct options *o);
 
 /* about.c */
+/* Appends what a setting, as settings_describe has it, may be: "64 to 16384 texels", "auto, given", "true, false"; and
+ * its default. */
+void setting_values(struct buf *out, const cJSON *setting);
+void setting_default(struct buf *out, const cJSON *setting);
 int settings_run(struct client *c, const struct options *o);
 int version_run(struct client *c, const struct options *o);
 

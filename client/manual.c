@@ -18,6 +18,22 @@ static void option_list(const struct option *option) {
     }
 }
 
+static void setting_list(void) {
+    cJSON *settings = settings_describe();
+    const cJSON *setting;
+    cJSON_ArrayForEach(setting, settings) {
+        struct buf text;
+        buf_init(&text, 8192);
+        buf_printf(&text, "%s. Values: ", member_text(setting, "help"));
+        setting_values(&text, setting);
+        buf_puts(&text, ". Default: ");
+        setting_default(&text, setting);
+        manual_item(stdout, member_text(setting, "name"), NULL, buf_text(&text));
+        buf_release(&text);
+    }
+    cJSON_Delete(settings);
+}
+
 static void page_1(void) {
     size_t count;
     const struct command *table = command_table(&count);
@@ -38,6 +54,9 @@ static void page_1(void) {
         option_list(table[i].options);
         manual_example(stdout, table[i].examples);
     }
+    manual_section(stdout, "SETTINGS");
+    manual_text(stdout, "What `submit --set NAME=VALUE` takes. `unbake settings` asks the server for its own.\n");
+    setting_list();
     manual_section(stdout, "EXIT STATUS");
     for (size_t i = 0; command_exit_statuses[i].meaning; i++) {
         char status[12];

@@ -1,50 +1,164 @@
 #!/bin/bash
-# README.md against the programs: commands, settings with their defaults, options of the daemon,
-# exit statuses, and the files that it names.
-build=${1:-build}
-failures=0
-fail() {
-    echo "README.md: $*"
-    failures=$((failures + 1))
+# The documents (README.md and those of the folders) against the tree and the programs:
+#
+# - links between documents, files, functions (file.c:function), targets of make, commands and options that they
+#   name are there;
+# - README.md's tables of settings, options and exit statuses agree with the tables in the programs; the manual
+#   pages have all of them;
+# - every block that is marked ```sh is run, in a folder of its own, with a small room and small textures.
+set -u
+# shellcheck source=tests/api/lib.sh
+. tests/api/lib.sh "$@"
+build=$(realpath "$build")
+document=README.md
+say() { fail "$document: $*"; }
+
+documents=$(find . -name '*.md' -not -path './build/*' -not -path './.git/*' | sed 's|^\./||' | sort)
+find Makefile client common config deploy server tests -type f >"$work/tree"
+
+# code: what stands in backquotes and in blocks, a line each.
+code() {
+    awk '/^```/ { block = !block; next }
+         block { print; next }
+         { n = split($0, part, "`"); for (i = 2; i <= n; i += 2) print part[i] }' "$document"
 }
-present() { grep -qF -- "$1" README.md || fail "there is no line with: $1"; }
 
-while read -r name _; do
-    present "| \`$name"
-    for option in $("$build/unbake" "$name" --help | sed -n 's/^ *\(-., \)\?--\([a-z-]*\).*/\2/p'); do
-        present "\`--$option"
+# --- links; an anchor is the heading in lower case, blanks as hyphens ---
+check_links() {
+    local link file anchor
+    for link in $(grep -o '](\([^)]*\))' "$document" | sed 's/^](//; s/)$//' | grep -v '^https\?:'); do
+        file=${link%%#*}
+        [ -z "$file" ] && file=$document || file=$(dirname "$document")/$file
+        [ -e "$file" ] || { say "the link $link leads nowhere"; continue; }
+        [[ $link == *#* ]] || continue
+        anchor=${link#*#}
+        sed -n 's/^##* //p' "$file" | tr 'A-Z ' 'a-z-' | tr -cd 'a-z0-9\n-' | grep -qx -- "$anchor" ||
+            say "there is no heading $anchor in $file"
     done
-done < <("$build/unbake" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]* .*\)/\1/p')
+}
 
-# A setting's row: what must be there, a tab, and the row to write where it is not.
-while IFS=$'\t' read -r start row; do
-    grep -qF -- "$start" README.md || fail "this row of the settings is missing or has changed: $row"
-done < <("$build/unbake" settings --json -q --retry 0 --server http://127.0.0.1:1 | jq -r '.[] |
-    (if .choices then .choices | join(", ") elif .minimum != null then
-        ("\(.minimum) to \(.maximum) \(.unit)" | rtrimstr(" ")) elif .type == "bool" then "true, false"
-     else .type end) as $values |
-    "| `\(.name)` | \(.default) |\t| `\(.name)` | \(.default) | \($values) | \(.help) |"')
-known=$("$build/unbake" settings -q --retry 0 --server http://127.0.0.1:1 | awk 'NR > 1 {print $1}')
-for name in $(sed -n '/^## Settings/,/^## /s/^| `\([a-z_]*\)`.*/\1/p' README.md); do
-    grep -qx "$name" <<<"$known" || fail "there is no setting $name"
+# --- files, functions, targets ---
+check_names() {
+    local name path
+    for name in $(code | sed 's|build/tests/||g' | grep -oE '\b(client|common|config|deploy|server|tests)/[A-Za-z0-9_./*-]*[A-Za-z0-9_/*]' | sort -u); do
+        # shellcheck disable=SC2086
+        compgen -G "$name" >/dev/null || [ -e "$(dirname "$document")/$name" ] || say "there is no $name"
+    done
+    for name in $(code | grep -oE '(^|[^A-Za-z0-9_./*$-])[a-z0-9_]+\.(c|h|sh|py)\b' | grep -oE '[a-z0-9_]+\.[a-z]+$' | sort -u); do
+        grep -q "/$name\$" "$work/tree" || say "there is no file $name"
+    done
+    for name in $(code | grep -oE '[A-Za-z0-9_/]+\.[ch]:[a-z0-9_]+' | sort -u); do
+        path=$(grep -E "(^|/)${name%:*}\$" "$work/tree" | head -n 1)
+        [ -n "$path" ] && grep -qE "\b${name#*:}\(" "$path" || say "there is no function ${name#*:} in ${name%:*}"
+    done
+    for name in $(code | grep -oE '(^|[;&|`] *|[A-Z_]+=[^ ]* )make [a-z]+' | sed 's/.*make //' | sort -u); do
+        grep -qE "^$name:.*## " Makefile || say "there is no target $name"
+    done
+}
+
+# --- commands: "unbake NAME --option", "unbaked NAME --option" ---
+for program in unbake unbaked; do
+    "$build/$program" --help | sed -nE "/^commands:/,/^\$/s/^  ($program )?([a-z-]+).*/\2/p" >"$work/$program"
+done
+check_commands() {
+    local program name rest option
+    while read -r program name rest; do
+        grep -qx -- "$name" "$work/$program" || { say "there is no command $program $name"; continue; }
+        for option in $(grep -oE -- '--[a-z]+[a-z-]*' <<<"$rest"); do
+            "$build/$program" "$name" --help | grep -q -- "$option\b" || say "$program $name has no $option"
+        done
+    done < <(code | grep -oE '(^|[ /(])unbaked? [a-z][a-z-]*[^#;&|)]*' | sed -E 's|^[ /(]||' | sort -u)
+}
+
+for document in $documents; do
+    check_links
+    check_names
+    check_commands
 done
 
-while read -r name _ default; do present "| \`$name\` | $default"; done \
-    < <(sed -n 's/^\([a-z_]*\) \(=\) *\(.*\)/\1 \2 \3/p' config/unbaked.conf)
-
-while read -r status meaning; do
-    present "| $status | ${meaning%%[,;]*}" || fail "exit status $status"
-done < <("$build/unbake" --help | sed -n '/^exit status:/,$s/^  \([0-9][0-9]*\) *\(.*\)/\1 \2/p')
-
-# Paths in backquotes; a bare name belongs to the folder named before it in the same cell.
-while IFS= read -r row; do
-    folder=.
-    for path in $(grep -o '`[A-Za-z0-9_/.]*\.[a-z]*`' <<<"$row" | tr -d '\`'); do
-        case $path in */*) folder=${path%/*} ;; *) path=$folder/$path ;; esac
-        [ -e "$path" ] || fail "there is no file $path"
+# --- README.md's tables ---
+document=README.md
+[ "$(wc -l <README.md)" -le 250 ] || say "more than 250 lines: a front door"
+while read -r name; do
+    sed -n '/^## The client/,/^## /p' README.md | grep -qE "\`$name[\` ]" || say "the client's command $name is missing"
+done <"$work/unbake"
+settings=$("$build/unbake" settings --json -q --retry 0 --server http://127.0.0.1:1)
+while IFS='|' read -r _ names default _; do
+    for name in $(grep -oE '[a-z_]+' <<<"$names"); do
+        wanted=$(jq -r --arg name "$name" '.[] | select(.name == $name) | .default' <<<"$settings")
+        grep -q "^$name =" config/unbaked.conf && wanted=$(sed -n "s/^$name = *//p" config/unbaked.conf)
+        [ -n "$wanted" ] || grep -q "^$name =" config/unbaked.conf || say "there is no setting or option $name"
+        equal "$(tr -d ' ' <<<"$default")" "$(tr -d ' ' <<<"$wanted")" "README.md: the default of $name"
     done
-done < <(sed -n '/^## Reading order/,/^## One/p' README.md | grep '^| `')
-for path in $(grep -o '](\([a-z/_.]*\))' README.md | tr -d '()]'); do
-    [ -e "$path" ] || fail "there is no file $path"
+done < <(sed -n '/^| setting /,/^$/p; /^| option /,/^$/p' README.md | grep '^| `')
+for status in $("$build/unbake" --help | sed -n '/^exit status:/,$s/^  \([0-9][0-9]*\) .*/\1/p'); do
+    tr '\n' ' ' <README.md | grep -qE "Exit status:[^.]*\b$status [a-z]" || say "the exit status $status is missing"
 done
-exit $((failures > 0))
+
+# --- the manual pages have all that README.md leaves to them ---
+"$build/unbake" manual unbake.1 >"$work/unbake.1"
+"$build/unbaked" manual unbaked.conf.5 >"$work/unbaked.conf.5"
+for name in $(jq -r '.[].name' <<<"$settings"); do
+    grep -qx "\\\\fB$name\\\\fR" "$work/unbake.1" || fail "unbake.1 lacks the setting $name"
+done
+for name in $(sed -n 's/^\([a-z_]*\) =.*/\1/p' config/unbaked.conf); do
+    grep -qx "\\\\fB$name\\\\fR" "$work/unbaked.conf.5" || fail "unbaked.conf.5 lacks the option $name"
+done
+
+# --- blocks ---
+# A folder in which build/ holds the programs, with what makes rooms and jobs small, and /tmp is below it.
+prepare() {
+    place=$work/place
+    rm -rf "$place"
+    mkdir -p "$place/build" "$place/tmp"
+    ln -s "$PWD/config" "$PWD/deploy" "$place"
+    cat >"$place/build/unbaked" <<WRAPPER
+#!/bin/bash
+case \$1 in
+demo-room) set -- "\$@" --width 64 --height 48 --frames 12 --test-frames 2 --spp 4 --test-spp 4 --texture-size 128 ;;
+relight) set -- "\$@" --spp 1 ;;
+--data) echo \$\$ >>"$place/pids"; set -- "\$@" --listen 127.0.0.1:$port --set min_free_mib=1 --set low_disk_mib=1 ;;
+esac
+exec "$build/unbaked" "\$@"
+WRAPPER
+    printf '#!/bin/bash\nexec "%s" "$@"\n' "$build/unbake" >"$place/build/unbake"
+    chmod +x "$place/build/unbaked" "$place/build/unbake"
+    { printf '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n'; printf '\x80\x80\x80\x80%.0s' $(seq 32); } >"$place/sky.hdr"
+}
+
+# The n-th block of the document, as it is to be run: builds nothing, streams end.
+block() {
+    cat <<PREAMBLE
+set -eu -o pipefail
+export UNBAKE_SERVER=http://127.0.0.1:$port XDG_CONFIG_HOME=$place/config
+make() { :; }
+curl() { command curl --max-time 30 "\$@"; }
+PREAMBLE
+    awk -v n="$1" '/^```sh$/ { inside = ++count == n; next } /^```/ { inside = 0 } inside' "$document" |
+        sed -e "s|/tmp/|$place/tmp/|g" -e "s/127.0.0.1:7117/127.0.0.1:$port/g" -e 's/texture_size=512/texture_size=64/g' \
+            -e 's/time_limit_sec=60/iterations=1/g' -e 's/"texture_size": 512, "time_limit_sec": 60/"texture_size": 64, "iterations": 1/'
+}
+
+end_all() {
+    local pid
+    for pid in $(cat "$place/pids" 2>/dev/null); do
+        kill -TERM "$pid" 2>/dev/null && wait_for 30 not_there "$pid"
+    done
+}
+not_there() { ! kill -0 "$1" 2>/dev/null; }
+
+start_daemon # for a port that is free
+port=${url##*:}
+stop_daemon
+for document in $documents; do
+    count=$(grep -c '^```sh$' "$document")
+    [ "$count" -gt 0 ] || continue
+    prepare
+    for n in $(seq "$count"); do
+        block "$n" >"$place/block.sh"
+        (cd "$place" && bash block.sh >block.log 2>&1 </dev/null) ||
+            say "block $n fails: $(tail -n 5 "$place/block.log")"
+    done
+    end_all
+done
+finish
