@@ -1,5 +1,5 @@
 /* sha256.c -- see sha256.h. The round constants and initial state are those of FIPS 180-4,
- * sections 4.2.2 and 5.3.3. */
+ * sections 4.2.2 and 5.3.3. Whole blocks go to the processor's own instructions where it has them. */
 #include "common/sha256.h"
 
 #include <errno.h>
@@ -8,8 +8,9 @@
 #include <unistd.h>
 
 #include "common/mem.h"
+#include "common/sha256_blocks.h"
 
-static const uint32_t round_constant[64] = {
+const uint32_t sha256_round_constant[64] = {
     0x428a2f98, 0x71374491, 0xb5c0fbcf, 0xe9b5dba5, 0x3956c25b, 0x59f111f1, 0x923f82a4, 0xab1c5ed5,
     0xd807aa98, 0x12835b01, 0x243185be, 0x550c7dc3, 0x72be5d74, 0x80deb1fe, 0x9bdc06a7, 0xc19bf174,
     0xe49b69c1, 0xefbe4786, 0x0fc19dc6, 0x240ca1cc, 0x2de92c6f, 0x4a7484aa, 0x5cb0a9dc, 0x76f988da,
@@ -45,7 +46,7 @@ static void compress(uint32_t state[8], const uint8_t block[64]) {
     uint32_t e = state[4], f = state[5], g = state[6], h = state[7];
     for (int i = 0; i < 64; i++) {
         uint32_t s1 = rotate(e, 6) ^ rotate(e, 11) ^ rotate(e, 25);
-        uint32_t t1 = h + s1 + ((e & f) ^ (~e & g)) + round_constant[i] + w[i];
+        uint32_t t1 = h + s1 + ((e & f) ^ (~e & g)) + sha256_round_constant[i] + w[i];
         uint32_t s0 = rotate(a, 2) ^ rotate(a, 13) ^ rotate(a, 22);
         uint32_t t2 = s0 + ((a & b) ^ (a & c) ^ (b & c));
         h = g;
@@ -67,7 +68,13 @@ static void compress(uint32_t state[8], const uint8_t block[64]) {
     state[7] += h;
 }
 
+void sha256_blocks_portable(uint32_t state[8], const uint8_t *data, size_t count) {
+    for (; count > 0; count--, data += 64)
+        compress(state, data);
+}
+
 void sha256_update(struct sha256 *s, const void *data, size_t length) {
+    sha256_blocks *native = sha256_blocks_native(), *blocks = native ? native : sha256_blocks_portable;
     const uint8_t *at = data;
     size_t used = s->length % sizeof s->block;
     s->length += length;
@@ -77,14 +84,14 @@ void sha256_update(struct sha256 *s, const void *data, size_t length) {
             memcpy(s->block + used, at, part);
         if (part < room)
             return;
-        compress(s->state, s->block);
+        blocks(s->state, s->block, 1);
         at += part;
         length -= part;
     }
-    for (; length >= sizeof s->block; at += sizeof s->block, length -= sizeof s->block)
-        compress(s->state, at);
-    if (length > 0)
-        memcpy(s->block, at, length);
+    size_t count = length / sizeof s->block, rest = length % sizeof s->block;
+    blocks(s->state, at, count);
+    if (rest > 0)
+        memcpy(s->block, at + count * sizeof s->block, rest);
 }
 
 void sha256_hex(struct sha256 *s, char hex[SHA256_HEX_SIZE]) {
