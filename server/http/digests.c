@@ -3,111 +3,242 @@
 
 #include <errno.h>
 #include <pthread.h>
-#include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
+#include "common/log.h"
 #include "common/mem.h"
+#include "server/http/job_file.h"
 
-#define ENTRY_COUNT 256 /* direct-mapped: a newer file takes the place of an older one */
-
-/* What tells one version of a file from another. Compared member by member. */
-struct version {
-    dev_t device;
-    ino_t inode;
-    off_t size;
-    struct timespec modified, changed;
-};
+#define CHUNK_BYTES ((size_t)256 << 10)
+#define RETRY_SEC 10 /* after the store could not be read, or could not take a digest */
 
 struct digests {
-    pthread_mutex_t mutex;
-    struct {
-        struct version version;
-        char hex[SHA256_HEX_SIZE]; /* "": free */
-    } entries[ENTRY_COUNT];
+    struct store *store;
+    const char *data_dir;
+    pthread_t thread;
+    atomic_bool stopping;
+    atomic_ullong hashed_bytes;
+    pthread_mutex_t mutex; /* guards what follows */
+    pthread_cond_t changed;
+    bool has_work; /* since it was last looked for */
+    bool is_idle;  /* nothing was found, or nothing can be done for a while */
 };
 
-struct digests *digests_new(void) {
-    struct digests *d = mem_calloc(1, sizeof *d);
-    pthread_mutex_init(&d->mutex, NULL);
-    return d;
+/* --- one file ---------------------------------------------------------------------------- */
+
+static int64_t nanoseconds(struct timespec t) {
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
-void digests_free(struct digests *d) {
-    if (!d)
-        return;
-    pthread_mutex_destroy(&d->mutex);
-    mem_free(d);
-}
-
-static bool same_time(struct timespec a, struct timespec b) {
-    return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec;
-}
-
-static bool same_version(const struct version *a, const struct version *b) {
-    return a->device == b->device && a->inode == b->inode && a->size == b->size &&
-           same_time(a->modified, b->modified) && same_time(a->changed, b->changed);
-}
-
-static enum status look(int fd, struct version *v, struct error *err) {
+static enum status look(int fd, struct file_version *v, struct error *err) {
     struct stat info;
     if (fstat(fd, &info) != 0)
         return error_set_errno(err, errno, "cannot look at an output");
     if (!S_ISREG(info.st_mode))
         return error_set(err, STATUS_CORRUPT, "an output is not a plain file");
-    *v = (struct version){info.st_dev, info.st_ino, info.st_size, info.st_mtim, info.st_ctim};
+    *v = (struct file_version){info.st_ino, (uint64_t)info.st_size, nanoseconds(info.st_mtim), nanoseconds(info.st_ctim)};
     return STATUS_OK;
 }
 
-static enum status hash(int fd, uint64_t size, char hex[SHA256_HEX_SIZE], struct error *err) {
+static bool is_same_version(const struct file_version *a, const struct file_version *b) {
+    return a->inode == b->inode && a->bytes == b->bytes && a->modified_ns == b->modified_ns &&
+           a->changed_ns == b->changed_ns;
+}
+
+static enum status hash(int fd, uint64_t bytes, const atomic_bool *stopping, char hex[SHA256_HEX_SIZE],
+                        struct error *err) {
     struct sha256 state;
-    char *chunk = mem_alloc((size_t)1 << 18);
+    char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
     sha256_init(&state);
-    for (uint64_t at = 0; at < size;) {
-        ssize_t got = pread(fd, chunk, (size_t)1 << 18, (off_t)at);
+    for (uint64_t at = 0; at < bytes && status == STATUS_OK;) {
+        uint64_t left = bytes - at;
+        ssize_t got = pread(fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)at);
         if (got < 0 && errno == EINTR)
             continue;
-        if (got <= 0) {
-            status = got < 0 ? error_set_errno(err, errno, "cannot read an output")
-                             : error_set(err, STATUS_UNAVAILABLE, "the file shrank while it was read");
-            break;
-        }
-        sha256_update(&state, chunk, (size_t)got);
-        at += (uint64_t)got;
+        if (got < 0)
+            status = error_set_errno(err, errno, "cannot read an output");
+        else if (got == 0)
+            status = error_set(err, STATUS_UNAVAILABLE, "the file shrank while it was read");
+        else if (stopping && atomic_load(stopping))
+            status = error_set(err, STATUS_CANCELLED, "the daemon is stopping");
+        else
+            sha256_update(&state, chunk, (size_t)got);
+        at += got > 0 ? (uint64_t)got : 0;
     }
     sha256_hex(&state, hex);
     mem_free(chunk);
     return status;
 }
 
-enum status digests_of(struct digests *d, int fd, uint64_t *size, char hex[SHA256_HEX_SIZE],
-                       struct error *err) {
-    struct version before, after;
+enum status digests_hash(int fd, const atomic_bool *stopping, struct file_version *version, char hex[SHA256_HEX_SIZE],
+                         struct error *err) {
+    struct file_version before;
     enum status status = look(fd, &before, err);
-    if (status != STATUS_OK)
-        return status;
-    *size = (uint64_t)before.size;
-    size_t slot = (size_t)(before.inode ^ before.inode >> 8) % ENTRY_COUNT;
-    pthread_mutex_lock(&d->mutex);
-    bool known = *d->entries[slot].hex && same_version(&d->entries[slot].version, &before);
-    if (known)
-        memcpy(hex, d->entries[slot].hex, SHA256_HEX_SIZE);
-    pthread_mutex_unlock(&d->mutex);
-    if (known)
-        return STATUS_OK;
-    status = hash(fd, *size, hex, err);
     if (status == STATUS_OK)
-        status = look(fd, &after, err);
+        status = hash(fd, before.bytes, stopping, hex, err);
+    if (status == STATUS_OK)
+        status = look(fd, version, err);
+    /* The change time moves when a rename takes the name away, too; the content did not. */
+    if (status == STATUS_OK && (version->bytes != before.bytes || version->modified_ns != before.modified_ns))
+        status = error_set(err, STATUS_UNAVAILABLE, "the file changed while it was read");
+    return status;
+}
+
+/* Not the numbers themselves: an inode is nobody's business. */
+static void make_tag(int64_t job_id, const char *name, const struct file_version *v, char tag[33]) {
+    char hex[SHA256_HEX_SIZE];
+    char *text = mem_printf("%lld %s %llu %llu %lld %lld", (long long)job_id, name, (unsigned long long)v->inode,
+                            (unsigned long long)v->bytes, (long long)v->modified_ns, (long long)v->changed_ns);
+    sha256_of(text, strlen(text), hex);
+    snprintf(tag, 33, "%.32s", hex);
+    mem_free(text);
+}
+
+enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
+                         struct digests_file *file, struct error *err) {
+    struct file_version v;
+    *file = (struct digests_file){0};
+    enum status status = look(fd, &v, err);
     if (status != STATUS_OK)
         return status;
-    /* The change time moves when a rename takes the name away, too; the content did not. */
-    if (after.size != before.size || !same_time(after.modified, before.modified))
-        return error_set(err, STATUS_UNAVAILABLE, "the file changed while it was read");
+    bool is_known = *row->digest && is_same_version(&row->version, &v);
+    if (is_known) {
+        memcpy(file->hex, row->digest, sizeof file->hex);
+    } else if (v.bytes <= DIGESTS_AT_ONCE) {
+        status = digests_hash(fd, NULL, &v, file->hex, err);
+    } else {
+        struct error why; /* on a full disk, say: then it is as it was */
+        if (store_output_want_digest(d->store, job_id, row->name, &why) != STATUS_OK)
+            log_debug("job %lld: %s is not hashed: %s", (long long)job_id, row->name, why.message);
+    }
+    file->bytes = v.bytes;
+    make_tag(job_id, row->name, &v, file->tag);
+    return status;
+}
+
+/* --- the thread -------------------------------------------------------------------------- */
+
+/* Hashes an output as it is now; *is_had says whether there is a digest. False when the daemon stops. */
+static bool compute(struct digests *d, int64_t job_id, const struct output_row *row, struct file_version *version,
+                    char hex[SHA256_HEX_SIZE], bool *is_had) {
+    struct error err;
+    int fd;
+    char *path = mem_printf("%lld/out/%s", (long long)job_id, row->name);
+    enum status status = job_file_open(d->data_dir, path, &fd, &err);
+    if (status == STATUS_OK) {
+        status = digests_hash(fd, &d->stopping, version, hex, &err);
+        close(fd);
+    }
+    mem_free(path);
+    *is_had = status == STATUS_OK;
+    if (*is_had)
+        atomic_fetch_add(&d->hashed_bytes, version->bytes);
+    else if (status != STATUS_CANCELLED && status != STATUS_UNAVAILABLE && status != STATUS_NOT_FOUND)
+        log_warning("job %lld: %s has no digest: %s", (long long)job_id, row->name, err.message);
+    return status != STATUS_CANCELLED;
+}
+
+/* Waits until there is something new to do, or (retries) for a while; false when the daemon stops. */
+static bool wait_for_work(struct digests *d, bool retries) {
+    struct timespec until;
+    clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_sec += RETRY_SEC;
     pthread_mutex_lock(&d->mutex);
-    d->entries[slot].version = after;
-    memcpy(d->entries[slot].hex, hex, SHA256_HEX_SIZE);
+    d->is_idle = !d->has_work || retries;
+    pthread_cond_broadcast(&d->changed);
+    int timed_out = 0;
+    while (!atomic_load(&d->stopping) && !timed_out && (retries || !d->has_work))
+        timed_out = retries ? pthread_cond_clockwait(&d->changed, &d->mutex, CLOCK_MONOTONIC, &until)
+                            : pthread_cond_wait(&d->changed, &d->mutex);
+    d->has_work = d->is_idle = false;
     pthread_mutex_unlock(&d->mutex);
+    return !atomic_load(&d->stopping);
+}
+
+/* Hashes one output and enters what came of it, as often as that takes; false when the daemon stops. */
+static bool work_on(struct digests *d, int64_t job_id, const struct output_row *row) {
+    struct file_version version;
+    char hex[SHA256_HEX_SIZE];
+    struct error err;
+    bool is_had, goes_on = compute(d, job_id, row, &version, hex, &is_had);
+    while (goes_on && store_output_enter_digest(d->store, job_id, row, is_had ? &version : NULL, is_had ? hex : NULL,
+                                                &err) != STATUS_OK) {
+        log_warning("job %lld: the digest of %s cannot be kept: %s", (long long)job_id, row->name, err.message);
+        goes_on = wait_for_work(d, true);
+    }
+    return goes_on;
+}
+
+static void *run(void *user) {
+    struct digests *d = user;
+    bool goes_on = true;
+    pthread_setname_np(pthread_self(), "digests");
+    while (goes_on && !atomic_load(&d->stopping)) {
+        struct output_row row;
+        struct error err;
+        int64_t job_id;
+        enum status status = store_output_next_digest(d->store, &job_id, &row, &err);
+        if (status == STATUS_OK)
+            goes_on = work_on(d, job_id, &row);
+        else if (status != STATUS_NOT_FOUND)
+            log_warning("cannot look for outputs that have no digest: %s", err.message);
+        output_row_release(&row);
+        if (goes_on && status != STATUS_OK)
+            goes_on = wait_for_work(d, status != STATUS_NOT_FOUND);
+    }
+    return NULL;
+}
+
+enum status digests_new(struct digests **out, struct store *store, const char *data_dir, struct error *err) {
+    struct digests *d = mem_calloc(1, sizeof *d);
+    d->store = store;
+    d->data_dir = data_dir;
+    pthread_mutex_init(&d->mutex, NULL);
+    pthread_cond_init(&d->changed, NULL);
+    int failed = pthread_create(&d->thread, NULL, run, d);
+    *out = failed ? NULL : d;
+    if (failed) {
+        pthread_cond_destroy(&d->changed);
+        pthread_mutex_destroy(&d->mutex);
+        mem_free(d);
+        return error_set_errno(err, failed, "cannot start the thread that hashes outputs");
+    }
     return STATUS_OK;
+}
+
+void digests_free(struct digests *d) {
+    if (!d)
+        return;
+    pthread_mutex_lock(&d->mutex);
+    atomic_store(&d->stopping, true);
+    pthread_cond_broadcast(&d->changed);
+    pthread_mutex_unlock(&d->mutex);
+    pthread_join(d->thread, NULL);
+    pthread_cond_destroy(&d->changed);
+    pthread_mutex_destroy(&d->mutex);
+    mem_free(d);
+}
+
+void digests_wake(void *digests) {
+    struct digests *d = digests;
+    pthread_mutex_lock(&d->mutex);
+    d->has_work = true;
+    pthread_cond_broadcast(&d->changed);
+    pthread_mutex_unlock(&d->mutex);
+}
+
+uint64_t digests_hashed_bytes(const struct digests *d) {
+    return atomic_load(&d->hashed_bytes);
+}
+
+void digests_wait(struct digests *d) {
+    pthread_mutex_lock(&d->mutex);
+    while (d->has_work || !d->is_idle)
+        pthread_cond_wait(&d->changed, &d->mutex);
+    pthread_mutex_unlock(&d->mutex);
 }

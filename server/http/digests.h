@@ -1,25 +1,49 @@
-/* digests.h -- the SHA-256 of files that are served, remembered.
+/* digests.h -- the SHA-256 of outputs, as the daemon finds it.
  *
- * A running worker replaces an output by rename and announces it a little later, often with the
- * same size. So neither the store's row nor the size says what a file holds: only its content
- * does. It is hashed once per version (device, inode, size, times), and every reply carries the
- * digest of the very bytes that follow. */
+ * A worker's word for what a file holds is not taken: it has read what a stranger uploaded. And a running worker
+ * replaces an output by rename and announces it a little later, often with the same size. So each version of a file
+ * (inode, size, times) is hashed once, by a thread of its own, from the time that it is announced, the smallest first;
+ * the store keeps the digest, over restarts too.
+ *
+ * 1. No reply waits for the hash of a file, but for one of at most DIGESTS_AT_ONCE bytes, which it hashes itself.
+ * 2. A version that has no digest yet has its tag: a rename, a write or a touch gives it another. */
 #ifndef UNBAKE_HTTP_DIGESTS_H
 #define UNBAKE_HTTP_DIGESTS_H
 
+#include <stdatomic.h>
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "common/error.h"
 #include "common/sha256.h"
+#include "server/store/store.h"
+
+#define DIGESTS_AT_ONCE ((uint64_t)1 << 20) /* bytes; some 5 ms at worst, from memory */
 
 struct digests; /* opaque; thread-safe */
 
-struct digests *digests_new(void);
-void digests_free(struct digests *d);
+/* Starts the thread. `store` and `data_dir` are borrowed; the caller sees to it that digests_wake is called when a
+ * digest is wanted. */
+enum status digests_new(struct digests **d, struct store *store, const char *data_dir, struct error *err);
+void digests_free(struct digests *d); /* what is not done yet is done after the next start; NULL is fine */
+void digests_wake(void *digests);
+uint64_t digests_hashed_bytes(const struct digests *d); /* by the thread, since it started */
+/* Until every wanted digest is there, or was found not to be had. For tests. */
+void digests_wait(struct digests *d);
 
-/* Size and digest of the regular file fd, whose offset is not moved. STATUS_UNAVAILABLE when it
- * changed while it was read. */
-enum status digests_of(struct digests *d, int fd, uint64_t *size, char hex[SHA256_HEX_SIZE],
-                       struct error *err);
+/* What the open file is. */
+struct digests_file {
+    uint64_t bytes;
+    char tag[33];              /* of its version: 32 hex digits */
+    char hex[SHA256_HEX_SIZE]; /* "": not known yet, and wanted from now on */
+};
+/* Looks at an output's open file, whose offset is not moved. STATUS_UNAVAILABLE when it changed while it was read. */
+enum status digests_look(struct digests *d, int64_t job_id, const struct output_row *row, int fd,
+                         struct digests_file *file, struct error *err);
+
+/* Hashes the open file; ends early where *stopping, if that is not NULL, says so: STATUS_CANCELLED. *version is what it
+ * was before and after. STATUS_UNAVAILABLE when it changed meanwhile. */
+enum status digests_hash(int fd, const atomic_bool *stopping, struct file_version *version, char hex[SHA256_HEX_SIZE],
+                         struct error *err);
 
 #endif

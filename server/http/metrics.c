@@ -6,6 +6,7 @@
 
 #include "common/file.h"
 #include "common/protocol.h"
+#include "server/http/digests.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
 #include "server/http/listener.h"
@@ -91,6 +92,8 @@ struct response *system_metrics(struct api *api, struct request *r) {
     tally_print(api->tally, "unbaked_http_requests_total", &b);
     metric(&b, "uploaded_bytes_total", "counter", "Bytes of bundles received.",
            (double)atomic_load(&api->uploaded_bytes));
+    metric(&b, "hashed_bytes_total", "counter", "Bytes of outputs read for their digests.",
+           (double)digests_hashed_bytes(api->digests));
     metric(&b, "event_streams", "gauge", "Open event streams.", (double)hub_count(api->hub));
     if (api->listener) {
         metric(&b, "connections", "gauge", "Open connections.", (double)listener_connections(api->listener));

@@ -2,9 +2,9 @@
  *
  * 1. A file's name comes from the store's row, never from the URL, and no part of its path below
  *    DATA/jobs/ may be a symbolic link.
- * 2. ETag and Repr-Digest are those of the bytes in the reply (digests.h). */
+ * 2. ETag and Repr-Digest are those of the bytes in the reply (digests.h). Before the digest is known the tag is of the
+ *    file's version, as strong, and there is no Repr-Digest. */
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -16,9 +16,11 @@
 #include "server/http/digests.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
+#include "server/http/job_file.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 
+#define ETAG_SIZE 80
 #define LOG_BYTES_DEFAULT 65536
 #define LOG_BYTES_MAX (1 << 20)
 
@@ -41,39 +43,18 @@ struct response *outputs_list(struct api *api, struct request *r) {
     return response_json(200, value);
 }
 
-/* Opens `path` below DATA/jobs/, one part after the other, following no link. */
-static enum status open_beneath(const struct api *api, const char *path, int *out, struct error *err) {
-    char *root = file_join(api->config.data_dir, "jobs");
-    int fd = open(root, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    mem_free(root);
-    for (const char *at = path; fd >= 0 && *at;) {
-        char part[256];
-        size_t length = strcspn(at, "/");
-        bool is_last = at[length] == '\0';
-        int next = -1;
-        if (length < sizeof part) {
-            snprintf(part, sizeof part, "%.*s", (int)length, at);
-            next = openat(fd, part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC |
-                          (is_last ? 0 : O_DIRECTORY));
-        } else {
-            errno = ENAMETOOLONG;
-        }
-        int number = errno;
-        close(fd);
-        errno = number;
-        fd = next;
-        at += length + (is_last ? 0 : 1);
-    }
-    *out = fd;
-    return fd >= 0 ? STATUS_OK : error_set_errno(err, errno, "cannot open jobs/%s", path);
+/* A strong tag for the file: of its content where that is known, else of its version. */
+static void make_etag(const struct digests_file *file, bool by_content, char etag[ETAG_SIZE]) {
+    if (by_content)
+        snprintf(etag, ETAG_SIZE, "\"sha256-%s\"", file->hex);
+    else
+        snprintf(etag, ETAG_SIZE, "\"file-%s\"", file->tag);
 }
 
-/* The part of the file that is asked for, or all of it. */
-static void apply_range(const struct request *r, const char *etag, uint64_t size, struct response **reply) {
-    const char *range = request_field(r, "Range"), *if_range = request_field(r, "If-Range");
+/* The part of the file that is asked for, or all of it. Ranges are of GET alone (RFC 9110, 14.2). */
+static void apply_range(const struct request *r, uint64_t size, struct response **reply) {
+    const char *range = request_field(r, "Range");
     uint64_t first = 0, count = size;
-    if (!range || (if_range && strcmp(if_range, etag) != 0))
-        return;
     switch (field_range(range, size, &first, &count)) {
     case FIELD_RANGE_WHOLE:
         return;
@@ -92,30 +73,62 @@ static void apply_range(const struct request *r, const char *etag, uint64_t size
     }
 }
 
-/* The reply that sends the open file; takes fd. */
-static struct response *send_file(struct api *api, const struct request *r, int fd,
-                                  const char *content_type) {
-    uint64_t size;
-    char hex[SHA256_HEX_SIZE], etag[80], digest[64];
-    struct error err;
-    if (digests_of(api->digests, fd, &size, hex, &err) != STATUS_OK) {
-        close(fd);
-        return problem_from(r, &err);
-    }
-    snprintf(etag, sizeof etag, "\"sha256-%s\"", hex);
-    field_digest_format(hex, digest);
-    const char *known = request_field(r, "If-None-Match");
-    struct response *reply = response_new(known && field_etag_listed(known, etag, true) ? 304 : 200);
-    if (reply->status == 304) {
-        close(fd);
-    } else {
-        reply->fd = fd;
-        reply->length = size;
-        response_field(reply, "Content-Type", "%s", content_type);
-        /* A worker wrote it, from what a stranger uploaded: in a browser it must not act as its reader. */
-        response_field(reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
+/* The file or its part, and what goes with it. `etag` becomes the tag that If-Range named, where that is one of this
+ * version: whoever has a part by that tag can tell that the rest belongs to it. */
+static struct response *send_bytes(const struct request *r, int fd, const struct digests_file *file,
+                                   const char *content_type, const char *version_etag, char etag[ETAG_SIZE]) {
+    const char *if_range = request_field(r, "If-Range");
+    char digest[64];
+    struct response *reply = response_new(200);
+    reply->fd = fd;
+    reply->length = file->bytes;
+    response_field(reply, "Content-Type", "%s", content_type);
+    /* A worker wrote it, from what a stranger uploaded: in a browser it must not act as its reader. */
+    response_field(reply, "Content-Security-Policy", "sandbox allow-same-origin; script-src 'none'");
+    if (*file->hex) {
+        field_digest_format(file->hex, digest);
         response_field(reply, "Repr-Digest", "%s", digest);
-        apply_range(r, etag, size, &reply);
+    }
+    bool is_same = !if_range || strcmp(if_range, etag) == 0 || strcmp(if_range, version_etag) == 0;
+    if (!request_field(r, "Range") || r->is_head || !is_same)
+        return reply;
+    if (if_range)
+        snprintf(etag, ETAG_SIZE, "%s", if_range);
+    apply_range(r, file->bytes, &reply);
+    return reply;
+}
+
+/* Whether a part is asked for of the content that has some digest, and what this file's is is not known yet. */
+static bool is_too_early(const struct request *r, const struct digests_file *file) {
+    const char *if_range = request_field(r, "If-Range");
+    return !*file->hex && !r->is_head && request_field(r, "Range") && if_range && strncmp(if_range, "\"sha256-", 8) == 0;
+}
+
+/* The reply that sends the open file; takes fd. */
+static struct response *send_file(struct api *api, const struct request *r, int64_t job_id, int fd,
+                                  const struct output_row *row) {
+    struct digests_file file;
+    char etag[ETAG_SIZE], version_etag[ETAG_SIZE];
+    struct error err;
+    struct response *reply = NULL;
+    if (digests_look(api->digests, job_id, row, fd, &file, &err) != STATUS_OK) {
+        reply = problem_from(r, &err);
+    } else if (is_too_early(r, &file)) {
+        reply = problem(r, 503, "the file's digest is being computed");
+        response_field(reply, "Retry-After", "1");
+    }
+    if (reply) {
+        close(fd);
+        return reply;
+    }
+    make_etag(&file, *file.hex, etag);
+    make_etag(&file, false, version_etag);
+    const char *known = request_field(r, "If-None-Match");
+    if (known && (field_etag_listed(known, etag, true) || field_etag_listed(known, version_etag, true))) {
+        close(fd);
+        reply = response_new(304);
+    } else {
+        reply = send_bytes(r, fd, &file, row->content_type, version_etag, etag);
     }
     response_field(reply, "ETag", "%s", etag);
     response_field(reply, "Accept-Ranges", "bytes");
@@ -137,10 +150,10 @@ struct response *outputs_get(struct api *api, struct request *r) {
     if (status != STATUS_OK)
         return problem_from(r, &err);
     char *path = mem_printf("%lld/out/%s", (long long)id, row.name);
-    status = open_beneath(api, path, &fd, &err);
+    status = job_file_open(api->config.data_dir, path, &fd, &err);
     mem_free(path);
     if (status == STATUS_OK)
-        reply = send_file(api, r, fd, row.content_type);
+        reply = send_file(api, r, id, fd, &row);
     else
         reply = problem_from(r, &err);
     output_row_release(&row);
@@ -185,7 +198,7 @@ struct response *jobs_log(struct api *api, struct request *r) {
     int fd = -1;
     size_t length = 0;
     struct error err;
-    enum status status = open_beneath(api, path, &fd, &err);
+    enum status status = job_file_open(api->config.data_dir, path, &fd, &err);
     if (status != STATUS_OK && status != STATUS_NOT_FOUND)
         return problem_from(r, &err);
     char *text = fd >= 0 ? read_tail(fd, (size_t)bytes, &length) : mem_strdup("");

@@ -46,7 +46,6 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     pthread_mutex_init(&api->scene_mutex, NULL);
     api->tally = tally_new();
     api->hub = hub_new(config->keepalive_sec);
-    api->digests = digests_new();
     api->partials = partials_new(api);
     *out = api;
     enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
@@ -60,8 +59,11 @@ enum status service_new(struct api **out, const struct api_config *config, struc
         status = sweep(api, folders[i], &kind, err);
     }
     space_renew_reserve(api);
+    if (status == STATUS_OK)
+        status = digests_new(&api->digests, store, config->data_dir, err);
     if (status == STATUS_OK) {
         store_on_change(store, hub_changed, api->hub);
+        store_on_digest_wanted(store, digests_wake, api->digests);
         return STATUS_OK;
     }
     service_free(api);
@@ -73,6 +75,7 @@ void service_free(struct api *api) {
     if (!api)
         return;
     store_on_change(api->store, NULL, NULL);
+    store_on_digest_wanted(api->store, NULL, NULL);
     partials_free(api->partials);
     hub_free(api->hub);
     tally_free(api->tally);

@@ -12,6 +12,8 @@ struct store {
     struct sql sql;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
+    void (*digest_wanted)(void *user);
+    void *digest_wanted_user;
     size_t events_per_job; /* kept */
     struct unpaid {        /* CPU time that could not be entered; see turns.c */
         int64_t owner_id;

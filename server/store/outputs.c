@@ -11,7 +11,9 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define COLUMNS "name, bytes, sha256, content_type, updated_ms, attempt"
+#define COLUMNS                                                                                \
+    "name, bytes, sha256, content_type, updated_ms, attempt, digest, digest_inode, digest_bytes, digest_modified_ns," \
+    " digest_changed_ns"
 
 static void fill(struct output_row *row, sqlite3_stmt *stmt) {
     *row = (struct output_row){
@@ -20,8 +22,11 @@ static void fill(struct output_row *row, sqlite3_stmt *stmt) {
         .content_type = sql_dup(stmt, 3),
         .updated_ms = sqlite3_column_int64(stmt, 4),
         .attempt = sqlite3_column_int(stmt, 5),
+        .version = {(uint64_t)sqlite3_column_int64(stmt, 7), (uint64_t)sqlite3_column_int64(stmt, 8),
+                    sqlite3_column_int64(stmt, 9), sqlite3_column_int64(stmt, 10)},
     };
     snprintf(row->sha256, sizeof row->sha256, "%s", sql_text(stmt, 2));
+    snprintf(row->digest, sizeof row->digest, "%s", sql_text(stmt, 6));
 }
 
 void output_row_release(struct output_row *row) {
@@ -45,6 +50,17 @@ static bool name_is_plain(const char *name) {
     return name[length - 1] != '/';
 }
 
+void store_on_digest_wanted(struct store *store, void (*wanted)(void *user), void *user) {
+    store->digest_wanted = wanted;
+    store->digest_wanted_user = user;
+}
+
+static enum status tell_wanted(const struct store *store, enum status status) {
+    if (status == STATUS_OK && store->digest_wanted)
+        store->digest_wanted(store->digest_wanted_user);
+    return status;
+}
+
 enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type,
                              const char *name, uint64_t bytes, const char *sha256,
                              const char *content_type, struct error *err) {
@@ -59,7 +75,7 @@ enum status store_output_put(struct store *store, int64_t job_id, int attempt, c
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT OR REPLACE INTO outputs (job_id, name, bytes, sha256,"
-                         " content_type, updated_ms, attempt) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                         " content_type, updated_ms, attempt, digest_wanted) VALUES (?, ?, ?, ?, ?, ?, ?, 1)",
                          "itittin", job_id, name, (int64_t)bytes, sha256, content_type,
                          store_now_ms(), attempt);
     if (status == STATUS_OK) {
@@ -73,7 +89,7 @@ enum status store_output_put(struct store *store, int64_t job_id, int attempt, c
         mem_free(text);
         cJSON_Delete(data);
     }
-    return store_end(store, status, job_id, err);
+    return tell_wanted(store, store_end(store, status, job_id, err));
 }
 
 enum status store_output_get(struct store *store, int64_t job_id, const char *name,
@@ -126,4 +142,49 @@ enum status store_output_list(struct store *store, int64_t job_id, struct output
         *rows = NULL;
     }
     return status;
+}
+
+/* --- digests ----------------------------------------------------------------------------- */
+
+enum status store_output_want_digest(struct store *store, int64_t job_id, const char *name, struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err,
+                     "UPDATE outputs SET digest_wanted = 1 WHERE job_id = ? AND name = ? AND digest_wanted = 0", "it",
+                     job_id, name);
+    return tell_wanted(store, store_end(store, status, STORE_NOTHING_CHANGED, err));
+}
+
+enum status store_output_next_digest(struct store *store, int64_t *job_id, struct output_row *row, struct error *err) {
+    sqlite3_stmt *stmt;
+    bool found = false;
+    *row = (struct output_row){0};
+    store_lock(store);
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
+                                   "SELECT " COLUMNS ", job_id FROM outputs WHERE digest_wanted = 1"
+                                   " ORDER BY bytes LIMIT 1", "");
+    if (found) {
+        fill(row, stmt);
+        *job_id = sqlite3_column_int64(stmt, 11);
+        sqlite3_reset(stmt);
+    }
+    store_unlock(store);
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "every output has its digest") : status;
+}
+
+enum status store_output_enter_digest(struct store *store, int64_t job_id, const struct output_row *row,
+                                      const struct file_version *version, const char *digest, struct error *err) {
+    static const struct file_version none = {0};
+    const struct file_version *v = version ? version : &none;
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err,
+                     "UPDATE outputs SET digest_wanted = 0, digest = ?, digest_inode = ?, digest_bytes = ?,"
+                     " digest_modified_ns = ?, digest_changed_ns = ?"
+                     " WHERE job_id = ? AND name = ? AND attempt = ? AND updated_ms = ? AND sha256 = ?",
+                     "tiiiiitnit", digest ? digest : "", (int64_t)v->inode, (int64_t)v->bytes, v->modified_ns,
+                     v->changed_ns, job_id, row->name, row->attempt, row->updated_ms, row->sha256);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }

@@ -192,7 +192,18 @@ static const char step_11[] =
 static const char step_12[] =
     "DROP INDEX scenes_by_age;";
 
+/* The SHA-256 that this daemon computed of an output ("": none yet), and of which version of the file. Those that
+ * are here already are hashed when they are first asked for. */
+static const char step_13[] =
+    "ALTER TABLE outputs ADD COLUMN digest TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE outputs ADD COLUMN digest_inode INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE outputs ADD COLUMN digest_bytes INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE outputs ADD COLUMN digest_modified_ns INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE outputs ADD COLUMN digest_changed_ns INTEGER NOT NULL DEFAULT 0;"
+    "ALTER TABLE outputs ADD COLUMN digest_wanted INTEGER NOT NULL DEFAULT 0 CHECK (digest_wanted IN (0, 1));"
+    "CREATE INDEX outputs_to_hash ON outputs (bytes) WHERE digest_wanted = 1;";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
                                     step_6, step_7, step_8, step_9, step_10,
-                                    step_11, step_12};
+                                    step_11, step_12, step_13};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

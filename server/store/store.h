@@ -297,22 +297,41 @@ enum status store_outbox_wait(struct store *store, double *seconds, struct error
 enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
                                 struct error *err);
 
+/* What tells one version of a file from another, as stat has it. */
+struct file_version {
+    uint64_t inode, bytes;
+    int64_t modified_ns, changed_ns; /* Unix time */
+};
+
 struct output_row {
     char *name;
     uint64_t bytes;
-    char sha256[65];
+    char sha256[65];     /* as the worker says */
     char *content_type;
     int64_t updated_ms;
     int attempt;
+    char digest[65];     /* as the daemon found it ("": not yet), in this version of the file: */
+    struct file_version version;
 };
 void output_row_release(struct output_row *row);
 /* Records a complete file of the job's out/ folder and appends its event (`type` is
- * EVENT_OUTPUT or EVENT_PREVIEW). STATUS_INPUT when the name is not a plain relative path. */
+ * EVENT_OUTPUT or EVENT_PREVIEW). STATUS_INPUT when the name is not a plain relative path. Its digest is
+ * wanted from then on. */
 enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type,
                              const char *name, uint64_t bytes, const char *sha256,
                              const char *content_type, struct error *err);
 enum status store_output_get(struct store *store, int64_t job_id, const char *name,
                              struct output_row *row, struct error *err);
+/* Called, outside the store's mutex, when a digest has become wanted. One subscriber; set before threads start. */
+void store_on_digest_wanted(struct store *store, void (*wanted)(void *user), void *user);
+/* The digest of what the output is now is wanted, if it was not. */
+enum status store_output_want_digest(struct store *store, int64_t job_id, const char *name, struct error *err);
+/* The smallest output whose digest is wanted; STATUS_NOT_FOUND when there is none. */
+enum status store_output_next_digest(struct store *store, int64_t *job_id, struct output_row *row, struct error *err);
+/* The digest of that version of the file that `row` announced; NULL: there will be none. Nothing changes where the
+ * output was announced again, or is gone. */
+enum status store_output_enter_digest(struct store *store, int64_t job_id, const struct output_row *row,
+                                      const struct file_version *version, const char *digest, struct error *err);
 /* All outputs by name; rows is allocated, the caller's: release each, then mem_free. */
 enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows,
                               size_t *count, struct error *err);

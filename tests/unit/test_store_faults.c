@@ -258,6 +258,23 @@ static enum status get_output(void) {
     output_row_release(&row);
     return status;
 }
+static enum status want_digest(void) { return store_output_want_digest(store, job, "a.png", &err); }
+static enum status next_digest(void) {
+    struct output_row row;
+    int64_t id;
+    enum status status = store_output_next_digest(store, &id, &row, &err);
+    output_row_release(&row);
+    return status;
+}
+static enum status enter_digest(void) {
+    struct output_row row;
+    const struct file_version version = {.inode = 7, .bytes = 3};
+    enum status status = store_output_get(store, job, "a.png", &row, &err);
+    if (status == STATUS_OK)
+        status = store_output_enter_digest(store, job, &row, &version, SCENE_A, &err);
+    output_row_release(&row);
+    return status;
+}
 static enum status list_outputs(void) {
     struct output_row *rows;
     size_t count;
@@ -371,6 +388,7 @@ static const struct step {
     STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first), STEP(place_last), STEP(place_before), STEP(count), STEP(next_job), STEP(pause_job), STEP(resume_job), STEPS(explain),
     STEPS(explain_no_more),
     STEP(start_job), STEP(progress), STEP(progress), STEPS(many_events), STEP(put_output), STEP(get_output), STEP(list_outputs),
+    STEP(next_digest), STEP(enter_digest), STEP(want_digest),
     STEP(list_events), STEP(page_of_job), STEP(page_of_all), STEP(page_of_mine), STEP(last_event_of_job),
     STEP(last_event_of_all), STEP(newest_event), STEP(running_jobs), STEP(charge), STEP(charge), STEP(pay), STEP(next_message),
     STEP(put_off), STEP(wait_for_message), STEP(delivered),
