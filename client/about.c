@@ -156,7 +156,7 @@ int version_run(struct client *c, const struct options *o) {
         if (status == STATUS_OK)
             print_server(c, reply.json);
         else
-            printf("%s\n", err.message);
+            client_say(c, "%s", err.message);
     }
     reply_release(&reply);
     return code;

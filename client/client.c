@@ -109,6 +109,16 @@ void client_note(struct client *c, const char *format, ...) {
     fputs("\n", stderr);
 }
 
+void client_say(struct client *c, const char *format, ...) {
+    char text[8192]; /* a server's names and states are far shorter */
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    put_clean(c->out.out, text);
+    fputs("\n", c->out.out);
+}
+
 void field_print(struct client *c, const char *name, const char *value) {
     if (!*value)
         return;

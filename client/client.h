@@ -65,6 +65,9 @@ int client_fail(struct client *c, const struct reply *reply, const struct error 
 /* Prints "unbake: " and a sentence to stderr unless --quiet or --json. */
 void client_note(struct client *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/* A sentence to stdout, made harmless: words of the server's are in it. */
+void client_say(struct client *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
 /* "name       value" on stdout, made harmless; nothing where the value is "". */
 void field_print(struct client *c, const char *name, const char *value);
 

@@ -34,7 +34,7 @@ static int list(struct client *c, const struct options *o, const struct collecti
     else if (c->json)
         client_print_json(c, items);
     else if (c->quiet)
-        cJSON_ArrayForEach(item, items) { printf("%s\n", member_text(item, "id")); }
+        cJSON_ArrayForEach(item, items) { client_say(c, "%s", member_text(item, "id")); }
     else if (cJSON_GetArraySize(items) == 0)
         client_note(c, "no %s", what->name);
     else
@@ -55,9 +55,9 @@ static void print_removed(struct client *c, const struct collection *what, const
     if (c->json)
         client_print_json(c, value);
     else if (dry_run)
-        printf("%s %.12s: %.0f file%s, %s\n", what->one, id, files, files == 1.0 ? "" : "s", size);
+        client_say(c, "%s %.12s: %.0f file%s, %s", what->one, id, files, files == 1.0 ? "" : "s", size);
     else if (!c->quiet)
-        printf("%s %.12s removed\n", what->one, id);
+        client_say(c, "%s %.12s removed", what->one, id);
     cJSON_Delete(value);
 }
 
@@ -88,9 +88,9 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     else if (!c->quiet) {
         keeping_sentence(kept, reply.json);
         bool is_used = cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
-        printf("%s %.12s is %s\n", what->one, id, *kept      ? kept
-                                                  : is_used ? "in use, and kept at least as long"
-                                                            : "kept until it is removed");
+        client_say(c, "%s %.12s is %s", what->one, id, *kept      ? kept
+                                                       : is_used ? "in use, and kept at least as long"
+                                                                 : "kept until it is removed");
     }
     buf_release(&path);
     reply_release(&reply);

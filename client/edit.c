@@ -42,9 +42,9 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
         client_print_json(c, reply.json);
     else if (!c->quiet) {
         keeping_sentence(kept, reply.json);
-        printf("job %lld is %s, priority %.0f%s%s: %s\n", (long long)id, member_text(reply.json, "state"),
-               member_number(reply.json, "priority", 0.0), *kept ? ", " : "", kept,
-               member_text(reply.json, "name"));
+        client_say(c, "job %lld is %s, priority %.0f%s%s: %s", (long long)id, member_text(reply.json, "state"),
+                   member_number(reply.json, "priority", 0.0), *kept ? ", " : "", kept,
+                   member_text(reply.json, "name"));
     }
     reply_release(&reply);
     return code;

@@ -266,8 +266,8 @@ static int act_on(struct client *c, const char *word, const char *action) {
     else if (c->json)
         client_print_json(c, reply.json);
     else if (!c->quiet)
-        printf("job %lld is %s%s%s\n", (long long)id, state, strcmp(wanted, "run") ? ", to " : "",
-               strcmp(wanted, "run") ? wanted : "");
+        client_say(c, "job %lld is %s%s%s", (long long)id, state, strcmp(wanted, "run") ? ", to " : "",
+                   strcmp(wanted, "run") ? wanted : "");
     reply_release(&reply);
     return code;
 }

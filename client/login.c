@@ -74,7 +74,8 @@ int login_run(struct client *c, const struct options *o) {
         if (c->json)
             client_print_json(c, reply.json);
         else if (!c->quiet)
-            printf("%s at %s, role %s\n", member_text(reply.json, "user"), server, member_text(reply.json, "role"));
+            client_say(c, "%s at %s, role %s", member_text(reply.json, "user"), server,
+                       member_text(reply.json, "role"));
         if (strncmp(server, "http://", 7) == 0 && !request_is_loopback(c->request))
             client_note(c, "%s is plain http: whoever is on the way can read the token", server);
     }

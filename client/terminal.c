@@ -8,6 +8,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "common/utf8.h"
+
 static bool locale_is_utf8(void) {
     static const char *const names[] = {"LC_ALL", "LC_CTYPE", "LANG"};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
@@ -85,17 +87,10 @@ static size_t utf8_length(const char *at) {
 }
 
 void terminal_clean(struct buf *out, const char *text) {
-    while (*text) {
-        size_t length = utf8_length(text);
-        unsigned char first = (unsigned char)text[0];
-        /* C0, DEL, and C1 (U+0080 to U+009F), which some terminals obey too. */
-        bool control = first < 0x20 || first == 0x7F ||
-                       (length == 2 && first == 0xC2 && (unsigned char)text[1] < 0xA0);
-        if (length == 0 || control)
-            buf_puts(out, "?");
-        else
-            buf_append(out, text, length);
-        text += length ? length : 1;
+    char shown[UTF8_SHOWN_SIZE];
+    for (size_t left = strlen(text), size; left > 0; text += size, left -= size) {
+        size = utf8_show(text, left, shown);
+        buf_puts(out, shown);
     }
 }
 

@@ -33,8 +33,8 @@ void terminal_keep(struct terminal *t);
 /* The escape sequences around coloured text; "" where there is no colour. */
 const char *terminal_colour(const struct terminal *t, enum colour colour);
 
-/* Appends text from elsewhere (a file's name, a log line): control characters and bytes that are
- * not UTF-8 become '?', so that they cannot drive the terminal. */
+/* Appends text from elsewhere (a file's name, a log line) as utf8_show has it, so that it can neither drive
+ * the terminal nor change how what stands beside it reads. */
 void terminal_clean(struct buf *out, const char *text);
 
 /* How many columns UTF-8 text takes, one a character; escape sequences take none. */

@@ -12,6 +12,8 @@
 #include "common/utf8.h"
 
 #define MAX_DEPTH 64
+#define NUMBER(macro) NUMBER_(macro)
+#define NUMBER_(digits) #digits
 #define WHOLE_MAX 9007199254740992.0 /* 2^53: every whole number up to it is a double */
 
 /* cJSON leaves out of a tree what there was no memory for: as everywhere, running out of memory ends
@@ -34,13 +36,18 @@ static void locate(const char *text, const char *at, size_t *line, size_t *colum
     }
 }
 
-/* Depth of brackets outside strings: cJSON's own limit is deeper than our stack should go. */
-static bool too_deep(const char *text, size_t length, const char **where) {
+/* What cJSON would take and we do not; NULL when there is nothing, else where. Brackets nested too deep for our
+ * stack, and a NUL within a string, at which cJSON would cut it without a word. */
+static const char *own_fault(const char *text, size_t length, const char **where) {
     int depth = 0;
     bool in_string = false;
     for (size_t i = 0; i < length; i++) {
         char c = text[i];
         if (in_string) {
+            if (c == '\\' && length - i > 5 && memcmp(text + i + 1, "u0000", 5) == 0) {
+                *where = text + i;
+                return "has a string with a NUL character (\\u0000)";
+            }
             if (c == '\\')
                 i++;
             else if (c == '"')
@@ -50,13 +57,13 @@ static bool too_deep(const char *text, size_t length, const char **where) {
         } else if (c == '[' || c == '{') {
             if (++depth > MAX_DEPTH) {
                 *where = text + i;
-                return true;
+                return "is nested more than " NUMBER(MAX_DEPTH) " deep";
             }
         } else if (c == ']' || c == '}') {
             depth--;
         }
     }
-    return false;
+    return NULL;
 }
 
 static int by_text(const void *a, const void *b) {
@@ -106,11 +113,10 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
         return error_set(err, STATUS_INPUT, "%s is not UTF-8: bad byte at line %zu, column %zu",
                          what, line, column);
     }
-    if (too_deep(text, length, &where)) {
+    const char *fault = own_fault(text, length, &where);
+    if (fault) {
         locate(text, where, &line, &column);
-        return error_set(err, STATUS_INPUT,
-                         "%s is nested more than %d deep at line %zu, column %zu", what, MAX_DEPTH,
-                         line, column);
+        return error_set(err, STATUS_INPUT, "%s %s at line %zu, column %zu", what, fault, line, column);
     }
     const char *end = NULL;
     cJSON *parsed = cJSON_ParseWithLengthOpts(text, length, &end, false);
@@ -170,11 +176,37 @@ static void write_out_numbers(cJSON *first) {
     }
 }
 
+/* The JSON text with characters that are not visible, which are in strings, as escapes: what is printed on a
+ * terminal, by us or by curl, is then what it looks like. The caller's. */
+static char *escape_invisible(const char *text) {
+    size_t left = strlen(text), used = 0;
+    char *out = mem_array(left + 1, 6); /* DEL, a byte, becomes six; a character of four bytes twelve */
+    uint32_t c;
+    for (size_t size; left > 0; text += size, left -= size) {
+        size = utf8_next(text, left, &c);
+        bool is_plain = size == 0 || c < 0x20 || utf8_kind(c) == UTF8_VISIBLE; /* line breaks, too */
+        size = size ? size : 1;
+        if (is_plain) {
+            memcpy(out + used, text, size);
+            used += size;
+        } else if (c < 0x10000) {
+            used += (size_t)sprintf(out + used, "\\u%04x", (unsigned)c);
+        } else {
+            used += (size_t)sprintf(out + used, "\\u%04x\\u%04x", (unsigned)(0xd7c0 + (c >> 10)),
+                                    (unsigned)(0xdc00 + (c & 0x3ff)));
+        }
+    }
+    out[used] = '\0';
+    char *fitted = mem_strdup(out);
+    mem_free(out);
+    return fitted;
+}
+
 static char *print(const cJSON *value, bool with_line_breaks) {
     cJSON *copy = cJSON_Duplicate(value, true);
     write_out_numbers(copy);
     char *printed = with_line_breaks ? cJSON_Print(copy) : cJSON_PrintUnformatted(copy);
-    char *text = mem_strdup(printed ? printed : "null");
+    char *text = escape_invisible(printed ? printed : "null");
     cJSON_free(printed);
     cJSON_Delete(copy);
     return text;

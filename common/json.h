@@ -1,7 +1,7 @@
 /* json.h -- reading and writing JSON (RFC 8259) over cJSON.
  *
  * Values are cJSON trees. These wrappers add what the library leaves out: limits on size and
- * depth, refusal of trailing text and of duplicate keys, the line and column of a syntax
+ * depth, refusal of trailing text, of duplicate keys and of NUL within strings, the line and column of a syntax
  * error, and look-ups that say what was expected and what was found. */
 #ifndef UNBAKE_COMMON_JSON_H
 #define UNBAKE_COMMON_JSON_H
@@ -21,7 +21,7 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
 /* Reads and parses a file of at most `limit` bytes. */
 enum status json_read(const char *path, size_t limit, cJSON **value, struct error *err);
 
-/* Compact text of the tree with no newline inside, or text with line breaks for people to read;
+/* Compact text of the tree with no newline inside, invisible characters escaped (utf8_kind), or text with line breaks for people to read;
  * the caller's (mem_free). A number reads back as the same double; whole ones up to 2^53 are
  * written without an exponent. */
 char *json_text(const cJSON *value);

@@ -14,7 +14,8 @@
 /* Sentence and values are cut before they are quoted, so that a line is whole whatever they hold. */
 #define MESSAGE_BYTES 1500
 #define VALUE_BYTES 256
-#define LINE_BYTES (2 * MESSAGE_BYTES + LOG_FIELDS_MAX * (2 * VALUE_BYTES + 40) + 200)
+#define CLEAN_FACTOR 4 /* utf8_show */
+#define LINE_BYTES (CLEAN_FACTOR * MESSAGE_BYTES + LOG_FIELDS_MAX * (CLEAN_FACTOR * VALUE_BYTES + 40) + 200)
 
 static atomic_int current_level = LOG_INFO, current_format = LOG_TEXT;
 
@@ -64,22 +65,14 @@ static void put_text(struct line *line, const char *text) {
     put(line, text, strlen(text));
 }
 
-/* The text without control bytes and without what is no UTF-8; `quoted`: with \ before " and \ */
+/* The text as utf8_show has it; `quoted`: with \ before " and \ */
 static void put_clean(struct line *line, const char *text, bool quoted) {
-    size_t length = strlen(text), bad;
-    while (length > 0) {
-        size_t good = utf8_valid(text, length, &bad) ? length : bad;
-        for (size_t i = 0; i < good; i++) {
-            unsigned char c = (unsigned char)text[i];
-            if (quoted && (c == '"' || c == '\\'))
-                put(line, "\\", 1);
-            put(line, c < 0x20 || c == 0x7f ? "?" : &text[i], 1);
-        }
-        if (good == length)
-            break;
-        put(line, "?", 1);
-        text += good + 1;
-        length -= good + 1;
+    char shown[UTF8_SHOWN_SIZE];
+    for (size_t left = strlen(text), size; left > 0; text += size, left -= size) {
+        size = utf8_show(text, left, shown);
+        if (quoted && (*shown == '"' || *shown == '\\'))
+            put(line, "\\", 1);
+        put_text(line, shown);
     }
 }
 

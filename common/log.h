@@ -5,7 +5,8 @@
  *   json     {"time":"2026-01-02T03:04:05.678Z","level":"info","msg":"request","request":"1f2e",...}
  *
  * Thread-safe (a line is one write). The level and the format are the program's only mutable
- * globals. What a user sent cannot forge a line: control characters are replaced, quotes escaped. */
+ * globals. What a user sent cannot forge a line or how it reads: control characters are
+ * replaced, invisible ones and those that change directions spelled out (utf8_show), quotes escaped. */
 #ifndef UNBAKE_COMMON_LOG_H
 #define UNBAKE_COMMON_LOG_H
 

@@ -79,15 +79,18 @@ static bool is_server_name(const char *names, const char *host, size_t length) {
 
 static struct response *check_host(const struct request *r, const char *version,
                                    const char *server_names) {
-    const char *host = request_field(r, "Host");
+    const char *host = request_field(r, "Host"), *authority = r->target.authority;
     size_t length;
-    if (!host) {
-        if (strcmp(version, "HTTP/1.0") == 0)
-            return NULL;
+    if (!host && strcmp(version, "HTTP/1.0") != 0)
         return refuse(r, 400, "the Host field is missing");
-    }
-    if (!field_host(host, &length))
+    if (host && !field_host(host, &length))
         return refuse(r, 400, "the Host field is not a host");
+    if (authority && !field_host(authority, &length))
+        return refuse(r, 400, "the request target's authority is not a host");
+    if (authority)
+        host = authority; /* RFC 9112, 3.2.2: whatever the field has */
+    if (!host)
+        return NULL;
     if (server_names && !field_is_loopback_host(host, length) && !is_server_name(server_names, host, length)) {
         struct response *reply = problem_full(r, 403, "this daemon does not answer for that Host",
             "behind a proxy, list the public name in server_names of the configuration", NULL);
@@ -97,8 +100,8 @@ static struct response *check_host(const struct request *r, const char *version,
     const char *origin = request_field(r, "Origin");
     if (!origin || r->method == METHOD_GET)
         return NULL;
-    const char *authority = strstr(origin, "://");
-    if (!authority || strcasecmp(authority + 3, host) != 0)
+    const char *separator = strstr(origin, "://");
+    if (!separator || strcasecmp(separator + 3, host) != 0)
         return refuse(r, 403, "a page of another origin must not change anything here");
     return NULL;
 }

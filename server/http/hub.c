@@ -119,16 +119,21 @@ void hub_recheck(struct hub *hub) {
 
 /* --- text -------------------------------------------------------------------------------- */
 
-/* One event; takes data, an object, which gets `at`, `job` and `attempt` where it lacks them. */
+/* What only the daemon says of an event, whatever its data has. */
+static void set(cJSON *data, const char *name, cJSON *value) {
+    cJSON_DeleteItemFromObjectCaseSensitive(data, name);
+    json_add(data, name, value);
+}
+
+/* One event; takes data, an object, which gets `at`, `job` and `attempt`. */
 static void render(struct subscriber *s, const struct event_row *row, cJSON *data) {
     char at[VIEW_TIME_SIZE];
     view_time(row->at_ms, at);
-    if (!cJSON_GetObjectItemCaseSensitive(data, "at"))
-        json_add_string(data, "at", at);
-    if (row->job_id && !cJSON_GetObjectItemCaseSensitive(data, "job"))
-        json_add_int(data, "job", row->job_id);
-    if (row->job_id && !cJSON_GetObjectItemCaseSensitive(data, "attempt"))
-        json_add_int(data, "attempt", row->attempt);
+    set(data, "at", json_new_string(at));
+    if (row->job_id) {
+        set(data, "job", cJSON_CreateNumber((double)row->job_id));
+        set(data, "attempt", cJSON_CreateNumber(row->attempt));
+    }
     char *text = json_text(data);
     if (s->what.is_ndjson)
         buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":%s}\n", (long long)row->id, row->type,
@@ -165,7 +170,9 @@ static void render_start(struct subscriber *s) {
     if (!s->what.is_ndjson && s->what.revision == 0)
         buf_puts(&s->text, s->what.snapshot ? "retry: 3000\n" : "retry: 3000\n\n");
     if (s->what.snapshot) {
-        struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE};
+        const cJSON *attempt = cJSON_GetObjectItemCaseSensitive(s->what.snapshot, "attempt");
+        struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE,
+                                .attempt = attempt->valueint};
         json_add_bool(s->what.snapshot, "snapshot", true);
         render(s, &row, s->what.snapshot);
         s->what.snapshot = NULL;

@@ -4,6 +4,7 @@
 
 #include "common/mem.h"
 #include "common/sha256.h"
+#include "common/utf8.h"
 #include "server/http/auth.h"
 #include "server/http/body.h"
 #include "server/http/field.h"
@@ -106,8 +107,9 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
     for (const cJSON *member = (*body)->child; member; member = member->next) {
         if (strcmp(member->string, "name") == 0) {
             *name = cJSON_GetStringValue(member);
-            if (!*name || !**name || strlen(*name) > API_NAME_MAX_BYTES)
-                problem_param(params, "name", NULL, "must be text of 1 to %d bytes", API_NAME_MAX_BYTES);
+            if (!*name || !**name || strlen(*name) > API_NAME_MAX_BYTES || !utf8_is_name(*name))
+                problem_param(params, "name", NULL, "must be text of 1 to %d bytes without control characters",
+                              API_NAME_MAX_BYTES);
         } else if (!keeping_read(keeping, member, params)) {
             problem_param(params, member->string, "there are name, pinned, expires_at", "is not known here");
         }

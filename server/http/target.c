@@ -3,6 +3,7 @@
 
 #include <stdint.h>
 #include <string.h>
+#include <strings.h>
 
 #include "common/buf.h"
 #include "common/mem.h"
@@ -107,17 +108,29 @@ static enum status parse_query(struct target *t, const char *query, struct error
     return STATUS_OK;
 }
 
+/* Takes scheme and authority off an absolute form ("http://host:80/path"); what follows, or raw. */
+static const char *take_authority(struct target *t, const char *raw) {
+    size_t scheme = strncasecmp(raw, "http://", 7) == 0 ? 7 : strncasecmp(raw, "https://", 8) == 0 ? 8 : 0;
+    if (scheme == 0)
+        return raw;
+    size_t length = strcspn(raw + scheme, "/?#");
+    t->authority = mem_strndup(raw + scheme, length);
+    return raw + scheme + length;
+}
+
 enum status target_parse(struct target *t, const char *raw, struct error *err) {
     memset(t, 0, sizeof *t);
+    raw = take_authority(t, raw);
     size_t path_length = strcspn(raw, "?");
-    t->path = mem_strndup(raw, path_length);
+    /* An absolute form may have no path (RFC 9110, 4.2.3). */
+    t->path = t->authority && path_length == 0 ? mem_strdup("/") : mem_strndup(raw, path_length);
     for (char *at = t->path; *at; at++)
         if (*at <= 0x20 || *at >= 0x7f) /* negative, too: for logs and replies */
             *at = '?';
     for (const char *at = raw; *at; at++)
         if (*at <= 0x20 || *at >= 0x7f)
             return error_set(err, STATUS_INPUT, "the request target has a byte that no URL may have");
-    if (raw[0] != '/')
+    if (t->path[0] != '/')
         return error_set(err, STATUS_INPUT, "the request target does not begin with a slash");
     if (strchr(raw, '#'))
         return error_set(err, STATUS_INPUT, "the request target has a fragment (#)");
@@ -128,6 +141,7 @@ enum status target_parse(struct target *t, const char *raw, struct error *err) {
 }
 
 void target_release(struct target *t) {
+    mem_free(t->authority);
     mem_free(t->path);
     for (size_t i = 0; i < t->segment_count; i++)
         mem_free(t->segments[i]);

@@ -1,5 +1,6 @@
-/* target.h -- the request target (RFC 9112, 3.2), taken apart by us: libmicrohttpd decodes %2F and
- * %00 before anybody can tell them from what they stand for.
+/* target.h -- the request target (RFC 9112, 3.2) in origin form ("/path") or absolute form ("http://host/path", as
+ * clients send it to proxies), taken apart by us: libmicrohttpd decodes %2F and %00 before anybody can tell them
+ * from what they stand for.
  *
  * 1. A segment is decoded after the path was split, so an encoded slash never splits a path.
  * 2. Decoded text is UTF-8 and holds no control byte; no path holds an empty, "." or ".." part,
@@ -15,6 +16,7 @@
 #define TARGET_QUERY_MAX 16
 
 struct target {
+    char *authority; /* of an absolute form, "host:port", not yet checked: it takes the place of Host; owned; or NULL */
     char *path; /* as sent, without the query, '?' for what no URL may have; owned */
     char *segments[TARGET_SEGMENTS_MAX]; /* decoded; owned; none for "/" */
     size_t segment_count;

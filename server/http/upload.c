@@ -12,6 +12,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "common/utf8.h"
 #include "server/http/field.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
@@ -58,6 +59,8 @@ static struct response *check_request(const struct request *r) {
         return problem(r, 400, "Repr-Digest has no sha-256 that can be read");
     if (name && (strlen(name) > API_NAME_MAX_BYTES || *name == '\0'))
         return problem(r, 400, "name must have 1 to %d bytes, not %zu", API_NAME_MAX_BYTES, strlen(name));
+    if (name && !utf8_is_name(name))
+        return problem(r, 400, "name has a control character");
     return NULL;
 }
 

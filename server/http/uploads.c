@@ -121,7 +121,7 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
         memcpy(row->sha256, bytes, SCENE_ID_SIZE);
     } else if ((key_length == 4 && memcmp(key, "name", 4) == 0) ||
                (key_length == 8 && memcmp(key, "filename", 8) == 0 && !row->name)) {
-        if (!is_text || used == 0 || used > API_NAME_MAX_BYTES)
+        if (!is_text || used == 0 || used > API_NAME_MAX_BYTES || !utf8_is_name(bytes))
             return false;
         mem_free(row->name);
         row->name = mem_strdup(bytes);
@@ -141,7 +141,7 @@ static struct response *read_metadata(const struct request *r, struct upload_row
             end--;
         if (key == 0 || !take_pair(row, at, key, at + value, end > value ? end - value : 0))
             return problem_full(r, 400, "Upload-Metadata is not a list of keys with values in base64",
-                                "name has 1 to 200 bytes of UTF-8, sha256 has 64 lower-case hex digits", NULL);
+                                "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits", NULL);
         at += length;
         at += *at == ',';
         at += strspn(at, " ");

@@ -7,6 +7,7 @@
 
 #include "common/mem.h"
 #include "common/url.h"
+#include "common/utf8.h"
 #include "server/http/api.h"
 #include "server/http/body.h"
 #include "server/http/keeping.h"
@@ -24,9 +25,10 @@ void wish_release(struct wish *w) {
 }
 
 static bool check_string(const cJSON *member, size_t max, cJSON *params) {
-    if (cJSON_IsString(member) && *member->valuestring && strlen(member->valuestring) <= max)
+    if (cJSON_IsString(member) && *member->valuestring && strlen(member->valuestring) <= max &&
+        utf8_is_name(member->valuestring))
         return true;
-    problem_param(params, member->string, NULL, "must be text of 1 to %zu bytes", max);
+    problem_param(params, member->string, NULL, "must be text of 1 to %zu bytes without control characters", max);
     return false;
 }
 
@@ -35,12 +37,13 @@ static void read_labels(struct wish *w, const cJSON *member, cJSON *params) {
     bool good = cJSON_IsObject(member);
     for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
         good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES &&
-               *label->string && strlen(label->string) <= LABEL_MAX_BYTES;
+               *label->string && strlen(label->string) <= LABEL_MAX_BYTES && utf8_is_name(label->string) &&
+               utf8_is_name(label->valuestring);
     if (good && count <= LABELS_MAX)
         w->labels = json_text(member);
     else
         problem_param(params, "labels", NULL, "must be an object of at most %d texts, each name and "
-                      "text of at most %d bytes", LABELS_MAX, LABEL_MAX_BYTES);
+                      "text of at most %d bytes without control characters", LABELS_MAX, LABEL_MAX_BYTES);
 }
 
 static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {

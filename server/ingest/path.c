@@ -9,20 +9,20 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 
-/* The name with every byte that is not printable ASCII or whole UTF-8 replaced, and cut. */
-static void printable(const char *name, char out[160]) {
-    size_t length = strlen(name), used = 0;
-    bool is_text = utf8_valid(name, length, NULL);
-    for (size_t i = 0; i < length && used < 150; i++) {
-        unsigned char c = (unsigned char)name[i];
-        out[used++] = c < 0x20 || c == 0x7f || (c >= 0x80 && !is_text) ? '?' : name[i];
+#define SHOWN_MAX 150
+
+/* The name as utf8_show has it, cut. */
+static void printable(const char *name, char out[SHOWN_MAX + UTF8_SHOWN_SIZE + 3]) {
+    char shown[UTF8_SHOWN_SIZE];
+    size_t left = strlen(name), used = 0;
+    while (left > 0 && used < SHOWN_MAX) {
+        size_t size = utf8_show(name, left, shown), length = strlen(shown);
+        memcpy(out + used, shown, length);
+        used += length;
+        name += size;
+        left -= size;
     }
-    while (used > 0 && used >= 150 && ((unsigned char)out[used - 1] & 0xc0) == 0x80)
-        used--; /* not within a character */
-    if (used >= 149)
-        memcpy(out + used, "...", 4);
-    else
-        out[used] = '\0';
+    memcpy(out + used, left > 0 ? "..." : "", left > 0 ? 4 : 1);
 }
 
 #define ABSOLUTE "is an absolute path: names must be relative to the bundle"
@@ -33,14 +33,18 @@ static const char *whole_fault(const char *name, size_t length) {
         return "is too long a name";
     if (!utf8_valid(name, length, NULL))
         return "is not a name in UTF-8";
-    for (size_t i = 0; i < length; i++) {
-        unsigned char c = (unsigned char)name[i];
-        if (c < 0x20 || c == 0x7f)
-            return "is a name with a control character";
-        if (c == '\\')
-            return "is a name with a backslash: folders are separated by \"/\"";
-    }
+    if (!utf8_is_name(name))
+        return "is a name with a control character";
+    if (strchr(name, '\\'))
+        return "is a name with a backslash: folders are separated by \"/\"";
     return name[0] == '/' ? ABSOLUTE : NULL;
+}
+
+/* Whether the plain form clean[length] of `name` begins with a drive of Windows, "C:/". A colon elsewhere is a
+ * character like others: "a:b", "12:30/x.jpg". */
+static bool has_drive(const char *clean, size_t length, const char *name) {
+    return length > 1 && isalpha((unsigned char)clean[0]) && clean[1] == ':' &&
+           (length > 2 ? clean[2] == '/' : name[strlen(name) - 1] == '/');
 }
 
 enum status path_clean(const char *name, char **clean, struct error *err) {
@@ -63,10 +67,10 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
         }
         part += n + (part[n] == '/');
     }
-    if (!fault && used > 1 && isalpha((unsigned char)out[0]) && out[1] == ':')
-        fault = ABSOLUTE; /* a drive, also behind "./" */
+    if (!fault && has_drive(out, used, name))
+        fault = ABSOLUTE; /* also behind "./" */
     if (fault) {
-        char shown[160];
+        char shown[SHOWN_MAX + UTF8_SHOWN_SIZE + 3];
         printable(name, shown);
         mem_free(out);
         return error_set(err, STATUS_INPUT, "\"%s\" %s", shown, fault);

@@ -11,7 +11,7 @@
 
 /* Brings a name to its plain form, "a/b/c" without "." or empty parts; the caller's (mem_free),
  * NULL on error. It may be "" (the bundle's own folder). Refused with STATUS_INPUT: absolute
- * names (drive letters too), "..", backslashes, control characters, what is not UTF-8, and
+ * names ("C:/x" too, but not "a:b"), "..", backslashes, what is no name by utf8_is_name, and
  * names too long or too deep. The message begins with the name, made fit to print. */
 enum status path_clean(const char *name, char **clean, struct error *err);
 

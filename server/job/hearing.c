@@ -18,11 +18,16 @@ struct listener {
     struct figures *figures;
 };
 
-static void enter_event(const struct listener *l, const char *type, const cJSON *data) {
+/* `data` is as the worker has it. What only the daemon says of an event is not for a worker to say:
+ * it may be that of another job, or run by whoever sent the scene. */
+static void enter_event(const struct listener *l, const char *type, cJSON *data) {
+    static const char *const daemons[] = {"job", "attempt", "at", "snapshot"};
     struct attempt *a = l->attempt;
     struct error err;
     if (a->job_id == 0 || a->event_count++ >= EVENTS_MAX)
         return;
+    for (size_t i = 0; i < sizeof daemons / sizeof *daemons; i++)
+        cJSON_DeleteItemFromObjectCaseSensitive(data, daemons[i]);
     char *text = json_text(data);
     enum status status = store_event_add(l->store, a->job_id, a->number, type, text, &err);
     mem_free(text);

@@ -26,6 +26,16 @@ equal "$(field '.invalid_params[0] | .name, .reason' | tr '\n' ' ')" \
     "settings.emitters only method=listing1 uses it, and the method is solve "
 post /v1/jobs "{\"scene\":\"$scene\",\"name\":\"\"}"; expect 422
 post /v1/jobs "{\"scene\":\"$scene\",\"name\":7}"; expect 422
+# What a name would do to a terminal, or to the text beside it, it must not hold; marks that scripts need it may.
+for bad in '"name":"a\u001b[2Jb"' '"name":"a\u202eb"' '"name":"a\u2066b"' '"name":"a\u2028b"' '"name":"a\u009bb"' \
+    '"labels":{"a\u202eb":"c"}' '"labels":{"a":"b\nc"}'; do
+    post /v1/jobs "{\"scene\":\"$scene\",$bad}"; expect 422 "$bad"
+done
+post '/v1/jobs?dry_run=1' "{\"scene\":\"$scene\",\"name\":\"a\\u0000b\"}"; expect 400 "a NUL in a name"
+field .detail | grep -q NUL || fail "the NUL is not named: $(cat "$work/body")"
+post '/v1/jobs?dry_run=1' "{\"scene\":\"$scene\",\"settings\":{\"method\":\"listing1\\u0000x\"}}"; expect 400 "a NUL in a setting"
+post '/v1/jobs?dry_run=1' "{\"scene\":\"$scene\",\"name\":\"\u0645\u06cc\u200c\u062e\u0648\u0627\u0647\u0645 \ud83d\udc69\u200d\ud83d\udd2c\"}"
+expect 200 "a name with joiners"
 post /v1/jobs "{\"scene\":\"$scene\",\"priority\":1.5}"; expect 422
 post /v1/jobs '{"scene":'; expect 400 "half a body"
 post /v1/jobs '[]'; expect 400 "an array"

@@ -55,6 +55,7 @@ void fuzz_seeds(struct seeds *s) {
     s->mutants = 20000;
     seeds_text(s, "/");
     seeds_text(s, "/v1/jobs/17/outputs/preview%2Fbase_color.png?wait=5&after=12");
+    seeds_text(s, "http://localhost:80/v1/jobs?limit=1");
     seeds_text(s, "/v1/scenes?name=K%C3%BCche+hinten&cursor=1700000000000-00ff%00");
     seeds_text(s, "/a/../b//c/./d%2e%2e%2f");
 }

@@ -225,7 +225,11 @@ static void test_text(void) {
     struct buf b;
     buf_init(&b, 1024);
     terminal_clean(&b, "a\033[2Jb\n\xC2\x9B" "c \xFF \xE2\x82\xAC \xE2\x82");
-    CHECK_STRING(buf_text(&b), "a?[2Jb??c ? \xE2\x82\xAC ??");
+    CHECK_STRING(buf_text(&b), "a?[2Jb?<U+009B>c ? \xE2\x82\xAC ??");
+    buf_clear(&b);
+    /* An override, an isolate, a separator, a mark, a soft hyphen, a tag; an emoji is left alone. */
+    terminal_clean(&b, "\u202Egpj.exe \u2066 \u2028 \u200E \u00AD \U000E0041 \U0001F600");
+    CHECK_STRING(buf_text(&b), "<U+202E>gpj.exe <U+2066> <U+2028> <U+200E> <U+00AD> <U+E0041> \U0001F600");
     buf_clear(&b);
     buf_puts(&b, "\033[31m\xE2\x82\xAC" "bc\033[0m");
     CHECK(text_columns(buf_text(&b)) == 3);

@@ -30,8 +30,10 @@ int main(void) {
     accept_path("/a%20b/%C3%A4?x", 2, "a b/\xC3\xA4");
     accept_path("/...", 1, "...");
     accept_path("/a+b", 1, "a+b");
+    accept_path("http://localhost/v1/jobs", 2, "v1/jobs");
+    accept_path("HTTPS://[::1]:8443", 0, "");
     static const char *const bad[] = {
-        "", "*", "v1", "http://localhost/v1", "//", "//evil.org/", "/v1//jobs", "/v1/jobs/", "/..", "/a/../b",
+        "", "*", "v1", "ftp://localhost/v1", "http:/v1", "http:", "http://localhost#a", "http://localhost//v1", "//", "//evil.org/", "/v1//jobs", "/v1/jobs/", "/..", "/a/../b",
         "/a/./b", "/a/%2e%2e/b", "/a%2f..%2fb", "/a%2F", "/%2fa", "/a%2f%2fb", "/a%00b", "/a%0ab", "/a%7fb",
         "/a%", "/a%2", "/a%zz", "/%%41", "/a#b", "/1/2/3/4/5/6/7/8/9/10/11/12/13/14/15/16/17",
         "/a%ff", "/a%c3", "/a?x=%ff", "/\xC3\xA4", "/a b", "/a\033b", "/a?x=%0", "/a?x=%00", "/a?x=1&x=2", "/a?x&x",
@@ -48,6 +50,13 @@ int main(void) {
     CHECK_STRING(target_query(&t, "x"), "=&");
     CHECK(target_query(&t, "nam") == NULL);
     CHECK_STRING(t.path, "/a");
+    target_release(&t);
+
+    /* The absolute form, without a path too. */
+    CHECK(target_parse(&t, "http://lab.example.org:80?name=x", NULL) == STATUS_OK);
+    CHECK_STRING(t.authority, "lab.example.org:80");
+    CHECK_STRING(t.path, "/");
+    CHECK_STRING(target_query(&t, "name"), "x");
     target_release(&t);
 
     char *text = target_encode("a b/\xC3\xA4~", 1);

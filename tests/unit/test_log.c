@@ -9,7 +9,7 @@
 
 /* What the call writes to stderr; the caller's. */
 static char *caught(void (*write_it)(void)) {
-    char path[] = "/tmp/test_log.XXXXXX", text[16384] = "";
+    char path[] = "/tmp/test_log.XXXXXX", text[32768] = "";
     int to = mkstemp(path), saved = dup(STDERR_FILENO);
     if (to < 0 || saved < 0)
         CHECK_SKIP("cannot write to /tmp");
@@ -26,13 +26,15 @@ static char *caught(void (*write_it)(void)) {
 
 static void write_nasty(void) {
     const struct log_field fields[] = {
-        {"path", "/a b\"c\\\n{\xff}", false}, {"status", "404", true}, {"user", NULL, false}, {"word", "plain", false}};
-    log_fields(LOG_WARNING, fields, 4, "it \"says\"\nlevel=error \x1b[31m");
+        {"path", "/a b\"c\\\n{\xff}", false}, {"status", "404", true}, {"user", NULL, false}, {"word", "plain", false},
+        {"name", "a\u202Eb", false}};
+    log_fields(LOG_WARNING, fields, 5, "it \"says\"\nlevel=error \x1b[31m");
 }
 
 static void write_long(void) {
-    static char text[5000];
-    memset(text, '"', sizeof text - 1);
+    static char text[5000]; /* of what takes most room: soft hyphens, and quotes */
+    for (size_t i = 0; i + 1 < sizeof text; i++)
+        text[i] = i > 4000 ? '"' : "\xC2\xAD"[i % 2];
     struct log_field fields[LOG_FIELDS_MAX];
     for (size_t i = 0; i < LOG_FIELDS_MAX; i++)
         fields[i] = (struct log_field){"a_key_of_thirty_characters_abc", text, false};
@@ -47,7 +49,7 @@ static void check_one_line(const char *text) {
 int main(void) {
     char *text = caught(write_nasty);
     check_one_line(text);
-    CHECK(strstr(text, "Z warning: it \"says\"?level=error ?[31m path=\"/a b\\\"c\\\\?{?}\" status=404 word=plain\n"));
+    CHECK(strstr(text, "Z warning: it \"says\"?level=error ?[31m path=\"/a b\\\"c\\\\?{?}\" status=404 word=plain name=a<U+202E>b\n"));
     mem_free(text);
 
     log_set_format(LOG_LOGFMT);
