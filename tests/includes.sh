@@ -24,7 +24,23 @@ own() {
     bad=1
 }
 
-engine='server/(ingest|scene|render|capture|gather|reconstruct|export)/'
+# The engine, lowest first: each folder includes only those before it (and common).
+engine_order='scene render capture gather state material light refine reconstruct'
+engine="server/($(echo "$engine_order" | tr ' ' '|')|ingest|export)/"
+above=" $engine_order "
+for folder in $engine_order; do
+    above=${above#* "$folder" }
+    above=" $above"
+    forbid "server/$folder" "server/($(echo "$above" | xargs | tr ' ' '|')|ingest|export)/" \
+        "$folder sees only what comes before it in: $engine_order"
+done
+forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' ' -f2- | tr ' ' '|'))/" \
+    'ingest and export see only scene'
+forbid server/ingest 'server/export/' 'ingest does not see export'
+forbid server/export 'server/ingest/' 'export does not see ingest'
+forbid "$(for folder in $engine_order ingest export; do echo "server/$folder"; done)" \
+    'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
+
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
@@ -34,18 +50,9 @@ forbid server/job "$engine|server/http/" 'job never sees the engine or http'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
 forbid server/worker 'server/(http|job)/|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
-forbid "server/scene server/render server/capture server/gather server/reconstruct server/ingest server/export" \
-    'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
-forbid server/scene 'server/(render|capture|gather|reconstruct|ingest|export)/' 'scene is data, no rays'
-forbid server/render 'server/(capture|gather|reconstruct|ingest|export)/' 'render sees only scene'
-forbid server/ingest 'server/(render|capture|gather|reconstruct|export)/' 'ingest sees only scene'
-forbid server/capture 'server/(gather|reconstruct|ingest|export)/' 'capture sees only render and scene'
-forbid server/gather 'server/(reconstruct|ingest|export)/' 'gather sees only capture, render and scene'
-forbid server/reconstruct 'server/(ingest|export)/' 'reconstruct sees only gather and what is below it'
-forbid server/export 'server/(render|capture|gather|reconstruct|ingest)/' 'export sees only scene'
 
 forbid "server/demo server/evaluate" 'server/(http|store|job|worker)/' 'tools know only the engine'
-forbid server/demo 'server/(ingest|capture|gather|reconstruct|export|evaluate)/' 'demo sees only render and scene'
+forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c sees the tools'
 

@@ -9,7 +9,7 @@
 #define UNBAKE_RECONSTRUCT_CALIBRATE_H
 
 #include "server/capture/views.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/reconstruction.h"
 
 /* Changes the photographs of r->scene, brings `views` up to date, adds "calibration" to r->report
  * and says in the log what was found. */

@@ -11,8 +11,8 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/settings.h"
-#include "server/reconstruct/reconstruction.h"
 #include "server/scene/scene.h"
+#include "server/state/reconstruction.h"
 
 /* Runs all stages up to `report`. Solves unknown exposures in `scene`, turns triangles
  * that photographs see from behind, gives the mesh normals where it has none. STATUS_CANCELLED when

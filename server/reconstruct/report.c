@@ -6,10 +6,10 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
-#include "server/reconstruct/emitters.h"
 #include "server/reconstruct/metrics.h"
 #include "server/render/film.h"
 #include "server/render/path.h"
+#include "server/state/evidence.h"
 
 /* HDR frames are shown with their median at this fraction of white. */
 #define SHOWN_MEDIAN 0.2

@@ -4,7 +4,7 @@
 #define UNBAKE_RECONSTRUCT_REPORT_H
 
 #include "server/capture/views.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/reconstruction.h"
 
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A held-out frame
  * of unknown exposure is compared at the exposure that fits it best, and where exposures or white balance were found to

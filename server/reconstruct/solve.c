@@ -8,16 +8,17 @@
 #include "common/mem.h"
 #include "server/gather/probes.h"
 #include "server/gather/sun_mirrored.h"
-#include "server/reconstruct/by_segment.h"
-#include "server/reconstruct/changing_light.h"
-#include "server/reconstruct/detail.h"
-#include "server/reconstruct/divide.h"
-#include "server/reconstruct/emission_pattern.h"
-#include "server/reconstruct/emitters.h"
-#include "server/reconstruct/gloss.h"
-#include "server/reconstruct/lamps.h"
-#include "server/reconstruct/sky_doubt.h"
-#include "server/reconstruct/sun_refit.h"
+#include "server/light/changing_light.h"
+#include "server/light/emitters.h"
+#include "server/light/lamps.h"
+#include "server/light/sky_doubt.h"
+#include "server/light/sun_refit.h"
+#include "server/material/detail.h"
+#include "server/material/divide.h"
+#include "server/material/emission_pattern.h"
+#include "server/material/gloss.h"
+#include "server/scene/by_segment.h"
+#include "server/state/evidence.h"
 
 /* The first tells what each place sends out, the second what is glossy in that light, the last all. The second is left
  * out where most light is an estimate (unseen_light.h), which is off by more than it puts right. */
@@ -197,7 +198,7 @@ static void average_arrived(const struct solve *s) {
         if (!is_seen || !divide_white(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
-        if (emitters_is_bright(r, texel))
+        if (evidence_is_bright(r, texel))
             add_arrived(sum[segment].bright, white);
     }
     for (size_t i = 0; i < r->segments.count; i++) {

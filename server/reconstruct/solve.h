@@ -13,7 +13,7 @@
 
 #include "common/error.h"
 #include "server/capture/views.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/reconstruction.h"
 
 /* Writes r->materials, r->is_emitter, r->evidence and the lights of r->world, and adds "solve" to
  * r->report. STATUS_CANCELLED when stopped: nothing is usable then. Deterministic. */

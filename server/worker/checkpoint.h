@@ -23,7 +23,7 @@
 #include <stdint.h>
 
 #include "common/error.h"
-#include "server/reconstruct/state.h"
+#include "server/state/state_array.h"
 
 #define CHECKPOINT_TILE_BYTES ((size_t)1 << 20)
 

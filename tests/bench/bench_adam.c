@@ -4,7 +4,7 @@
  * whole texture; those of all are next to each other, a band of the texture at a time, which
  * spares gigabytes of log entries. Processor time is taken, and the best of REPEATS counts on either
  * side: what else runs on the machine only ever adds. Prints a line "name value goal better". */
-#include "server/reconstruct/params.h"
+#include "server/refine/params.h"
 #include "tests/bench/engine.h"
 
 #define SIDE 8192

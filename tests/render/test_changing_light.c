@@ -1,7 +1,7 @@
 /* changing_light.h: a black wall that shows a picture in half of the photographs, dimmer than white paint would be, is
  * found to emit, and where; one that mirrors the lamp is not, nor one on which the same is painted, not even where half
  * of the photographs saturate far below it. */
-#include "server/reconstruct/emitters.h"
+#include "server/state/evidence.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 

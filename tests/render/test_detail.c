@@ -2,8 +2,8 @@
  * number of threads; none comes out darker than black; what one half of the photographs alone tells
  * stays; and pixels of little worth are counted as exactly as others. */
 #include "server/capture/halves.h"
-#include "server/reconstruct/detail.h"
-#include "server/reconstruct/divide.h"
+#include "server/material/detail.h"
+#include "server/material/divide.h"
 #include "server/scene/surface.h"
 #define PAINTED_WIDTH 40 /* pixels larger than texels */
 #define PAINTED_HEIGHT 30

@@ -1,8 +1,7 @@
 /* Emitters that show a picture: light samples and hits read the same place of it, paths are linear in it, and
  * reconstruction finds it from photographs (emission_pattern.h), for any number of threads and anew after a
  * checkpoint. Where the lamp is equally bright all over, none is found. */
-#include "server/reconstruct/emission_pattern.h"
-#include "server/reconstruct/emitters.h"
+#include "server/material/emission_pattern.h"
 #include "server/render/bsdf.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"

@@ -1,6 +1,6 @@
 /* emitters.h: a lamp is found, and of a speck in mixed pixels a single look that is too bright tells nothing. */
-#include "server/reconstruct/emitters.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/evidence.h"
+#include "server/state/reconstruction.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"

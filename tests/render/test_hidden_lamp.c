@@ -1,7 +1,7 @@
 /* lamp_find.h: a lamp that no photograph shows is found by what it lights, and is as bright as it is; where the lamp
  * was photographed, be it thinner than a pixel, nothing else is taken for one. The same for any number of threads. */
-#include "server/reconstruct/emitters.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/evidence.h"
+#include "server/state/reconstruction.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"

@@ -1,8 +1,8 @@
 /* saturated_light.h: a lamp at which every photograph saturates is as bright as what it lights tells, and so is a sky;
  * where some photograph measured them, what they light is not asked. A bar before a white sky that some photographs
  * show as white is no lamp. Of lamps that are alike none is brighter than the others. The same for any number of threads. */
-#include "server/reconstruct/emitters.h"
-#include "server/reconstruct/reconstruction.h"
+#include "server/state/evidence.h"
+#include "server/state/reconstruction.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"

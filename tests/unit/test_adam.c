@@ -1,5 +1,5 @@
 /* adam.h: touched entries move as Algorithm 1 says, untouched ones not at all. */
-#include "server/reconstruct/adam.h"
+#include "server/refine/adam.h"
 
 #include "tests/check.h"
 

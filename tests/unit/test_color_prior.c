@@ -5,7 +5,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/reconstruct/color_prior.h"
+#include "server/material/color_prior.h"
 #include "tests/check.h"
 
 #define WALLS 6

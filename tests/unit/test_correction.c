@@ -1,5 +1,5 @@
 /* correction.h: factors of base colour told by noisy looks, and what is thought of them where there are few. */
-#include "server/reconstruct/correction.h"
+#include "server/refine/correction.h"
 
 #include <math.h>
 

@@ -1,5 +1,5 @@
 /* denoise.h: noise goes, texture stays, holes are filled, and nothing crosses from chart to chart. */
-#include "server/reconstruct/denoise.h"
+#include "server/material/denoise.h"
 
 #include "common/mem.h"
 #include "tests/check.h"

@@ -1,5 +1,5 @@
 /* emission.h: radiance moves in the logarithm, what is black stays black, others may be put out for good. */
-#include "server/reconstruct/emission.h"
+#include "server/refine/emission.h"
 
 #include "tests/check.h"
 #include "tests/unit/surface.h"

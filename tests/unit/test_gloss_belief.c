@@ -1,5 +1,5 @@
 /* gloss_belief.h: what segments of one colour tell of each other, and when they do not. */
-#include "server/reconstruct/gloss_belief.h"
+#include "server/material/gloss_belief.h"
 
 #include <math.h>
 

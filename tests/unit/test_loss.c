@@ -1,6 +1,6 @@
 /* loss.h: two half-estimates give an unbiased gradient where one gives a biased one; saturated
  * pixels only push up. */
-#include "server/reconstruct/loss.h"
+#include "server/refine/loss.h"
 
 #include "common/rng.h"
 #include "tests/check.h"

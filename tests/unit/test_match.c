@@ -1,5 +1,5 @@
 /* match.h: what a look tells. */
-#include "server/reconstruct/match.h"
+#include "server/refine/match.h"
 
 #include "tests/check.h"
 

@@ -1,6 +1,6 @@
 /* measured.h: a look of much weight counts for much where the others do not contradict it; into a highlight that none of
  * the others shows it does not, however sharp it is. */
-#include "server/reconstruct/measured.h"
+#include "server/material/measured.h"
 
 #include <math.h>
 

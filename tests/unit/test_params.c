@@ -1,5 +1,5 @@
 /* params.h: how texels, blocks and segments move. */
-#include "server/reconstruct/params.h"
+#include "server/refine/params.h"
 
 #include "tests/check.h"
 #include "tests/unit/surface.h"

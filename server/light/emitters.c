@@ -1,0 +1,137 @@
+/* emitters.c -- see emitters.h. */
+#include "server/light/emitters.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/scene/by_segment.h"
+#include "server/scene/surface.h"
+
+#define TEXELS_PER_SEGMENT 256
+#define VIEWS_PER_TEXEL 4
+/* Looks that a class of distance from an edge must have for its median to count. */
+#define LEAST_LOOKS 12
+/* Of a segment seen in mixed pixels alone, fewer than this are an accident of noise. */
+#define LEAST_LOOKS_MIXED 3
+#define RING_PIXELS 4.0f
+#define OUTSHINES 1.3f
+/* A saturated pixel must be so much brighter than all around it: a bar before a white sky is as white as the sky. */
+#define OUTSHINES_WHITE 1.05f
+/* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
+#define OWN_PART 0.25f
+/* Segments this many times brighter than the median of the room outshine it. */
+#define BRIGHT 4.0f
+
+struct evidence_job {
+    struct reconstruction *r;
+    const struct views *views;
+    struct texels_by_segment texels;
+    struct emitter_evidence *evidence;
+};
+
+/* Values of one channel; of the saturated ones, the lower bounds. */
+struct channel_values {
+    struct bounded value[TEXELS_PER_SEGMENT * VIEWS_PER_TEXEL];
+    size_t count;
+};
+
+/* What the looks of one class of distance from an edge (views_edge) show. */
+struct shown_values {
+    struct channel_values channel[3];
+    size_t outshone_count; /* looks left out since something beside was as bright */
+};
+
+static void add_value(struct channel_values *v, float radiance, bool saturated) {
+    v->value[v->count++] = (struct bounded){radiance, saturated};
+}
+
+/* Whether what a look of this class of distance from an edge shows is the surface's own. A bright
+ * window may stand behind a thin frame: a pixel that mixes surfaces speaks only when it is clearly
+ * brighter than all around it, one near an edge when it is no darker than its surroundings. */
+static bool outshines(const struct photograph *photo, const struct view *view, const struct photograph_sample *sample,
+                      int edge) {
+    float own = rgb_mean(sample->radiance);
+    if (edge == 0)
+        return true;
+    struct photograph_ring ring = photograph_ring(photo, view->x, view->y, RING_PIXELS);
+    if (edge == VIEWS_EDGE)
+        return own > OUTSHINES * ring.brightest;
+    bool is_white = sample->saturated[0] || sample->saturated[1] || sample->saturated[2];
+    return own * ring.count >= (is_white ? OUTSHINES_WHITE : 1.0f) * ring.sum;
+}
+
+static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
+    const struct reconstruction *r = job->r;
+    struct surface_point at;
+    struct view view[VIEWS_PER_TEXEL];
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return;
+    size_t seen = views_pick(job->views, at.position, at.normal, texel, VIEWS_PER_TEXEL, view);
+    for (size_t k = 0; k < seen; k++) {
+        struct photograph_sample sample;
+        const struct photograph *photo = &r->scene->photograph[job->views->train[view[k].train]];
+        int edge = views_edge(job->views, &view[k], at.triangle);
+        if (!photograph_sample(photo, view[k].x, view[k].y, &sample))
+            continue;
+        if (!outshines(photo, &view[k], &sample, edge)) {
+            shown[edge].outshone_count++;
+            continue;
+        }
+        struct channel_values *channel = shown[edge].channel;
+        add_value(&channel[0], sample.radiance.r, sample.saturated[0]);
+        add_value(&channel[1], sample.radiance.g, sample.saturated[1]);
+        add_value(&channel[2], sample.radiance.b, sample.saturated[2]);
+    }
+}
+
+static void observe_segment(void *user, size_t segment, int thread) {
+    (void)thread;
+    struct evidence_job *job = user;
+    if (job->evidence[segment].hidden)
+        return; /* it is known from elsewhere */
+    struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
+    size_t count = by_segment_count(&job->texels, segment), wanted = count < TEXELS_PER_SEGMENT ? count : TEXELS_PER_SEGMENT;
+    for (size_t i = 0; i < wanted; i++)
+        observe_texel(job, by_segment_spaced(&job->texels, segment, i, wanted), shown);
+    /* The looks farthest from edges, as soon as there are some. */
+    struct shown_values *best = shown;
+    for (int edge = 1; edge <= VIEWS_EDGE; edge++) {
+        if (best->channel[0].count < LEAST_LOOKS)
+            best = &shown[edge];
+    }
+    size_t told = best->channel[0].count;
+    size_t least = best == &shown[VIEWS_EDGE] ? LEAST_LOOKS_MIXED : 1;
+    bool is_own = told >= least && (float)told >= OWN_PART * (float)(told + best->outshone_count);
+    if (!is_own)
+        best = &shown[0]; /* most often it is not what shines: nothing is known */
+    struct emitter_evidence *e = &job->evidence[segment];
+    e->seen = is_own;
+    e->mixed = best == &shown[VIEWS_EDGE];
+    float value[3] = {0};
+    for (int c = 0; c < 3; c++)
+        e->bound[c] = best->channel[c].count > 0 &&
+                      !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
+    e->least = rgb_make(value[0], value[1], value[2]);
+    if (!e->unbound)
+        e->shown = e->least;
+    mem_free(shown);
+}
+
+void emitters_observe(const struct reconstruction *r, const struct views *views,
+                      struct emitter_evidence *evidence) {
+    struct evidence_job job = {.r = (struct reconstruction *)r, .views = views, .evidence = evidence};
+    by_segment_sort(&job.texels, &r->segments, &r->inverse);
+    parallel_for(r->pool, r->segments.count, observe_segment, &job);
+    by_segment_release(&job.texels);
+}
+
+void emitters_light_bright(struct reconstruction *r, const struct views *views,
+                           const struct emitter_evidence *evidence) {
+    for (size_t i = 0; i < r->segments.count; i++) {
+        rgb shown = evidence[i].shown;
+        bool shines = evidence[i].hidden || evidence[i].unbound || rgb_mean(shown) > BRIGHT * views->median_radiance;
+        r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
+    }
+    world_update_lights(&r->world);
+}

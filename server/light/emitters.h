@@ -1,0 +1,19 @@
+/* emitters.h -- what photographs show of each segment's light, before it is known what emits. */
+#ifndef UNBAKE_LIGHT_EMITTERS_H
+#define UNBAKE_LIGHT_EMITTERS_H
+
+#include "server/capture/views.h"
+#include "server/state/evidence.h"
+#include "server/state/reconstruction.h"
+
+/* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of
+ * each; not those of hidden lamps, nor `shown` of what is unbound. */
+void emitters_observe(const struct reconstruction *r, const struct views *views,
+                      struct emitter_evidence *evidence);
+
+/* Makes lights of what outshines the room, before it is known what emits: its emission is what is shown of it,
+ * own and reflected light together; that of all else is 0. */
+void emitters_light_bright(struct reconstruction *r, const struct views *views,
+                           const struct emitter_evidence *evidence);
+
+#endif

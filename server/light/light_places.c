@@ -1,0 +1,139 @@
+/* light_places.c -- see light_places.h. */
+#include "server/light/light_places.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/gather/sun.h"
+#include "server/render/sampler.h"
+
+#define WAYS 128 /* directions a point */
+#define AROUND 640 /* the texels around one, each way as far as this part of the atlas's width, tell what it shows */
+#define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
+/* Logarithms of base colour: what of it is odd counts up to this much. */
+#define ODD_MOST 1.0f
+/* Light beside which this share of the room's median is nothing. */
+#define DARK 0.01f
+
+struct gathering {
+    const struct survey *survey;
+    const struct fused *shown; /* or NULL */
+    struct light_place *place; /* [survey->count] */
+};
+
+/* What photographs show of a point. */
+static rgb shown_of(const struct gathering *g, size_t index) {
+    const struct reconstruction *r = g->survey->r;
+    uint32_t texel = g->survey->texel[index], around = r->atlas.width / AROUND;
+    rgb shown = g->shown ? fused_around(g->shown, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
+    return rgb_is_black(shown) ? fused_around(&r->fused, &r->atlas, &r->inverse, texel, around) : shown;
+}
+
+static void gather_place(void *user, size_t index, int thread) {
+    const struct gathering *g = user;
+    const struct survey *survey = g->survey;
+    const struct reconstruction *r = survey->r;
+    struct light_place *p = &g->place[index];
+    uint32_t texel = survey->texel[index];
+    struct irradiance light;
+    *p = (struct light_place){
+        .segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
+        return;
+    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
+    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
+    p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+}
+
+static int by_segment(const void *a, const void *b) {
+    const struct light_place *first = a, *second = b;
+    if (first->segment != second->segment)
+        return first->segment < second->segment ? -1 : 1;
+    return (first->at.triangle > second->at.triangle) - (first->at.triangle < second->at.triangle);
+}
+
+size_t light_places_end(const struct light_places *s, size_t first) {
+    size_t end = first;
+    while (end < s->count && s->place[end].segment == s->place[first].segment)
+        end++;
+    return end;
+}
+
+size_t light_places_odder(const struct light_places *s, float odd) {
+    size_t count = 0;
+    for (size_t i = 0; i < s->count; i++)
+        count += s->place[i].odd > odd;
+    return count;
+}
+
+/* Keeps light from being nothing. */
+static void floor_light(struct light_places *s) {
+    float *mean = mem_array(s->count + 1, sizeof *mean);
+    for (size_t i = 0; i < s->count; i++)
+        mean[i] = rgb_mean(s->place[i].shown);
+    float dark = fmaxf(DARK * quantile(mean, s->count, 0.5), 1e-20f);
+    for (size_t i = 0; i < s->count; i++) {
+        s->place[i].shown = rgb_add(s->place[i].shown, rgb_gray(dark));
+        s->place[i].white = rgb_add(s->place[i].white, rgb_gray(dark));
+    }
+    mem_free(mean);
+}
+
+static float log_base(const struct light_place *p) {
+    return logf(rgb_mean(p->shown) / rgb_mean(p->white));
+}
+
+void light_places_leave_out_lamps(struct light_places *s) {
+    size_t kept = 0;
+    for (size_t first = 0, end; first < s->count; first = end) {
+        size_t bright = 0;
+        end = light_places_end(s, first);
+        for (size_t i = first; i < end; i++)
+            bright += log_base(&s->place[i]) > logf(PLACE_WHITE) + PLACE_BRIGHT;
+        for (size_t i = first; i < end && 2 * bright < end - first; i++)
+            s->place[kept++] = s->place[i];
+    }
+    s->count = kept;
+}
+
+static void find_odd(struct light_places *s) {
+    float *sorted = mem_array(s->count + 1, sizeof *sorted);
+    for (size_t first = 0, end; first < s->count; first = end) {
+        end = light_places_end(s, first);
+        for (size_t i = first; i < end; i++)
+            sorted[i - first] = log_base(&s->place[i]);
+        float median = quantile(sorted, end - first, 0.5);
+        for (size_t i = first; i < end; i++) {
+            float log = log_base(&s->place[i]);
+            s->place[i].odd = clampf(fmaxf(log - median, log - logf(PLACE_WHITE)), -ODD_MOST, ODD_MOST);
+        }
+    }
+    mem_free(sorted);
+}
+
+void light_places_take(struct light_places *s, struct light_place *place, size_t count) {
+    *s = (struct light_places){.count = count, .place = place};
+    qsort(s->place, s->count, sizeof *s->place, by_segment);
+    floor_light(s);
+    find_odd(s);
+}
+
+void light_places_init(struct light_places *s, const struct survey *survey, const struct fused *shown) {
+    struct light_place *place = mem_array(survey->count + 1, sizeof *place);
+    parallel_for(survey->r->pool, survey->count, gather_place, &(struct gathering){survey, shown, place});
+    light_places_take(s, place, survey->count);
+}
+
+void light_places_thin(struct light_places *thin, const struct light_places *s, size_t most) {
+    size_t wanted = s->count < most ? s->count : most;
+    *thin = (struct light_places){.count = wanted, .place = mem_array(wanted + 1, sizeof *thin->place)};
+    for (size_t i = 0; i < wanted; i++)
+        thin->place[i] = s->place[i * s->count / wanted];
+}
+
+void light_places_release(struct light_places *s) {
+    mem_free(s->place);
+    *s = (struct light_places){0};
+}

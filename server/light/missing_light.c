@@ -1,0 +1,217 @@
+/* missing_light.c -- see missing_light.h. */
+#include "server/light/missing_light.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+
+/* Standard deviations of the logarithm of base colour within a segment and above white; and what a highlight, not
+ * known yet, may add to base colour, which makes dark surfaces less alike. */
+#define SPREAD_WITHIN 0.3f
+#define SPREAD_BEYOND 0.15f
+#define GLOSS 0.04f
+/* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
+ * much stronger; then nearer and nearer to the best. */
+#define FAINTEST 0.01
+#define STRONGER 2.0f
+#define STRENGTHS 20
+#define NEARER 5
+/* Rounds in which the strength tells what places it is asked of, and they tell the strength. */
+#define ROUNDS 4
+/* Points of which the median of a segment is taken. */
+#define MEDIAN_POINTS 512
+
+static void ask_all(struct missing_light *m) {
+    for (size_t i = 0; i < m->places->count; i++)
+        m->weight[i] = 1.0f;
+}
+
+void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches) {
+    *m = (struct missing_light){.places = places, .white = white, .in_patches = in_patches};
+    m->base = mem_array(places->count + 1, sizeof *m->base);
+    m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
+    m->spread = mem_array(places->count + 1, sizeof *m->spread);
+    m->weight = mem_array(places->count + 1, sizeof *m->weight);
+    ask_all(m);
+    missing_light_renew(m);
+}
+
+void missing_light_release(struct missing_light *m) {
+    mem_free(m->weight);
+    mem_free(m->spread);
+    mem_free(m->sorted);
+    mem_free(m->base);
+    *m = (struct missing_light){0};
+}
+
+static float channel_of(rgb value, int channel) {
+    return channel == MISSING_MEAN ? rgb_mean(value) : (&value.r)[channel];
+}
+
+/* The share of a place's light in a channel that a strength of the one that is tried would be. */
+static float part_of(const struct light_place *p, float strength, int channel) {
+    float light = strength * p->lit;
+    return light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
+}
+
+float missing_light_part(const struct light_place *p, float strength) {
+    return part_of(p, strength, MISSING_MEAN);
+}
+
+/* From 0, as usual, to 1, not to be explained (Geman and McClure). */
+static double oddity(float off, float spread) {
+    double e = (double)(off / spread);
+    return e * e / (1.0 + e * e);
+}
+
+/* The median of base[first, end), of not too many of them. */
+static float median_of(const struct missing_light *m, size_t first, size_t end) {
+    size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
+    for (size_t i = first; i < end; i += stride)
+        m->sorted[count++] = m->base[i];
+    return quantile(m->sorted, count, 0.5);
+}
+
+/* Fills base[first, end): logarithms. */
+static void find_base(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
+    for (size_t i = first; i < end; i++) {
+        const struct light_place *p = &m->places->place[i];
+        m->base[i] = logf(channel_of(p->shown, channel) / (channel_of(p->white, channel) + strength * p->lit));
+    }
+}
+
+/* Of base colours about a median. */
+static float spread_about(float median) {
+    return SPREAD_WITHIN + GLOSS * expf(-median);
+}
+
+void missing_light_renew(struct missing_light *m) {
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        find_base(m, first, end, 0.0f, MISSING_MEAN);
+        m->spread[first] = spread_about(median_of(m, first, end));
+    }
+}
+
+/* How odd place i is, of whose segment's base colours that is the median. */
+static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
+    double within = oddity(m->base[i] - median, spread);
+    double beyond = oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND);
+    return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
+}
+
+/* How odd the base colours of a segment are. */
+static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
+    double sum = 0.0;
+    find_base(m, first, end, strength, channel);
+    float median = median_of(m, first, end), spread = m->in_patches ? spread_about(median) : m->spread[first];
+    for (size_t i = first; i < end; i++)
+        sum += place_misfit(m, i, median, spread);
+    return sum;
+}
+
+/* The same for all segments that the light reaches. */
+static double misfit(const struct missing_light *m, float strength, int channel) {
+    double sum = 0.0;
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        bool any = false;
+        end = light_places_end(m->places, first);
+        for (size_t i = first; i < end; i++)
+            any = any || m->places->place[i].lit > 0.0f;
+        if (any)
+            sum += segment_misfit(m, first, end, strength, channel);
+    }
+    return sum;
+}
+
+/* Adds the places of a segment in question, with the light or without. */
+static double share_misfit(const struct missing_light *m, size_t first, size_t end, float strength, float share,
+                           bool with) {
+    double sum = 0.0;
+    find_base(m, first, end, with ? strength : 0.0f, MISSING_MEAN);
+    float median = median_of(m, first, end);
+    for (size_t i = first; i < end; i++) {
+        if (missing_light_part(&m->places->place[i], strength) >= share)
+            sum += place_misfit(m, i, median, m->spread[first]);
+    }
+    return sum;
+}
+
+struct missing_share missing_light_share(const struct missing_light *m, float strength, float share) {
+    struct missing_share sum = {0.0, 0.0, 0.0};
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        for (size_t i = first; i < end; i++) {
+            const struct light_place *p = &m->places->place[i];
+            sum.count += missing_light_part(p, strength) >= share ? (double)p->weight : 0.0;
+        }
+        sum.before += share_misfit(m, first, end, strength, share, false);
+        sum.after += share_misfit(m, first, end, strength, share, true);
+    }
+    return sum;
+}
+
+double missing_light_misfit(const struct missing_light *m) {
+    double sum = 0.0;
+    for (size_t first = 0, end; first < m->places->count; first = end) {
+        end = light_places_end(m->places, first);
+        sum += segment_misfit(m, first, end, 0.0f, MISSING_MEAN);
+    }
+    return sum;
+}
+
+static float faintest_strength(const struct missing_light *m, int channel) {
+    double light = 0.0, lit = 0.0, lit_count = 0.0;
+    for (size_t i = 0; i < m->places->count; i++) {
+        light += (double)channel_of(m->places->place[i].white, channel);
+        lit += (double)m->places->place[i].lit;
+        lit_count += m->places->place[i].lit > 0.0f;
+    }
+    return lit > 0.0 ? (float)(FAINTEST * light / (double)m->places->count * lit_count / lit) : 0.0f;
+}
+
+float missing_light_strength(const struct missing_light *m, int channel, double *explained) {
+    double without = misfit(m, 0.0f, channel), least = without;
+    float best = 0.0f, step = STRONGER, strength = faintest_strength(m, channel);
+    for (int i = 0; i < STRENGTHS; i++, strength *= STRONGER) {
+        double here = misfit(m, strength, channel);
+        if (here < least)
+            least = here, best = strength;
+    }
+    for (int i = 0; i < NEARER && best > 0.0f; i++) {
+        step = sqrtf(step);
+        float middle = best;
+        for (int side = -1; side <= 1; side += 2) {
+            float other = side < 0 ? middle / step : middle * step;
+            double here = misfit(m, other, channel);
+            if (here < least)
+                least = here, best = other;
+        }
+    }
+    *explained = without - least;
+    return best;
+}
+
+static void ask_by_share(struct missing_light *m, float strength, int channel) {
+    for (size_t i = 0; i < m->places->count; i++) {
+        float share = part_of(&m->places->place[i], strength, channel);
+        m->weight[i] = share * share;
+    }
+}
+
+static float strength_by_share(struct missing_light *m, int channel) {
+    double explained;
+    float strength = missing_light_strength(m, channel, &explained);
+    for (int i = 0; i < ROUNDS && strength > 0.0f; i++) {
+        ask_by_share(m, strength, channel);
+        strength = missing_light_strength(m, channel, &explained);
+    }
+    ask_all(m);
+    return strength;
+}
+
+rgb missing_light_color(struct missing_light *m) {
+    float r = strength_by_share(m, 0), g = strength_by_share(m, 1);
+    return rgb_make(r, g, strength_by_share(m, 2));
+}

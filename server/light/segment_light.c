@@ -1,0 +1,72 @@
+/* segment_light.c -- see segment_light.h. */
+#include "server/light/segment_light.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/render/bsdf.h"
+
+void segment_light_init(struct segment_light *l, const struct reconstruction *r) {
+    const struct mesh *mesh = &r->scene->mesh;
+    *l = (struct segment_light){.r = r, .area_m2 = mem_calloc(r->segments.count, sizeof *l->area_m2)};
+    by_segment_sort(&l->texels, &r->segments, &r->inverse);
+    for (size_t i = 0; i < mesh->triangle_count; i++)
+        l->area_m2[r->segments.of_triangle[i]] += 0.5f * vec3_length(mesh_cross(mesh, i));
+}
+
+void segment_light_release(struct segment_light *l) {
+    by_segment_release(&l->texels);
+    mem_free(l->area_m2);
+    *l = (struct segment_light){0};
+}
+
+struct lighting {
+    const struct accel *accel;
+    struct light_place *place;
+    float area_m2; /* that a point stands for */
+    size_t point_count;
+    struct surface_point point[SEGMENT_LIGHT_POINTS];
+};
+
+/* What comes from a point, which stands for a disc, if nothing is between. */
+static float disc_light(const struct surface_point *from, const struct surface_point *to, float area_m2) {
+    vec3 way = vec3_sub(from->position, to->position);
+    float square = vec3_dot(way, way), scale = 1.0f / sqrtf(fmaxf(square, 1e-20f));
+    float here = vec3_dot(way, to->shading) * scale, there = -vec3_dot(way, from->normal) * scale;
+    bool in_front = here > 0.0f && there > 0.0f && vec3_dot(way, to->normal) > 0.0f;
+    return in_front ? area_m2 * here * there / (BSDF_PI * square + area_m2) : 0.0f;
+}
+
+static bool is_between(const struct accel *accel, const struct surface_point *from, const struct surface_point *to) {
+    vec3 way = vec3_sub(from->position, to->position);
+    vec3 start = accel_offset(to->position, to->normal, way);
+    vec3 ray = vec3_sub(accel_offset(from->position, from->normal, vec3_neg(way)), start);
+    float length = vec3_length(ray);
+    return !(length > 0.0f) || accel_occluded(accel, start, vec3_scale(ray, 1.0f / length), 0.0f, length);
+}
+
+static void light_place(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct lighting *l = user;
+    struct light_place *p = &l->place[index];
+    p->lit = 0.0f;
+    for (size_t i = 0; i < l->point_count; i++) {
+        float light = disc_light(&l->point[i], &p->at, l->area_m2);
+        if (light > 0.0f && !is_between(l->accel, &l->point[i], &p->at))
+            p->lit += light;
+    }
+}
+
+void segment_light_places(const struct segment_light *l, struct light_places *places, uint32_t segment, size_t points) {
+    const struct reconstruction *r = l->r;
+    struct lighting job = {.accel = r->world.accel, .place = places->place};
+    size_t first = l->texels.first[segment], count = l->texels.first[segment + 1] - first;
+    size_t wanted = count < points ? count : points;
+    for (size_t i = 0; i < wanted; i++) {
+        uint32_t texel = l->texels.texel[first + i * count / wanted];
+        job.point_count +=
+            surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &job.point[job.point_count]);
+    }
+    job.area_m2 = l->area_m2[segment] / fmaxf((float)job.point_count, 1.0f);
+    parallel_for(r->pool, places->count, light_place, &job);
+}

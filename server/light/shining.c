@@ -1,0 +1,343 @@
+/* shining.c -- see shining.h. */
+#include "server/light/shining.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/gather/incident.h"
+#include "server/light/unseen_fit.h"
+#include "server/render/sampler.h"
+
+#define PLACES 64
+#define POINTS 1024        /* all over the room; those with this share of unseen directions tell of them */
+#define SHARE_LEAST 0.1f
+#define LEAST_POINTS 64
+#define WAYS 256           /* directions at a place */
+#define BRIGHTER_PLACES 0.75
+#define KEY_PLACES 31      /* keep these random numbers apart from others of the triangle */
+#define KEY_WAYS 37
+#define KEY_SUN 41
+/* What saturates in all photographs may be so much brighter than they tell: who takes too much light for granted splits
+ * too little. */
+#define PERHAPS_BRIGHTER 16.0f
+/* The sun is looked for in so many directions; from the best ones on in steps that grow smaller. */
+#define SUN_WAYS 2048
+#define SUN_BEST 8
+#define SUN_STEPS 96
+#define SUN_STEP 0.05f     /* radians, about half the spacing of the directions */
+#define SUN_SMALLEST 0.003f
+/* It is found where it reaches this much more of the part than of what is beside it. */
+#define SUN_CONTRAST 0.6f
+/* Whatever else it reaches is this much brighter than what it does not. */
+#define SUN_BRIGHTER 2.0f
+/* Beside a part: within its own size of it, and about as inclined. */
+#define BESIDE_COSINE 0.8f
+#define LEAST_BESIDE 6
+
+struct shining_place {
+    uint32_t triangle;
+    vec3 position, normal;
+};
+
+/* --- places --------------------------------------------------------------------------------------- */
+
+static float area_of(const struct mesh *mesh, uint32_t triangle) {
+    return 0.5f * vec3_length(mesh_cross(mesh, triangle));
+}
+
+/* Up to `most` places, evenly spread over the area of the triangles. */
+static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, size_t count, size_t most,
+                            struct shining_place *place) {
+    double total = 0.0, passed = 0.0;
+    size_t chosen = 0;
+    for (size_t i = 0; i < count; i++)
+        total += (double)area_of(mesh, triangle[i]);
+    for (size_t i = 0; i < count; i++) {
+        passed += (double)area_of(mesh, triangle[i]);
+        vec3 normal = vec3_normalize(mesh_cross(mesh, triangle[i]));
+        for (; chosen < most && passed >= total * ((double)chosen + 0.5) / (double)most; chosen++) {
+            vec2 u = sampler_pair(sampler_key(KEY_PLACES, triangle[i], 0), (uint32_t)chosen, 0);
+            float root = sqrtf(u.x);
+            vec3 at = mesh_point(mesh, triangle[i], root * (1.0f - u.y), root * u.y);
+            place[chosen] = (struct shining_place){triangle[i], at, normal};
+        }
+    }
+    return chosen;
+}
+
+/* --- what arrives --------------------------------------------------------------------------------- */
+
+static void trace_ways(const struct shining *s, const struct shining_place *place, uint32_t key, struct accel_ray ray[WAYS],
+                       struct accel_hit hit[WAYS]) {
+    vec3 frame[3] = {[2] = place->normal};
+    vec3_frame(place->normal, &frame[0], &frame[1]);
+    for (uint32_t i = 0; i < WAYS; i++) {
+        vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+        ray[i] = (struct accel_ray){accel_offset(place->position, place->normal, direction), 0.0f, direction,
+                                    INFINITY};
+    }
+    accel_intersect_many(s->r->world.accel, WAYS, ray, hit);
+}
+
+static float radiance_of(const struct shining *s, uint32_t triangle) {
+    float mean = s->light->mean[triangle];
+    if (s->light->is_bound[triangle])
+        return PERHAPS_BRIGHTER * mean;
+    return mean >= 0.0f ? mean : s->segment_mean[s->r->segments.of_triangle[triangle]];
+}
+
+static bool is_seen(const struct shining *s, vec3 direction) {
+    const struct environment *e = &s->r->environment;
+    return e->map.pixel && environment_is_seen(e, direction);
+}
+
+static float distant_radiance(const struct shining *s, vec3 direction) {
+    float radiance = rgb_mean(lights_environment(s->r->world.lights, direction));
+    bool seen = is_seen(s, direction);
+    if (seen && !environment_is_told(&s->r->environment, direction))
+        return PERHAPS_BRIGHTER * radiance;
+    if (!s->has_unseen || seen)
+        return radiance;
+    struct unseen_corners c = unseen_corners(direction);
+    double unseen = 0.0;
+    for (int k = 0; k < 4; k++)
+        unseen += (double)c.weight[k] * exp(s->log_unseen[c.cell[k]]);
+    return fmaxf(radiance, (float)unseen);
+}
+
+static float white_at(const struct shining *s, const struct shining_place *place, uint32_t key) {
+    struct accel_ray ray[WAYS];
+    struct accel_hit hit[WAYS];
+    double sum = 0.0;
+    trace_ways(s, place, key, ray, hit);
+    for (size_t i = 0; i < WAYS; i++) {
+        bool far = hit[i].triangle == ACCEL_NONE;
+        sum += (double)(far ? distant_radiance(s, ray[i].direction) : radiance_of(s, hit[i].triangle));
+    }
+    return (float)(sum / WAYS);
+}
+
+float shining_white(const struct shining *s, const uint32_t *triangle, size_t count) {
+    struct shining_place place[PLACES];
+    float white[PLACES];
+    size_t places = choose_places(&s->r->scene->mesh, triangle, count, PLACES, place);
+    for (size_t i = 0; i < places; i++)
+        white[i] = white_at(s, &place[i], sampler_key(KEY_WAYS, triangle[0], (uint32_t)i));
+    return quantile(white, places, BRIGHTER_PLACES);
+}
+
+/* --- light from directions that nobody sees ------------------------------------------------------- */
+
+struct survey {
+    const struct shining *shining;
+    struct unseen_point point[POINTS];
+};
+
+/* What arrives at a place, known and not. */
+static void look_around(void *user, size_t index, int thread) {
+    (void)thread;
+    struct survey *survey = user;
+    const struct shining *s = survey->shining;
+    uint32_t triangle = s->room[index].triangle;
+    struct unseen_point *p = &survey->point[index];
+    struct accel_ray ray[WAYS];
+    struct accel_hit hit[WAYS];
+    *p = (struct unseen_point){.segment = s->r->segments.of_triangle[triangle], .shown = s->light->mean[triangle]};
+    trace_ways(s, &s->room[index], sampler_key(KEY_WAYS, triangle, 0), ray, hit);
+    for (size_t i = 0; i < WAYS; i++) {
+        vec3 direction = ray[i].direction;
+        if (hit[i].triangle != ACCEL_NONE || is_seen(s, direction)) {
+            bool far = hit[i].triangle == ACCEL_NONE;
+            p->known += (far ? distant_radiance(s, direction) : radiance_of(s, hit[i].triangle)) / WAYS;
+            continue;
+        }
+        p->filled += distant_radiance(s, direction) / WAYS;
+        p->unseen += 1.0f / WAYS;
+        struct unseen_corners c = unseen_corners(direction);
+        for (int k = 0; k < 4; k++)
+            p->share[c.cell[k]] += c.weight[k] / WAYS;
+    }
+}
+
+static void find_segment_means(struct shining *s) {
+    const struct reconstruction *r = s->r;
+    size_t segments = r->segments.count;
+    double *pixels = mem_calloc(segments + 1, sizeof *pixels), *sum = mem_calloc(segments + 1, sizeof *sum);
+    for (size_t t = 0; t < r->scene->mesh.triangle_count; t++) {
+        for (size_t i = r->segments.of_triangle[t], k = 0; k < 2; i = segments, k++) {
+            pixels[i] += (double)s->light->pixels[t];
+            sum[i] += (double)s->light->pixels[t] * (double)fmaxf(s->light->mean[t], 0.0f);
+        }
+    }
+    s->segment_mean = mem_calloc(segments, sizeof *s->segment_mean);
+    for (size_t i = 0; i < segments; i++) {
+        size_t from = pixels[i] > 0.0 ? i : segments; /* the room */
+        s->segment_mean[i] = pixels[from] > 0.0 ? (float)(sum[from] / pixels[from]) : 0.0f;
+    }
+    mem_free(sum);
+    mem_free(pixels);
+}
+
+/* As unseen_light.h has it, but that it is done in any case: who takes too much light for granted splits too
+ * little. */
+static void find_unseen_light(struct shining *s) {
+    const struct reconstruction *r = s->r;
+    const struct mesh *mesh = &r->scene->mesh;
+    struct survey *survey = mem_alloc(sizeof *survey);
+    uint32_t *shown = mem_array(mesh->triangle_count + 1, sizeof *shown);
+    size_t count = 0, kept = 0;
+    double unseen = 0.0;
+    survey->shining = s;
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        if (s->light->shown[t] >= 0.0f)
+            shown[count++] = (uint32_t)t;
+    }
+    s->room_count = choose_places(mesh, shown, count, POINTS, s->room);
+    parallel_for(r->pool, s->room_count, look_around, survey);
+    for (size_t i = 0; i < s->room_count; i++) {
+        unseen += (double)survey->point[i].unseen / (double)s->room_count;
+        if (survey->point[i].unseen >= SHARE_LEAST)
+            survey->point[kept++] = survey->point[i];
+    }
+    s->unseen_share = (float)unseen;
+    if (kept >= LEAST_POINTS) {
+        unseen_fit(survey->point, kept, r->segments.count, s->log_unseen);
+        s->has_unseen = true;
+    }
+    mem_free(shown);
+    mem_free(survey);
+}
+
+void shining_init(struct shining *s, const struct reconstruction *r, const struct triangle_light *light) {
+    *s = (struct shining){.r = r, .light = light, .room = mem_array(POINTS, sizeof *s->room)};
+    find_segment_means(s);
+    find_unseen_light(s);
+}
+
+void shining_release(struct shining *s) {
+    mem_free(s->room);
+    mem_free(s->segment_mean);
+    *s = (struct shining){0};
+}
+
+/* --- the sun -------------------------------------------------------------------------------------- */
+
+struct sunlight {
+    const struct shining *shining;
+    const struct accel *accel;
+    struct shining_place lit[PLACES], beside[PLACES];
+    size_t lit_count, beside_count;
+};
+
+/* Whether light may come from far away in a direction. */
+static bool is_open(const struct accel *accel, const struct shining_place *place, vec3 direction) {
+    vec3 origin = accel_offset(place->position, place->normal, direction);
+    return vec3_dot(direction, place->normal) > 0.0f &&
+           !accel_occluded(accel, origin, direction, 0.0f, INFINITY);
+}
+
+static float share_open(const struct sunlight *sun, const struct shining_place *place, size_t count, vec3 direction) {
+    size_t open = 0;
+    for (size_t i = 0; i < count; i++)
+        open += is_open(sun->accel, &place[i], direction);
+    return (float)open / (float)count;
+}
+
+/* How much more of the part than of what is beside it sees out in a direction. */
+static float contrast(const struct sunlight *sun, vec3 direction) {
+    float lit = share_open(sun, sun->lit, sun->lit_count, direction);
+    return lit > SUN_CONTRAST ? lit - share_open(sun, sun->beside, sun->beside_count, direction) : lit - 1.0f;
+}
+
+/* The places of `unlit` that are beside the part. */
+static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const uint32_t *unlit, size_t count) {
+    vec3 middle = {0, 0, 0}, normal = {0, 0, 0};
+    float reach_m = 0.0f;
+    for (size_t i = 0; i < sun->lit_count; i++) {
+        middle = vec3_mad(middle, 1.0f / (float)sun->lit_count, sun->lit[i].position);
+        normal = vec3_add(normal, sun->lit[i].normal);
+    }
+    normal = vec3_normalize(normal);
+    for (size_t i = 0; i < sun->lit_count; i++)
+        reach_m = fmaxf(reach_m, 2.0f * vec3_length(vec3_sub(sun->lit[i].position, middle)));
+    uint32_t *near = mem_array(count + 1, sizeof *near);
+    size_t near_count = 0;
+    for (size_t i = 0; i < count; i++) {
+        vec3 at = mesh_point(mesh, unlit[i], 1.0f / 3.0f, 1.0f / 3.0f);
+        if (vec3_length(vec3_sub(at, middle)) < reach_m &&
+            vec3_dot(vec3_normalize(mesh_cross(mesh, unlit[i])), normal) > BESIDE_COSINE)
+            near[near_count++] = unlit[i];
+    }
+    size_t chosen = near_count > 0 ? choose_places(mesh, near, near_count, PLACES, sun->beside) : 0;
+    mem_free(near);
+    return near_count < LEAST_BESIDE ? 0 : chosen;
+}
+
+struct candidate {
+    vec3 direction;
+    float contrast;
+};
+
+/* Climbs from a direction to better ones near it. */
+static void climb(const struct sunlight *sun, struct candidate *c, uint32_t key) {
+    float step = SUN_STEP;
+    for (uint32_t i = 0; i < SUN_STEPS && step > SUN_SMALLEST && c->contrast < SUN_CONTRAST; i++) {
+        vec3 s, t;
+        vec3_frame(c->direction, &s, &t);
+        vec2 u = sampler_pair(key, i, 0);
+        vec3 moved = vec3_mad(c->direction, step * (2.0f * u.x - 1.0f), s);
+        struct candidate next = {.direction = vec3_normalize(vec3_mad(moved, step * (2.0f * u.y - 1.0f), t))};
+        next.contrast = contrast(sun, next.direction);
+        if (next.contrast > c->contrast)
+            *c = next;
+        else if (i % 8 == 7)
+            step *= 0.8f;
+    }
+}
+
+/* Whether what light from a direction would fall on, all over the room, is no brighter than the rest. */
+static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
+    const struct shining *s = sun->shining;
+    float value[2][POINTS];
+    size_t count[2] = {0, 0};
+    for (size_t i = 0; i < s->room_count; i++) {
+        int open = is_open(sun->accel, &s->room[i], direction) ? 1 : 0;
+        value[open][count[open]++] = s->light->mean[s->room[i].triangle];
+    }
+    return count[1] >= LEAST_BESIDE &&
+           quantile(value[1], count[1], 0.5) < SUN_BRIGHTER * quantile(value[0], count[0], 0.5);
+}
+
+bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_count, const uint32_t *unlit,
+                       size_t unlit_count) {
+    const struct mesh *mesh = &s->r->scene->mesh;
+    struct sunlight sun = {.shining = s, .accel = s->r->world.accel};
+    struct candidate best[SUN_BEST];
+    sun.lit_count = choose_places(mesh, lit, lit_count, PLACES, sun.lit);
+    sun.beside_count = choose_beside(&sun, mesh, unlit, unlit_count);
+    if (sun.beside_count == 0)
+        return false;
+    for (int k = 0; k < SUN_BEST; k++)
+        best[k] = (struct candidate){.direction = sun.lit[0].normal, .contrast = -2.0f};
+    uint32_t key = sampler_key(KEY_SUN, lit[0], 0);
+    vec3 frame[3] = {[2] = sun.lit[0].normal};
+    vec3_frame(frame[2], &frame[0], &frame[1]);
+    for (uint32_t i = 0; i < SUN_WAYS; i++) {
+        struct candidate c = {.direction = incident_cosine_direction(frame, sampler_pair(key, i, 0))};
+        c.contrast = contrast(&sun, c.direction);
+        for (int k = 0; k < SUN_BEST; k++) {
+            if (c.contrast > best[k].contrast) {
+                struct candidate worse = best[k];
+                best[k] = c;
+                c = worse;
+            }
+        }
+    }
+    for (uint32_t k = 0; k < SUN_BEST; k++) {
+        climb(&sun, &best[k], sampler_key(KEY_SUN, lit[0], k + 1));
+        if (best[k].contrast >= SUN_CONTRAST && !is_contradicted(&sun, best[k].direction))
+            return true;
+    }
+    return false;
+}

@@ -1,0 +1,43 @@
+/* shining.h -- whether a part of the surface sends out light of its own, told from photographs alone, before
+ * anything is known of materials.
+ *
+ * Two questions. Is it brighter than a white surface could be there? What arrives is gathered by rays, which read
+ * what photographs show of the triangles that they meet. And if so, may something far away shine on
+ * this part only, through an opening: the sun? Then there is a direction in which one sees out from the part
+ * and not from beside it, and what else it reaches through openings is brighter than the rest of the room. */
+#ifndef UNBAKE_LIGHT_SHINING_H
+#define UNBAKE_LIGHT_SHINING_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/capture/triangle_light.h"
+#include "server/light/unseen_fit.h"
+#include "server/state/reconstruction.h"
+
+struct shining_place;
+
+struct shining {
+    const struct reconstruction *r;     /* borrowed, both; needs world and environment */
+    const struct triangle_light *light;
+    float *segment_mean;                /* [segment_count] what a triangle that nobody sees shows; owned */
+    size_t room_count;
+    struct shining_place *room;         /* [room_count] places all over the room; owned */
+    float unseen_share;                 /* of rays from surfaces: those that go where nothing is known */
+    bool has_unseen;                    /* what comes from there was estimated: */
+    double log_unseen[UNSEEN_CELLS];
+};
+
+void shining_init(struct shining *s, const struct reconstruction *r, const struct triangle_light *light);
+void shining_release(struct shining *s);
+
+/* Radiance (mean of the channels) that a white surface would send out at the brighter places of count > 0
+ * triangles. Thread-safe, as is the next. */
+float shining_white(const struct shining *s, const uint32_t *triangle, size_t count);
+
+/* Whether light from one direction may fall on the triangles `lit` and not on those of `unlit` that are near them. */
+bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_count, const uint32_t *unlit,
+                       size_t unlit_count);
+
+#endif

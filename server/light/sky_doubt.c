@@ -1,0 +1,48 @@
+/* sky_doubt.c -- see sky_doubt.h. */
+#include "server/light/sky_doubt.h"
+
+#include <math.h>
+
+#include "server/gather/incident.h"
+#include "server/render/sampler.h"
+#include "server/scene/surface.h"
+#include "server/state/evidence.h"
+
+#define PLACES 64
+#define WAYS 64
+#define KEY_DOUBT 0x5d0b7u
+
+/* What comes to a place from there, by the cosine. */
+static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
+    struct surface_point at;
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return 0.0f;
+    uint32_t key = sampler_key(KEY_DOUBT, texel, 0);
+    vec3 frame[3] = {[2] = at.shading};
+    vec3_frame(at.shading, &frame[0], &frame[1]);
+    float sum = 0.0f;
+    for (uint32_t i = 0; i < WAYS; i++) {
+        vec3 d = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+        if (vec3_dot(d, at.normal) > 0.0f && !environment_is_seen(&r->environment, d) &&
+            !accel_occluded(r->world.accel, accel_offset(at.position, at.normal, d), d, 0.0f, INFINITY))
+            sum += rgb_mean(lights_environment(r->world.lights, d));
+    }
+    return sum / WAYS;
+}
+
+float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count) {
+    size_t bright = 0, met = 0, taken = 0;
+    float sum = 0.0f;
+    if (!r->environment.map.pixel)
+        return 0.0f;
+    for (size_t i = 0; i < count; i++)
+        bright += evidence_is_bright(r, texel[i]);
+    size_t of = bright > 0 ? bright : count, wanted = of < PLACES ? of : PLACES;
+    for (size_t i = 0; i < count && taken < wanted; i++) {
+        if ((bright == 0 || evidence_is_bright(r, texel[i])) && met++ == taken * of / wanted) {
+            sum += unseen_light_at(r, texel[i]);
+            taken++;
+        }
+    }
+    return taken > 0 ? sum / (float)taken : 0.0f;
+}

@@ -1,0 +1,20 @@
+/* sky_doubt.h -- what falls on a segment from parts of the sky that no photograph shows.
+ *
+ * A window sill lies under the sky up to the zenith; photographs taken in the room look out a little above the horizon,
+ * and what is above that was filled in from there (environment.h). Skies get brighter upwards, or towards the sun, by
+ * factors. A sill that is brighter than white paint by the guess is no lamp as long as such a sky would explain it.
+ * What falls there is told here; how much brighter it may be, and what emits, is decided in solve.c, and the map is not
+ * changed. */
+#ifndef UNBAKE_LIGHT_SKY_DOUBT_H
+#define UNBAKE_LIGHT_SKY_DOUBT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/state/reconstruction.h"
+
+/* Radiance (mean of the channels) that a white surface at the brighter of texel[count], all of one segment, would send
+ * of what the map of r->world's environment holds in directions that no photograph shows; 0 without a map. Thread-safe. */
+float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count);
+
+#endif

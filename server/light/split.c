@@ -1,0 +1,319 @@
+/* split.c -- see split.h.
+ *
+ * Segment by segment, at rising levels of brightness: the connected sets of triangles that show at least the
+ * level are looked at, until the level is more than a white surface there could send out. So a part is as
+ * large as it can be, and nothing in it may only reflect. */
+#include "server/light/split.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/capture/triangle_light.h"
+#include "server/light/shining.h"
+#include "server/scene/adjacency.h"
+
+#define FIRST_LEVEL 1.5f /* of the median of the photographs */
+#define LEVEL_STEP 1.25f
+/* The share of a level that must be beyond what white could reflect; so much more where all light that
+ * arrives is an estimate. As the decision has it later (solve.c). */
+#define BEYOND_WHITE 0.25f
+#define BEYOND_WHITE_UNSEEN 0.25f
+/* A set whose white was that far above its level is looked at again when the level comes near. */
+#define NEAR 0.8f
+/* A part and what is left are that large in photographs, at least, and differ by so much. */
+#define LEAST_PIXELS 100.0f
+#define LEAST_SHARE 0.05f
+#define LEAST_CONTRAST 2.0f
+/* What shows less than this share of its part is mixed with what is beside it. */
+#define PURE 0.3f
+/* What is cut off from the rest of the segment by a part and smaller than this share of it belongs to it. */
+#define HOLE 0.02f
+
+struct job {
+    const struct reconstruction *r;
+    struct shining shining;
+    struct triangle_light light;
+    struct adjacency adjacency;
+    float first_level;
+    uint32_t *first;    /* [segment_count + 1] where a segment's triangles begin in... */
+    uint32_t *triangle; /* [triangle_count] all, by segment */
+    uint32_t *parent;   /* [triangle_count] connected sets at the present level, written by segment */
+    float *size;        /* [triangle_count] of a root of those: pixels or m^2 */
+    uint32_t *part;     /* [triangle_count] number of the part among its segment's, from 1; 0: the rest */
+    bool *settled;      /* [triangle_count] is known to shine */
+    float *needed;      /* [triangle_count] levels below this are known not to be beyond white */
+    uint32_t *count;    /* [segment_count] parts found */
+};
+
+/* A segment at one level. */
+struct level {
+    const struct job *job;
+    const uint32_t *triangle; /* [triangle_count] of the segment */
+    size_t triangle_count;
+    uint32_t segment;
+    float bright;
+    uint32_t *lit, *unlit;    /* [triangle_count] scratch: a part; what is darker than the level */
+    float *value;             /* [triangle_count] scratch, as below */
+    struct member *member;
+};
+
+/* --- connected sets ------------------------------------------------------------------------------- */
+
+static uint32_t root_of(uint32_t *parent, uint32_t t) {
+    while (parent[t] != t)
+        t = parent[t] = parent[parent[t]];
+    return t;
+}
+
+static bool is_lit(const struct level *l, uint32_t t) {
+    return !l->job->settled[t] && l->job->light.shown[t] >= l->bright;
+}
+
+static bool is_rest(const struct level *l, uint32_t t) {
+    return l->job->part[t] == 0;
+}
+
+/* Joins neighbours of the segment that both belong to what is asked for. */
+static void connect(const struct level *l, bool (*belongs)(const struct level *l, uint32_t t)) {
+    const struct job *job = l->job;
+    for (size_t i = 0; i < l->triangle_count; i++)
+        job->parent[l->triangle[i]] = l->triangle[i];
+    for (size_t i = 0; i < l->triangle_count; i++) {
+        uint32_t t = l->triangle[i];
+        for (uint32_t h = 3 * t; belongs(l, t) && h < 3 * t + 3; h++) {
+            uint32_t other = job->adjacency.next[h] / 3;
+            if (job->r->segments.of_triangle[other] != l->segment || !belongs(l, other))
+                continue;
+            uint32_t a = root_of(job->parent, t), b = root_of(job->parent, other);
+            job->parent[a > b ? a : b] = a > b ? b : a;
+        }
+    }
+}
+
+/* --- a part --------------------------------------------------------------------------------------- */
+
+static float area_of(const struct job *job, uint32_t t) {
+    return 0.5f * vec3_length(mesh_cross(&job->r->scene->mesh, t));
+}
+
+struct measure {
+    float pixels, shown; /* what they fill together; the median of what they show */
+};
+
+static struct measure measure(const struct level *l, const uint32_t *triangle, size_t count) {
+    struct measure m = {0.0f, 0.0f};
+    for (size_t i = 0; i < count; i++) {
+        m.pixels += l->job->light.pixels[triangle[i]];
+        l->value[i] = l->job->light.shown[triangle[i]];
+    }
+    m.shown = quantile(l->value, count, 0.5);
+    return m;
+}
+
+static size_t collect_unlit(const struct level *l) {
+    size_t count = 0;
+    for (size_t i = 0; i < l->triangle_count; i++) {
+        float shown = l->job->light.shown[l->triangle[i]];
+        if (!l->job->settled[l->triangle[i]] && shown >= 0.0f && shown < l->bright)
+            l->unlit[count++] = l->triangle[i];
+    }
+    return count;
+}
+
+/* Makes the part's own what it cuts off from the rest and is small: dark writing on a bright screen. */
+static void fill_holes(const struct level *l, size_t lit_count, uint32_t part) {
+    const struct job *job = l->job;
+    float area = 0.0f;
+    connect(l, is_rest);
+    for (size_t i = 0; i < l->triangle_count; i++)
+        job->size[l->triangle[i]] = 0.0f;
+    for (size_t i = 0; i < l->triangle_count; i++)
+        job->size[root_of(job->parent, l->triangle[i])] += area_of(job, l->triangle[i]);
+    for (size_t i = 0; i < lit_count; i++)
+        area += area_of(job, l->lit[i]);
+    for (size_t i = 0; i < lit_count; i++) {
+        for (uint32_t h = 3 * l->lit[i]; h < 3 * l->lit[i] + 3; h++) {
+            uint32_t other = job->adjacency.next[h] / 3;
+            if (job->r->segments.of_triangle[other] != l->segment || !is_rest(l, other))
+                continue;
+            uint32_t root = root_of(job->parent, other);
+            if (job->size[root] < HOLE * area)
+                job->size[root] = -1.0f;
+        }
+    }
+    for (size_t i = 0; i < l->triangle_count; i++) {
+        uint32_t t = l->triangle[i];
+        if (!is_rest(l, t) || job->size[root_of(job->parent, t)] >= 0.0f)
+            continue;
+        job->part[t] = part;
+        job->settled[t] = true;
+    }
+}
+
+/* Keeps those of the part's triangles that show it alone. All of them are settled. */
+static size_t settle(const struct level *l, size_t lit_count, float shown) {
+    size_t kept = 0;
+    for (size_t i = 0; i < lit_count; i++) {
+        uint32_t t = l->lit[i];
+        l->job->settled[t] = true;
+        if (l->job->light.shown[t] >= PURE * shown)
+            l->lit[kept++] = t;
+    }
+    return kept;
+}
+
+static void make_part(const struct level *l, size_t lit_count) {
+    uint32_t part = ++l->job->count[l->segment];
+    for (size_t i = 0; i < lit_count; i++)
+        l->job->part[l->lit[i]] = part;
+    fill_holes(l, lit_count, part);
+}
+
+/* Looks at one connected set of what shows at least the level. */
+static void try_part(const struct level *l, size_t lit_count, const struct measure *unlit, size_t unlit_count) {
+    const struct job *job = l->job;
+    struct measure lit = measure(l, l->lit, lit_count);
+    if (lit.pixels < LEAST_PIXELS || l->bright < job->needed[l->lit[0]])
+        return;
+    float white = shining_white(&job->shining, l->lit, lit_count);
+    float needed = white / (1.0f - BEYOND_WHITE - BEYOND_WHITE_UNSEEN * job->shining.unseen_share);
+    if (l->bright < needed) {
+        for (size_t i = 0; i < lit_count; i++)
+            job->needed[l->lit[i]] = NEAR * needed;
+        return;
+    }
+    lit_count = settle(l, lit_count, lit.shown);
+    if (unlit->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * lit.pixels) &&
+        lit.shown >= LEAST_CONTRAST * unlit->shown &&
+        !shining_is_sunlit(&job->shining, l->lit, lit_count, l->unlit, unlit_count))
+        make_part(l, lit_count);
+}
+
+struct member {
+    uint32_t root, triangle;
+};
+
+static int by_root(const void *a, const void *b) {
+    const struct member *x = a, *y = b;
+    if (x->root != y->root)
+        return x->root < y->root ? -1 : 1;
+    return x->triangle < y->triangle ? -1 : x->triangle > y->triangle;
+}
+
+static void try_level(const struct level *l) {
+    size_t unlit_count = collect_unlit(l), members = 0;
+    struct measure unlit = measure(l, l->unlit, unlit_count);
+    connect(l, is_lit);
+    for (size_t i = 0; i < l->triangle_count; i++) {
+        if (is_lit(l, l->triangle[i]))
+            l->member[members++] = (struct member){root_of(l->job->parent, l->triangle[i]), l->triangle[i]};
+    }
+    qsort(l->member, members, sizeof *l->member, by_root);
+    for (size_t i = 0, end; i < members; i = end) {
+        size_t lit_count = 0;
+        for (end = i; end < members && l->member[end].root == l->member[i].root; end++)
+            l->lit[lit_count++] = l->member[end].triangle;
+        try_part(l, lit_count, &unlit, unlit_count);
+    }
+}
+
+/* --- all segments --------------------------------------------------------------------------------- */
+
+static float brightest(const struct job *job, const uint32_t *triangle, size_t count) {
+    float bright = 0.0f;
+    for (size_t i = 0; i < count; i++)
+        bright = fmaxf(bright, job->light.shown[triangle[i]]);
+    return bright;
+}
+
+static void try_segment(void *user, size_t segment, int thread) {
+    (void)thread;
+    struct job *job = user;
+    size_t count = job->first[segment + 1] - job->first[segment];
+    struct level l = {.job = job, .triangle = job->triangle + job->first[segment], .triangle_count = count,
+                      .segment = (uint32_t)segment, .bright = job->first_level};
+    float most = brightest(job, l.triangle, count);
+    if (!(most >= l.bright))
+        return;
+    l.lit = mem_array(count, sizeof *l.lit);
+    l.unlit = mem_array(count, sizeof *l.unlit);
+    l.value = mem_array(count, sizeof *l.value);
+    l.member = mem_array(count, sizeof *l.member);
+    for (; l.bright <= most; l.bright *= LEVEL_STEP)
+        try_level(&l);
+    mem_free(l.member);
+    mem_free(l.value);
+    mem_free(l.unlit);
+    mem_free(l.lit);
+}
+
+static void sort_triangles(struct job *job) {
+    const struct segments *segments = &job->r->segments;
+    size_t triangles = job->r->scene->mesh.triangle_count;
+    job->first = mem_calloc(segments->count + 2, sizeof *job->first);
+    job->triangle = mem_array(triangles, sizeof *job->triangle);
+    /* A counting sort; first[] is shifted by two while it counts and by one while it places. */
+    for (size_t t = 0; t < triangles; t++)
+        job->first[segments->of_triangle[t] + 2]++;
+    for (size_t s = 2; s < segments->count + 2; s++)
+        job->first[s] += job->first[s - 1];
+    for (size_t t = 0; t < triangles; t++)
+        job->triangle[job->first[segments->of_triangle[t] + 1]++] = (uint32_t)t;
+}
+
+/* Numbers the parts after the segments, in the order of these. */
+static void number_parts(struct split *split, const struct job *job, struct segments *segments) {
+    split->old_count = segments->count;
+    for (size_t s = 0; s < split->old_count; s++)
+        split->part_count += job->count[s];
+    split->whole = mem_array(split->part_count + 1, sizeof *split->whole);
+    segments->id = mem_realloc_array(segments->id, split->old_count + split->part_count, sizeof *segments->id);
+    for (size_t s = 0; s < split->old_count; s++) {
+        uint32_t first = (uint32_t)segments->count;
+        for (uint32_t part = 1; part <= job->count[s]; part++) {
+            split->whole[segments->count - split->old_count] = (uint32_t)s;
+            segments->id[segments->count++] = segments->id[s];
+        }
+        for (size_t i = job->first[s]; i < job->first[s + 1]; i++) {
+            uint32_t t = job->triangle[i];
+            segments->of_triangle[t] = job->part[t] > 0 ? first + job->part[t] - 1 : (uint32_t)s;
+        }
+    }
+}
+
+void split_segments(struct split *split, struct reconstruction *r, const struct views *views) {
+    size_t triangles = r->scene->mesh.triangle_count;
+    struct job job = {.r = r, .first_level = FIRST_LEVEL * views->median_radiance};
+    *split = (struct split){0};
+    triangle_light_measure(&job.light, views, r->pool);
+    shining_init(&job.shining, r, &job.light);
+    adjacency_make(&job.adjacency, &r->scene->mesh);
+    sort_triangles(&job);
+    job.parent = mem_array(triangles, sizeof *job.parent);
+    job.size = mem_array(triangles, sizeof *job.size);
+    job.part = mem_calloc(triangles, sizeof *job.part);
+    job.settled = mem_calloc(triangles, sizeof *job.settled);
+    job.needed = mem_calloc(triangles, sizeof *job.needed);
+    job.count = mem_calloc(r->segments.count, sizeof *job.count);
+    parallel_for(r->pool, r->segments.count, try_segment, &job);
+    number_parts(split, &job, &r->segments);
+    mem_free(job.count);
+    mem_free(job.needed);
+    mem_free(job.settled);
+    mem_free(job.part);
+    mem_free(job.size);
+    mem_free(job.parent);
+    mem_free(job.triangle);
+    mem_free(job.first);
+    adjacency_release(&job.adjacency);
+    shining_release(&job.shining);
+    triangle_light_release(&job.light);
+}
+
+void split_release(struct split *split) {
+    mem_free(split->whole);
+    *split = (struct split){0};
+}

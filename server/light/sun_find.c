@@ -1,0 +1,257 @@
+/* sun_find.c -- see sun_find.h. */
+#include "server/light/sun_find.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/light/missing_light.h"
+#include "server/render/bsdf.h"
+
+/* So many bright points must be there, and be lit. */
+#define LEAST_BRIGHT 12
+/* Directions asked: so far apart, in degrees, at so many bright points and others, of which the likeliest ones
+ * are fitted. */
+#define ASKED_DEGREES 3.0
+#define ASKED_POINTS 768
+#define CANDIDATES 24
+/* Half the angles of discs tried, in degrees: first the sun's own; in haze it is wider. What is best explained by
+ * the last one is no disc, but a sky that no photograph shows. */
+static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f};
+#define RADII (sizeof radius_degrees / sizeof *radius_degrees)
+#define DISC_RAYS 16
+/* A sun must explain this share of what it could, were all that it lights odd without it and as usual with it. */
+#define EXPLAINS 0.7
+/* Where the best of the likeliest directions explains less than this part of that there is none. */
+#define HOPEFUL 0.25
+/* Nor does one make white paper brighter than this many times the room: 100,000 lux over 10. */
+#define BRIGHTEST 1e4f
+#define STEPS 24 /* to better directions, or to smaller steps */
+
+struct search {
+    struct reconstruction *r;
+    float median_radiance; /* of the room */
+    struct light_places places;
+    struct missing_light missing;
+    struct sun sun;        /* that is tried */
+    int rays;              /* a point, to see how much of it is open */
+};
+
+/* A direction and how odd what it lights is. */
+struct candidate {
+    vec3 direction;
+    double score;
+};
+
+/* --- directions ------------------------------------------------------------------------------------ */
+
+struct asked {
+    const struct search *s;
+    size_t count;
+    uint32_t *place;           /* [count] */
+    float *weight;             /* [count] places of the room that it stands for */
+    double mean, deviation;    /* of how odd places are */
+    struct candidate *candidate;
+};
+
+static void ask_direction(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct asked *a = user;
+    struct candidate *c = &a->candidate[index];
+    struct sun sun = {.direction = c->direction};
+    double sum = 0.0, weights = 0.0;
+    for (size_t i = 0; i < a->count; i++) {
+        const struct light_place *p = &a->s->places.place[a->place[i]];
+        double weight = (double)(a->weight[i] * sun_visible(&sun, a->s->r->world.accel, &p->at, 1));
+        sum += weight * ((double)p->odd - a->mean);
+        weights += weight;
+    }
+    c->score = sum / (sqrt(weights + 1.0) * a->deviation);
+}
+
+/* Up to ASKED_POINTS places that are bright, or not. */
+static void choose_asked(struct asked *a, bool bright) {
+    size_t all = 0, met = 0, first = a->count;
+    for (size_t i = 0; i < a->s->places.count; i++)
+        all += (a->s->places.place[i].odd > PLACE_BRIGHT) == bright;
+    size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
+    for (size_t i = 0; i < a->s->places.count && a->count - first < wanted; i++) {
+        if ((a->s->places.place[i].odd > PLACE_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
+            a->weight[a->count] = (float)all / (float)wanted;
+            a->place[a->count++] = (uint32_t)i;
+        }
+    }
+}
+
+static int by_score(const void *a, const void *b) {
+    const struct candidate *first = a, *second = b;
+    return (first->score < second->score) - (first->score > second->score);
+}
+
+/* Fills candidate[CANDIDATES] with the likeliest unseen directions; returns their number. */
+static size_t ask_directions(const struct search *s, struct candidate candidate[CANDIDATES]) {
+    struct asked a = {.s = s};
+    size_t rows = (size_t)(180.0 / ASKED_DEGREES), count = 0;
+    a.place = mem_array(2 * ASKED_POINTS, sizeof *a.place);
+    a.weight = mem_array(2 * ASKED_POINTS, sizeof *a.weight);
+    a.candidate = mem_array(2 * rows * rows, sizeof *a.candidate);
+    for (size_t row = 0; row < rows; row++) {
+        double theta = PI * ((double)row + 0.5) / (double)rows;
+        size_t columns = (size_t)ceil(2.0 * (double)rows * sin(theta));
+        for (size_t column = 0; column < columns; column++) {
+            double phi = 2.0 * PI * ((double)column + 0.5) / (double)columns;
+            vec3 d = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+            if (!s->r->environment.map.pixel || !environment_is_seen(&s->r->environment, d))
+                a.candidate[count++].direction = d;
+        }
+    }
+    double squares = 0.0;
+    for (size_t i = 0; i < s->places.count; i++) {
+        a.mean += (double)s->places.place[i].odd / (double)s->places.count;
+        squares += (double)(s->places.place[i].odd * s->places.place[i].odd) / (double)s->places.count;
+    }
+    a.deviation = sqrt(fmax(squares - a.mean * a.mean, 1e-12));
+    choose_asked(&a, true);
+    choose_asked(&a, false);
+    parallel_for(s->r->pool, count, ask_direction, &a);
+    qsort(a.candidate, count, sizeof *a.candidate, by_score);
+    count = count < CANDIDATES ? count : CANDIDATES;
+    memcpy(candidate, a.candidate, count * sizeof *candidate);
+    mem_free(a.candidate);
+    mem_free(a.weight);
+    mem_free(a.place);
+    return count;
+}
+
+/* --- fit --------------------------------------------------------------------------------------------- */
+
+static void shine_on(void *user, size_t index, int thread) {
+    (void)thread;
+    struct search *s = user;
+    struct light_place *p = &s->places.place[index];
+    p->open = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
+    p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
+}
+
+/* How much a sun in a direction explains. */
+static double try_direction(struct search *s, vec3 direction) {
+    double explained;
+    s->sun.direction = direction;
+    parallel_for(s->r->pool, s->places.count, shine_on, s);
+    missing_light_strength(&s->missing, MISSING_MEAN, &explained);
+    return explained;
+}
+
+/* Moves the best direction by ever smaller steps for as long as more is explained. */
+static void walk(struct search *s, struct candidate *best, double degrees, double least_degrees) {
+    for (int i = 0; i < STEPS && degrees >= least_degrees; i++) {
+        bool moved = false;
+        vec3 middle = best->direction, across, up;
+        float step = (float)tan(degrees * PI / 180.0);
+        vec3_frame(middle, &across, &up);
+        for (int k = 0; k < 8; k++) {
+            float angle = (float)k * 0.25f * BSDF_PI;
+            vec3 d = vec3_mad(vec3_mad(middle, step * cosf(angle), across), step * sinf(angle), up);
+            struct candidate other = {vec3_normalize(d), 0.0};
+            other.score = try_direction(s, other.direction);
+            if (other.score > best->score)
+                *best = other, moved = true;
+        }
+        if (!moved)
+            degrees *= 0.5;
+    }
+}
+
+/* So many places that are odder than this the sun lights; one that sees half of it is half a place. */
+static double count_lit(const struct search *s, float odd) {
+    double lit = 0.0;
+    for (size_t i = 0; i < s->places.count; i++)
+        lit += s->places.place[i].odd > odd ? (double)s->places.place[i].open : 0.0;
+    return lit;
+}
+
+static struct candidate best_direction(struct search *s) {
+    struct candidate candidate[CANDIDATES], best = {.score = 0.0};
+    size_t count = ask_directions(s, candidate);
+    s->rays = 1;
+    for (size_t i = 0; i < count; i++) {
+        candidate[i].score = try_direction(s, candidate[i].direction);
+        if (candidate[i].score > best.score)
+            best = candidate[i];
+    }
+    if (best.score > 0.0)
+        try_direction(s, best.direction);
+    if (best.score <= HOPEFUL * EXPLAINS * count_lit(s, -INFINITY))
+        best.score = 0.0;
+    else
+        walk(s, &best, 2.0, 0.25);
+    return best;
+}
+
+/* False where the light is wider than a disc. */
+static bool find_radius(struct search *s, struct candidate *best) {
+    size_t radius = 0;
+    best->score = 0.0;
+    s->rays = DISC_RAYS;
+    for (size_t i = 0; i < RADII; i++) {
+        s->sun.radius_rad = radius_degrees[i] * BSDF_PI / 180.0f;
+        double explained = try_direction(s, best->direction);
+        if (explained > best->score)
+            best->score = explained, radius = i;
+    }
+    s->sun.radius_rad = radius_degrees[radius] * BSDF_PI / 180.0f;
+    walk(s, best, 0.5, 0.1);
+    return radius + 1 < RADII;
+}
+
+/* --- the whole ------------------------------------------------------------------------------------- */
+
+/* Fills s->sun; the share of what it lights that it explains goes to *explains. */
+static void look_for_sun(struct search *s, double *explains) {
+    struct candidate best = best_direction(s);
+    if (!(best.score > 0.0))
+        return;
+    bool is_disc = find_radius(s, &best);
+    try_direction(s, best.direction);
+    *explains = best.score / fmax(count_lit(s, -INFINITY), 1.0);
+    rgb white = missing_light_color(&s->missing);
+    s->sun.is_there = is_disc && count_lit(s, PLACE_BRIGHT) >= LEAST_BRIGHT && *explains > EXPLAINS &&
+                      rgb_mean(white) < BRIGHTEST * s->median_radiance;
+    s->sun.irradiance = rgb_scale(white, BSDF_PI);
+}
+
+static void report(const struct search *s, double explains) {
+    const struct reconstruction *r = s->r;
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
+    json_add_bool(figures, "found", r->sun.is_there);
+    json_add_number(figures, "explains", explains);
+    json_add_number(figures, "lights_share", count_lit(s, -INFINITY) / fmax((double)s->places.count, 1.0));
+}
+
+void sun_report(const struct reconstruction *r) {
+    cJSON *figures = cJSON_GetObjectItem(r->report, "sun");
+    cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
+    for (int c = 0; c < 3; c++) {
+        cJSON_AddItemToArray(direction, cJSON_CreateNumber((double)(&r->sun.direction.x)[c]));
+        cJSON_AddItemToArray(irradiance, cJSON_CreateNumber((double)(&r->sun.irradiance.r)[c]));
+    }
+    json_add_number(figures, "radius_deg", (double)r->sun.radius_rad * 180.0 / PI);
+}
+
+void sun_find(struct reconstruction *r, const struct views *views) {
+    struct search s = {.r = r, .median_radiance = views->median_radiance};
+    double explains = 0.0;
+    struct survey survey;
+    survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
+    light_places_init(&s.places, &survey, NULL);
+    survey_release(&survey);
+    light_places_leave_out_lamps(&s.places);
+    missing_light_init(&s.missing, &s.places, PLACE_WHITE, true);
+    if (light_places_odder(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
+        look_for_sun(&s, &explains);
+    r->sun = s.sun;
+    report(&s, explains);
+    missing_light_release(&s.missing);
+    light_places_release(&s.places);
+}

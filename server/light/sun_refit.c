@@ -1,0 +1,91 @@
+/* sun_refit.c -- see sun_refit.h. */
+#include "server/light/sun_refit.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/gather/sun.h"
+#include "server/light/missing_light.h"
+#include "server/render/bsdf.h"
+#include "server/scene/surface.h"
+
+/* By so much a channel changes at most: what asks for more is no polish. */
+#define CHANGE_MOST 2.0f
+
+static bool tells(const struct divide *d, uint32_t texel) {
+    const struct reconstruction *r = d->r;
+    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && !r->is_emitter[reconstruction_segment(r, texel)];
+}
+
+/* Evenly spread; returns their number. */
+static size_t choose_texels(const struct divide *d, uint32_t texel[LIGHT_PLACES]) {
+    const struct inverse_uv *inverse = &d->r->inverse;
+    size_t all = 0, met = 0, count = 0;
+    for (size_t i = 0; i < inverse->valid_count; i++)
+        all += tells(d, inverse->valid[i]);
+    size_t wanted = all < LIGHT_PLACES ? all : LIGHT_PLACES;
+    for (size_t i = 0; i < inverse->valid_count && count < wanted; i++) {
+        if (tells(d, inverse->valid[i]) && met++ == count * all / wanted)
+            texel[count++] = inverse->valid[i];
+    }
+    return count;
+}
+
+struct placing {
+    const struct divide *divide;
+    const uint32_t *texel;
+    struct light_place *place;
+};
+
+/* What it shows of its base colour alone, and what a white surface there would, without the sun and of the sun; of no
+ * weight where that was not measured. */
+static void place_texel(void *user, size_t index, int thread) {
+    (void)thread;
+    const struct placing *job = user;
+    const struct reconstruction *r = job->divide->r;
+    const struct measured *m = &job->divide->measured[job->texel[index]];
+    struct light_place *p = &job->place[index];
+    struct irradiance light = {0};
+    rgb white;
+    *p = (struct light_place){.segment = reconstruction_segment(r, job->texel[index])};
+    if (!(m->weight > 0.0f) || !divide_white(job->divide, job->texel[index], &white) ||
+        !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, job->texel[index], &p->at))
+        return;
+    sun_add_light(&r->sun, r->world.accel, &p->at, &light);
+    rgb of_sun = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
+    p->weight = 1.0f;
+    p->shown = rgb_clamp(rgb_mul(measured_value(m), white), 0.0f, INFINITY);
+    p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
+    p->open = sun_visible(&r->sun, r->world.accel, &p->at, 0);
+    p->lit = p->open * vec3_dot(r->sun.direction, p->at.shading);
+}
+
+static void find_places(struct divide *d, struct light_places *places) {
+    uint32_t *texel = mem_array(LIGHT_PLACES, sizeof *texel);
+    size_t count = choose_texels(d, texel), known = 0;
+    struct light_place *place = mem_array(count + 1, sizeof *place);
+    divide_texels(d, texel, count);
+    parallel_for(d->r->pool, count, place_texel, &(struct placing){d, texel, place});
+    for (size_t i = 0; i < count; i++) {
+        if (place[i].weight > 0.0f)
+            place[known++] = place[i];
+    }
+    light_places_take(places, place, known);
+    mem_free(texel);
+}
+
+void sun_refit(struct divide *d) {
+    struct light_places places;
+    struct missing_light missing;
+    if (!d->r->sun.is_there)
+        return;
+    find_places(d, &places);
+    missing_light_init(&missing, &places, PLACE_WHITE, true);
+    rgb fitted = rgb_scale(missing_light_color(&missing), BSDF_PI), *sun = &d->r->sun.irradiance;
+    for (int c = 0; c < 3; c++) {
+        float before = (&sun->r)[c];
+        (&sun->r)[c] = clampf((&fitted.r)[c], before / CHANGE_MOST, before * CHANGE_MOST);
+    }
+    missing_light_release(&missing);
+    light_places_release(&places);
+}

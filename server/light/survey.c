@@ -1,0 +1,105 @@
+/* survey.c -- see survey.h. */
+#include "server/light/survey.h"
+
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/light/emitters.h"
+#include "server/state/evidence.h"
+
+/* What was fused, and of those that no photograph shows the mean of their segment, or of the room. */
+static void fill_radiance(struct survey *s) {
+    const struct reconstruction *r = s->r;
+    size_t segments = r->segments.count;
+    double(*sum)[4] = mem_calloc(segments + 1, sizeof *sum);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        rgb shown = fused_radiance(&r->fused, texel);
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        for (size_t to = reconstruction_segment(r, texel), k = 0; k < 2; to = segments, k++) {
+            sum[to][0] += (double)shown.r;
+            sum[to][1] += (double)shown.g;
+            sum[to][2] += (double)shown.b;
+            sum[to][3] += 1.0;
+        }
+    }
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        const double *from = sum[segment][3] > 0.0 ? sum[segment] : sum[segments];
+        for (int c = 0; c < 3 && !(r->fused.count[texel] > 0.0f) && from[3] > 0.0; c++)
+            s->radiance[texel][c] = image_half_from_float((float)(from[c] / from[3]));
+    }
+    mem_free(sum);
+}
+
+/* Makes lights of what outshines the room. */
+static void light_bright(struct reconstruction *r, const struct views *views, const bool *without) {
+    struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
+    memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
+    emitters_observe(r, views, evidence);
+    for (size_t i = 0; i < r->segments.count && without; i++) {
+        if (without[i])
+            evidence[i] = (struct emitter_evidence){0};
+    }
+    emitters_light_bright(r, views, evidence);
+    mem_free(evidence);
+}
+
+/* Segments of `without` are as bright as they are by now, to those who see them in a mirror. */
+static void leave_out(struct survey *s, const bool *without) {
+    const struct reconstruction *r = s->r;
+    s->field.only_mirrored = without;
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
+        if (without[segment])
+            rgb_to_half(s->radiance[texel], r->evidence[segment].shown);
+    }
+}
+
+/* A surface that photographs show, and do not only tell how bright it is at least, and that is no lamp. */
+static bool tells(const struct reconstruction *r, const bool *without, uint32_t texel) {
+    uint32_t segment = reconstruction_segment(r, texel);
+    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && rgb_is_black(r->materials.emission[segment]) &&
+           !(without && without[segment]);
+}
+
+static void choose_points(struct survey *s, const bool *without, size_t points) {
+    const struct reconstruction *r = s->r;
+    size_t seen = 0, met = 0;
+    for (size_t i = 0; i < r->inverse.valid_count; i++)
+        seen += tells(r, without, r->inverse.valid[i]);
+    size_t wanted = seen < points ? seen : points;
+    s->texel = mem_array(wanted + 1, sizeof *s->texel);
+    for (size_t i = 0; i < r->inverse.valid_count && s->count < wanted; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        if (tells(r, without, texel) && met++ == s->count * seen / wanted)
+            s->texel[s->count++] = texel;
+    }
+}
+
+void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
+                 const struct light_field *field, const bool *without, size_t points) {
+    size_t texels = (size_t)r->fused.width * r->fused.height;
+    *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
+    memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
+    if (!field)
+        fill_radiance(s);
+    s->field = (struct light_field){.world = &r->world, .radiance = (const uint16_t(*)[3])s->radiance};
+    if (field)
+        s->field.lobe = field->lobe;
+    if (without)
+        leave_out(s, without);
+    light_bright(r, views, without);
+    choose_points(s, without, points);
+    s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);
+}
+
+void survey_release(struct survey *s) {
+    struct reconstruction *r = s->r;
+    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
+    world_update_lights(&r->world);
+    mem_free(s->scratch);
+    mem_free(s->texel);
+    mem_free(s->radiance);
+}

@@ -1,0 +1,191 @@
+/* unseen_fit.c -- see unseen_fit.h. */
+#include "server/light/unseen_fit.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "common/quantile.h"
+#include "server/capture/conjugate.h"
+
+#define COLUMNS UNSEEN_COLUMNS
+#define ROWS UNSEEN_ROWS
+#define CELLS UNSEEN_CELLS
+/* White paint, and the part of the points that is no whiter. In scans that is not near 1: in creases of a
+ * fused mesh too little light is found. */
+#define WHITE_BASE_COLOR 0.85
+#define NO_WHITER 0.9
+/* Standard deviations of the logarithm of base colour within a segment and above white. */
+#define SPREAD_WITHIN 0.3
+#define SPREAD_BEYOND 0.15
+/* Deviations at which a point has a quarter of its influence: emitters are no surfaces lit. Beyond white it
+ * comes later, or a room that is much too dark would be taken for one of lamps. */
+#define OUTLIER 2.0
+#define OUTLIER_BEYOND 5.0
+/* Weights, as shares of the points at one deviation, of cells that differ from their neighbours by a factor of
+ * e, and from where they began. */
+#define SMOOTHNESS 0.01
+#define INERTIA 0.001
+#define STEPS 40
+#define LONGEST_STEP 0.5 /* of a logarithm */
+#define FAINTEST 1e-12   /* in place of no light */
+
+struct fit {
+    const struct unseen_point *point; /* [count] */
+    size_t count, segment_count;
+    double *cell;                     /* [CELLS] the logarithm of the map */
+    double start[CELLS];
+};
+
+struct unseen_corners unseen_corners(vec3 d) {
+    double x = atan2((double)d.x, (double)-d.z) / (2.0 * PI) * COLUMNS - 0.5;
+    double y = acos(fmin(fmax((double)d.y, -1.0), 1.0)) / PI * ROWS - 0.5;
+    double column = floor(x), row = floor(y);
+    float fx = (float)(x - column), fy = (float)(y - row);
+    struct unseen_corners c;
+    for (int i = 0; i < 4; i++) {
+        int at_x = ((int)column + i % 2 + COLUMNS) % COLUMNS, at_y = (int)row + i / 2;
+        at_y = at_y < 0 ? 0 : at_y >= ROWS ? ROWS - 1 : at_y;
+        c.cell[i] = (size_t)(at_y * COLUMNS + at_x);
+        c.weight[i] = (i % 2 ? fx : 1.0f - fx) * (i / 2 ? fy : 1.0f - fy);
+    }
+    return c;
+}
+
+static double arrived(const struct unseen_point *p, const double log_radiance[CELLS]) {
+    double sum = (double)p->known;
+    for (size_t k = 0; k < CELLS; k++)
+        sum += (double)p->share[k] * exp(log_radiance[k]);
+    return fmax(sum, FAINTEST);
+}
+
+double unseen_base_color(const struct unseen_point *point, size_t count, double below, const double *log_radiance) {
+    float *base = mem_array(count + 1, sizeof *base);
+    for (size_t i = 0; i < count; i++) {
+        const struct unseen_point *p = &point[i];
+        double light = log_radiance ? arrived(p, log_radiance) : (double)(p->known + p->filled);
+        base[i] = (float)((double)p->shown / fmax(light, FAINTEST));
+    }
+    double found = (double)quantile(base, count, below);
+    mem_free(base);
+    return found;
+}
+
+/* Multiplies the map so that nearly all is no whiter than white. */
+static void make_white(struct fit *f) {
+    double low = -20.0, high = 20.0, cell[CELLS];
+    for (int i = 0; i < 40; i++) {
+        double middle = 0.5 * (low + high);
+        for (size_t k = 0; k < CELLS; k++)
+            cell[k] = f->cell[k] + middle;
+        *(unseen_base_color(f->point, f->count, NO_WHITER, cell) > WHITE_BASE_COLOR ? &low : &high) = middle;
+    }
+    for (size_t k = 0; k < CELLS; k++)
+        f->cell[k] += high;
+}
+
+/* Geman and McClure's weight of a residual in deviations. */
+static double influence(double deviations, double outlier) {
+    double e = deviations / outlier, w = 1.0 / (1.0 + e * e);
+    return w * w;
+}
+
+/* The weighted mean of the logarithm of base colour in each segment. */
+static void means_of_segments(const struct fit *f, const double *log_base, double *mean) {
+    size_t segments = f->segment_count;
+    double *weight = mem_calloc(segments, sizeof *weight);
+    memset(mean, 0, segments * sizeof *mean);
+    for (size_t i = 0; i < f->count; i++) {
+        double w = influence(fmax(log_base[i] - log(WHITE_BASE_COLOR), 0.0) / SPREAD_BEYOND, OUTLIER_BEYOND);
+        mean[f->point[i].segment] += w * log_base[i];
+        weight[f->point[i].segment] += w;
+    }
+    for (size_t s = 0; s < segments; s++)
+        mean[s] /= fmax(weight[s], 1e-12);
+    mem_free(weight);
+}
+
+struct normal {
+    double matrix[CELLS][CELLS], residual[CELLS];
+};
+
+static void multiply(const void *user, const double *x, double *out) {
+    const struct normal *n = user;
+    for (size_t i = 0; i < CELLS; i++)
+        out[i] = conjugate_dot(n->matrix[i], x, CELLS);
+}
+
+static void precondition(const void *user, const double *residual, double *out) {
+    const struct normal *n = user;
+    for (size_t i = 0; i < CELLS; i++)
+        out[i] = residual[i] / n->matrix[i][i];
+}
+
+/* Pulls the difference of two unknowns, or of one and a constant, to zero. */
+static void tie(struct normal *n, size_t a, size_t b, double difference, double weight) {
+    n->matrix[a][a] += weight;
+    n->residual[a] -= weight * difference;
+    if (a == b)
+        return;
+    n->matrix[b][b] += weight;
+    n->matrix[a][b] -= weight;
+    n->matrix[b][a] -= weight;
+    n->residual[b] += weight * difference;
+}
+
+static void add_point(struct normal *n, const struct unseen_point *p, const double cell[CELLS], double log_base,
+                      double mean) {
+    double within = log_base - mean, beyond = fmax(log_base - log(WHITE_BASE_COLOR), 0.0);
+    double within_weight = influence(within / SPREAD_WITHIN, OUTLIER) / (SPREAD_WITHIN * SPREAD_WITHIN);
+    double beyond_weight = influence(beyond / SPREAD_BEYOND, OUTLIER_BEYOND) / (SPREAD_BEYOND * SPREAD_BEYOND);
+    double pull = within_weight * within + beyond_weight * beyond;
+    double weight = within_weight + (beyond > 0.0 ? beyond_weight : 0.0);
+    double slope[CELLS], all = arrived(p, cell);
+    for (size_t k = 0; k < CELLS; k++)
+        slope[k] = (double)p->share[k] * exp(cell[k]) / all; /* of -log_base */
+    for (size_t k = 0; k < CELLS; k++) {
+        if (slope[k] == 0.0)
+            continue;
+        n->residual[k] += slope[k] * pull;
+        for (size_t m = 0; m < CELLS; m++)
+            n->matrix[k][m] += weight * slope[k] * slope[m];
+    }
+}
+
+static void step(struct fit *f, struct normal *n, double *log_base, double *mean) {
+    double *cell = f->cell, move[CELLS] = {0};
+    double inertia = INERTIA * (double)f->count, smoothness = SMOOTHNESS * (double)f->count;
+    memset(n, 0, sizeof *n);
+    for (size_t i = 0; i < f->count; i++)
+        log_base[i] = log(fmax((double)f->point[i].shown, FAINTEST) / arrived(&f->point[i], cell));
+    means_of_segments(f, log_base, mean);
+    for (size_t i = 0; i < f->count; i++)
+        add_point(n, &f->point[i], cell, log_base[i], mean[f->point[i].segment]);
+    for (size_t k = 0; k < CELLS; k++) {
+        size_t right = k % COLUMNS + 1 < COLUMNS ? k + 1 : k + 1 - COLUMNS;
+        tie(n, k, k, cell[k] - f->start[k], inertia);
+        tie(n, k, right, cell[k] - cell[right], smoothness);
+        if (k + COLUMNS < CELLS)
+            tie(n, k, k + COLUMNS, cell[k] - cell[k + COLUMNS], smoothness);
+    }
+    struct conjugate_system system = {CELLS, multiply, precondition, n};
+    conjugate_solve(&system, CELLS, 0.0, n->residual, move);
+    for (size_t k = 0; k < CELLS; k++)
+        cell[k] += fmin(fmax(move[k], -LONGEST_STEP), LONGEST_STEP);
+}
+
+void unseen_fit(const struct unseen_point *point, size_t count, size_t segment_count, double log_radiance[CELLS]) {
+    struct fit f = {.point = point, .count = count, .segment_count = segment_count, .cell = log_radiance};
+    double *log_base = mem_array(count, sizeof *log_base);
+    double *mean = mem_array(segment_count, sizeof *mean);
+    struct normal *n = mem_array(1, sizeof *n);
+    memset(log_radiance, 0, CELLS * sizeof *log_radiance);
+    make_white(&f);
+    memcpy(f.start, f.cell, sizeof f.start);
+    for (int i = 0; i < STEPS; i++)
+        step(&f, n, log_base, mean);
+    make_white(&f);
+    mem_free(n);
+    mem_free(mean);
+    mem_free(log_base);
+}

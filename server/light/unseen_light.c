@@ -1,0 +1,155 @@
+/* unseen_light.c -- see unseen_light.h. */
+#include "server/light/unseen_light.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/capture/fill.h"
+#include "server/light/survey.h"
+#include "server/light/unseen_fit.h"
+#include "server/render/sampler.h"
+
+#define POINTS 2048
+#define WAYS 512 /* directions a point */
+#define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
+/* A point speaks of the unseen directions where they have this share of its rays; so many must. */
+#define SHARE_LEAST 0.1f
+#define LEAST_POINTS 64
+/* At this many radians from what is seen 1/e of what was filled in from there is kept. */
+#define NEAR 0.1f
+/* Nothing is so white. Light is missing, and not only known badly, if more than the rest of the points are. */
+#define IMPOSSIBLE_BASE_COLOR 1.5
+#define NOT_IMPOSSIBLE 0.8
+/* Where more of all rays than this leave the room that way, light is a guess for the most part, and what surfaces say
+ * is a better one however credible it looks (redkitchen .51; staircase2 .13, rooms with windows .02 at most). */
+#define MOSTLY_UNSEEN 0.3
+
+struct unseen {
+    struct reconstruction *r;
+    const struct survey *survey; /* while points are gathered */
+    size_t count;
+    struct unseen_point *point;  /* [count] */
+    double log_radiance[UNSEEN_CELLS];
+    float *angle;                /* [map height][map width] to what is seen; NULL where there is no map */
+};
+
+/* The share of what was filled in that is kept. */
+static float kept_of_filled(const struct unseen *u, size_t cell) { return expf(-u->angle[cell] / NEAR); }
+
+/* --- looking around ------------------------------------------------------------------------------- */
+
+static void look_around(void *user, size_t index, int thread) {
+    struct unseen *u = user;
+    const struct reconstruction *r = u->r;
+    struct unseen_point *p = &u->point[index];
+    const struct light_field *field = &u->survey->field;
+    struct incident *in = &u->survey->scratch[thread];
+    uint32_t texel = u->survey->texel[index], key = sampler_key(KEY_UNSEEN, texel, 0);
+    struct surface_point at;
+    *p = (struct unseen_point){.segment = reconstruction_segment(r, texel)};
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return;
+    vec3 frame[3] = {[2] = at.shading};
+    vec3_frame(at.shading, &frame[0], &frame[1]);
+    for (uint32_t i = 0; i < WAYS; i++)
+        in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
+    incident_trace(in, field, &at, key, 0, WAYS);
+    for (size_t i = 0; i < WAYS; i++) {
+        if (!in->leaves[i])
+            continue;
+        float share = 1.0f / WAYS; /* of the ray, that is unseen */
+        if (u->angle)
+            share *= 1.0f - kept_of_filled(u, environment_cell(&r->environment, in->direction[i]));
+        p->filled += share * rgb_mean(in->radiance[i]);
+        p->unseen += share;
+        struct unseen_corners c = unseen_corners(in->direction[i]);
+        for (int k = 0; k < 4; k++)
+            p->share[c.cell[k]] += share * c.weight[k];
+    }
+    struct irradiance light;
+    irradiance_gather(&light, in, field, &at, key, WAYS);
+    p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
+    p->shown = rgb_mean(fused_radiance(&r->fused, texel));
+}
+
+static double unseen_share(const struct unseen *u) {
+    double sum = 0.0;
+    for (size_t i = 0; i < u->count; i++)
+        sum += (double)u->point[i].unseen;
+    return sum / fmax((double)u->count, 1.0);
+}
+
+/* Keeps the points that speak of the unseen directions. */
+static void keep_telling_points(struct unseen *u) {
+    size_t kept = 0;
+    for (size_t i = 0; i < u->count; i++) {
+        if (u->point[i].unseen >= SHARE_LEAST)
+            u->point[kept++] = u->point[i];
+    }
+    u->count = kept;
+}
+
+/* --- the whole ------------------------------------------------------------------------------------ */
+
+static void fill_in(const struct unseen *u) {
+    struct environment *e = &u->r->environment;
+    for (size_t row = 0; row < e->map.height; row++) {
+        for (size_t column = 0; column < e->map.width; column++) {
+            size_t at = row * e->map.width + column;
+            if (e->confidence.pixel[2 * at] > 0.0f)
+                continue;
+            struct unseen_corners c = unseen_corners(environment_direction(e, column, row));
+            double radiance = 0.0;
+            for (int k = 0; k < 4; k++)
+                radiance += (double)c.weight[k] * exp(u->log_radiance[c.cell[k]]);
+            float kept = u->angle ? kept_of_filled(u, at) : 0.0f, *pixel = e->map.pixel + 3 * at;
+            for (size_t channel = 0; channel < 3; channel++)
+                pixel[channel] = kept * pixel[channel] + (1.0f - kept) * (float)radiance;
+        }
+    }
+}
+
+/* Fills the points: what they show, and what is around them. */
+static void gather_points(struct unseen *u, const struct views *views) {
+    struct survey survey;
+    survey_init(&survey, u->r, views, NULL, NULL, POINTS);
+    u->survey = &survey;
+    u->count = survey.count;
+    u->point = mem_array(u->count + 1, sizeof *u->point);
+    parallel_for(u->r->pool, u->count, look_around, u);
+    survey_release(&survey);
+}
+
+static void relight(struct unseen *u) {
+    struct reconstruction *r = u->r;
+    unseen_fit(u->point, u->count, r->segments.count, u->log_radiance);
+    if (!r->environment.map.pixel)
+        environment_make_unseen(&r->environment);
+    fill_in(u);
+    environment_update_figures(&r->environment);
+    world_set_environment(&r->world, &r->environment.map, r->pool);
+}
+
+void unseen_light_estimate(struct reconstruction *r, const struct views *views) {
+    struct unseen u = {.r = r};
+    cJSON *figures = cJSON_AddObjectToObject(r->report, "unseen_light");
+    const struct image *known = &r->environment.confidence;
+    if (r->environment.map.pixel) {
+        u.angle = mem_array((size_t)known->width * known->height, sizeof *u.angle);
+        fill_angles(known, u.angle);
+    }
+    gather_points(&u, views);
+    r->unseen_share = unseen_share(&u);
+    keep_telling_points(&u);
+    double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
+    bool matters = u.count >= LEAST_POINTS &&
+                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
+    if (matters)
+        relight(&u);
+    r->sky_is_fitted = matters;
+    json_add_number(figures, "share_of_rays", r->unseen_share);
+    json_add_number(figures, "base_color_without", base_color);
+    json_add_bool(figures, "estimated", matters);
+    mem_free(u.angle);
+    mem_free(u.point);
+}

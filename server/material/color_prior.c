@@ -1,0 +1,161 @@
+/* color_prior.c -- see color_prior.h. */
+#include "server/material/color_prior.h"
+
+#include <math.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+#include "server/scene/surface.h"
+
+/* Variance by light of others (struct measured, mixing) at which a texel counts half: of a black frame before a
+ * window a few clean texels must outweigh many that shine with it. */
+#define MIXING_FLOOR 0.001
+#define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
+/* Share of a segment's texels that must be measured cleanly for its own mean to count as much as its
+ * surroundings; it counts with the square of that share. */
+#define SHARE_KNOWN 0.003
+/* A cube tells when so many clean texels were measured in it. */
+#define LEAST_WEIGHT 8.0
+#define STRIDE 3 /* valid texels from one that is asked to the next */
+#define LEVELS 7 /* of grids; 2^(LEVELS - 1) cubes along each side of the room's bounds at the finest */
+
+/* Sums over measured texels. */
+struct evidence {
+    double color[3], squares, weight;
+};
+
+struct grids {
+    vec3 lower;
+    float scale; /* cubes of the finest grid per metre */
+    struct evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
+};
+
+static void evidence_add(struct evidence *e, const struct measured *m) {
+    rgb v = measured_value(m);
+    double weight = MIXING_FLOOR / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
+    e->color[0] += weight * (double)v.r;
+    e->color[1] += weight * (double)v.g;
+    e->color[2] += weight * (double)v.b;
+    e->squares += weight * (double)rgb_dot(v, v);
+    e->weight += weight;
+}
+
+static struct color_prior prior_of(const struct evidence *e) {
+    if (!(e->weight > 0.0))
+        return (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f};
+    rgb mean = rgb_make((float)(e->color[0] / e->weight), (float)(e->color[1] / e->weight),
+                        (float)(e->color[2] / e->weight));
+    float variance = (float)(e->squares / e->weight) - rgb_dot(mean, mean);
+    return (struct color_prior){mean, fmaxf(variance, LEAST_VARIANCE)};
+}
+
+/* --- surroundings -------------------------------------------------------------------------------- */
+
+static void grids_init(struct grids *g, const struct mesh *mesh) {
+    vec3 upper;
+    mesh_bounds(mesh, &g->lower, &upper);
+    vec3 size = vec3_sub(upper, g->lower);
+    float longest = fmaxf(size.x, fmaxf(size.y, size.z));
+    g->scale = (float)(1 << (LEVELS - 1)) / fmaxf(longest * 1.0001f, 1e-6f);
+    for (int k = 0; k < LEVELS; k++)
+        g->cell[k] = mem_calloc((size_t)1 << (3 * k), sizeof *g->cell[k]);
+}
+
+static void grids_release(struct grids *g) {
+    for (int k = 0; k < LEVELS; k++)
+        mem_free(g->cell[k]);
+}
+
+static struct evidence *grids_cell(const struct grids *g, int level, vec3 point) {
+    uint32_t last = (1u << (LEVELS - 1)) - 1u;
+    vec3 at = vec3_scale(vec3_sub(point, g->lower), g->scale);
+    const float place[3] = {at.x, at.y, at.z};
+    size_t index = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        uint32_t finest = (uint32_t)clampf(place[axis], 0.0f, (float)last);
+        index = index << level | finest >> (LEVELS - 1 - level);
+    }
+    return &g->cell[level][index];
+}
+
+static bool is_known(const struct reconstruction *r, const struct measured *measured, uint32_t texel) {
+    return measured[texel].weight > 0.0f && !r->is_emitter[reconstruction_segment(r, texel)];
+}
+
+static void grids_fill(struct grids *g, const struct reconstruction *r, const struct measured *measured) {
+    for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
+        uint32_t texel = r->inverse.valid[i];
+        struct surface_point at;
+        if (!is_known(r, measured, texel) ||
+            !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+            continue;
+        for (int k = 0; k < LEVELS; k++)
+            evidence_add(grids_cell(g, k, at.position), &measured[texel]);
+    }
+}
+
+/* What is measured around each chart, texel by texel of it from the finest grid that tells. */
+static struct evidence *around_charts(const struct reconstruction *r, const struct grids *g) {
+    struct evidence *around = mem_calloc(r->atlas.chart_count, sizeof *around);
+    for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
+        uint32_t texel = r->inverse.valid[i];
+        struct surface_point at;
+        if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+            continue;
+        int level = LEVELS - 1;
+        while (level > 0 && !(grids_cell(g, level, at.position)->weight > LEAST_WEIGHT))
+            level--;
+        const struct evidence *cell = grids_cell(g, level, at.position);
+        if (!(cell->weight > 0.0))
+            continue;
+        struct evidence *to = &around[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]];
+        for (int c = 0; c < 3; c++)
+            to->color[c] += cell->color[c] / cell->weight;
+        to->squares += cell->squares / cell->weight;
+        to->weight += 1.0;
+    }
+    return around;
+}
+
+/* --- segments ------------------------------------------------------------------------------------ */
+
+/* What is known of each segment, and how many texels it has. */
+static struct evidence *of_segments(const struct reconstruction *r, const struct measured *measured,
+                                    size_t *texels) {
+    struct evidence *own = mem_calloc(r->segments.count, sizeof *own);
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        uint32_t texel = r->inverse.valid[i];
+        texels[reconstruction_segment(r, texel)]++;
+        if (is_known(r, measured, texel))
+            evidence_add(&own[reconstruction_segment(r, texel)], &measured[texel]);
+    }
+    return own;
+}
+
+static struct color_prior mix(struct color_prior a, struct color_prior b, float part_of_b) {
+    return (struct color_prior){rgb_mad(rgb_scale(a.mean, 1.0f - part_of_b), part_of_b, b.mean),
+                                a.variance + part_of_b * (b.variance - a.variance)};
+}
+
+struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured) {
+    struct grids grids;
+    size_t *texels = mem_calloc(r->segments.count, sizeof *texels);
+    struct evidence *own = of_segments(r, measured, texels);
+    grids_init(&grids, &r->scene->mesh);
+    grids_fill(&grids, r, measured);
+    struct evidence *around = around_charts(r, &grids);
+    struct color_prior *prior = mem_array(r->atlas.chart_count, sizeof *prior);
+    for (size_t i = 0; i < r->scene->mesh.triangle_count; i++) {
+        size_t chart = r->atlas.chart_of_triangle[i], segment = r->segments.of_triangle[i];
+        double share = own[segment].weight / ((double)texels[segment] + 1.0) / SHARE_KNOWN;
+        prior[chart] = r->is_emitter[segment]
+                           ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
+                           : mix(prior_of(&around[chart]), prior_of(&own[segment]),
+                                 (float)(share * share / (1.0 + share * share)));
+    }
+    mem_free(around);
+    mem_free(own);
+    mem_free(texels);
+    grids_release(&grids);
+    return prior;
+}

@@ -1,0 +1,165 @@
+/* listing1.c -- see listing1.h. */
+#include "server/refine/listing1.h"
+
+#include "common/mem.h"
+#include "server/light/emitters.h"
+#include "server/refine/emitter_decision.h"
+#include "server/refine/params.h"
+#include "server/state/evidence.h"
+
+/* Parts of the run, as fractions of it. The levels of the coarse part get equal time; the decision
+ * about emitters falls into the first of them. */
+#define DECISION_AT OPTIMISER_FALL_FROM
+#define COARSE_PART 0.4
+/* The neutral start of emission. Of what the photographs show of a segment the part
+ * q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) is its own light, q being how many times brighter it is than
+ * the median of the room; the rest is reflected. A segment that no photograph shows does not emit. */
+#define NEUTRAL_BRIGHTNESS 3.0f
+
+_Static_assert(PASS_CHUNK_TEXELS >= EMITTER_DECISION_TEXELS, "the decision works in a pass's batches");
+
+/* What a checkpoint holds of how far the method is. */
+struct progress {
+    int32_t level;
+    int32_t decided; /* the emitters are fixed */
+};
+
+struct listing1 {
+    struct optimiser *o; /* borrowed: its owner */
+    struct params params;
+    struct params_rates rates; /* at the start */
+    struct gradient *gradient;
+    struct gradient_log **log; /* [chunk_count] */
+    struct progress progress;
+    int coarse_levels;
+    bool any_emits; /* setting emitters */
+};
+
+static int level_at(const struct listing1 *l, double fraction) {
+    if (l->coarse_levels == 0 || fraction >= COARSE_PART)
+        return 0;
+    return l->coarse_levels - (int)(fraction / COARSE_PART * l->coarse_levels);
+}
+
+static struct params_rates rates_at(const struct listing1 *l, double fraction) {
+    float fall = optimiser_rate_fall(fraction);
+    return (struct params_rates){
+        .base_color = fall * l->rates.base_color,
+        .roughness = fall * l->rates.roughness,
+        .specular = fall * l->rates.specular,
+        .emission = fall * l->rates.emission,
+    };
+}
+
+static void start_base_color(struct reconstruction *r) {
+    for (size_t i = 0; i < r->inverse.valid_count; i++) {
+        float *value = r->materials.base_color.texel[r->inverse.valid[i]];
+        value[0] = value[1] = value[2] = NEUTRAL_BASE_COLOR;
+    }
+}
+
+static float neutral_share(rgb shown, float median) {
+    float q = rgb_mean(shown) / median;
+    return q * q / (q * q + NEUTRAL_BRIGHTNESS * NEUTRAL_BRIGHTNESS);
+}
+
+static void start_neutral(struct reconstruction *r, const struct views *views) {
+    start_base_color(r);
+    emitters_observe(r, views, r->evidence);
+    for (size_t s = 0; s < r->segments.count; s++) {
+        rgb shown = r->evidence[s].shown;
+        r->materials.emission[s] = rgb_scale(shown, neutral_share(shown, views->median_radiance));
+    }
+}
+
+static void fix_emitters(struct listing1 *l) {
+    if (!l->any_emits)
+        emission_fix(&l->o->emission, l->o->r->is_emitter);
+    params_free_segments(&l->params);
+}
+
+static void decide_emitters(struct listing1 *l) {
+    struct reconstruction *r = l->o->r;
+    if (!l->any_emits)
+        emitter_decision_make(r, l->o->pass.batch, r->evidence);
+    /* A part of a segment's median light may have been more than all of its dark parts': what base
+     * colour did about that is worth nothing. */
+    start_base_color(r);
+    params_refine(&l->params, l->progress.level);
+    fix_emitters(l);
+    for (size_t s = 0; s < r->segments.count; s++)
+        emission_set(&l->o->emission, s, r->materials.emission[s]);
+    world_update_lights(&r->world);
+    l->progress.decided = 1;
+}
+
+static void walk_backwards(void *self, size_t chunk, struct look_batch *b) {
+    struct listing1 *l = self;
+    gradient_log_clear(l->log[chunk]);
+    if (b->look_count > 0)
+        path_batch_backward(b->paths, b->d_radiance, l->log[chunk]);
+}
+
+static void iterate(void *self, double fraction) {
+    struct listing1 *l = self;
+    struct optimiser *o = l->o;
+    if (!l->progress.decided && fraction >= DECISION_AT)
+        decide_emitters(l);
+    /* Never back to a coarser one: an extended job has a smaller part of its run behind it. */
+    if (l->progress.level > level_at(l, fraction)) {
+        l->progress.level = level_at(l, fraction);
+        params_refine(&l->params, l->progress.level);
+    }
+    pass_run(&o->pass, o->counters.iteration, walk_backwards, l);
+    gradient_reduce(l->gradient, l->log, o->pass.chunk_count, o->r->pool);
+    pass_d_emission(&o->pass, l->gradient->d_emission); /* in place of the derivative by all that it sheds */
+    struct params_rates rates = rates_at(l, fraction);
+    params_step(&l->params, l->gradient, &rates, o->r->pool);
+}
+
+static void resumed(void *self) {
+    struct listing1 *l = self;
+    params_set_level(&l->params, l->progress.level);
+    if (l->progress.decided)
+        fix_emitters(l);
+}
+
+static void release(void *self) {
+    struct listing1 *l = self;
+    for (size_t c = 0; c < l->o->pass.chunk_count; c++)
+        gradient_log_free(l->log[c]);
+    mem_free(l->log);
+    gradient_free(l->gradient);
+    params_release(&l->params);
+    mem_free(l);
+}
+
+static const struct optimiser_method method = {iterate, resumed, NULL, NULL, release};
+
+struct optimiser *listing1_new(struct reconstruction *r, const struct views *views,
+                               const struct reconstruct_hooks *hooks) {
+    const struct settings *set = r->settings;
+    struct listing1 *l = mem_alloc(sizeof *l);
+    start_neutral(r, views);
+    struct optimiser *o = optimiser_new(r, views, hooks, true, &method, l);
+    *l = (struct listing1){.o = o};
+    l->any_emits = settings_is(set, "emitters", "any");
+    l->coarse_levels = (int)settings_number(set, "coarse_levels");
+    l->progress.level = l->coarse_levels;
+    l->rates = (struct params_rates){
+        .base_color = (float)settings_number(set, "base_color_rate"),
+        .roughness = (float)settings_number(set, "roughness_rate"),
+        .specular = (float)settings_number(set, "specular_rate"),
+        .emission = (float)settings_number(set, "emission_rate"),
+    };
+    params_init(&l->params, &r->materials, &r->inverse, &r->segments, &o->emission, l->coarse_levels);
+    l->gradient = gradient_new(r->atlas.width, r->atlas.height, r->segments.count);
+    l->log = mem_array(o->pass.chunk_count, sizeof *l->log);
+    for (size_t c = 0; c < o->pass.chunk_count; c++)
+        l->log[c] = gradient_log_new(r->segments.count);
+    optimiser_keep(o, "progress", &l->progress, sizeof l->progress);
+    optimiser_keep(o, "base_color.adam", l->params.base_color.record, adam_bytes(&l->params.base_color));
+    optimiser_keep(o, "roughness.adam", l->params.roughness.record, adam_bytes(&l->params.roughness));
+    optimiser_keep(o, "specular.adam", l->params.specular.record, adam_bytes(&l->params.specular));
+    return o;
+}

@@ -1,0 +1,122 @@
+/* look.c -- see look.h. */
+#include "server/refine/look.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "common/rng.h"
+
+/* Weight of a photograph's pixel that mixes surfaces: it speaks only where nothing else does. */
+#define UNCLEAN_TRUST 0.02f
+
+void look_batch_init(struct look_batch *b, const struct reconstruction *r, const struct views *views,
+                     const struct path_settings *path, int cameras, int samples, size_t texels) {
+    size_t looks = texels * (size_t)cameras, paths = looks * (size_t)samples;
+    *b = (struct look_batch){.r = r, .views = views, .path = *path, .cameras = cameras,
+                             .samples = samples, .look_capacity = looks};
+    b->look = mem_array(looks, sizeof *b->look);
+    b->paths = path->derivatives ? path_batch_new(paths, path->max_depth) : path_batch_new_forward(paths);
+    b->ray = mem_array(paths, sizeof *b->ray);
+    b->key = mem_array(paths, sizeof *b->key);
+    b->reference = mem_array(paths, sizeof *b->reference);
+    b->radiance = mem_array(paths, sizeof *b->radiance);
+    b->d_radiance = mem_array(paths, sizeof *b->d_radiance);
+}
+
+void look_batch_release(struct look_batch *b) {
+    mem_free(b->look);
+    path_batch_free(b->paths);
+    mem_free(b->ray);
+    mem_free(b->key);
+    mem_free(b->reference);
+    mem_free(b->radiance);
+    mem_free(b->d_radiance);
+    *b = (struct look_batch){0};
+}
+
+void look_batch_clear(struct look_batch *b) {
+    b->look_count = 0;
+}
+
+/* Sets up the paths of look number `at`, whose first sample has number `sample_number`. False when
+ * one cannot be used: out of the picture, masked, a pixel that shines by chance, or one that mixes surfaces while the
+ * texel's centre is not in such a one. */
+static bool connect(struct look_batch *b, size_t at, const struct view *view, uint32_t texel,
+                    uint64_t iteration, uint32_t sample_number) {
+    const struct reconstruction *r = b->r;
+    const struct photograph *photo = &r->scene->photograph[b->views->train[view->train]];
+    bool clean = views_clean(b->views, view);
+    uint32_t x = texel % r->atlas.width, y = texel / r->atlas.width;
+    for (int i = 0; i < b->samples; i++) {
+        struct path_key key = {texel, (uint32_t)(2 * iteration) + (uint32_t)(i & 1),
+                               sample_number + (uint32_t)i / 2};
+        /* Where in the texel: the photograph saw all of it, not its centre. */
+        uint64_t bits = rng_key(b->path.seed ^ key.iteration, key.index, key.sample);
+        uint32_t triangle;
+        float b1, b2, depth_m;
+        struct view place = *view;
+        if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)x + rng_to_float((uint32_t)bits),
+                               (float)y + rng_to_float((uint32_t)(bits >> 32)), &triangle, &b1, &b2))
+            return false;
+        vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
+        size_t path = at * (size_t)b->samples + (size_t)i;
+        if (!camera_project(&photo->camera, point, &place.x, &place.y, &depth_m) ||
+            (clean && !views_clean(b->views, &place)) || photograph_sparks(photo, place.x, place.y) ||
+            !photograph_sample(photo, place.x, place.y, &b->reference[path]))
+            return false;
+        vec3 origin = camera_origin(&photo->camera);
+        b->ray[path] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
+        b->key[path] = key;
+    }
+    b->look[at] = (struct look){texel, reconstruction_segment(r, texel), photo, *view,
+                                clean ? 1.0f : UNCLEAN_TRUST};
+    return true;
+}
+
+void look_add(struct look_batch *b, uint32_t texel, uint64_t iteration) {
+    const struct reconstruction *r = b->r;
+    uint32_t triangle;
+    float b1, b2;
+    if (!inverse_uv_lookup(&r->inverse, &r->atlas, (float)(texel % r->atlas.width) + 0.5f,
+                           (float)(texel / r->atlas.width) + 0.5f, &triangle, &b1, &b2))
+        return;
+    vec3 normal = vec3_normalize(mesh_cross(&r->scene->mesh, triangle));
+    vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
+    struct view view[VIEWS_PICK_MAX];
+    uint32_t key = (uint32_t)rng_key(b->path.seed, iteration, texel);
+    size_t seen = views_pick(b->views, point, normal, key, (size_t)b->cameras, view);
+    uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
+    for (size_t k = 0; k < seen && b->look_count < b->look_capacity; k++) {
+        if (connect(b, b->look_count, &view[k], texel, iteration, (uint32_t)k * samples_a_half))
+            b->look_count++;
+    }
+}
+
+void look_add_pixels(struct look_batch *b, uint64_t number, uint64_t iteration) {
+    const struct reconstruction *r = b->r;
+    uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
+    for (int k = 0; k < b->cameras && b->look_count < b->look_capacity; k++) {
+        uint64_t pick = rng_key(b->path.seed, iteration, number * VIEWS_PICK_MAX + (uint64_t)k);
+        uint64_t place = rng_mix64(pick);
+        struct view view = {.train = rng_below((uint32_t)pick, (uint32_t)b->views->train_count)};
+        const struct camera *camera = &r->scene->photograph[b->views->train[view.train]].camera;
+        struct accel_hit hit;
+        vec3 direction;
+        view.x = rng_to_float((uint32_t)place) * (float)camera->width;
+        view.y = rng_to_float((uint32_t)(place >> 32)) * (float)camera->height;
+        if (!camera_direction(camera, view.x, view.y, &direction) ||
+            !accel_intersect(b->views->accel, camera_origin(camera), direction, 0.0f, INFINITY, &hit))
+            continue;
+        vec2 at = atlas_point(&r->atlas, hit.triangle, hit.b1, hit.b2);
+        uint32_t texel = (uint32_t)at.y * r->atlas.width + (uint32_t)at.x;
+        if (r->inverse.triangle[texel] != INVERSE_UV_NONE &&
+            connect(b, b->look_count, &view, texel, iteration, (uint32_t)k * samples_a_half))
+            b->look_count++;
+    }
+}
+
+void look_trace(struct look_batch *b) {
+    size_t paths = b->look_count * (size_t)b->samples;
+    if (paths > 0)
+        path_batch_trace(b->paths, &b->r->world, &b->path, paths, b->ray, b->key, b->radiance);
+}
