@@ -110,7 +110,8 @@ done
 prepare() {
     place=$work/place
     rm -rf "$place"
-    mkdir -p "$place/build" "$place/tmp"
+    mkdir -p "$place/build" "$place/tmp" "$place/backup" "$place/etc" "$place/var/lib"
+    echo "data_dir = $place/var/lib/unbaked" >"$place/etc/unbaked.conf"
     ln -s "$PWD/config" "$PWD/deploy" "$place"
     cat >"$place/build/unbaked" <<WRAPPER
 #!/bin/bash
@@ -123,20 +124,47 @@ exec "$build/unbaked" "\$@"
 WRAPPER
     printf '#!/bin/bash\nexec "%s" "$@"\n' "$build/unbake" >"$place/build/unbake"
     chmod +x "$place/build/unbaked" "$place/build/unbake"
+    cat >"$place/preamble" <<PREAMBLE
+set -eu -o pipefail
+export UNBAKE_SERVER=http://127.0.0.1:$port XDG_CONFIG_HOME=$place/config PATH=$place/build:\$PATH
+make() { :; }
+curl() { command curl --max-time 30 "\$@"; }
+systemctl() {
+    case \$1 in
+    start) unbaked --data "$place/var/lib/unbaked" >>"$place/service.log" 2>&1 & ;;
+    stop) pid=\$(tail -n 1 "$place/pids"); kill "\$pid"; while kill -0 "\$pid" 2>/dev/null; do sleep 0.05; done ;;
+    esac
+}
+chown() { :; }
+install() { mkdir -p "\${@: -1}"; }
+command -v rsync >/dev/null || rsync() { cp "\$@"; }
+PREAMBLE
     { printf '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n'; printf '\x80\x80\x80\x80%.0s' $(seq 32); } >"$place/sky.hdr"
 }
 
-# The n-th block of the document, as it is to be run: builds nothing, streams end.
+# The n-th block of the document, as it is to be run: builds nothing, streams end, and what a server has in / is in
+# the place, belongs to whoever runs the test, and is no service of systemd's.
 block() {
-    cat <<PREAMBLE
-set -eu -o pipefail
-export UNBAKE_SERVER=http://127.0.0.1:$port XDG_CONFIG_HOME=$place/config
-make() { :; }
-curl() { command curl --max-time 30 "\$@"; }
-PREAMBLE
+    cat "$place/preamble"
     awk -v n="$1" '/^```sh$/ { inside = ++count == n; next } /^```/ { inside = 0 } inside' "$document" |
-        sed -e "s|/tmp/|$place/tmp/|g" -e "s/127.0.0.1:7117/127.0.0.1:$port/g" -e 's/texture_size=512/texture_size=64/g' \
+        sed -E "s#(^|[ =])/(tmp|var|etc|backup)/#\\1$place/\\2/#g" | sed -e "s/127.0.0.1:7117/127.0.0.1:$port/g" -e 's/texture_size=512/texture_size=64/g' \
             -e 's/time_limit_sec=60/iterations=1/g' -e 's/"texture_size": 512, "time_limit_sec": 60/"texture_size": 64, "iterations": 1/'
+}
+
+# What deploy/README.md takes for granted.
+a_server_with_a_job() {
+    cat "$place/preamble" - >"$place/block.sh" <<'BLOCK'
+systemctl start unbaked
+build/unbaked demo-room room
+unbake submit room --set texture_size=64 --set iterations=1 --watch
+BLOCK
+    (cd "$place" && bash block.sh >block.log 2>&1 </dev/null) || say "the server: $(tail -n 5 "$place/block.log")"
+}
+# Restored, it has the job's outputs.
+check_restored() {
+    [ -d "$place/var/lib/unbaked.before" ] && [ ! -e "$place/var/lib/unbaked/state.db-journal" ] || say "nothing was restored"
+    "$build/unbake" get last --server "http://127.0.0.1:$port" -o "$place/outputs" -q &&
+        [ -s "$place/outputs/base_color.exr" ] || say "the restored server has no outputs"
 }
 
 end_all() {
@@ -154,11 +182,13 @@ for document in $documents; do
     count=$(grep -c '^```sh$' "$document")
     [ "$count" -gt 0 ] || continue
     prepare
+    [ "$document" != deploy/README.md ] || a_server_with_a_job
     for n in $(seq "$count"); do
         block "$n" >"$place/block.sh"
         (cd "$place" && bash block.sh >block.log 2>&1 </dev/null) ||
             say "block $n fails: $(tail -n 5 "$place/block.log")"
     done
+    [ "$document" != deploy/README.md ] || check_restored
     end_all
 done
 finish
