@@ -14,6 +14,7 @@
 #include "common/quantile.h"
 #include "server/capture/censored.h"
 #include "server/capture/fill.h"
+#include "server/scene/latlong.h"
 
 /* A point so far away that every camera of a room sees it in the same direction, in metres. */
 #define FAR_M 1e6f
@@ -135,23 +136,22 @@ static float combine(struct censored *value, size_t count, bool *is_bound) {
 }
 
 /* Solid angle of a cell. */
-static double row_angle(const struct environment *e, size_t row) {
-    return sin(PI * (double)row / (double)(e->map.height - 1));
+static double cell_angle(const struct environment *e, size_t row) {
+    return latlong_pixel_angle(e->map.width, e->map.height, (uint32_t)row);
 }
 
-/* A cell of the map: the direction of its centre, and the ways to its neighbours in column and row. */
+/* A cell of the map, around a pixel: the direction of its centre, and the ways across it along row and column. */
 struct cell {
     vec3 centre, along, down;
 };
 
 static struct cell cell_at(const struct image *map, size_t column, size_t row) {
-    double step_phi = 2.0 * PI / (double)map->width, step_theta = PI / (double)(map->height - 1);
-    double phi = step_phi * ((double)column + 0.5), theta = step_theta * (double)row;
-    double sp = sin(phi), cp = cos(phi), st = sin(theta), ct = cos(theta), across = step_phi * st;
+    uint32_t w = map->width, h = map->height;
+    double x = (double)column, y = (double)row;
     return (struct cell){
-        .centre = {(float)(st * sp), (float)ct, (float)(-st * cp)},
-        .along = {(float)(across * cp), 0.0f, (float)(across * sp)},
-        .down = {(float)(step_theta * ct * sp), (float)(-step_theta * st), (float)(-step_theta * ct * cp)},
+        .centre = latlong_pixel(w, h, x, y),
+        .along = vec3_sub(latlong_pixel(w, h, x + 0.5, y), latlong_pixel(w, h, x - 0.5, y)),
+        .down = vec3_sub(latlong_pixel(w, h, x, y + 0.5), latlong_pixel(w, h, x, y - 0.5)),
     };
 }
 
@@ -298,7 +298,7 @@ static void forget_weak_bounds(struct environment *e) {
 static double saturated_share(const struct environment *e) {
     double seen = 0.0, saturated = 0.0;
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        double angle = is_seen(e, i) ? row_angle(e, i / e->map.width) : 0.0;
+        double angle = is_seen(e, i) ? cell_angle(e, i / e->map.width) : 0.0;
         seen += angle;
         saturated += e->is_bound[i] ? angle : 0.0;
     }
@@ -313,7 +313,7 @@ void environment_update_figures(struct environment *e) {
     float *spread = mem_array(cells, sizeof *spread);
     for (size_t i = 0; i < cells; i++) {
         const float *p = e->map.pixel + 3 * i, *known = e->confidence.pixel + 2 * i;
-        double angle = row_angle(e, i / e->map.width);
+        double angle = cell_angle(e, i / e->map.width);
         double light = angle * (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
         all += angle;
         luminance += light;
@@ -372,13 +372,7 @@ void environment_make_unseen(struct environment *e) {
 }
 
 size_t environment_cell(const struct environment *e, vec3 direction) {
-    uint32_t width = e->map.width, height = e->map.height;
-    double phi = atan2((double)direction.x, (double)-direction.z);
-    double theta = acos(fmin(fmax((double)direction.y, -1.0), 1.0));
-    double column = (phi < 0.0 ? phi + 2.0 * PI : phi) / (2.0 * PI) * (double)width;
-    double row = theta / PI * (double)(height - 1) + 0.5;
-    size_t x = (size_t)column < width ? (size_t)column : width - 1;
-    return (size_t)row * width + x;
+    return latlong_nearest(e->map.width, e->map.height, direction);
 }
 
 bool environment_is_seen(const struct environment *e, vec3 direction) {
@@ -391,7 +385,7 @@ bool environment_is_told(const struct environment *e, vec3 direction) {
 }
 
 vec3 environment_direction(const struct environment *e, size_t column, size_t row) {
-    return cell_at(&e->map, column, row).centre;
+    return latlong_pixel(e->map.width, e->map.height, (double)column, (double)row);
 }
 
 void environment_brighten(struct environment *e, rgb factor) {

@@ -2,7 +2,7 @@
  *
  * A pixel that meets no surface (views_open) shows light that comes from so far away that only its
  * direction counts. All such pixels of the training photographs make a latitude-longitude map in
- * the layout of world.h, which lights the room through its openings from then on.
+ * the layout of latlong.h, which lights the room through its openings from then on.
  *
  * Limits. What an opening shows is taken to be infinitely far: where it is near (a wall that was
  * not scanned, seen through a hole of the mesh), photographs from different places disagree about

@@ -6,6 +6,7 @@
 
 #include "common/mem.h"
 #include "common/vec.h"
+#include "server/scene/latlong.h"
 
 /* What spreads is at most this many times the typical known luminance. */
 #define SPREAD_LIMIT 4.0
@@ -13,8 +14,9 @@
 /* A row counts for another by the distance to the power of minus this: a tenth farther than the nearest a tenth of it. */
 #define ROW_FALLOFF 24.0
 
-static float sine_of_row(uint32_t row, uint32_t height) {
-    return (float)sin(PI * ((double)row + 0.5) / (double)height);
+/* Solid angle of a pixel, by its index. */
+static double angle_of(const struct image *map, size_t pixel) {
+    return latlong_pixel_angle(map->width, map->height, (uint32_t)(pixel / map->width));
 }
 
 /* The square of the mean square root: a mean that a sun hardly moves. */
@@ -24,7 +26,7 @@ static double typical_luminance(const struct image *map, const struct image *kno
         const float *p = map->pixel + 3 * i;
         if (!(known->pixel[i * known->channel_count] > 0.0f))
             continue;
-        double angle = (double)sine_of_row((uint32_t)(i / map->width), map->height);
+        double angle = angle_of(map, i);
         sum += angle * sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
         weight += angle;
     }
@@ -51,7 +53,7 @@ static rgb *row_colors(const struct image *map, const struct image *known, doubl
         if (!(known->pixel[i * known->channel_count] > 0.0f))
             continue;
         rgb c = below_limit(map, i, limit);
-        double angle = (double)sine_of_row((uint32_t)(i / width), height), *s = sum[i / width];
+        double angle = angle_of(map, i), *s = sum[i / width];
         s[0] += angle * (double)c.r;
         s[1] += angle * (double)c.g;
         s[2] += angle * (double)c.b;
@@ -76,12 +78,16 @@ static rgb *row_colors(const struct image *map, const struct image *known, doubl
 struct level {
     uint32_t width, height;
     float (*value)[4]; /* [height][width]; owned */
+    float *angle;      /* [height] solid angle of a cell of each row; owned */
 };
 
 static void start_finest(struct level *l, const struct image *map, const struct image *known, const rgb *row_color,
                          double limit) {
-    *l = (struct level){map->width, map->height, NULL};
+    *l = (struct level){.width = map->width, .height = map->height};
     l->value = mem_calloc((size_t)l->width * l->height, sizeof *l->value);
+    l->angle = mem_array(l->height, sizeof *l->angle);
+    for (uint32_t y = 0; y < l->height; y++)
+        l->angle[y] = (float)latlong_pixel_angle(l->width, l->height, y);
     for (size_t i = 0; i < (size_t)l->width * l->height; i++) {
         if (!(known->pixel[i * known->channel_count] > 0.0f))
             continue;
@@ -94,15 +100,17 @@ static void start_finest(struct level *l, const struct image *map, const struct 
 
 /* Half the size: means by solid angle and knowledge. One known cell of four makes a known one. */
 static void pull(const struct level *fine, struct level *coarse) {
-    *coarse = (struct level){fine->width / 2, fine->height / 2, NULL};
+    *coarse = (struct level){.width = fine->width / 2, .height = fine->height / 2};
     coarse->value = mem_calloc((size_t)coarse->width * coarse->height, sizeof *coarse->value);
+    coarse->angle = mem_array(coarse->height, sizeof *coarse->angle);
     for (uint32_t y = 0; y < coarse->height; y++) {
+        coarse->angle[y] = 2.0f * (fine->angle[2 * y] + fine->angle[2 * y + 1]);
         for (uint32_t x = 0; x < coarse->width; x++) {
             float sum[3] = {0}, weight = 0.0f, all = 0.0f;
             for (uint32_t k = 0; k < 4; k++) {
                 uint32_t row = 2 * y + k / 2;
                 const float *v = fine->value[(size_t)row * fine->width + 2 * x + k % 2];
-                float angle = sine_of_row(row, fine->height);
+                float angle = fine->angle[row];
                 for (int c = 0; c < 3; c++)
                     sum[c] += angle * v[3] * v[c];
                 weight += angle * v[3];
@@ -143,11 +151,11 @@ static void push(const struct level *coarse, struct level *fine) {
 /* One Gauss-Seidel sweep of the Laplace equation over the inner rows; known cells hold still. */
 static void diffuse(struct level *l) {
     uint32_t w = l->width;
-    double step_x = 2.0 * PI / w, step_y = PI / (l->height - 1);
+    double step_x = 2.0 * PI / w, step_y = latlong_polar(l->height, 1.0);
     for (uint32_t y = 1; y + 1 < l->height; y++) {
-        double sine = sin(step_y * y);
-        float up = (float)(sin(step_y * (y - 0.5)) * sine / (step_y * step_y));
-        float down = (float)(sin(step_y * (y + 0.5)) * sine / (step_y * step_y));
+        double sine = sin(latlong_polar(l->height, y));
+        float up = (float)(sin(latlong_polar(l->height, y - 0.5)) * sine / (step_y * step_y));
+        float down = (float)(sin(latlong_polar(l->height, y + 0.5)) * sine / (step_y * step_y));
         float side = (float)(1.0 / (step_x * step_x)), over = 1.0f / (up + down + 2.0f * side);
         float(*row)[4] = l->value + (size_t)y * w;
         for (uint32_t x = 0; x < w; x++) {
@@ -203,8 +211,10 @@ void fill_sphere(struct image *map, const struct image *known) {
     for (size_t i = 0; i < (size_t)map->width * map->height; i++)
         for (size_t c = 0; c < 3 && level[0].value[i][3] < 1.0f; c++)
             map->pixel[3 * i + c] = fmaxf(level[0].value[i][c] + (&row_color[i / map->width].r)[c], 0.0f);
-    for (int i = 0; i < count; i++)
+    for (int i = 0; i < count; i++) {
         mem_free(level[i].value);
+        mem_free(level[i].angle);
+    }
     mem_free(row_color);
 }
 
@@ -260,11 +270,11 @@ static void nearest_init(struct nearest *n, const struct image *known) {
     *n = (struct nearest){known->width, known->height, mem_array(pixels, sizeof *n->of),
                           mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
     for (uint32_t y = 0; y < n->height; y++) {
-        double theta = PI * y / (n->height - 1);
+        double theta = latlong_polar(n->height, y);
         n->row[y] = (vec2){(float)sin(theta), (float)cos(theta)};
     }
     for (uint32_t x = 0; x < n->width; x++) {
-        double phi = 2.0 * PI * x / n->width;
+        double phi = latlong_azimuth(n->width, x);
         n->column[x] = (vec2){(float)sin(phi), (float)cos(phi)};
     }
     for (size_t i = 0; i < pixels; i++)

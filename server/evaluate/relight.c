@@ -12,6 +12,7 @@
 #include "server/ingest/ply.h"
 #include "server/ingest/transforms.h"
 #include "server/render/film.h"
+#include "server/scene/latlong.h"
 
 #define ROULETTE_DEPTH 5
 
@@ -85,9 +86,7 @@ void relight_orient(const struct image *picture, char up, float turn_deg, float 
     image_init_rgb(out, picture->width, picture->height);
     for (uint32_t y = 0; y < out->height; y++) {
         for (uint32_t x = 0; x < out->width; x++) {
-            double phi = 2.0 * PI * ((double)x + 0.5) / out->width;
-            double theta = PI * (double)y / (double)(out->height - 1), sine = sin(theta);
-            vec3 d = {(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
+            vec3 d = latlong_pixel(out->width, out->height, x, y);
             rgb value = rgb_scale(lights_environment(lights, to_picture(d, up, turn)), scale);
             memcpy(out->pixel + 3 * ((size_t)y * out->width + x), &value, sizeof value);
         }

@@ -257,8 +257,8 @@ static void add_room(struct glb *g) {
         cJSON *extras = add_object(room, "extras");
         json_add_string(extras, "environment", "environment.exr");
         json_add_string(extras, "environment_layout",
-                        "column over width = atan2(x, -z) / 2 pi modulo 1, row over height = acos(y) / pi, "
-                        "in this node's axes");
+                        "(column + 1/2) over width = atan2(x, -z) / 2 pi modulo 1, row over (height - 1) = acos(y) / pi: "
+                        "the first and the last row are the poles; in this node's axes");
     }
     g->children = cJSON_AddArrayToObject(room, "children");
 }

@@ -9,8 +9,8 @@
  *                    values continue EXPORT_MARGIN texels beyond the charts, so that other
  *                    renderers may filter and make mipmaps
  *   confidence.exr   float: `count` observations and `spread` of their radiance, by texel
- *   environment.exr  float: distant light, R G B by latitude and longitude (the column over the width is
- *                    atan2(x, -z) / 2 pi modulo 1, the row over the height acos(y) / pi), where
+ *   environment.exr  float: distant light, R G B by latitude and longitude in the layout of latlong.h (column x is
+ *                    at atan2(x, -z) = 2 pi (x + 1/2) / width, row y at acos(y) = pi y / (height - 1)), where
  *                    some was seen
  *   environment_confidence.exr   float: by direction the `count` of photographs that show it, 0 where it
  *                    was filled in, and the `spread` of what they show

@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "common/vec.h"
+#include "server/scene/latlong.h"
 
 #define COMPARISON_GAP 4 /* pixels between the pictures */
 
@@ -190,8 +191,9 @@ void picture_environment(const struct export_input *input, struct image *image) 
     for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
         const float *p = map->pixel + i * map->channel_count;
         if (known->pixel[i * known->channel_count] > 0.0f) {
-            roots += sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
-            seen += 1.0;
+            double angle = latlong_pixel_angle(map->width, map->height, (uint32_t)(i / map->width));
+            roots += angle * sqrt((double)rgb_luminance(rgb_make(p[0], p[1], p[2])));
+            seen += angle;
         }
     }
     float scale = roots > 0.0 ? ENVIRONMENT_GRAY * (float)(seen * seen / (roots * roots)) : 1.0f;

@@ -2,10 +2,10 @@
 #include "server/gather/sun.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "common/mem.h"
 #include "server/render/bsdf.h"
+#include "server/scene/latlong.h"
 
 /* Where the first rays agree no more are asked. */
 #define FIRST_RAYS 5
@@ -62,16 +62,28 @@ void sun_add_light(const struct sun *sun, const struct accel *accel, const struc
 
 /* --- the map -------------------------------------------------------------------------------------- */
 
-/* Twice as many pixels along each side: each becomes four alike. */
-static void refine_image(struct image *image) {
+/* Twice as many pixels along each side, read where the coarse ones have the same direction: between four of them, or as
+ * the nearest one has it. */
+static void refine_image(struct image *image, bool nearest) {
     struct image fine = {.width = 2 * image->width, .height = 2 * image->height,
                          .channel_count = image->channel_count, .channel = image->channel};
-    size_t channels = image->channel_count;
+    size_t channels = image->channel_count, stride = image->width * channels;
     image_allocate(&fine);
-    for (size_t y = 0; y < fine.height; y++) {
-        for (size_t x = 0; x < fine.width; x++)
-            memcpy(&fine.pixel[(y * fine.width + x) * channels],
-                   &image->pixel[(y / 2 * image->width + x / 2) * channels], channels * sizeof *fine.pixel);
+    for (uint32_t row = 0; row < fine.height; row++) {
+        for (uint32_t column = 0; column < fine.width; column++) {
+            float x, y;
+            latlong_place(image->width, image->height, latlong_pixel(fine.width, fine.height, column, row), &x, &y);
+            float fx = x - floorf(x), fy = y - floorf(y);
+            if (nearest)
+                fx = roundf(fx), fy = roundf(fy);
+            size_t left = (size_t)x, right = (left + 1) % image->width;
+            const float *top = image->pixel + (size_t)y * stride, *low = top + stride;
+            for (size_t c = 0; c < channels; c++) {
+                float above = (1.0f - fx) * top[left * channels + c] + fx * top[right * channels + c];
+                float below = (1.0f - fx) * low[left * channels + c] + fx * low[right * channels + c];
+                fine.pixel[((size_t)row * fine.width + column) * channels + c] = (1.0f - fy) * above + fy * below;
+            }
+        }
     }
     image->channel = NULL; /* moved */
     image_release(image);
@@ -79,36 +91,45 @@ static void refine_image(struct image *image) {
 }
 
 /* The share of a pixel of the map that is within an angle of the sun's middle. */
-static float covered(const struct image *map, size_t column, size_t row, vec3 middle, float cosine) {
+static float covered(const struct image *map, uint32_t column, uint32_t row, vec3 middle, float cosine) {
     int inside = 0;
     for (int i = 0; i < GRID * GRID; i++) {
-        float x = ((float)column + ((float)(i % GRID) + 0.5f) / GRID) / (float)map->width;
-        float y = ((float)row + ((float)(i / GRID) + 0.5f) / GRID) / (float)map->height;
-        float phi = 2.0f * BSDF_PI * x, theta = BSDF_PI * y;
-        vec3 d = {sinf(theta) * sinf(phi), cosf(theta), -sinf(theta) * cosf(phi)};
-        inside += vec3_dot(d, middle) > cosine;
+        double x = column + (i % GRID + 0.5) / GRID - 0.5, y = row + (i / GRID + 0.5) / GRID - 0.5;
+        inside += vec3_dot(latlong_pixel(map->width, map->height, x, y), middle) > cosine;
     }
     return (float)inside / (GRID * GRID);
+}
+
+/* Of each pixel of a row, the share that the disc covers; those of a pole, which are one direction, have it alike. */
+static void cover_row(const struct image *map, uint32_t row, vec3 middle, float radius_rad, float *share) {
+    uint32_t width = map->width, height = map->height;
+    float cosine = cosf(radius_rad), reach = cosf(fminf(radius_rad + 3.0f * BSDF_PI / (float)height, BSDF_PI));
+    double sum = 0.0;
+    for (uint32_t x = 0; x < width; x++) {
+        bool near = vec3_dot(latlong_pixel(width, height, x, row), middle) > reach;
+        share[x] = near ? covered(map, x, row, middle, cosine) : 0.0f;
+        sum += (double)share[x];
+    }
+    for (uint32_t x = 0; x < width && (row == 0 || row + 1 == height); x++)
+        share[x] = (float)(sum / width);
 }
 
 /* The sum over the map of what each pixel has of the disc, by solid angle; or, with `each`, that much of it is
  * added to every pixel. */
 static double cover(struct image *map, vec3 middle, float radius_rad, const rgb *each) {
     double sum = 0.0;
-    float cosine = cosf(radius_rad), reach = cosf(fminf(radius_rad + 3.0f * BSDF_PI / (float)map->height, BSDF_PI));
-    for (size_t row = 0; row < map->height; row++) {
-        double theta = (double)BSDF_PI * ((double)row + 0.5) / (double)map->height;
-        double angle = sin(theta) * 2.0 * (double)(BSDF_PI * BSDF_PI) / (double)(map->width * map->height);
-        for (size_t column = 0; column < map->width; column++) {
-            float phi = 2.0f * BSDF_PI * ((float)column + 0.5f) / (float)map->width;
-            vec3 d = {(float)sin(theta) * sinf(phi), (float)cos(theta), -(float)sin(theta) * cosf(phi)};
-            float share = vec3_dot(d, middle) > reach ? covered(map, column, row, middle, cosine) : 0.0f;
-            float *pixel = &map->pixel[(row * map->width + column) * map->channel_count];
-            sum += angle * (double)share;
+    float *share = mem_array(map->width, sizeof *share);
+    for (uint32_t row = 0; row < map->height; row++) {
+        double angle = latlong_pixel_angle(map->width, map->height, row);
+        cover_row(map, row, middle, radius_rad, share);
+        for (uint32_t column = 0; column < map->width; column++) {
+            float *pixel = &map->pixel[((size_t)row * map->width + column) * map->channel_count];
+            sum += angle * (double)share[column];
             for (size_t c = 0; each && c < 3; c++)
-                pixel[c] += share * (&each->r)[c];
+                pixel[c] += share[column] * (&each->r)[c];
         }
     }
+    mem_free(share);
     return sum;
 }
 
@@ -116,8 +137,8 @@ void sun_draw(const struct sun *sun, struct environment *e) {
     if (!sun->is_there)
         return;
     while (e->map.width < ENVIRONMENT_MAX_WIDTH && BSDF_PI / (float)e->map.height > sun->radius_rad) {
-        refine_image(&e->map);
-        refine_image(&e->confidence);
+        refine_image(&e->map, false);
+        refine_image(&e->confidence, true);
         mem_free(e->is_bound);
         e->is_bound = NULL;
     }

@@ -30,7 +30,8 @@ float sun_visible(const struct sun *sun, const struct accel *accel, const struct
 void sun_add_light(const struct sun *sun, const struct accel *accel, const struct surface_point *at,
                    struct irradiance *irradiance);
 
-/* Adds it to the map, which is made finer first if its pixels are larger than the disc. */
+/* Adds it to the map (latlong.h), which is made finer first if its pixels are larger than the disc: what the map sends
+ * more comes to sun->irradiance, from around sun->direction. */
 void sun_draw(const struct sun *sun, struct environment *environment);
 
 #endif

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "server/light/missing_light.h"
 #include "server/render/bsdf.h"
+#include "server/scene/latlong.h"
 
 /* So many bright points must be there, and be lit. */
 #define LEAST_BRIGHT 12
@@ -97,11 +98,10 @@ static size_t ask_directions(const struct search *s, struct candidate candidate[
     a.weight = mem_array(2 * ASKED_POINTS, sizeof *a.weight);
     a.candidate = mem_array(2 * rows * rows, sizeof *a.candidate);
     for (size_t row = 0; row < rows; row++) {
-        double theta = PI * ((double)row + 0.5) / (double)rows;
-        size_t columns = (size_t)ceil(2.0 * (double)rows * sin(theta));
+        double down = ((double)row + 0.5) / (double)rows;
+        size_t columns = (size_t)ceil(2.0 * (double)rows * sin(PI * down));
         for (size_t column = 0; column < columns; column++) {
-            double phi = 2.0 * PI * ((double)column + 0.5) / (double)columns;
-            vec3 d = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+            vec3 d = latlong_direction(((double)column + 0.5) / (double)columns, down);
             if (!s->r->environment.map.pixel || !environment_is_seen(&s->r->environment, d))
                 a.candidate[count++].direction = d;
         }

@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 #include "server/capture/conjugate.h"
+#include "server/scene/latlong.h"
 
 #define COLUMNS UNSEEN_COLUMNS
 #define ROWS UNSEEN_ROWS
@@ -38,8 +39,8 @@ struct fit {
 };
 
 struct unseen_corners unseen_corners(vec3 d) {
-    double x = atan2((double)d.x, (double)-d.z) / (2.0 * PI) * COLUMNS - 0.5;
-    double y = acos(fmin(fmax((double)d.y, -1.0), 1.0)) / PI * ROWS - 0.5;
+    struct latlong at = latlong_of(d); /* the centres of cells are half a cell in, both ways: this is no map */
+    double x = at.around * COLUMNS - 0.5, y = at.down * ROWS - 0.5;
     double column = floor(x), row = floor(y);
     float fx = (float)(x - column), fy = (float)(y - row);
     struct unseen_corners c;

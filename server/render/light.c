@@ -50,10 +50,6 @@ static void table_release(struct light_table *t) {
     memset(t, 0, sizeof *t);
 }
 
-static float row_sine(const struct lights *l, size_t row) {
-    return (float)sin(PI * ((double)row + 0.5) / (double)(l->height - 1));
-}
-
 /* Copies the pixels; the first column comes again behind the last. */
 static void take_pixels(struct lights *l, const struct image *environment) {
     size_t stride = (size_t)l->width + 1;
@@ -69,21 +65,21 @@ static void take_pixels(struct lights *l, const struct image *environment) {
     }
 }
 
-/* Luminance of a cell times the sine of its polar angle. */
-static float cell_light(const struct lights *l, size_t x, size_t y) {
+/* Mean luminance of a cell. */
+static float cell_luminance(const struct lights *l, size_t x, size_t y) {
     size_t stride = (size_t)l->width + 1;
     float sum = 0.0f;
     for (size_t k = 0; k < 4; k++) {
         const float *p = l->environment[(y + k / 2) * stride + x + k % 2];
         sum += rgb_luminance((rgb){p[0], p[1], p[2]});
     }
-    return 0.25f * sum * row_sine(l, y);
+    return 0.25f * sum;
 }
 
 /* The reach of a cell of the map. */
 static float cell_share(const struct lights *l, const struct reach *reach, size_t x, size_t y) {
-    double column = ((double)x + 1.0) / l->width, row = ((double)y + 0.5) / (l->height - 1);
-    return reach ? reach_share(reach, column, row) : 1.0f;
+    struct latlong middle = {((double)x + 1.0) / l->width, ((double)y + 0.5) / (l->height - 1)};
+    return reach ? reach_share(reach, middle) : 1.0f;
 }
 
 /* Cells of a block. */
@@ -101,25 +97,23 @@ static void make_blocks(struct lights *l, const struct reach *reach) {
     l->grain = (l->width + MAX_BLOCK_COLUMNS - 1) / MAX_BLOCK_COLUMNS;
     l->block_columns = (l->width + l->grain - 1) / l->grain;
     size_t block_count = (size_t)l->block_columns * ((l->height - 2) / l->grain + 1);
-    size_t cell_count = (size_t)l->width * (l->height - 1);
     float *weight = mem_calloc(block_count, sizeof *weight);
     double shines = 0.0, arrives = 0.0;
     /* What no ray of the reach has found may yet be there: the second time round. */
     for (int pass = 0; pass < 2; pass++) {
         float least = arrives > 0.0 ? (float)(LEAST_REACH * arrives / shines) : 1.0f;
-        for (size_t i = 0; i < cell_count; i++) {
-            size_t x = i % l->width, y = i / l->width;
-            float light = cell_light(l, x, y), share = cell_share(l, reach, x, y);
-            if (pass == 1) {
-                weight[y / l->grain * l->block_columns + x / l->grain] += light * fmaxf(least, share);
-                continue;
+        for (uint32_t y = 0; y + 1 < l->height; y++) {
+            float angle = (float)latlong_cell_angle(l->width, l->height, y);
+            for (uint32_t x = 0; x < l->width; x++) {
+                float light = angle * cell_luminance(l, x, y), share = cell_share(l, reach, x, y);
+                if (pass == 1)
+                    weight[y / l->grain * l->block_columns + x / l->grain] += light * fmaxf(least, share);
+                shines += pass == 0 ? (double)light : 0.0;
+                arrives += pass == 0 ? (double)(light * share) : 0.0;
             }
-            shines += (double)light;
-            arrives += (double)(light * share);
         }
     }
-    double cell_angle = 2.0 * PI * PI / ((double)l->width * (double)(l->height - 1));
-    l->environment_power = reach ? arrives * cell_angle * reach->area : -1.0;
+    l->environment_power = reach ? arrives * reach->area : -1.0;
     table_make(&l->blocks, block_count, weight);
     mem_free(weight);
 }
@@ -284,18 +278,7 @@ bool lights_update(struct lights *l, const struct mesh *mesh, const struct segme
     return !same;
 }
 
-/* Column and row of a direction in the map, in units of cells, which lie between pixel centres. As
- * in Mitsuba 3, a column's centre is half a pixel in, and the first and last row are the poles. */
-static void environment_place(const struct lights *l, vec3 d, float *x, float *y) {
-    float turn = atan2f(d.x, -d.z) * (float)(0.5 / PI) - 0.5f / (float)l->width;
-    turn -= floorf(turn);
-    *x = fminf(turn * (float)l->width, (float)l->width * 0x1.fffffep-1f);
-    float bottom = (float)(l->height - 1);
-    *y = clampf(acosf(clampf(d.y, -1.0f, 1.0f)) * (float)(1.0 / PI) * bottom, 0.0f,
-                bottom * 0x1.fffffep-1f);
-}
-
-/* The map at a place as environment_place gives it. */
+/* The map at a place as latlong_place gives it. */
 static rgb radiance_at(const struct lights *l, float x, float y) {
     size_t i = (size_t)x, j = (size_t)y, stride = (size_t)l->width + 1;
     float fx = x - (float)i, fy = y - (float)j;
@@ -323,15 +306,12 @@ static void sample_environment(const struct lights *l, float pick, float u, floa
     uint32_t left = block % l->block_columns * l->grain, top = block / l->block_columns * l->grain;
     float x = fminf((float)left + u * (float)block_width(l, block), (float)l->width * 0x1.fffffep-1f);
     float y = fminf((float)top + v * (float)block_height(l, block), (float)(l->height - 1) * 0x1.fffffep-1f);
-    double phi = 2.0 * PI * ((double)x + 0.5) / (double)l->width;
-    double theta = PI * (double)y / (double)(l->height - 1);
-    double sine = sin(theta);
-    s->direction = (vec3){(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
+    s->direction = latlong_pixel(l->width, l->height, (double)x, (double)y);
     s->point = s->normal = (vec3){0.0f, 0.0f, 0.0f};
     s->distance_m = INFINITY;
     s->segment = LIGHT_ENVIRONMENT;
     s->radiance = radiance_at(l, x, y);
-    s->pdf = density_of(l, block, fmaxf((float)sine, 1e-6f));
+    s->pdf = density_of(l, block, fmaxf((float)sin(latlong_polar(l->height, (double)y)), 1e-6f));
 }
 
 rgb lights_pattern(const struct lights *l, const struct light_triangle *t, float u, float v) {
@@ -378,7 +358,7 @@ rgb lights_environment(const struct lights *l, vec3 direction) {
     if (l->width == 0)
         return (rgb){0.0f, 0.0f, 0.0f};
     float x, y;
-    environment_place(l, direction, &x, &y);
+    latlong_place(l->width, l->height, direction, &x, &y);
     return radiance_at(l, x, y);
 }
 
@@ -386,7 +366,7 @@ float lights_pdf_environment(const struct lights *l, vec3 direction) {
     if (!(l->environment_chance > 0.0f))
         return 0.0f;
     float x, y;
-    environment_place(l, direction, &x, &y);
+    latlong_place(l->width, l->height, direction, &x, &y);
     uint32_t block = (uint32_t)y / l->grain * l->block_columns + (uint32_t)x / l->grain;
     return density_of(l, block, sqrtf(fmaxf(1.0f - direction.y * direction.y, 1e-12f)));
 }

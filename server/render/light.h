@@ -3,7 +3,7 @@
  * A triangle of an emitter segment is picked with probability proportional to its power, area
  * times luminance (that of the segment's mean, whatever pattern its emission has), and a point on it
  * uniformly; it emits from its front side only. The
- * environment is a latitude-longitude map, picked by luminance times solid angle and, where that
+ * environment is a latitude-longitude map (latlong.h), picked by luminance times solid angle and, where that
  * was measured, by how much of the direction's light finds a way in (reach.h), constant within a
  * cell of the map (of a large map: a block of cells, so that the table stays in the cache). With
  * both present samples are shared out by power: what emitters send out, and what of the environment
@@ -19,6 +19,7 @@
 #include "common/vec.h"
 #include "server/render/reach.h"
 #include "server/scene/atlas.h"
+#include "server/scene/latlong.h"
 #include "server/scene/materials.h"
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"

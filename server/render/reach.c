@@ -41,9 +41,8 @@ static void measure_bin(void *user, size_t bin, int thread) {
     double total = m->area_until[m->mesh->triangle_count - 1];
     float sum = 0.0f;
     for (size_t i = 0; i < POINTS; i++) {
-        double phi = 2.0 * PI * ((double)(bin % REACH_COLUMNS) + (double)number(bin, i, 0)) / REACH_COLUMNS;
-        double theta = PI * ((double)(bin / REACH_COLUMNS) + (double)number(bin, i, 1)) / REACH_ROWS;
-        vec3 direction = {(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+        vec3 direction = latlong_direction(((double)(bin % REACH_COLUMNS) + (double)number(bin, i, 0)) / REACH_COLUMNS,
+                                           ((double)(bin / REACH_COLUMNS) + (double)number(bin, i, 1)) / REACH_ROWS);
         size_t t = triangle_at(m, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
         vec3 normal = vec3_normalize(mesh_cross(m->mesh, t));
         float cosine = vec3_dot(normal, direction);

@@ -11,6 +11,7 @@
 #include "common/parallel.h"
 #include "common/vec.h"
 #include "server/render/accel.h"
+#include "server/scene/latlong.h"
 #include "server/scene/mesh.h"
 
 #define REACH_COLUMNS 64
@@ -21,13 +22,13 @@ struct reach {
     double area;                            /* of all surface, m^2 */
 };
 
-/* Bins are even in the angles of an environment map (world.h). The same for any number of threads. */
+/* Bins are even in azimuth and polar angle (struct latlong). The same for any number of threads. */
 void reach_measure(struct reach *reach, const struct mesh *mesh, const struct accel *accel,
                    struct parallel *pool);
 
-/* The share of the bin that holds (column, row) in [0, 1) of the map's width and height. */
-static inline float reach_share(const struct reach *reach, double column, double row) {
-    int x = (int)(column * REACH_COLUMNS) % REACH_COLUMNS, y = (int)(row * REACH_ROWS);
+/* The share of the bin that holds a direction; around = 1 is 0 again. */
+static inline float reach_share(const struct reach *reach, struct latlong at) {
+    int x = (int)(at.around * REACH_COLUMNS) % REACH_COLUMNS, y = (int)(at.down * REACH_ROWS);
     return reach->share[y < REACH_ROWS ? y : REACH_ROWS - 1][x];
 }
 

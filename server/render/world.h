@@ -38,9 +38,8 @@ struct world {
     struct guide *guide;              /* of the lights; NULL: picked by power; owned */
 };
 
-/* Builds the acceleration structure and the emitter tables. environment (latitude-longitude,
- * column over width = atan2(x, -z) / 2 pi modulo 1, row over height = acos(y) / pi) may be NULL:
- * black; it is copied. The rest must keep still and unchanged until world_release, the contents
+/* Builds the acceleration structure and the emitter tables. environment, a map in the layout of
+ * latlong.h, may be NULL: black; it is copied. The rest must keep still and unchanged until world_release, the contents
  * of materials excepted. */
 enum status world_init(struct world *world, const struct mesh *mesh, const struct segments *segments,
                        const struct atlas *atlas, const struct materials *materials,

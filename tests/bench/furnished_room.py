@@ -324,8 +324,9 @@ def cafe(rng):
 
 
 def directions(height=128, width=256):
-    """Of the pixels of a map of light: the sine of elevation [height][1][1], the azimuth [1][width][1]."""
-    up = np.cos(np.pi * (np.arange(height) + 0.5) / height)[:, None, None]
+    """Of the pixels of a map of light: the sine of elevation [height][1][1], the azimuth [1][width][1]. The first and the
+    last row are the poles, as Mitsuba 3 reads it."""
+    up = np.cos(np.pi * np.arange(height) / (height - 1))[:, None, None]
     return up, (2 * np.pi * (np.arange(width) + 0.5) / width)[None, :, None]
 
 

@@ -4,6 +4,7 @@
 #define UNBAKE_TESTS_RENDER_OPEN_ROOM_H
 
 #include "server/capture/views.h"
+#include "server/scene/latlong.h"
 #include "tests/render/small_room.h"
 
 #define SKY_WIDTH 256
@@ -19,9 +20,7 @@ static inline rgb sky_at(vec3 d) {
 }
 
 static inline vec3 direction_of(const struct image *map, uint32_t x, uint32_t y) {
-    double phi = 2.0 * PI * ((double)x + 0.5) / map->width;
-    double theta = PI * (double)y / (double)(map->height - 1);
-    return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+    return latlong_pixel(map->width, map->height, x, y);
 }
 
 static inline void make_sky(struct image *sky) {

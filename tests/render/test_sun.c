@@ -2,6 +2,7 @@
  * it is and as strong as it is, its patch is gone from the floor's base colour and it is in the environment's map;
  * a lamp, and a sky without a sun, are none. The same for any number of threads. */
 #include "server/reconstruct/reconstruct.h"
+#include "server/scene/latlong.h"
 #include "tests/check.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
@@ -20,12 +21,12 @@ static void make_sky(struct image *sky, float sun) {
 }
 
 static float sun_theta(void) {
-    return 3.14159265f * (SUN_ROW + 0.5f) / SKY_HEIGHT;
+    return (float)latlong_polar(SKY_HEIGHT, SUN_ROW);
 }
 
 /* Of a surface that faces it. */
 static float sun_irradiance(void) {
-    return SUN_RADIANCE * (2.0f * 3.14159265f / SKY_WIDTH) * (3.14159265f / SKY_HEIGHT) * sinf(sun_theta());
+    return SUN_RADIANCE * (float)latlong_pixel_angle(SKY_WIDTH, SKY_HEIGHT, SUN_ROW);
 }
 
 /* Mean base colour of the floor's texels that the sun lights. */
@@ -53,9 +54,9 @@ static float irradiance_in_map(const struct environment *e, vec3 direction) {
     for (size_t row = 0; row < e->map.height; row++) {
         for (size_t column = 0; column < e->map.width; column++) {
             vec3 d = environment_direction(e, column, row);
-            float angle = 2.0f * 3.14159265f * 3.14159265f / (float)(e->map.width * e->map.height);
+            float angle = (float)latlong_pixel_angle(e->map.width, e->map.height, (uint32_t)row);
             if (vec3_dot(d, direction) > 0.995f)
-                sum += angle * sqrtf(1.0f - d.y * d.y) * e->map.pixel[3 * (row * e->map.width + column)];
+                sum += angle * e->map.pixel[3 * (row * e->map.width + column)];
         }
     }
     return sum;

@@ -4,16 +4,15 @@
 #include "server/capture/fill.h"
 #include "common/mem.h"
 #include "common/vec.h"
+#include "server/scene/latlong.h"
 #include "tests/check.h"
 
 #define WIDTH 128
 #define HEIGHT 64
 #define KNOWN 4
 
-/* The direction of a pixel, the poles in the first and the last row. */
 static vec3 direction_of(size_t at) {
-    double phi = 2.0 * PI * ((double)(at % WIDTH) + 0.5) / WIDTH, theta = PI * (double)(at / WIDTH) / (HEIGHT - 1);
-    return (vec3){(float)(sin(theta) * sin(phi)), (float)cos(theta), (float)(-sin(theta) * cos(phi))};
+    return latlong_pixel(WIDTH, HEIGHT, (double)(at % WIDTH), (double)(at / WIDTH));
 }
 
 static double angle_between(size_t a, size_t b) {
