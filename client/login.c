@@ -56,8 +56,10 @@ int login_run(struct client *c, const struct options *o) {
     char token[TOKEN_MAX];
     const char *server = request_server(c->request);
     (void)o;
-    if (!read_token(c, token))
-        return CLIENT_INTERRUPTED;
+    if (!read_token(c, token)) {
+        error_set(&err, STATUS_CANCELLED, "interrupted: no token is kept");
+        return client_fail(c, NULL, &err);
+    }
     if (!*token) {
         error_set(&err, STATUS_INPUT, "no token was given");
         error_hint(&err, "`unbaked token add NAME`, on the server, makes one: type or pipe it in");

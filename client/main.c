@@ -44,6 +44,14 @@ static int unknown_command(struct client *c, const char *name) {
     return client_fail(c, NULL, &err);
 }
 
+/* Whether --json stands among the words, also where they are at fault and were not all read. */
+static bool asks_for_json(int argc, char *const *argv) {
+    for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++)
+        if (strcmp(argv[i], "--json") == 0)
+            return true;
+    return false;
+}
+
 /* Options that all commands share may come first, too (`unbake --json list`): they are put behind the
  * command's name. */
 static void put_command_first(int argc, char **argv) {
@@ -104,13 +112,12 @@ static int run(struct client *c, const struct command *command, const struct opt
     return code;
 }
 
-int main(int argc, char **argv) {
-    struct client c = {0};
+/* Finds the command, checks its words and runs it; what main returns. */
+static int dispatch(struct client *c, int argc, char **argv) {
     struct options o;
     struct error err;
-    terminal_init(&c.out, stdout);
-    terminal_init(&c.err, stderr);
     put_command_first(argc, argv);
+    c->json = asks_for_json(argc, argv);
     const char *name = argc > 1 ? argv[1] : "";
     bool help = strcmp(name, "help") == 0;
     if (help && argc > 2) {
@@ -127,7 +134,7 @@ int main(int argc, char **argv) {
         name = "version";
     const struct command *command = command_find(name);
     if (!command)
-        return unknown_command(&c, name);
+        return unknown_command(c, name);
     if (help) {
         command_help(command, stdout);
         return CLIENT_OK;
@@ -135,17 +142,29 @@ int main(int argc, char **argv) {
     int code = CLIENT_OK;
     enum status status = options_parse(&o, argc - 2, argv + 2, command->options,
                                        command_shared_options, &err);
-    c.json = options_flag(&o, "json");
-    c.quiet = options_flag(&o, "quiet");
+    if (status == STATUS_OK)
+        c->json = options_flag(&o, "json");
+    c->quiet = options_flag(&o, "quiet");
     if (options_flag(&o, "help"))
         command_help(command, stdout);
     else if (status != STATUS_OK)
-        code = client_fail(&c, NULL, &err);
-    else if ((code = check_words(&c, command, o.word_count)) == CLIENT_OK)
-        code = run(&c, command, &o);
+        code = client_fail(c, NULL, &err);
+    else if ((code = check_words(c, command, o.word_count)) == CLIENT_OK)
+        code = run(c, command, &o);
     options_release(&o);
-    /* A full disk or a closed pipe must not look like success. */
-    if (fflush(stdout) != 0 && code == CLIENT_OK)
-        code = CLIENT_LOCAL;
+    return code;
+}
+
+int main(int argc, char **argv) {
+    struct client c = {0};
+    struct error err;
+    terminal_init(&c.out, stdout);
+    terminal_init(&c.err, stderr);
+    int code = dispatch(&c, argc, argv);
+    /* A full disk or a closed pipe must not look like success; an earlier flush may have met it. */
+    if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLIENT_OK) {
+        error_set(&err, STATUS_IO, "cannot write all to standard output");
+        code = client_fail(&c, NULL, &err);
+    }
     return code;
 }

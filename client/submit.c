@@ -222,8 +222,7 @@ static void print_dry_run(struct submission *s, const struct reply *reply) {
     if (s->pack && !s->present)
         printf("scene %.12s is not on the server: %s would be sent\n", s->scene, size);
     else
-        printf("scene %.12s is on the server (%s)\n", s->scene,
-               member_text(reply->json, "scene_state"));
+        client_say(c, "scene %.12s is on the server (%s)", s->scene, member_text(reply->json, "scene_state"));
 }
 
 static void print_job(struct submission *s, const cJSON *job) {
