@@ -27,7 +27,7 @@ EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/em
 
 COMMON_SRC = $(wildcard common/*.c)
 # The engine's libraries stay out of the client: it links only these.
-CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_codec.c common/image_read.c common/exr_%.c common/png.c common/jpeg.c common/hdr.c common/exif.c,$(COMMON_SRC))
+CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_codec.c common/image_read.c common/exr_%.c common/png_%.c common/jpeg.c common/hdr.c common/exif.c,$(COMMON_SRC))
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))

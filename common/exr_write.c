@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/exr_stream.h"
@@ -117,7 +118,9 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
     else if (code != EXR_ERR_SUCCESS)
         status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path,
                            exr_get_default_error_message(code));
+    struct stat facts;
+    bool is_file = fstat(stream.fd, &facts) == 0 && S_ISREG(facts.st_mode);
     if (close(stream.fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot close %s", path);
-    return status;
+    return status == STATUS_OK && is_file ? image_check_exr(path, image, err) : status;
 }

@@ -3,7 +3,7 @@
  * Pixels are float, interleaved, top row first. Readers accept what an uploaded bundle may
  * hold, so every size is capped (IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS) before memory is asked
  * for, and damage is STATUS_INPUT with a sentence, never a crash. Thread-safe: no shared
- * state. exr_*.c are the only include of OpenEXRCore, png.c of libpng, jpeg.c of libjpeg. */
+ * state. exr_*.c are the only include of OpenEXRCore, png_*.c of libpng, jpeg.c of libjpeg. */
 #ifndef UNBAKE_COMMON_IMAGE_H
 #define UNBAKE_COMMON_IMAGE_H
 
@@ -76,7 +76,10 @@ enum status image_probe(const char *path, struct image *image, struct image_info
 
 enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
 
-/* Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these
+/* Both writers read back what they have written, where it is a file, and compare it with the picture: STATUS_CORRUPT says
+ * what a reader would find in its place.
+ *
+ * Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these
  * channels; the same pixels give the same bytes. Overwrites `path` in place: callers that
  * need atomicity write a temporary name. */
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,

@@ -1,4 +1,4 @@
-/* image_codec.h -- what the codecs (exr_*.c, hdr.c, jpeg.c, png.c) share with image_read.c, which
+/* image_codec.h -- what the codecs (exr_*.c, hdr.c, jpeg.c, png_*.c) share with image_read.c, which
  * chooses among them; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
@@ -17,6 +17,10 @@ struct image_source {
     int io_error;          /* errno of the first read that the system refused, else 0 */
 };
 
+/* Opens a file (a FIFO under a picture's name does not block) that must be a regular one; `path` is borrowed. */
+enum status image_source_open(struct image_source *source, const char *path, struct error *err);
+void image_source_close(struct image_source *source);
+
 /* Reads up to `length` bytes at `offset`; fewer only at the end or after an I/O error. */
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
                          size_t length);
@@ -34,6 +38,11 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
                            struct image_info *info, struct error *err);
 enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
                             struct image_info *info, struct error *err);
+
+/* Whether the files that were written hold these pictures, as image_write_exr and image_write_png ask of themselves:
+ * STATUS_CORRUPT says what a reader finds in their place. */
+enum status image_check_exr(const char *path, const struct image *image, struct error *err);
+enum status image_check_png(const char *path, const struct image *image, float scale, struct error *err);
 
 /* exif.c: reads what image_info holds out of a TIFF-structured EXIF block ("II*\0..." or
  * "MM\0*..."). Best effort: what is absent, damaged or out of range keeps its value. */

@@ -1,9 +1,5 @@
 /* image_read.c -- the readers of image.h: where a picture's bytes come from, and which codec takes them. */
-#include <errno.h>
-#include <fcntl.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "common/image_codec.h"
 
@@ -50,21 +46,12 @@ static enum status read_source(struct image_source *source, bool probe, struct i
 static enum status read_path(const char *path, bool probe, struct image *image,
                              struct image_info *info, struct error *err) {
     *image = (struct image){0};
-    /* Without O_NONBLOCK a FIFO under a picture's name would block for ever. */
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd < 0)
-        return error_set_errno(err, errno, "cannot open %s", path);
-    struct stat facts;
-    enum status status;
-    if (fstat(fd, &facts) != 0)
-        status = error_set_errno(err, errno, "cannot read %s", path);
-    else if (!S_ISREG(facts.st_mode))
-        status = error_set(err, STATUS_INPUT, "%s: not a regular file", path);
-    else {
-        struct image_source source = {.name = path, .fd = fd, .size = (uint64_t)facts.st_size};
-        status = read_source(&source, probe, image, info, err);
-    }
-    close(fd);
+    struct image_source source;
+    enum status status = image_source_open(&source, path, err);
+    if (status != STATUS_OK)
+        return status;
+    status = read_source(&source, probe, image, info, err);
+    image_source_close(&source);
     return status;
 }
 

@@ -61,8 +61,8 @@ own 'microhttpd\.h' server/http/listener.c
 own 'gnutls/' server/http/tls.c server/worker/deliver.c
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
 own 'curl/' client/request.c
-own 'openexr' common/exr_read.c common/exr_stream.c common/exr_stream.h common/exr_write.c
-own 'png\.h' common/png.c
+own 'openexr' common/exr_stream.h
+own 'png\.h' common/png_memory.h
 own 'jpeglib\.h' common/jpeg.c
 own 'seccomp\.h' server/worker/sandbox.c
 

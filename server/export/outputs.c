@@ -102,10 +102,36 @@ static enum status put_image(struct export *e, const char *type, const char *nam
     return status;
 }
 
+static bool holds(FILE *file, const char *data, size_t length) {
+    char block[1 << 16];
+    size_t done = 0, got;
+    while ((got = fread(block, 1, sizeof block, file)) > 0) {
+        if (got > length - done || memcmp(block, data + done, got) != 0)
+            return false;
+        done += got;
+    }
+    return done == length;
+}
+
+/* As file_replace, and reads it back. */
+static enum status replace(const char *path, const void *data, size_t length, struct error *err) {
+    enum status status = file_replace(path, data, length, err);
+    if (status != STATUS_OK)
+        return status;
+    FILE *file = fopen(path, "rbe");
+    if (!file)
+        return error_set_errno(err, errno, "cannot read back %s", path);
+    if (!holds(file, data, length))
+        status = ferror(file) ? error_set_errno(err, errno, "cannot read back %s", path)
+                              : error_set(err, STATUS_CORRUPT, "%s: read back, it is not what was written", path);
+    fclose(file);
+    return status;
+}
+
 static enum status put_bytes(struct export *e, const char *name, const char *content_type,
                              const void *data, size_t length, struct error *err) {
     char *path = file_join(e->dir, name);
-    enum status status = file_replace(path, data, length, err);
+    enum status status = replace(path, data, length, err);
     if (status == STATUS_OK)
         status = pass_on(e, EVENT_OUTPUT, name, content_type, err);
     mem_free(path);
@@ -265,7 +291,7 @@ static enum status put_formats(struct export *e, struct error *err) {
 static enum status put_views(struct export *e, struct error *err) {
     cJSON *views = views_json(e->input->comparison, e->input->comparison_count);
     char *text = json_page(views), *path = file_join(e->dir, "views.json");
-    enum status status = file_replace(path, text, strlen(text), err);
+    enum status status = replace(path, text, strlen(text), err);
     if (status == STATUS_OK)
         status = tell(e, EVENT_OUTPUT, "views.json", MIME_JSON,
                       "the cameras of the held-out views, as transforms.json has them", err);

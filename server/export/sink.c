@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <string.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include "common/file.h"
 #include "common/mem.h"
@@ -39,7 +40,10 @@ static bool admit(struct sink *s, uint64_t length) {
 }
 
 void sink_bytes(struct sink *s, const void *data, size_t length) {
-    if (admit(s, length) && fwrite_unlocked(data, 1, length, s->file) != length)
+    if (!admit(s, length))
+        return;
+    s->checksum = (uint32_t)crc32_z(s->checksum, data, length);
+    if (fwrite_unlocked(data, 1, length, s->file) != length)
         fail(s, errno);
 }
 
@@ -66,16 +70,23 @@ void sink_vec3(struct sink *s, vec3 v) {
 }
 
 void sink_printf(struct sink *s, const char *format, ...) {
-    if (s->status != STATUS_OK)
-        return;
-    va_list arguments;
+    char line[512], *text = line;
+    va_list arguments, again;
     va_start(arguments, format);
-    int length = vfprintf(s->file, format, arguments);
+    va_copy(again, arguments);
+    int length = vsnprintf(line, sizeof line, format, arguments);
+    if (length >= (int)sizeof line) {
+        text = mem_alloc((size_t)length + 1);
+        vsnprintf(text, (size_t)length + 1, format, again);
+    }
+    va_end(again);
     va_end(arguments);
-    if (length < 0)
+    if (length < 0 && s->status == STATUS_OK)
         fail(s, errno);
-    else
-        admit(s, (uint64_t)length);
+    else if (length > 0)
+        sink_bytes(s, text, (size_t)length);
+    if (text != line)
+        mem_free(text);
 }
 
 void sink_copy(struct sink *s, const char *path, uint64_t length) {
@@ -95,6 +106,27 @@ void sink_copy(struct sink *s, const char *path, uint64_t length) {
         fclose(from);
 }
 
+/* What the page cache has is what is read: that the disk keeps it is not known. */
+static enum status read_back(const struct sink *s, struct error *err) {
+    char block[1 << 16];
+    uint64_t length = 0;
+    size_t got;
+    uLong checksum = 0;
+    FILE *file = fopen(s->temporary, "rbe");
+    if (!file)
+        return error_set_errno(err, errno, "cannot read back %s", s->temporary);
+    while ((got = fread_unlocked(block, 1, sizeof block, file)) > 0) {
+        checksum = crc32_z(checksum, (const Bytef *)block, got);
+        length += got;
+    }
+    enum status status = ferror(file) ? error_set_errno(err, errno, "cannot read back %s", s->temporary) : STATUS_OK;
+    fclose(file);
+    if (status == STATUS_OK && (length != s->written || checksum != s->checksum))
+        status = error_set(err, STATUS_CORRUPT, "%s: read back, its %llu bytes are not the %llu that were written",
+                           s->path, (unsigned long long)length, (unsigned long long)s->written);
+    return status;
+}
+
 enum status sink_close(struct sink *s, enum status status, struct error *err) {
     bool had_failed = ferror(s->file) != 0;
     if ((fclose(s->file) != 0 || had_failed) && s->status == STATUS_OK)
@@ -104,6 +136,8 @@ enum status sink_close(struct sink *s, enum status status, struct error *err) {
                            (unsigned long long)s->limit);
     else if (status == STATUS_OK && s->status != STATUS_OK)
         status = error_set_errno(err, s->number, "cannot write %s", s->path);
+    if (status == STATUS_OK)
+        status = read_back(s, err);
     if (status == STATUS_OK)
         status = file_put_in_place(s->temporary, s->path, err);
     else

@@ -1,7 +1,8 @@
 /* sink.h -- a file that is written from front to back: buffered, little-endian, put in place when
  * whole.
  *
- * A failure is kept, what follows it goes nowhere, and sink_close tells of it. */
+ * A failure is kept, what follows it goes nowhere, and sink_close tells of it. It reads the file back, too: what is put in
+ * place is what was given. */
 #ifndef UNBAKE_EXPORT_SINK_H
 #define UNBAKE_EXPORT_SINK_H
 
@@ -17,6 +18,7 @@ struct sink {
     char *path, *temporary; /* owned */
     FILE *file;
     uint64_t written, limit; /* bytes */
+    uint32_t checksum;       /* CRC-32 of the bytes so far */
     enum status status;     /* of what was written so far */
     int number;             /* errno of the failure; STATUS_LIMIT has none */
 };

@@ -1,7 +1,7 @@
 /* run.c -- a reconstruction inside a worker: the clocks, the checkpoint, the previews, the
  * outputs, and what is said of them.
  *
- * 1. A file is announced after it is whole under its final name, with the hash of what is there.
+ * 1. A file is announced after it is whole under its final name and was read back, with the hash of what is there.
  * 2. Checkpoints come every checkpoint_interval_sec. Where they would take more than
  *    CHECKPOINT_SHARE of the time (a slow disk) the interval grows, at most CHECKPOINT_STRETCH
  *    times: what a crash costs stays bounded. Previews likewise, without a bound.
@@ -28,6 +28,7 @@
 #include "server/ingest/bundle.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/worker/checkpoint.h"
+#include "server/worker/read_back.h"
 #include "server/worker/results.h"
 #include "server/worker/tasks.h"
 
@@ -46,6 +47,7 @@ struct run {
     char *out_dir;
     bool stop;
     bool preview_asked; /* by SIGUSR1 */
+    const struct mesh *mesh; /* that outputs are of */
     double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
     double preview_interval_sec;
     size_t series_count;
@@ -212,7 +214,9 @@ static enum status announce(void *user, const char *type, const char *name,
     char *path = file_join(run->out_dir, name);
     char hex[SHA256_HEX_SIZE];
     struct stat info;
-    enum status status = sha256_of_file(path, hex, err);
+    enum status status = read_back(path, name, run->mesh, err);
+    if (status == STATUS_OK)
+        status = sha256_of_file(path, hex, err);
     if (status == STATUS_OK && stat(path, &info) != 0)
         status = error_set_errno(err, errno, "cannot look at %s", path);
     if (status == STATUS_OK)
@@ -229,6 +233,7 @@ static enum status write_preview(void *user, const struct reconstruction *r, str
     struct run *run = user;
     double start = clock_sec();
     struct export_input input = results_so_far(r, title_of(run));
+    run->mesh = input.mesh;
     enum status status = export_preview(run->out_dir, &input, announce, run, err);
     double end = clock_sec(), wait = (end - start) / PREVIEW_SHARE;
     if (wait < run->preview_interval_sec)
@@ -242,6 +247,7 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
                                  struct error *err) {
     struct export_input input;
     results_make(&input, r, title_of(run));
+    run->mesh = input.mesh;
     tell_stage(run, "export");
     enum status status = export_outputs(run->out_dir, &input, announce, run, err);
     mem_free((void *)input.comparison);

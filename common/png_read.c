@@ -1,24 +1,20 @@
-/* png.c -- PNG pictures by libpng (libpng.org/pub/png/libpng-manual.txt).
+/* png_read.c -- PNG pictures by libpng (libpng.org/pub/png/libpng-manual.txt).
  *
  * libpng reports errors by longjmp, so each entry point keeps what must survive in one struct
  * that outlives the jump and does its cleaning after setjmp has returned. A damaged file is
  * refused as a whole, whatever part could be decoded: checksums are part of the check. */
-#include <errno.h>
-#include <math.h>
-#include <png.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "common/image_codec.h"
 #include "common/mem.h"
+#include "common/png_memory.h"
 
 /* Deflate's best ratio is 1032 : 1. */
 #define MAX_RATIO 1032
 /* What libpng may ask for at once, for text and profiles that we do not want. */
 #define MAX_CHUNK_BYTES ((png_alloc_size_t)8 << 20)
-
-/* ---------------------------------------------------------------------------- reading */
 
 struct reader {
     struct image_source *source;
@@ -33,17 +29,6 @@ struct reader {
     uint8_t *row;      /* [row_bytes] one row as stored */
     char warning[128]; /* the last one: it often says what the error that follows means */
 };
-
-/* Running out of memory is nobody's damaged picture. */
-static png_voidp allocate(png_structp png, png_alloc_size_t bytes) {
-    (void)png;
-    return mem_alloc(bytes);
-}
-
-static void release(png_structp png, png_voidp memory) {
-    (void)png;
-    mem_free(memory);
-}
 
 static void read_failed(png_structp png, png_const_charp message) {
     struct reader *r = png_get_error_ptr(png);
@@ -163,8 +148,8 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
                            struct image_info *info, struct error *err) {
     struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
     struct reader *volatile kept = &r;
-    r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL, allocate,
-                                     release);
+    r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL,
+                                     png_memory_new, png_memory_free);
     r.png_info = r.png ? png_create_info_struct(r.png) : NULL;
     if (!r.png_info) {
         png_destroy_read_struct(&r.png, NULL, NULL);
@@ -181,110 +166,5 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
     }
     png_destroy_read_struct(&kept->png, &kept->png_info, NULL);
     mem_free(kept->row);
-    return kept->status;
-}
-
-/* ---------------------------------------------------------------------------- writing */
-
-struct writer {
-    const char *path;
-    FILE *file;
-    struct error *err;
-    enum status status;
-    png_structp png;
-    png_infop png_info;
-    uint8_t *row;
-};
-
-static void write_failed(png_structp png, png_const_charp message) {
-    struct writer *w = png_get_error_ptr(png);
-    w->status = error_set(w->err, STATUS_INTERNAL, "cannot write %s: %s", w->path, message);
-    longjmp(png_jmpbuf(png), 1);
-}
-
-static void ignore_warning(png_structp png, png_const_charp message) {
-    (void)png;
-    (void)message;
-}
-
-static void write_bytes(png_structp png, png_bytep data, size_t length) {
-    struct writer *w = png_get_io_ptr(png);
-    if (fwrite(data, 1, length, w->file) == length)
-        return;
-    w->status = error_set_errno(w->err, errno, "cannot write %s", w->path);
-    longjmp(png_jmpbuf(png), 1);
-}
-
-static void flush_bytes(png_structp png) {
-    (void)png; /* fclose does */
-}
-
-static uint8_t to_byte(float linear) {
-    float value = linear > 0 ? fminf(linear, 1) : 0; /* not a number: 0 */
-    return (uint8_t)(image_linear_to_srgb(value) * 255.0f + 0.5f);
-}
-
-/* One row of `out_count` channels: 3, or 1 for a grey picture. */
-static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, float scale,
-                     uint8_t *row) {
-    const float *pixel = image->pixel + (size_t)y * image->width * image->channel_count;
-    uint32_t step = image->channel_count < 3 ? 0 : 1; /* grey: all from the first channel */
-    for (uint32_t x = 0; x < image->width; x++, pixel += image->channel_count, row += out_count) {
-        bool finite = true;
-        for (uint32_t c = 0; c < out_count; c++) {
-            float value = pixel[c * step] * scale;
-            finite = finite && isfinite(value);
-            row[c] = to_byte(value);
-        }
-        if (!finite)
-            memcpy(row, "\xff\x00\xff", out_count);
-    }
-}
-
-static bool has_non_finite(const struct image *image) {
-    size_t pixel_count = (size_t)image->width * image->height;
-    for (size_t i = 0; i < pixel_count; i++)
-        if (!isfinite(image->pixel[i * image->channel_count]))
-            return true;
-    return false;
-}
-
-static void write_picture(struct writer *w, const struct image *image, float scale) {
-    /* A grey picture with a non-finite value is written in colour, for the magenta to show. */
-    bool colour = image->channel_count >= 3 || has_non_finite(image);
-    png_set_IHDR(w->png, w->png_info, image->width, image->height, 8,
-                 colour ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_set_sRGB(w->png, w->png_info, PNG_sRGB_INTENT_PERCEPTUAL);
-    png_set_compression_level(w->png, 4);
-    png_write_info(w->png, w->png_info);
-    w->row = mem_array(image->width, 3);
-    for (uint32_t y = 0; y < image->height; y++) {
-        fill_row(image, y, colour ? 3 : 1, scale, w->row);
-        png_write_row(w->png, w->row);
-    }
-    png_write_end(w->png, NULL);
-}
-
-enum status image_write_png(const char *path, const struct image *image, float scale,
-                            struct error *err) {
-    struct writer w = {.path = path, .err = err};
-    struct writer *volatile kept = &w;
-    w.file = fopen(path, "wbe");
-    if (!w.file)
-        return error_set_errno(err, errno, "cannot create %s", path);
-    w.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning, NULL, allocate,
-                                      release);
-    w.png_info = w.png ? png_create_info_struct(w.png) : NULL;
-    if (!w.png_info)
-        w.status = error_set(err, STATUS_INTERNAL, "libpng does not start");
-    else if (setjmp(png_jmpbuf(w.png)) == 0) {
-        png_set_write_fn(w.png, &w, write_bytes, flush_bytes);
-        write_picture(&w, image, scale);
-    }
-    png_destroy_write_struct(&kept->png, &kept->png_info);
-    mem_free(kept->row);
-    if (fclose(kept->file) != 0 && kept->status == STATUS_OK)
-        kept->status = error_set_errno(err, errno, "cannot write %s", path);
     return kept->status;
 }

@@ -1,0 +1,178 @@
+/* exr_header.c -- which part and which channels of an EXR file make the picture, and whether the file can hold it.
+ *
+ * A file's sizes are checked against image.h's limits and against the file's own length before pixels are asked for: a
+ * chunk takes at least 8 bytes of table and compresses at most MAX_RATIO : 1, so a small file cannot ask for a large
+ * picture. */
+#include <string.h>
+
+#include "common/exr_reader.h"
+
+/* Deflate reaches 1032 : 1, after PXR24 has dropped a byte of four. */
+#define MAX_RATIO 1536
+
+static int find_channel(const exr_attr_chlist_t *list, const char *name) {
+    for (int i = 0; i < list->num_channels; i++)
+        if (strcmp(list->entries[i].name.str, name) == 0)
+            return i;
+    return -1;
+}
+
+/* Takes the first part with R, G and B; failing that, the first one that is not deep. */
+static enum status choose_part(struct exr_reader *r, struct error *err) {
+    int part_count = 0;
+    exr_result_t code = exr_get_count(r->context, &part_count);
+    r->part = -1;
+    for (int i = 0; code == EXR_ERR_SUCCESS && i < part_count; i++) {
+        exr_storage_t storage;
+        const exr_attr_chlist_t *list;
+        code = exr_get_storage(r->context, i, &storage);
+        if (code != EXR_ERR_SUCCESS || storage > EXR_STORAGE_TILED)
+            continue;
+        code = exr_get_channels(r->context, i, &list);
+        if (code != EXR_ERR_SUCCESS)
+            break;
+        bool colour = find_channel(list, "R") >= 0 && find_channel(list, "G") >= 0 &&
+                      find_channel(list, "B") >= 0;
+        if (r->part < 0 || colour) {
+            r->part = i;
+            r->storage = storage;
+            r->list = list;
+        }
+        if (colour)
+            break;
+    }
+    if (code != EXR_ERR_SUCCESS)
+        return exr_stream_refuse(r->stream, code, err);
+    if (r->part < 0)
+        return error_set(err, STATUS_INPUT,
+                         "%s: the EXR holds only deep data; a flat picture was expected",
+                         r->stream->source->name);
+    return STATUS_OK;
+}
+
+/* Refuses what the picture cannot hold. */
+static enum status check_channels(const struct exr_reader *r, struct error *err) {
+    const exr_attr_chlist_t *list = r->list;
+    const char *file = r->stream->source->name;
+    if (list->num_channels > IMAGE_MAX_CHANNELS - 2) /* grey becomes three */
+        return error_set(err, STATUS_LIMIT, "%s: %d channels are more than the limit of %d", file,
+                         list->num_channels, IMAGE_MAX_CHANNELS - 2);
+    bool half = true;
+    for (int i = 0; i < list->num_channels; i++) {
+        const exr_attr_chlist_entry_t *entry = &list->entries[i];
+        char name[sizeof ((struct image *)NULL)->channel[0]];
+        exr_stream_printable(entry->name.str, name, sizeof name);
+        if (entry->x_sampling != 1 || entry->y_sampling != 1)
+            return error_set(err, STATUS_INPUT,
+                             "%s: channel %s is subsampled %d x %d (luminance/chroma EXR); only "
+                             "full-resolution channels can be read", file, name,
+                             entry->x_sampling, entry->y_sampling);
+        if (strlen(entry->name.str) >= sizeof name)
+            return error_set(err, STATUS_INPUT, "%s: the channel name %s... is too long", file,
+                             name);
+        half = half && entry->pixel_type == EXR_PIXEL_HALF;
+    }
+    if (r->compression <= EXR_COMPRESSION_PXR24 ||
+        (half && r->compression <= EXR_COMPRESSION_B44A))
+        return STATUS_OK;
+    /* OpenEXRCore 3.1.5 has no DWA and mixes up the rows of B44's other channels. */
+    error_set(err, STATUS_INPUT, "%s: this reader knows no EXR compression %s", file,
+              r->compression <= EXR_COMPRESSION_B44A ? "B44 of channels other than half"
+                                                     : "DWAA or DWAB");
+    return error_hint(err, "save the file with ZIP or PIZ compression");
+}
+
+/* Gives every channel of the file its place: R, G, B, A first, then the rest in the file's
+ * (alphabetical) order. Fills name[] and returns the count of the picture's channels. */
+static uint32_t order_channels(struct exr_reader *r, const char **name) {
+    const exr_attr_chlist_t *list = r->list;
+    bool colour = find_channel(list, "R") >= 0 || find_channel(list, "G") >= 0 ||
+                  find_channel(list, "B") >= 0;
+    uint32_t count = 0;
+    r->grey = colour ? -1 : find_channel(list, "Y");
+    for (int i = 0; i < list->num_channels; i++)
+        r->target[i] = -1;
+    if (r->grey >= 0) {
+        r->target[r->grey] = 0;
+        for (; count < 3; count++)
+            name[count] = image_rgba[count];
+    }
+    for (int k = 0; k < 4; k++) {
+        int i = find_channel(list, image_rgba[k]);
+        if (i < 0)
+            continue;
+        r->target[i] = (int)count;
+        name[count++] = image_rgba[k];
+    }
+    for (int i = 0; i < list->num_channels; i++) {
+        if (r->target[i] >= 0)
+            continue;
+        r->target[i] = (int)count;
+        name[count++] = list->entries[i].name.str;
+    }
+    return count;
+}
+
+static int64_t side(int32_t min, int32_t max) {
+    return (int64_t)max - min + 1;
+}
+
+/* Against the file's length. */
+static enum status check_plausible(const struct exr_reader *r, struct error *err) {
+    const struct image_source *source = r->stream->source;
+    int32_t chunk_count = 0;
+    exr_result_t code = exr_get_chunk_count(r->context, r->part, &chunk_count);
+    if (code != EXR_ERR_SUCCESS)
+        return exr_stream_refuse(r->stream, code, err);
+    uint64_t pixel_bytes = 0;
+    for (int i = 0; i < r->list->num_channels; i++)
+        pixel_bytes += r->list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
+    uint64_t bytes = pixel_bytes * (uint64_t)side(r->data.min.x, r->data.max.x) *
+                     (uint64_t)side(r->data.min.y, r->data.max.y);
+    uint64_t ratio = r->compression == EXR_COMPRESSION_NONE ? 1 : MAX_RATIO;
+    if (chunk_count < 1 || (uint64_t)chunk_count * 8 > source->size ||
+        bytes / ratio > source->size)
+        return error_set(err, STATUS_INPUT,
+                         "%s: damaged EXR: the file's %llu bytes cannot hold the picture that its "
+                         "header promises", source->name, (unsigned long long)source->size);
+    return STATUS_OK;
+}
+
+enum status exr_read_header(struct exr_reader *r, struct image *image, struct image_info *info, struct error *err) {
+    enum status status = choose_part(r, err);
+    if (status != STATUS_OK)
+        return status;
+    exr_result_t code = exr_get_data_window(r->context, r->part, &r->data);
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_get_display_window(r->context, r->part, &r->display);
+    if (code == EXR_ERR_SUCCESS)
+        code = exr_get_compression(r->context, r->part, &r->compression);
+    if (code != EXR_ERR_SUCCESS)
+        return exr_stream_refuse(r->stream, code, err);
+    status = check_channels(r, err);
+    if (status != STATUS_OK)
+        return status;
+    const char *name[IMAGE_MAX_CHANNELS];
+    uint32_t channel_count = order_channels(r, name);
+    const exr_attr_box2i_t *windows[2] = {&r->data, &r->display};
+    for (int i = 0; i < 2; i++) { /* both have to pass; the display window is what stays */
+        image_release(image);
+        int64_t width = side(windows[i]->min.x, windows[i]->max.x);
+        int64_t height = side(windows[i]->min.y, windows[i]->max.y);
+        status = image_header(image, r->stream->source->name, width < 0 ? 0 : (uint64_t)width,
+                              height < 0 ? 0 : (uint64_t)height, channel_count, name, err);
+        if (status != STATUS_OK)
+            return status;
+    }
+    if (r->data.min.x > r->display.max.x || r->data.max.x < r->display.min.x ||
+        r->data.min.y > r->display.max.y || r->data.max.y < r->display.min.y)
+        return error_set(err, STATUS_INPUT,
+                         "%s: the EXR's data window lies outside its display window",
+                         r->stream->source->name);
+    info->encoding = IMAGE_LINEAR;
+    info->bits = 16;
+    for (int i = 0; i < r->list->num_channels; i++)
+        if (r->list->entries[i].pixel_type != EXR_PIXEL_HALF)
+            info->bits = 32;
+    return check_plausible(r, err);
+}

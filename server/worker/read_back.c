@@ -1,0 +1,79 @@
+/* read_back.c -- see read_back.h. */
+#include "server/worker/read_back.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/json.h"
+#include "common/mem.h"
+#include "server/ingest/mesh_file.h"
+
+#define JSON_LIMIT ((size_t)1 << 30) /* bytes; none of ours is near */
+
+/* What a mesh has whatever the order of its triangles and vertices, and however it is turned about the origin. */
+struct sums {
+    size_t triangle_count;
+    double area;    /* m^2 */
+    double squares; /* of the corners' distances from the origin, m^2 */
+};
+
+static struct sums sums_of(const struct mesh *mesh) {
+    struct sums sums = {.triangle_count = mesh->triangle_count, .area = mesh_area(mesh)};
+    for (size_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++) {
+            vec3 p = mesh->position[mesh->index[t][c]];
+            sums.squares += (double)p.x * (double)p.x + (double)p.y * (double)p.y + (double)p.z * (double)p.z;
+        }
+    return sums;
+}
+
+/* Within what single precision loses when a mesh is turned. */
+static bool near(double found, double wanted) {
+    return fabs(found - wanted) <= 1e-5 * fabs(wanted);
+}
+
+static enum status compare(const char *name, const struct mesh *found_mesh, const struct mesh *mesh, struct error *err) {
+    struct sums found = sums_of(found_mesh), wanted = sums_of(mesh);
+    if (found.triangle_count != wanted.triangle_count)
+        return error_set(err, STATUS_CORRUPT, "%s: read back, it has %zu triangles, not %zu", name, found.triangle_count,
+                         wanted.triangle_count);
+    if (!near(found.area, wanted.area) || !near(found.squares, wanted.squares))
+        return error_set(err, STATUS_CORRUPT, "%s: read back, its %zu triangles lie elsewhere: %g m2 in place of %g", name,
+                         found.triangle_count, found.area, wanted.area);
+    return STATUS_OK;
+}
+
+static enum status read_mesh(const char *path, const char *name, const struct mesh *mesh, struct error *err) {
+    struct mesh found = {0};
+    enum status status = mesh_file_read(path, name, MESH_MAX_TRIANGLES, &found, NULL, err);
+    if (status == STATUS_OK)
+        status = compare(name, &found, mesh, err);
+    mesh_release(&found);
+    return status;
+}
+
+static enum status read_json(const char *path, struct error *err) {
+    cJSON *value = NULL;
+    enum status status = json_read(path, JSON_LIMIT, &value, err);
+    cJSON_Delete(value);
+    return status;
+}
+
+enum status read_back(const char *path, const char *name, const struct mesh *mesh, struct error *err) {
+    struct error own = {0};
+    enum status status = STATUS_OK;
+    const char *dot = strrchr(name, '.');
+    if (mesh_file_is_known(name))
+        status = read_mesh(path, name, mesh, &own);
+    else if (dot && strcmp(dot, ".json") == 0)
+        status = read_json(path, &own);
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    /* What a reader refuses in a file of ours is our fault, not that of the input. */
+    if (status == STATUS_INPUT || status == STATUS_LIMIT)
+        return error_set(err, STATUS_CORRUPT, "read back: %s", own.message);
+    if (err)
+        *err = own;
+    return status;
+}
