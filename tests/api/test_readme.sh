@@ -48,8 +48,9 @@ check_names() {
         grep -q "/$name\$" "$work/tree" || say "there is no file $name"
     done
     for name in $(code | grep -oE '[A-Za-z0-9_/]+\.[ch]:[a-z0-9_]+' | sort -u); do
-        path=$(grep -E "(^|/)${name%:*}\$" "$work/tree" | head -n 1)
-        [ -n "$path" ] && grep -qE "\b${name#*:}\(" "$path" || say "there is no function ${name#*:} in ${name%:*}"
+        # shellcheck disable=SC2046
+        grep -qE "\b${name#*:}\(" $(grep -E "(^|/)${name%:*}\$" "$work/tree") /dev/null ||
+            say "there is no function ${name#*:} in ${name%:*}"
     done
     for name in $(code | grep -oE '(^|[;&|`] *|[A-Z_]+=[^ ]* )make [a-z]+' | sed 's/.*make //' | sort -u); do
         grep -qE "^$name:.*## " Makefile || say "there is no target $name"
