@@ -8,12 +8,14 @@ PREFIX ?= /usr/local
 CC ?= cc
 CFLAGS ?= -O2 -g
 SANITIZE ?=
+# Warnings are errors in CI (CI=true); a newer compiler's must not keep anybody else from building.
+WERROR ?= $(if $(filter true,$(CI)),-Werror)
 
 WARNINGS = -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes -Wvla
 # -fno-math-errno lets loops with sqrtf vectorise; -ffp-contract=off keeps results the same on
 # machines with and without fused multiply-add.
 ALL_CFLAGS = -std=c11 -D_GNU_SOURCE -I. $(WARNINGS) -fno-math-errno -ffp-contract=off \
-             -fstack-protector-strong -pthread $(SANITIZE) $(EXR_CFLAGS) $(CPPFLAGS) $(CFLAGS)
+             -fstack-protector-strong -pthread $(WERROR) $(SANITIZE) $(EXR_CFLAGS) $(CPPFLAGS) $(CFLAGS)
 ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
 
 # deploy/install-deps.sh puts these in place; the variables are only expanded when a compiler runs.
@@ -47,7 +49,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests benches bench fidelity rooms paper chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms paper chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -111,16 +113,29 @@ $(B)/tests/%.so: tests/%.c $(wildcard tests/*.h tests/chaos/*.h)
 	@mkdir -p $(@D)
 	$(CC) $(ALL_CFLAGS) -shared -fPIC -o $@ $< -ldl
 
-tests: all $(TEST_BIN) $(FUZZ_BIN) $(PRELOAD)
+# With T=name only the tests that have it in their names are built, and what scripts among them need.
+HELPER_BIN = $(foreach t,$(TEST_BIN),$(if $(filter test_%,$(notdir $(t))),,$(t)))
+named = $(foreach t,$(1),$(if $(findstring $(T),$(patsubst $(B)/tests/%,%,$(t))),$(t)))
+SCRIPTS = $(call named,$(patsubst tests/%.sh,$(B)/tests/%,$(wildcard tests/*/test_*.sh)))
+SELECTED_BIN = $(if $(T),$(call named,$(TEST_BIN) $(FUZZ_BIN)) $(if $(SCRIPTS),$(HELPER_BIN) $(PRELOAD)),\
+                         $(TEST_BIN) $(FUZZ_BIN) $(PRELOAD))
+tests: all $(SELECTED_BIN)
 benches: all $(BENCH_BIN)
 
 demo: deps ## make a room, reconstruct it, show where the pictures are
 	@+$(BUILD) all
 	@tests/demo.sh $(B)
 
-test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name runs one (T=adam)
+test: deps ## build and run all tests, the quick ones also under the sanitizers; T=name: only those (T=adam)
 	@+$(BUILD) tests $(if $(T),,benches asan-build tsan-build)
 	@tests/run.sh "$(T)" $(B) $(if $(T),,build/asan build/tsan)
+
+CHECK_BIN = $(filter $(B)/tests/unit/% $(B)/tests/gradient/% $(B)/tests/render/test_furnace \
+                     $(B)/tests/render/test_principled,$(TEST_BIN))
+check: ## what a change needs while it is written: unit, gradient, closed forms, one small job; under a minute
+	@+$(BUILD) check-build
+	@TEST_SET=check tests/run.sh "" $(B)
+check-build: all $(CHECK_BIN)
 
 bench: ## print the speed ratios and write build/bench.json; LONG=1: also what takes many minutes
 	@deploy/install-deps.sh bench

@@ -2,7 +2,8 @@
 # run.sh NAME BUILD...: runs the tests that were built under each BUILD, all of them or those with
 # NAME in their names, TEST_LANES (2) at a time. One line a test; a failing test's output follows its line.
 # Last: "N passed, N failed, N skipped". Tests of build/asan and build/tsan have asan/ or tsan/ before
-# their names; of several builds these run only what is worth its time there.
+# their names; of several builds these run only what is worth its time there. With TEST_SET=check only what a change
+# needs while it is written: unit, gradient and closed forms, and one small job.
 set -u
 only=$1
 shift
@@ -22,6 +23,22 @@ render/test_emitters render/test_hidden_lamp render/test_sky_doubt unit/test_eva
 api/test_http_faults api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
+
+# What `make check` runs, as patterns of names, and what of it takes longer than the rest together.
+check="unit/* gradient/* render/test_furnace render/test_principled api/test_one_job"
+slow_check="unit/test_worker_faults unit/test_client_request unit/test_atlas"
+
+# Whether a test belongs to the set that was asked for.
+is_wanted() { # NAME
+    local pattern
+    [ "${TEST_SET:-all}" = check ] || return 0
+    [[ " $slow_check " != *" $1 "* ]] || return 1
+    for pattern in $check; do
+        # shellcheck disable=SC2053
+        [[ $1 != $pattern ]] || return 0
+    done
+    return 1
+}
 
 # One test: prints its line in one piece and adds its outcome to $outcomes.
 run_one() {
@@ -68,6 +85,7 @@ for build in "$@"; do
         name=${source#tests/}
         name=${name%.*}
         [[ -z $only || $name == *"$only"* ]] || continue
+        is_wanted "$name" || continue
         [[ $several -eq 0 || " "${slow//$'\n'/ }" " != *" $name "* ]] || continue
         case $source in
         *.c) start_one "$prefix$name" "$build/tests/$name" ;;
