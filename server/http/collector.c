@@ -39,8 +39,6 @@ static enum status remove_expired(struct api *api, const struct expired *e, cons
     if (e->kind == EXPIRED_SCENE)
         pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_expired_delete(api->store, e, now, err);
-    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
-        status = store_expired_delete(api->store, e, now, err);
     if (status == STATUS_OK)
         status = e->kind == EXPIRED_UPLOAD ? partial_forget(api->partials, e->id, err)
                                            : space_discard(api, path, err);
@@ -108,7 +106,7 @@ static void *run(void *user) {
         partials_tend(c->api->partials);
         if (collector_run(c->api, false, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
-        space_renew_reserve(c->api);
+        store_reserve_renew(c->api->store);
         pthread_mutex_lock(&c->mutex);
         clock_gettime(CLOCK_MONOTONIC, &until);
         double seconds = (double)until.tv_sec + 1e-9 * (double)until.tv_nsec + c->interval_sec;

@@ -284,8 +284,6 @@ struct response *jobs_delete(struct api *api, struct request *r) {
         return measure_job(api, r, id);
     struct error err;
     enum status status = store_job_delete(api->store, id, &err);
-    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
-        status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
         char path[40];
         snprintf(path, sizeof path, "jobs/%lld", (long long)id);

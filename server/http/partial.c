@@ -207,7 +207,5 @@ enum status partial_forget(struct partials *p, const char *id, struct error *err
 
 enum status partial_remove(struct partials *p, const char *id, struct error *err) {
     enum status status = store_upload_delete(p->api->store, id, err);
-    if (status == STATUS_NO_SPACE && space_spend_reserve(p->api))
-        status = store_upload_delete(p->api->store, id, err);
     return status == STATUS_OK ? partial_forget(p, id, err) : status;
 }

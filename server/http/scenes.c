@@ -167,8 +167,6 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     char *path = mem_printf("scenes/%s", row.id);
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
-    if (status == STATUS_NO_SPACE && space_spend_reserve(api))
-        status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
         status = space_discard(api, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);

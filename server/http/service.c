@@ -58,7 +58,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
         enum store_files kind = (enum store_files)i;
         status = sweep(api, folders[i], &kind, err);
     }
-    space_renew_reserve(api);
+    store_reserve_renew(store);
     if (status == STATUS_OK)
         status = digests_new(&api->digests, store, config->data_dir, err);
     if (status == STATUS_OK) {

@@ -2,44 +2,13 @@
 #include "server/http/space.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include "common/file.h"
-#include "common/log.h"
 #include "common/mem.h"
 #include "server/http/problem.h"
-
-#define RESERVE_BYTES ((uint64_t)16 << 20)
-#define RESERVE_BYTES_MIN ((uint64_t)256 << 10)
-
-bool space_spend_reserve(struct api *api) {
-    char *path = file_join(api->config.data_dir, "reserve");
-    bool spent = unlink(path) == 0;
-    if (spent)
-        log_warning("the disk is full: %s was given up so that something can be removed", path);
-    mem_free(path);
-    return spent;
-}
-
-void space_renew_reserve(struct api *api) {
-    char *path = file_join(api->config.data_dir, "reserve");
-    uint64_t room = 0;
-    /* Not all that there is: others need it more. */
-    if (access(path, F_OK) != 0 && file_free_bytes(api->config.data_dir, &room, NULL) == STATUS_OK &&
-        room / 8 >= RESERVE_BYTES_MIN) {
-        uint64_t bytes = room / 8 < RESERVE_BYTES ? room / 8 : RESERVE_BYTES;
-        int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-        bool done = fd >= 0 && posix_fallocate(fd, 0, (off_t)bytes) == 0;
-        if (fd >= 0)
-            close(fd);
-        if (fd >= 0 && !done)
-            unlink(path);
-    }
-    mem_free(path);
-}
 
 enum status space_discard(struct api *api, const char *path, struct error *err) {
     char *from = file_join(api->config.data_dir, path);
@@ -63,7 +32,7 @@ enum status space_discard(struct api *api, const char *path, struct error *err) 
 out:
     mem_free(from);
     mem_free(to);
-    space_renew_reserve(api);
+    store_reserve_renew(api->store);
     return status;
 }
 

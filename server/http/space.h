@@ -8,11 +8,6 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
-/* DATA/reserve is a file of nothing that is given up when the disk is full and something is to be
- * removed: the database needs room to say so. False when it is gone already. */
-bool space_spend_reserve(struct api *api);
-void space_renew_reserve(struct api *api); /* where there is room for it again */
-
 /* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
 enum status space_discard(struct api *api, const char *path, struct error *err);
 

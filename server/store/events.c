@@ -37,10 +37,10 @@ static enum status prune_excess(struct store *store, int64_t job_id, struct erro
     return status == STATUS_OK && last > 0 ? prune_job(store, job_id, last, err) : status;
 }
 
-enum status store_event_prune(struct store *store, int64_t before_ms, bool *more, struct error *err) {
+static enum status prune(struct store *store, int64_t before_ms, bool *more, struct error *err) {
     int64_t job_id, last;
     *more = false;
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_int(&store->sql, 0, &job_id, err,
@@ -58,6 +58,14 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
                              job_id);
     }
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_event_prune(struct store *store, int64_t before_ms, bool *more, struct error *err) {
+    enum status status;
+    do
+        status = prune(store, before_ms, more, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,

@@ -5,11 +5,13 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
+#include "server/store/reserve.h"
 #include "server/store/sql.h"
 
 struct store {
     pthread_mutex_t mutex; /* around every use of sql */
     struct sql sql;
+    struct reserve reserve;
     void (*changed)(void *user, int64_t job_id);
     void *changed_user;
     void (*digest_wanted)(void *user);
@@ -36,6 +38,9 @@ extern const int schema_version; /* the number of steps */
 void store_lock(struct store *store);
 void store_unlock(struct store *store);
 enum status store_begin(struct store *store, struct error *err);
+/* One that frees space or stops work: also while the disk is full; see reserve.h. Where it fails with STATUS_NO_SPACE
+ * it is to be tried again after store_reserve_spend, while that is true. */
+enum status store_begin_freeing(struct store *store, struct error *err);
 enum status store_end(struct store *store, enum status status, int64_t changed_job,
                       struct error *err);
 

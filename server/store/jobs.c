@@ -274,9 +274,9 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
     return store_end(store, status, id, err);
 }
 
-enum status store_job_delete(struct store *store, int64_t id, struct error *err) {
+static enum status delete_job(struct store *store, int64_t id, struct error *err) {
     int64_t state;
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_int(&store->sql, -1, &state, err, "SELECT state FROM jobs WHERE id = ?", "i", id);
@@ -289,6 +289,14 @@ enum status store_job_delete(struct store *store, int64_t id, struct error *err)
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ?", "i", id);
     return store_end(store, status, id, err);
+}
+
+enum status store_job_delete(struct store *store, int64_t id, struct error *err) {
+    enum status status;
+    do
+        status = delete_job(store, id, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,

@@ -49,9 +49,8 @@ enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit
     return status;
 }
 
-enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms,
-                                 struct error *err) {
-    enum status status = store_begin(store, err);
+static enum status delete_expired(struct store *store, const struct expired *what, int64_t now_ms, struct error *err) {
+    enum status status = store_begin_freeing(store, err);
     int64_t changed = what->kind == EXPIRED_JOB     ? (int64_t)strtoll(what->id, NULL, 10)
                       : what->kind == EXPIRED_SCENE ? 0
                                                     : STORE_NOTHING_CHANGED;
@@ -72,4 +71,13 @@ enum status store_expired_delete(struct store *store, const struct expired *what
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = error_set(err, STATUS_CONFLICT, "%s is not to go any more", what->id);
     return store_end(store, status, changed, err);
+}
+
+enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms,
+                                 struct error *err) {
+    enum status status;
+    do
+        status = delete_expired(store, what, now_ms, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }

@@ -279,11 +279,11 @@ enum status store_scene_patch(struct store *store, const struct caller *who, con
     return store_end(store, status, 0, err);
 }
 
-enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
-                               bool *is_gone, struct error *err) {
+static enum status delete_scene(struct store *store, const char *id, int64_t owner_id, bool dry_run, bool *is_gone,
+                                struct error *err) {
     int64_t state = -1, others = 0, job = 0, in_check = 0;
     *is_gone = false;
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = state_of(store, id, &state, err);
@@ -310,6 +310,15 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
                         : sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
     status = store_end(store, status, 0, err);
     *is_gone = status == STATUS_OK && !others;
+    return status;
+}
+
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
+                               bool *is_gone, struct error *err) {
+    enum status status;
+    do
+        status = delete_scene(store, id, owner_id, dry_run, is_gone, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
     return status;
 }
 

@@ -64,6 +64,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     *out = NULL;
     struct store *store = mem_calloc(1, sizeof *store);
     pthread_mutex_init(&store->mutex, NULL);
+    store->reserve.wal_fd = -1;
     store->events_per_job = EVENTS_PER_JOB;
     char *path = file_join(dir, "state.db");
     enum status status = sql_open(&store->sql, path, SQL_WAL, 0, err);
@@ -73,6 +74,11 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
         status = migrate(store, err);
     if (status == STATUS_OK)
         status = store_look_for_users(store, err);
+    /* What is freed is no more written than it must be: Debian's SQLite overwrites every freed page by default. */
+    if (status == STATUS_OK)
+        status = sql_script(&store->sql, "PRAGMA secure_delete=FAST", err);
+    if (status == STATUS_OK)
+        reserve_open(store, dir);
     if (status == STATUS_OK)
         status = file_sync_parent(path, err); /* a new file's name is on disk too */
     mem_free(path);
@@ -87,6 +93,7 @@ void store_close(struct store *store) {
     if (!store)
         return;
     sql_close(&store->sql);
+    reserve_close(store);
     pthread_mutex_destroy(&store->mutex);
     mem_free(store->unpaid);
     mem_free(store);

@@ -8,7 +8,9 @@
  *    when that forbids it; unknown ids are STATUS_NOT_FOUND.
  * 4. A transition appends its `state` event in the same transaction.
  * 5. Event ids grow over all jobs and are never used twice.
- * 6. A list of scenes, jobs, outputs or uploads that cannot be read to its end has no rows.
+ * 6. What frees space or stops work (cancel, pause, delete, the end of an attempt, the end of a token) needs none: it
+ *    works on a full disk; see reserve.h. All else is STATUS_NO_SPACE there.
+ * 7. A list of scenes, jobs, outputs or uploads that cannot be read to its end has no rows.
  *
  * All functions are thread-safe. */
 #ifndef UNBAKE_STORE_STORE_H
@@ -21,6 +23,7 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "server/job/job.h"
+#include "server/store/reserve.h"
 #include "server/store/retention.h"
 #include "server/store/users.h"
 

@@ -17,17 +17,29 @@ void store_unlock(struct store *store) {
     pthread_mutex_unlock(&store->mutex);
 }
 
-enum status store_begin(struct store *store, struct error *err) {
+static enum status begin(struct store *store, bool is_freeing, struct error *err) {
     store_lock(store);
-    enum status status = sql_begin(&store->sql, err);
+    enum status status = is_freeing ? STATUS_OK : reserve_check(store, err);
+    if (status == STATUS_OK)
+        status = sql_begin(&store->sql, err);
     if (status != STATUS_OK)
         store_unlock(store);
     return status;
 }
 
+enum status store_begin(struct store *store, struct error *err) {
+    return begin(store, false, err);
+}
+
+enum status store_begin_freeing(struct store *store, struct error *err) {
+    return begin(store, true, err);
+}
+
 enum status store_end(struct store *store, enum status status, int64_t changed_job,
                       struct error *err) {
     status = sql_end(&store->sql, status, err);
+    if (status == STATUS_OK)
+        reserve_keep(store);
     store_unlock(store);
     if (status == STATUS_OK && changed_job != STORE_NOTHING_CHANGED && store->changed)
         store->changed(store->changed_user, changed_job);

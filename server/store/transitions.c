@@ -59,20 +59,28 @@ static enum status look(struct store *store, int64_t id, struct present *now, st
     return status;
 }
 
-/* Locks, begins and reads the job. On an error everything is undone already. */
-static enum status job_begin(struct store *store, int64_t id, struct present *now,
-                             struct error *err) {
-    enum status status = store_begin(store, err);
+static enum status begun(struct store *store, enum status status, int64_t id, struct present *now, struct error *err) {
     if (status != STATUS_OK)
         return status;
     status = look(store, id, now, err);
     return status == STATUS_OK ? status : store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
+/* Locks, begins and reads the job. On an error everything is undone already. */
+static enum status job_begin(struct store *store, int64_t id, struct present *now,
+                             struct error *err) {
+    return begun(store, store_begin(store, err), id, now, err);
+}
+
+/* The same for what stops work, and works on a full disk. */
+static enum status job_begin_stopping(struct store *store, int64_t id, struct present *now, struct error *err) {
+    return begun(store, store_begin_freeing(store, err), id, now, err);
+}
+
 /* As job_begin, and the job must be running its attempt `attempt`. */
 static enum status attempt_begin(struct store *store, int64_t id, int attempt, struct present *now,
                                  struct error *err) {
-    enum status status = job_begin(store, id, now, err);
+    enum status status = job_begin_stopping(store, id, now, err);
     if (status != STATUS_OK || (now->state == JOB_RUNNING && now->attempt == attempt))
         return status;
     error_set(err, STATUS_CONFLICT, "job %lld is %s (attempt %d): attempt %d has no say",
@@ -138,9 +146,9 @@ static enum status wish(struct store *store, struct present *now, enum job_wante
 
 /* --- what users ask ---------------------------------------------------------------------- */
 
-enum status store_job_cancel(struct store *store, int64_t id, struct error *err) {
+static enum status cancel_job(struct store *store, int64_t id, struct error *err) {
     struct present now;
-    enum status status = job_begin(store, id, &now, err);
+    enum status status = job_begin_stopping(store, id, &now, err);
     if (status != STATUS_OK)
         return status;
     if (now.state == JOB_CANCELLED || now.wanted == JOB_WANT_CANCEL)
@@ -154,9 +162,9 @@ enum status store_job_cancel(struct store *store, int64_t id, struct error *err)
     return store_end(store, status, id, err);
 }
 
-enum status store_job_pause(struct store *store, int64_t id, struct error *err) {
+static enum status pause_job(struct store *store, int64_t id, struct error *err) {
     struct present now;
-    enum status status = job_begin(store, id, &now, err);
+    enum status status = job_begin_stopping(store, id, &now, err);
     if (status != STATUS_OK)
         return status;
     if (now.state == JOB_PAUSED || now.wanted == JOB_WANT_PAUSE)
@@ -170,6 +178,22 @@ enum status store_job_pause(struct store *store, int64_t id, struct error *err) 
     else
         status = forbidden(&now, "paused", err);
     return store_end(store, status, id, err);
+}
+
+enum status store_job_cancel(struct store *store, int64_t id, struct error *err) {
+    enum status status;
+    do
+        status = cancel_job(store, id, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
+}
+
+enum status store_job_pause(struct store *store, int64_t id, struct error *err) {
+    enum status status;
+    do
+        status = pause_job(store, id, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 /* Into the queue by its user's wish, where there is room for one more. */
@@ -276,8 +300,7 @@ enum status store_job_start(struct store *store, int64_t id, int *attempt, struc
     return store_end(store, status, id, err);
 }
 
-/* The end of an attempt in state `to`. */
-static enum status finish(struct store *store, int64_t id, int attempt, enum job_state to,
+static enum status finish_once(struct store *store, int64_t id, int attempt, enum job_state to,
                           const char *reason, const char *hint, struct error *err) {
     struct present now;
     enum status status = attempt_begin(store, id, attempt, &now, err);
@@ -285,6 +308,16 @@ static enum status finish(struct store *store, int64_t id, int attempt, enum job
         return status;
     status = move(store, &now, to, reason, hint, err);
     return store_end(store, status, id, err);
+}
+
+/* The end of an attempt in state `to`. */
+static enum status finish(struct store *store, int64_t id, int attempt, enum job_state to,
+                          const char *reason, const char *hint, struct error *err) {
+    enum status status;
+    do
+        status = finish_once(store, id, attempt, to, reason, hint, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err) {
@@ -305,8 +338,8 @@ enum status store_job_restarted(struct store *store, int64_t id, int attempt, st
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
-                            const char *hint, int memory_step, struct error *err) {
+static enum status crash(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
+                         int memory_step, struct error *err) {
     struct present now;
     enum status status = attempt_begin(store, id, attempt, &now, err);
     if (status != STATUS_OK)
@@ -317,6 +350,15 @@ enum status store_job_crash(struct store *store, int64_t id, int attempt, const 
         status = sql_run(&store->sql, err, "UPDATE jobs SET memory_step = ? WHERE id = ?", "ni",
                          memory_step, id);
     return store_end(store, status, id, err);
+}
+
+enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
+                            const char *hint, int memory_step, struct error *err) {
+    enum status status;
+    do
+        status = crash(store, id, attempt, reason, hint, memory_step, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason,
@@ -373,14 +415,18 @@ static enum status requeue_one(struct store *store, int64_t *id, struct error *e
 }
 
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err) {
-    for (*requeued = 0;; ++*requeued) {
-        int64_t id;
-        enum status status = store_begin(store, err);
+    *requeued = 0;
+    for (;;) {
+        int64_t id = 0;
+        enum status status = store_begin_freeing(store, err);
         if (status != STATUS_OK)
             return status;
         status = requeue_one(store, &id, err);
         status = store_end(store, status, id ? id : STORE_NOTHING_CHANGED, err);
+        if (status == STATUS_NO_SPACE && store_reserve_spend(store))
+            continue;
         if (status != STATUS_OK || id == 0)
             return status;
+        ++*requeued;
     }
 }

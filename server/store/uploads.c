@@ -176,10 +176,18 @@ enum status store_upload_keep(struct store *store, const char *id, const struct 
     return end_change(store, status, id, err);
 }
 
-enum status store_upload_delete(struct store *store, const char *id, struct error *err) {
-    enum status status = store_begin(store, err);
+static enum status delete_upload(struct store *store, const char *id, struct error *err) {
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err, "DELETE FROM uploads WHERE id = ?", "t", id);
     return end_change(store, status, id, err);
+}
+
+enum status store_upload_delete(struct store *store, const char *id, struct error *err) {
+    enum status status;
+    do
+        status = delete_upload(store, id, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }

@@ -189,12 +189,11 @@ enum status store_token_find(struct store *store, const char *token, struct call
     return error_set(err, STATUS_NOT_FOUND, "the token is not, or no longer, valid");
 }
 
-enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
-                               struct error *err) {
+static enum status revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err) {
     size_t digits = strspn(number_or_name, "0123456789");
     bool is_number = digits > 0 && digits <= 18 && number_or_name[digits] == '\0';
     *count = 0;
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     if (is_number)
@@ -213,6 +212,15 @@ enum status store_token_revoke(struct store *store, const char *number_or_name, 
     status = store_end(store, status, STORE_NOTHING_CHANGED, err);
     if (status == STATUS_OK)
         *count = gone;
+    return status;
+}
+
+enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
+                               struct error *err) {
+    enum status status;
+    do
+        status = revoke(store, number_or_name, count, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
     return status;
 }
 

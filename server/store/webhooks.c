@@ -94,11 +94,10 @@ enum status store_outbox_wait(struct store *store, double *seconds, struct error
     return status;
 }
 
-enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
-                                struct error *err) {
+static enum status settle(struct store *store, int64_t id, bool delivered, bool *gave_up, struct error *err) {
     int64_t tries;
     *gave_up = false;
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_int(&store->sql, 0, &tries, err, "SELECT tries FROM outbox WHERE id = ?", "i", id);
@@ -110,4 +109,13 @@ enum status store_outbox_settle(struct store *store, int64_t id, bool delivered,
         status = sql_run(&store->sql, err, "UPDATE outbox SET tries = tries + 1, next_ms = ? WHERE id = ?", "ii",
                          store_now_ms() + (int64_t)pause, id);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
+                                struct error *err) {
+    enum status status;
+    do
+        status = settle(store, id, delivered, gave_up, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }

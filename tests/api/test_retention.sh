@@ -129,17 +129,30 @@ if [ "$(id -u)" -eq 0 ] && mkdir "$work/disk" && mount -t tmpfs -o size=90m none
     run 0 cancel "$first" "$second"
     wait_for 60 job_is "$second" cancelled # the first had gone, perhaps, and it ran
 
-    # --- a disk that is full: what is not needed can be removed all the same ---
+    # --- a disk that is full: what runs or waits can be stopped, what is not needed removed all the same ---
     wait_for 60 job_is "$first" cancelled
+    for third in 1 2 3; do
+        run 0 submit --scene "$("$build/unbake" show "$first" --json | jq -r .scene)" $long -q
+        more[third]=$out
+    done
+    wait_for 60 job_is "${more[1]}" running
     head -c 200m /dev/zero >"$work/disk/filler" 2>/dev/null
     head -c 100k /dev/zero >>"$work/disk/filler" 2>/dev/null
     equal "$(df --output=avail -B1 "$work/disk" | tail -n 1 | tr -d ' ')" 0 "bytes free"
     call POST /v1/uploads -H "$tus" -H 'Upload-Length: 1000000'; expect 507 "an upload on a full disk"
+    for action in 1/pause 2/pause 3/cancel 2/cancel 1/cancel; do
+        call POST "/v1/jobs/${more[${action%/*}]}/${action#*/}"; expect 202 "$action on a full disk"
+        head -c 20m /dev/zero >"$work/disk/filler-${action/\//-}" 2>/dev/null
+    done
+    for third in 1 2 3; do
+        wait_for 60 job_is "${more[third]}" cancelled
+        run 0 rm "${more[third]}"
+    done
     run 0 rm "$first"
     run 0 rm "$second"
     run 0 scenes rm "$("$build/unbake" scenes -q | head -n 1)"
     [ -z "$(ls -A "$data/scenes")$(ls -A "$data/jobs")" ] || fail "left: $(ls "$data/scenes" "$data/jobs")"
-    rm "$work/disk/filler"
+    rm "$work/disk"/filler*
 
     # --- a room that does not fit when it is unpacked is no faulty room: it waits for more space ---
     make_room "$work/wide"

@@ -1,0 +1,150 @@
+/* reserve.c -- see reserve.h. */
+#include "server/store/reserve.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+#include "server/store/internal.h"
+
+/* A cancelled job is some 12 pages; of a job that is removed most pages are freed, and those are not written. */
+#define CUSHION_BYTES ((int64_t)4 << 20)
+#define STEP_BYTES ((int64_t)1 << 20) /* of the log; so that not every commit extends it */
+#define SPARE_PAGES 256               /* of the database: what stops a job adds an event */
+#define CHUNK_BYTES (256 << 10)       /* by which its file grows */
+#define WAL_HEADER 32                 /* bytes: sqlite.org/fileformat2.html, 4.1 */
+#define FRAME_HEADER 24
+#define CHECKPOINT_FRAMES 1000        /* SQLite's own default */
+#define CHECKPOINT_TIGHT 16
+
+#define FILE_BYTES ((uint64_t)16 << 20) /* of DATA/reserve */
+#define FILE_BYTES_MIN ((uint64_t)256 << 10)
+
+/* SQLite calls it after each commit, with what the log holds. Its own hook, which this one takes the place of, makes the
+ * checkpoints; one that fails is made up for by the next. */
+static int committed(void *user, sqlite3 *db, const char *name, int frames) {
+    struct reserve *r = user;
+    bool is_reset = frames < r->wal_frames;
+    struct stat info;
+    r->wal_frames = frames;
+    if (is_reset && r->wal_fd >= 0 && fstat(r->wal_fd, &info) == 0 && info.st_size < r->wal_bytes)
+        r->wal_bytes = info.st_size; /* journal_size_limit has cut it */
+    if (frames >= (r->is_tight ? CHECKPOINT_TIGHT : CHECKPOINT_FRAMES))
+        sqlite3_wal_checkpoint_v2(db, name, SQLITE_CHECKPOINT_PASSIVE, NULL, NULL);
+    return SQLITE_OK;
+}
+
+static bool is_full(int number) {
+    return number == ENOSPC || number == EDQUOT || number == EFBIG;
+}
+
+/* False where the disk has no room for it. */
+static bool extend_wal(struct store *store) {
+    struct reserve *r = &store->reserve;
+    int64_t wanted = WAL_HEADER + r->wal_frames * (r->page_bytes + FRAME_HEADER) + CUSHION_BYTES;
+    if (r->wal_fd < 0) {
+        char *path = mem_printf("%s-wal", store->sql.path);
+        r->wal_fd = open(path, O_RDWR | O_CLOEXEC); /* SQLite takes no locks on this file, so it may be closed again */
+        mem_free(path);
+    }
+    if (wanted <= r->wal_bytes || r->is_unsupported || r->wal_fd < 0)
+        return true;
+    wanted += STEP_BYTES;
+    if (fallocate(r->wal_fd, 0, 0, wanted) == 0) {
+        r->wal_bytes = wanted;
+        return true;
+    }
+    r->is_unsupported = errno == EOPNOTSUPP || errno == ENOSYS;
+    return !is_full(errno);
+}
+
+/* The same for the database file, which a checkpoint writes to. */
+static bool extend_database(struct store *store) {
+    struct reserve *r = &store->reserve;
+    int64_t pages = 0;
+    if (sql_int(&store->sql, 0, &pages, NULL, "PRAGMA page_count", "") != STATUS_OK ||
+        pages + SPARE_PAGES <= r->page_count)
+        return true;
+    pages += SPARE_PAGES;
+    int64_t bytes = pages * r->page_bytes;
+    errno = 0;
+    int code = sqlite3_file_control(store->sql.db, "main", SQLITE_FCNTL_SIZE_HINT, &bytes);
+    if (code == SQLITE_OK) {
+        r->page_count = pages;
+        return true;
+    }
+    /* SQLite does not hand the reason on. */
+    uint64_t room = 0;
+    return !(is_full(errno) || (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)CUSHION_BYTES));
+}
+
+void reserve_keep(struct store *store) {
+    struct reserve *r = &store->reserve;
+    bool was_tight = r->is_tight;
+    r->is_tight = !(extend_wal(store) && extend_database(store));
+    if (r->is_tight && !was_tight)
+        log_warning("%s: the disk is full: only what frees space or stops work is entered", store->sql.path);
+    else if (was_tight && !r->is_tight)
+        log_info("%s: the disk has room again", store->sql.path);
+}
+
+enum status reserve_check(struct store *store, struct error *err) {
+    if (store->reserve.is_tight)
+        reserve_keep(store);
+    if (!store->reserve.is_tight)
+        return STATUS_OK;
+    error_set(err, STATUS_NO_SPACE, "%s: the disk is full", store->sql.path);
+    return error_hint(err, "Free some space on the disk that holds the file: cancel or delete jobs, delete scenes.");
+}
+
+void reserve_open(struct store *store, const char *dir) {
+    struct reserve *r = &store->reserve;
+    int64_t page_bytes = 0;
+    int chunk = CHUNK_BYTES;
+    r->dir = mem_strdup(dir);
+    if (sql_int(&store->sql, 4096, &page_bytes, NULL, "PRAGMA page_size", "") != STATUS_OK)
+        page_bytes = 4096;
+    r->page_bytes = (int)page_bytes;
+    sqlite3_file_control(store->sql.db, "main", SQLITE_FCNTL_CHUNK_SIZE, &chunk);
+    sqlite3_wal_hook(store->sql.db, committed, r);
+    reserve_keep(store);
+}
+
+void reserve_close(struct store *store) {
+    if (store->reserve.wal_fd >= 0)
+        close(store->reserve.wal_fd);
+    mem_free(store->reserve.dir);
+    store->reserve = (struct reserve){.wal_fd = -1};
+}
+
+/* --- the file ------------------------------------------------------------------------------ */
+
+bool store_reserve_spend(struct store *store) {
+    char *path = file_join(store->reserve.dir, "reserve");
+    bool spent = unlink(path) == 0;
+    if (spent)
+        log_warning("the disk is full: %s was given up so that something can be stopped or removed", path);
+    mem_free(path);
+    return spent;
+}
+
+void store_reserve_renew(struct store *store) {
+    char *path = file_join(store->reserve.dir, "reserve");
+    uint64_t room = 0;
+    /* Not all that there is: others need it more. */
+    if (access(path, F_OK) != 0 && file_free_bytes(store->reserve.dir, &room, NULL) == STATUS_OK &&
+        room / 8 >= FILE_BYTES_MIN) {
+        uint64_t bytes = room / 8 < FILE_BYTES ? room / 8 : FILE_BYTES;
+        int fd = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+        bool done = fd >= 0 && posix_fallocate(fd, 0, (off_t)bytes) == 0;
+        if (fd >= 0)
+            close(fd);
+        if (fd >= 0 && !done)
+            unlink(path);
+    }
+    mem_free(path);
+}
