@@ -224,12 +224,26 @@ bool outcome_lacks_room(const struct attempt *a) {
            WEXITSTATUS(a->wait_status) == PROGRESS_EXIT_NO_SPACE;
 }
 
+/* Files that were announced must be entered before a job ends, but a full disk does not hold up who stops it: they are
+ * announced again by the next attempt, if there is one. */
+static enum status make_up(struct attempt *a, struct store *store, struct error *err) {
+    enum status status = hearing_make_up(a, store, err);
+    struct job job = {0};
+    bool is_unwanted = status == STATUS_NO_SPACE && a->job_id && store_job_get(store, a->job_id, &job, NULL) == STATUS_OK &&
+                       job.wanted != JOB_WANT_RUN;
+    job_release(&job);
+    if (is_unwanted)
+        log_warning("job %lld: %d announced files are left out, as it is stopped: %s", (long long)a->job_id,
+                    cJSON_GetArraySize(a->untaken), err->message);
+    return is_unwanted ? STATUS_OK : status;
+}
+
 enum status outcome_settle(struct attempt *a, struct store *store, struct figures *figures, struct error *err) {
     struct verdict verdict;
     attempt_charge(a, store, figures);
     housekeeping_drop_scraps(a->dir);
     judge(a, &verdict);
-    enum status status = hearing_make_up(a, store, err);
+    enum status status = make_up(a, store, err);
     if (status == STATUS_OK && a->job_id)
         status = measure_job(store, a->job_id, a->dir, err);
     if (status == STATUS_OK)

@@ -5,8 +5,19 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#include "server/store/reserve.h"
 #include "server/store/sql.h"
+
+/* What reserve.c knows of the space of the database's files. */
+struct reserve {
+    char *dir;           /* of the data; owned */
+    int wal_fd;          /* -1: not open yet */
+    bool is_unsupported; /* the file system does not allocate beforehand */
+    bool is_tight;
+    int page_bytes;
+    int64_t wal_frames;  /* that the log holds */
+    int64_t wal_bytes;   /* that it has space for */
+    int64_t page_count;  /* that the database file has space for */
+};
 
 struct store {
     pthread_mutex_t mutex; /* around every use of sql */
@@ -38,9 +49,10 @@ extern const int schema_version; /* the number of steps */
 void store_lock(struct store *store);
 void store_unlock(struct store *store);
 enum status store_begin(struct store *store, struct error *err);
-/* One that frees space or stops work: also while the disk is full; see reserve.h. Where it fails with STATUS_NO_SPACE
+/* One that frees space or stops work: also while the disk is full; see reserve.c. Where it fails with STATUS_NO_SPACE
  * it is to be tried again after store_reserve_spend, while that is true. */
 enum status store_begin_freeing(struct store *store, struct error *err);
+bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false when it is gone already */
 enum status store_end(struct store *store, enum status status, int64_t changed_job,
                       struct error *err);
 
@@ -67,6 +79,13 @@ int64_t store_now_ms(void); /* Unix time */
 
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);
+
+/* reserve.c, under the mutex. After the database was opened. What cannot be had now is tried again after each commit. */
+void reserve_open(struct store *store, const char *dir);
+void reserve_close(struct store *store); /* after the database was closed */
+void reserve_keep(struct store *store);  /* after a commit */
+/* Before an ordinary transaction: STATUS_NO_SPACE while it is tight. */
+enum status reserve_check(struct store *store, struct error *err);
 
 /* Inside a transaction: appends one event. */
 enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,

@@ -1,6 +1,18 @@
-/* reserve.c -- see reserve.h. */
-#include "server/store/reserve.h"
-
+/* reserve.c -- room that is kept for transactions which free space or stop work: a full disk must not hinder them.
+ *
+ *      room      (WAL and database have their space beforehand)   every transaction
+ *       │  ▲
+ *       ▼  └─ (the disk has room again)
+ *      tight     (they cannot be extended)                        only those that free or stop
+ *
+ * 1. After each commit the write-ahead log is extended to CUSHION_BYTES beyond what it holds, and the database file to
+ *    SPARE_PAGES beyond its last. Ordinary transactions are refused with STATUS_NO_SPACE as soon as that cannot be done, so what is
+ *    kept is left to the others, which need no block that the disk does not have already.
+ * 2. While it is tight, each commit is followed by a checkpoint, so that the same part of the log is used again.
+ * 3. Where the file system cannot allocate beforehand, or writes elsewhere even then (copy on write), DATA/reserve is
+ *    the second line: a file of nothing that is removed when such a transaction has failed, which is then tried again.
+ *
+ * Under the store's mutex, except store_reserve_spend and store_reserve_renew. */
 #include <errno.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,6 +22,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/store/internal.h"
+#include "server/store/store.h"
 
 /* A cancelled job is some 12 pages; of a job that is removed most pages are freed, and those are not written. */
 #define CUSHION_BYTES ((int64_t)4 << 20)

@@ -66,8 +66,9 @@ enum status store_share_check_scene(struct store *store, const char *id, uint64_
     return status == STATUS_OK && least >= 0 ? compare((uint64_t)least, bytes, limit_bytes, err) : status;
 }
 
-enum status store_disk_enter(struct store *store, const struct disk_use *list, size_t count, struct error *err) {
-    enum status status = store_begin(store, err);
+/* Part of the end of an attempt. */
+static enum status enter_all(struct store *store, const struct disk_use *list, size_t count, struct error *err) {
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     for (size_t i = 0; i < count && status == STATUS_OK; i++)
@@ -78,6 +79,14 @@ enum status store_disk_enter(struct store *store, const struct disk_use *list, s
                      : sql_run(&store->sql, err, "UPDATE scenes SET disk_bytes = ? WHERE id = ?", "it", list[i].bytes,
                                list[i].scene_id);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_disk_enter(struct store *store, const struct disk_use *list, size_t count, struct error *err) {
+    enum status status;
+    do
+        status = enter_all(store, list, count, err);
+    while (status == STATUS_NO_SPACE && store_reserve_spend(store));
+    return status;
 }
 
 enum status store_disk_unknown(struct store *store, size_t skip, size_t limit, struct disk_use *list, size_t *count,

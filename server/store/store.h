@@ -9,7 +9,7 @@
  * 4. A transition appends its `state` event in the same transaction.
  * 5. Event ids grow over all jobs and are never used twice.
  * 6. What frees space or stops work (cancel, pause, delete, the end of an attempt, the end of a token) needs none: it
- *    works on a full disk; see reserve.h. All else is STATUS_NO_SPACE there.
+ *    works on a full disk; see reserve.c. All else is STATUS_NO_SPACE there.
  * 7. A list of scenes, jobs, outputs or uploads that cannot be read to its end has no rows.
  *
  * All functions are thread-safe. */
@@ -23,7 +23,6 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "server/job/job.h"
-#include "server/store/reserve.h"
 #include "server/store/retention.h"
 #include "server/store/users.h"
 
@@ -44,6 +43,10 @@ bool store_has_files(struct store *store, enum store_files kind, const char *id)
 
 /* Writes a consistent copy to the empty file `path` while others go on using the store. */
 enum status store_backup(struct store *store, const char *path, struct error *err);
+
+/* DATA/reserve is a file of nothing that is given up where what frees space or stops work cannot be entered. Makes it
+ * anew where there is room for it. */
+void store_reserve_renew(struct store *store);
 
 /* Called, outside the store's mutex, after a transaction that appended events to `job_id` (0: a
  * scene changed). One subscriber; set before threads start. */
