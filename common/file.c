@@ -38,6 +38,15 @@ enum status file_read(const char *path, struct buf *out, struct error *err) {
     return status;
 }
 
+enum status file_rename_new(const char *from, const char *to, struct error *err) {
+    int failed = renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0 ? 0 : errno;
+    if (failed == EINVAL || failed == ENOSYS) /* a file system that cannot, such as NFS */
+        failed = link(from, to) != 0 ? errno : unlink(from) != 0 ? errno : 0;
+    if (failed == EEXIST)
+        return error_set(err, STATUS_CONFLICT, "%s is there already", to);
+    return failed ? error_set_errno(err, failed, "cannot rename to %s", to) : STATUS_OK;
+}
+
 enum status file_write_all(int fd, const void *data, size_t length, const char *path,
                            struct error *err) {
     const char *at = data;

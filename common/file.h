@@ -20,6 +20,10 @@ enum status file_replace(const char *path, const void *data, size_t length, stru
  * names are in one folder. */
 enum status file_put_in_place(const char *temporary, const char *path, struct error *err);
 
+/* Renames within a folder where nothing has the new name yet: STATUS_CONFLICT otherwise, and both stay. Not
+ * yet durable. */
+enum status file_rename_new(const char *from, const char *to, struct error *err);
+
 /* Writes all of `data` to fd, through short writes and EINTR. `path` is for the message. */
 enum status file_write_all(int fd, const void *data, size_t length, const char *path,
                            struct error *err);

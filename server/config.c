@@ -10,8 +10,10 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/nearest.h"
+#include "server/http/address.h"
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
+#define DEFAULT "default" /* where an option is from that was not set */
 
 #define TEXT(name, value, help) {#name, OPTION_TEXT, "", 0, 0, value, help, offsetof(struct config, name)}
 #define INT(name, unit, low, high, value, help) \
@@ -31,6 +33,9 @@ static const struct option table[] = {
     TEXT(tls_key, "", "PEM file of the certificate's key. SIGHUP reads both files again."),
     TEXT(server_names, "",
          "Host names besides localhost that the daemon answers for, as a proxy passes them on."),
+    TEXT(trusted_proxies, "",
+         "Addresses or networks of proxies in front, 10.0.0.0/8: their word on where a request comes from counts."),
+    TEXT(proxy_field, "X-Forwarded-For", "The field in which they say so: X-Forwarded-For or Forwarded."),
     TEXT(log_level, "info", "error, warning, info or debug; the log goes to stderr."),
     TEXT(log_format, "text", "text, logfmt or json: how a line of the log is written."),
     INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time."),
@@ -136,6 +141,9 @@ void config_set(struct config *c, const char *name, const char *value, const cha
                    nearest.best ? "?" : "");
         return;
     }
+    char **origin = &c->where[option - table];
+    mem_free(*origin);
+    *origin = mem_strdup(where);
     if (option->type == OPTION_BOOL) {
         set_bool(c, option, value, where, problems);
     } else if (option->type != OPTION_TEXT) {
@@ -147,19 +155,23 @@ void config_set(struct config *c, const char *name, const char *value, const cha
     }
 }
 
+_Static_assert(TABLE_COUNT <= CONFIG_OPTIONS_MAX, "struct config has a place for each option's origin");
+
 void config_init(struct config *c) {
     struct buf none;
     memset(c, 0, sizeof *c);
     buf_init(&none, 4096);
     for (size_t i = 0; i < TABLE_COUNT; i++)
-        config_set(c, table[i].name, table[i].default_text, "default", &none);
+        config_set(c, table[i].name, table[i].default_text, DEFAULT, &none);
     buf_release(&none); /* a test holds the defaults against their ranges */
 }
 
 void config_release(struct config *c) {
-    for (size_t i = 0; i < TABLE_COUNT; i++)
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        mem_free(c->where[i]);
         if (table[i].type == OPTION_TEXT)
             mem_free(*(char **)member(c, &table[i]));
+    }
 }
 
 /* `text` without white space at its ends; changes it. */
@@ -198,8 +210,13 @@ enum status config_read(struct config *c, const char *path, struct buf *problems
     bool seen[TABLE_COUNT] = {false};
     buf_init(&text, FILE_MAX_BYTES);
     enum status status = file_read(path, &text, err);
-    if (status == STATUS_OK && text.length > 0 && memchr(text.data, '\0', text.length))
-        status = error_set(err, STATUS_INPUT, "%s is not a text file", path);
+    const char *nul = status == STATUS_OK && text.length > 0 ? memchr(text.data, '\0', text.length) : NULL;
+    if (nul) {
+        size_t line = 1;
+        for (const char *at = text.data; at < nul; at++)
+            line += *at == '\n';
+        status = error_set(err, STATUS_INPUT, "%s:%zu: is not a text file: there is a NUL byte", path, line);
+    }
     char *rest = status == STATUS_OK && text.length > 0 ? text.data : NULL;
     for (size_t number = 1; rest; number++) {
         char *line = strsep(&rest, "\n");
@@ -237,14 +254,31 @@ enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE]
     return STATUS_OK;
 }
 
-static void check_word(const char *name, const char *value, const char *const *words, struct buf *problems) {
+/* Where an option was set. */
+static const char *origin(const struct config *c, const char *name) {
+    return c->where[find(name) - table];
+}
+
+static bool is_set(const struct config *c, const char *name) {
+    return strcmp(origin(c, name), DEFAULT) != 0;
+}
+
+static void check_word(const struct config *c, const char *name, const char *value, const char *const *words,
+                       struct buf *problems) {
     for (size_t i = 0; words[i]; i++)
         if (strcmp(words[i], value) == 0)
             return;
-    buf_printf(problems, "%s must be", name);
+    buf_printf(problems, "%s: %s must be", origin(c, name), name);
     for (size_t i = 0; words[i]; i++)
         buf_printf(problems, "%s %s", i == 0 ? "" : words[i + 1] ? "," : " or", words[i]);
     buf_printf(problems, ", not \"%s\"\n", value);
+}
+
+static void check_proxies(const struct config *c, struct buf *problems) {
+    struct proxies proxies;
+    struct error err;
+    if (proxies_parse(&proxies, c->trusted_proxies, c->proxy_field, &err) != STATUS_OK)
+        buf_printf(problems, "%s: %s\n", origin(c, proxies.field ? "trusted_proxies" : "proxy_field"), err.message);
 }
 
 void config_check(const struct config *c, struct buf *problems) {
@@ -256,15 +290,18 @@ void config_check(const struct config *c, struct buf *problems) {
     bool is_loopback;
     struct error err;
     if (config_address(c->listen, address, &port, &is_loopback, &err) != STATUS_OK)
-        buf_printf(problems, "%s%s%s\n", err.message, *err.hint ? "; " : "", err.hint);
-    check_word("access", c->access, accesses, problems);
-    check_word("log_level", c->log_level, levels, problems);
-    check_word("log_format", c->log_format, formats, problems);
+        buf_printf(problems, "%s: %s%s%s\n", origin(c, "listen"), err.message, *err.hint ? "; " : "", err.hint);
+    check_word(c, "access", c->access, accesses, problems);
+    check_word(c, "log_level", c->log_level, levels, problems);
+    check_word(c, "log_format", c->log_format, formats, problems);
+    check_proxies(c, problems);
     if (*c->data_dir == '\0')
-        buf_puts(problems, "data_dir must name a folder\n");
+        buf_printf(problems, "%s: data_dir must name a folder\n", origin(c, "data_dir"));
     if ((*c->tls_certificate != '\0') != (*c->tls_key != '\0'))
-        buf_puts(problems, "tls_certificate and tls_key go together: one of them is missing\n");
+        buf_printf(problems, "%s: tls_certificate and tls_key go together: one of them is missing\n",
+                   origin(c, *c->tls_key ? "tls_key" : "tls_certificate"));
     if (c->max_streams >= c->max_connections)
-        buf_printf(problems, "max_streams (%lld) must be less than max_connections (%lld)\n",
+        buf_printf(problems, "%s: max_streams (%lld) must be less than max_connections (%lld)\n",
+                   origin(c, is_set(c, "max_streams") ? "max_streams" : "max_connections"),
                    (long long)c->max_streams, (long long)c->max_connections);
 }

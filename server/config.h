@@ -24,8 +24,12 @@ struct option {
     size_t offset;            /* of the member in struct config */
 };
 
+#define CONFIG_OPTIONS_MAX 128
+
 struct config {
+    char *where[CONFIG_OPTIONS_MAX]; /* by the table: where it was set, "unbaked.conf:12"; owned; NULL: default */
     char *listen, *access, *tls_certificate, *tls_key, *server_names; /* owned */
+    char *trusted_proxies, *proxy_field;                              /* owned */
     char *data_dir, *log_level, *log_format;                          /* owned */
     int64_t max_running, threads, max_attempts, queue_limit, worker_memory_mib;
     int64_t user_max_running, user_queue_limit, user_max_jobs, user_max_mib;
@@ -51,7 +55,8 @@ void config_set(struct config *c, const char *name, const char *value, const cha
                 struct buf *problems);
 /* Reads a file; faults append a line each. The status is about the file itself. */
 enum status config_read(struct config *c, const char *path, struct buf *problems, struct error *err);
-/* What concerns several options, or needs more than a range. Appends a line a fault. */
+/* What concerns several options, or needs more than a range. Appends a line a fault, which begins with where
+ * the option was set. */
 void config_check(const struct config *c, struct buf *problems);
 
 #define CONFIG_ADDRESS_SIZE 64

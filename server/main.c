@@ -22,6 +22,7 @@
 #include "server/admin/admin.h"
 #include "server/admin/folder.h"
 #include "server/commands.h"
+#include "server/http/address.h"
 #include "server/http/collector.h"
 #include "server/http/hub.h"
 #include "server/http/listener.h"
@@ -63,6 +64,7 @@ struct daemon {
     char address[CONFIG_ADDRESS_SIZE]; /* that it listens on */
     unsigned long watched_rounds; /* of the scheduler, when the watchdog was last fed */
     struct api_library libraries[LIBRARY_COUNT];
+    struct proxies proxies;
 };
 
 /* An address that others can reach needs tokens. */
@@ -115,7 +117,8 @@ static struct scheduler_config scheduler_options(const struct config *c) {
     };
 }
 
-static struct api_config api_options(const struct config *c, const struct api_library *list) {
+static struct api_config api_options(const struct config *c, const struct proxies *proxies,
+                                     const struct api_library *list) {
     return (struct api_config){
         .data_dir = c->data_dir,
         .max_attempts = (int)c->max_attempts,
@@ -133,6 +136,7 @@ static struct api_config api_options(const struct config *c, const struct api_li
         .access = read_access(c->access),
         .is_tls = *c->tls_certificate != '\0',
         .server_names = c->server_names,
+        .proxies = proxies,
         .libraries = list,
         .library_count = LIBRARY_COUNT,
     };
@@ -160,8 +164,9 @@ static enum status build(struct daemon *d, struct error *err) {
     libraries_list(list);
     for (size_t i = 0; i < LIBRARY_COUNT; i++)
         d->libraries[i] = (struct api_library){list[i].name, list[i].version};
+    proxies_parse(&d->proxies, c->trusted_proxies, c->proxy_field, NULL); /* was checked with the rest */
     const struct scheduler_config work = scheduler_options(c);
-    const struct api_config limits = api_options(c, d->libraries);
+    const struct api_config limits = api_options(c, &d->proxies, d->libraries);
     listener_options(c, &network, d->address, &is_loopback);
     enum status status = store_open(&d->store, c->data_dir, err);
     if (status == STATUS_OK)

@@ -35,16 +35,21 @@ static int fail(const struct error *err) {
     return err->status == STATUS_INPUT ? EXIT_USAGE : EXIT_FAILURE;
 }
 
-/* -1 to go on, or what the command returns. */
-static int begin(struct invocation *in, int argc, char **argv, const struct flag *flags, size_t words_min,
-                 size_t words_max) {
-    int code = invocation_read(in, argc, argv, flags, CONFIG_FILE_DEFAULT);
+/* -1 to go on, or what the command returns. `file` as for invocation_read. */
+static int begin_with(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
+                      size_t words_min, size_t words_max) {
+    int code = invocation_read(in, argc, argv, flags, file);
     if (code < 0 && invocation_has(in, "--help"))
         return COMMAND_HELP;
     if (code < 0 && (in->word_count < words_min || in->word_count > words_max))
         return COMMAND_MISUSED;
     log_set_level(LOG_WARNING);
     return code;
+}
+
+static int begin(struct invocation *in, int argc, char **argv, const struct flag *flags, size_t words_min,
+                 size_t words_max) {
+    return begin_with(CONFIG_FILE_DEFAULT, in, argc, argv, flags, words_min, words_max);
 }
 
 /* --- token --------------------------------------------------------------------------------- */
@@ -119,29 +124,41 @@ int token_command(int argc, char **argv) {
 
 /* --- backup -------------------------------------------------------------------------------- */
 
-/* Copies what fd holds to `path`, which appears only when it is whole and on the disk. */
+/* Copies what fd holds to `path`, which appears only when it is whole and on the disk, and where nothing is yet: an
+ * earlier backup may be all that is left. */
 static enum status keep(int fd, const char *path, uint64_t *bytes, struct error *err) {
-    char *part = mem_printf("%s.part", path), chunk[65536];
+    char *part = mem_printf("%s.part-XXXXXX", path), chunk[65536];
     enum status status = STATUS_OK;
     ssize_t got = 0;
     *bytes = 0;
-    int out = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (out < 0)
+    int out = mkostemp(part, O_CLOEXEC); /* 0600 */
+    bool is_made = out >= 0;
+    if (!is_made)
         status = error_set_errno(err, errno, "cannot create %s", part);
     while (status == STATUS_OK && (got = read(fd, chunk, sizeof chunk)) > 0) {
         status = file_write_all(out, chunk, (size_t)got, part, err);
         *bytes += (uint64_t)got;
     }
-    if (status == STATUS_OK && (got < 0 || fsync(out) != 0 || rename(part, path) != 0))
-        status = error_set_errno(err, errno, "cannot write %s", path);
+    if (status == STATUS_OK && (got < 0 || fsync(out) != 0))
+        status = error_set_errno(err, errno, "cannot write %s", part);
+    if (status == STATUS_OK)
+        status = file_rename_new(part, path, err);
     if (status == STATUS_OK)
         status = file_sync_parent(path, err);
-    if (out >= 0)
-        close(out);
-    if (status != STATUS_OK)
+    else if (is_made)
         unlink(part);
+    if (is_made)
+        close(out);
     mem_free(part);
     return status;
+}
+
+static enum status check_new(const char *path, struct error *err) {
+    struct stat info;
+    if (lstat(path, &info) != 0)
+        return STATUS_OK; /* a path that leads nowhere is told when it is opened */
+    error_set(err, STATUS_CONFLICT, "%s is there already, and a backup overwrites nothing", path);
+    return error_hint(err, "name another, as %s-$(date +%%F)", path);
 }
 
 int backup_command(int argc, char **argv) {
@@ -152,7 +169,9 @@ int backup_command(int argc, char **argv) {
     int fd = -1, code = begin(&in, argc, argv, backup_flags, 1, 1);
     json_add_string(request, "command", "backup");
     if (code < 0) {
-        enum status status = admin_call(in.config.data_dir, request, &reply, &fd, &err);
+        enum status status = check_new(in.words[0], &err);
+        if (status == STATUS_OK)
+            status = admin_call(in.config.data_dir, request, &reply, &fd, &err);
         if (status == STATUS_OK && fd < 0)
             status = error_set(&err, STATUS_INTERNAL, "the daemon sent no copy");
         if (status == STATUS_OK)
@@ -174,14 +193,18 @@ int backup_command(int argc, char **argv) {
 
 int check_config_command(int argc, char **argv) {
     struct invocation in;
-    int code = begin(&in, argc, argv, check_config_flags, 0, 1);
     struct buf problems;
     struct error err;
+    int code = begin_with(NULL, &in, argc, argv, check_config_flags, 0, 1);
+    bool has_file = in.word_count == 1;
+    if (code < 0 && !has_file) {
+        invocation_release(&in);
+        code = begin(&in, argc, argv, check_config_flags, 0, 1);
+    }
     buf_init(&problems, (size_t)1 << 20);
-    if (code < 0 && in.word_count == 1 &&
-        config_read(&in.config, in.words[0], &problems, &err) != STATUS_OK)
+    if (code < 0 && has_file && config_read(&in.config, in.words[0], &problems, &err) != STATUS_OK)
         buf_printf(&problems, "%s\n", err.message);
-    if (code < 0 && in.word_count == 1)
+    if (code < 0 && has_file)
         config_check(&in.config, &problems);
     if (code < 0 && problems.length > 0) {
         fputs(buf_text(&problems), stderr);

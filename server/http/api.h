@@ -15,6 +15,8 @@ struct api_library {
     const char *name, *version;
 };
 
+struct proxies; /* address.h */
+
 enum api_access {
     API_ACCESS_AUTO,   /* tokens, once there is one; before, anybody who reaches the daemon */
     API_ACCESS_TOKENS, /* tokens only */
@@ -33,6 +35,7 @@ struct api_config {
     size_t max_streams;        /* event streams at once */
     double keepalive_sec;
     enum api_access access;
+    const struct proxies *proxies; /* whose word on addresses counts (address.h); NULL: nobody's */
     bool is_tls;               /* connections are encrypted by this daemon */
     int64_t scene_keep_ms, job_keep_ms, upload_keep_ms; /* see store/retention.h */
     const char *server_names;  /* besides loopback; separated by spaces or commas */
@@ -45,6 +48,7 @@ struct digests;  /* digests.h */
 struct partials; /* partial.h */
 struct listener; /* listener.h */
 struct tally;    /* tally.h */
+struct brake;    /* brake.h */
 
 struct api {
     struct api_config config; /* pointers in it are borrowed */
@@ -57,6 +61,7 @@ struct api {
     /* Held while a scene's row and its file appear or disappear together. */
     pthread_mutex_t scene_mutex;
     struct tally *tally; /* of requests */
+    struct brake *brake; /* on wrong tokens */
     atomic_ullong uploaded_bytes;
 };
 

@@ -1,11 +1,16 @@
 /* auth.c -- see auth.h. */
 #include "server/http/auth.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
 
+#include "common/clock.h"
+#include "common/log.h"
 #include "common/mem.h"
+#include "server/http/address.h"
+#include "server/http/brake.h"
 #include "server/http/field.h"
 #include "server/http/problem.h"
 #include "server/http/route.h"
@@ -42,10 +47,37 @@ static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
     return cookies && read_cookie(cookies, token);
 }
 
-struct response *auth_refuse(const struct request *r, const char *detail) {
+/* 401 with what a caller without a valid token is told. */
+static struct response *refuse(const struct request *r, const char *detail) {
     struct response *reply = problem_full(r, 401, detail,
         "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
     response_field(reply, "WWW-Authenticate", "Bearer realm=\"unbaked\"");
+    return reply;
+}
+
+static void log_failure(const struct request *r, const char *more) {
+    char address[ADDRESS_TEXT_SIZE];
+    address_text(&r->address, address);
+    const struct log_field fields[] = {
+        {"request", r->id, false}, {"client", address, false}, {"path", r->target.path, false}};
+    log_fields(LOG_INFO, fields, sizeof fields / sizeof *fields, "login failed: the token is not valid%s", more);
+}
+
+struct response *auth_reject(struct api *api, struct request *r) {
+    bool is_first;
+    double wait_sec = brake_fail(api->brake, &r->address, clock_sec(), &is_first);
+    if (wait_sec <= 0.0 || is_first)
+        log_failure(r, is_first ? "; more of them from this address are refused with 429 and not logged" : "");
+    if (wait_sec <= 0.0)
+        return refuse(r, "the token is not, or no longer, valid");
+    cJSON *members = cJSON_CreateObject();
+    json_add_string(members, "type", "urn:unbake:too-many-tokens");
+    json_add_string(members, "title", "Too many tokens that are not valid");
+    struct response *reply = problem_full(r, 429, "too many tokens that are not valid came from this address",
+                                          "a valid token is let in at any time", members);
+    response_field(reply, "Retry-After", "%.0f", ceil(wait_sec));
+    reply->must_close = true; /* the next try is to cost a connection */
+    r->is_braked = true;
     return reply;
 }
 
@@ -62,11 +94,11 @@ struct response *auth_check(struct api *api, struct request *r) {
     if (status == STATUS_NOT_FOUND && is_open)
         r->caller = (struct caller){.role = ROLE_ADMIN}; /* of another daemon, or of another time */
     else if (status == STATUS_NOT_FOUND)
-        return auth_refuse(r, "the token is not, or no longer, valid");
+        return auth_reject(api, r);
     else if (status != STATUS_OK)
         return problem_from(r, &err);
     else if (!has_token && !is_open)
-        return auth_refuse(r, "this daemon asks for a token");
+        return refuse(r, "this daemon asks for a token");
     if (r->caller.role >= r->route->access - ROUTE_VIEWER)
         return NULL;
     if (r->route->access == ROUTE_ADMIN)

@@ -17,8 +17,9 @@ bool auth_is_open(const struct api *api);
  * not use the route at all. */
 struct response *auth_check(struct api *api, struct request *r);
 
-/* 401 with what a caller without a valid token is told. */
-struct response *auth_refuse(const struct request *r, const char *detail);
+/* To a caller whose token is not valid: 401, or 429 where its address has presented too many (brake.h). Logged, with
+ * the address and without the token. */
+struct response *auth_reject(struct api *api, struct request *r);
 
 /* The job or scene that the path names at its third part. False with *refusal: 404 where there is
  * none that the caller may read, in the same words whether it exists or not; 403 where `needed`

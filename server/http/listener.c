@@ -17,6 +17,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/acceptor.h"
+#include "server/http/address.h"
 #include "server/http/auth.h"
 #include "server/http/head.h"
 #include "server/http/hub.h"
@@ -320,6 +321,9 @@ static struct response *begin(struct exchange *x, const char *method, const char
     struct request *r = &x->request;
     take_method(r, method);
     MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, take_field, r);
+    struct address peer = address_of_socket(
+        MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
+    r->address = l->api->config.proxies ? address_of_request(r, &peer, l->api->config.proxies) : peer;
     head_request_id(r);
     const char *length = request_field(r, "Content-Length");
     r->has_body = request_field(r, "Transfer-Encoding") || (length && strcmp(length, "0") != 0);
@@ -403,16 +407,18 @@ static void *on_target(void *user, const char *target, struct MHD_Connection *co
 static void log_request(const struct exchange *x, int status, bool is_whole) {
     static const char *const names[] = {"GET", "POST", "PATCH", "DELETE", "OPTIONS", "other"};
     const struct request *r = &x->request;
-    char status_text[8], duration[24];
+    char status_text[8], duration[24], address[ADDRESS_TEXT_SIZE];
+    address_text(&r->address, address);
     snprintf(status_text, sizeof status_text, "%d", status);
     snprintf(duration, sizeof duration, "%.1f", 1000.0 * (clock_sec() - x->begun_sec));
     const struct log_field fields[] = {
-        {"request", r->id, false},         {"method", r->is_head ? "HEAD" : names[r->method], false},
+        {"request", r->id, false},         {"client", address, false},
+        {"method", r->is_head ? "HEAD" : names[r->method], false},
         {"path", r->target.path, false},   {"status", status_text, true},
         {"ms", duration, true},            {"user", *r->caller.name ? r->caller.name : NULL, false},
         {"end", is_whole ? NULL : "cut short", false},
     };
-    log_fields(r->method == METHOD_GET ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
+    log_fields(r->method == METHOD_GET || r->is_braked ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
                "answered");
 }
 
@@ -486,7 +492,7 @@ enum status listener_reload(struct listener *l, struct error *err) {
 static enum status start_library(struct listener *l, const struct listener_config *config, struct error *err) {
     struct MHD_OptionItem tls[] = {
         {MHD_OPTION_HTTPS_CERT_CALLBACK, 0, tls_certificate_callback()},
-        {MHD_OPTION_HTTPS_PRIORITIES, 0, "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2"},
+        {MHD_OPTION_HTTPS_PRIORITIES, 0, TLS_PRIORITIES},
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};

@@ -22,6 +22,12 @@ enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIO
 #define REQUEST_ID_SIZE 65
 #define RESPONSE_FIELDS_MAX 12
 
+/* Of IPv6, or of IPv4 as ::ffff:a.b.c.d, in network order; all 0 where it is not known. */
+struct address {
+    uint8_t bytes[16];
+};
+#define ADDRESS_TEXT_SIZE 46 /* INET6_ADDRSTRLEN */
+
 struct field {
     char *name, *value; /* owned */
 };
@@ -39,6 +45,8 @@ struct request {
     bool has_body;
     int64_t content_length;   /* -1: not known (chunked) */
     char id[REQUEST_ID_SIZE]; /* for X-Request-Id and logs */
+    struct address address;    /* where it comes from (address.h) */
+    bool is_braked;            /* refused as one of too many wrong tokens */
     const struct route *route; /* set by routes_begin; static storage */
     struct caller caller;      /* who asks; set by routes_begin */
     struct buf body;           /* what was collected of it, for routes that take JSON */

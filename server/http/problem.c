@@ -46,8 +46,10 @@ struct response *problem_full(const struct request *r, int status, const char *d
     cJSON *body = members ? members : cJSON_CreateObject();
     char type[64];
     snprintf(type, sizeof type, "urn:unbake:%s", kind->word);
-    json_add_string(body, "type", type);
-    json_add_string(body, "title", kind->title);
+    if (!cJSON_HasObjectItem(body, "type")) {
+        json_add_string(body, "type", type);
+        json_add_string(body, "title", kind->title);
+    }
     json_add_int(body, "status", status);
     json_add_string(body, "detail", detail);
     json_add_string(body, "instance", r->target.path ? r->target.path : "");

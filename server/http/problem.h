@@ -9,7 +9,8 @@
 /* A reply of that HTTP status; its type and title follow from it. */
 struct response *problem(const struct request *r, int status, const char *detail_format, ...)
     __attribute__((format(printf, 3, 4)));
-/* The same with a hint ("" for none) and further members (an object, taken; NULL for none). */
+/* The same with a hint ("" for none) and further members (an object, taken; NULL for none), which may have
+ * their own type and title. */
 struct response *problem_full(const struct request *r, int status, const char *detail,
                               const char *hint, cJSON *members);
 /* 422 with invalid_params (an array of {name, reason, hint?}; taken). */

@@ -6,6 +6,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/http/brake.h"
 #include "server/http/digests.h"
 #include "server/http/hub.h"
 #include "server/http/partial.h"
@@ -45,6 +46,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     api->scheduler = scheduler;
     pthread_mutex_init(&api->scene_mutex, NULL);
     api->tally = tally_new();
+    api->brake = brake_new();
     api->hub = hub_new(config->keepalive_sec);
     api->partials = partials_new(api);
     *out = api;
@@ -79,6 +81,7 @@ void service_free(struct api *api) {
     partials_free(api->partials);
     hub_free(api->hub);
     tally_free(api->tally);
+    brake_free(api->brake);
     digests_free(api->digests);
     pthread_mutex_destroy(&api->scene_mutex);
     mem_free(api);

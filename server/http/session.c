@@ -54,7 +54,7 @@ struct response *session_add(struct api *api, struct request *r) {
     else
         status = store_token_find(api->store, token, &caller, &err);
     if (!reply && status == STATUS_NOT_FOUND)
-        reply = auth_refuse(r, "the token is not, or no longer, valid");
+        reply = auth_reject(api, r);
     if (!reply && status != STATUS_OK)
         reply = problem_from(r, &err);
     if (!reply) {

@@ -10,6 +10,10 @@
 
 #include "common/error.h"
 
+/* In GnuTLS's words. Of TLS 1.2 only what has forward secrecy: no static RSA, and no SHA-1, as a MAC or in a signature. */
+#define TLS_PRIORITIES \
+    "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-RSA:-SHA1:-SIGN-RSA-SHA1:-SIGN-DSA-SHA1:-SIGN-ECDSA-SHA1"
+
 struct tls; /* opaque */
 
 /* PEM files: a chain, the server's certificate first, and its key. */

@@ -14,6 +14,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/http/address.h"
 #include "server/http/listener.h"
 #include "server/http/service.h"
 #include "tests/check.h"
@@ -24,6 +25,7 @@ struct rig {
     struct scheduler *scheduler;
     struct api *api;
     struct listener *listener;
+    struct proxies proxies;
 };
 
 static inline void rig_must(enum status status, const struct error *err, const char *what) {
@@ -42,7 +44,9 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
     struct scheduler_config work = {.data_dir = rig->dir, .worker_binary = "/bin/false", .max_running = 1,
         .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
     rig_must(scheduler_new(&rig->scheduler, &work, rig->store, &err), &err, "scheduler_new");
-    struct api_config config = {.data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
+    struct proxies *proxies = &rig->proxies; /* the test stands for many callers */
+    rig_must(proxies_parse(proxies, "127.0.0.1", "X-Forwarded-For", &err), &err, "proxies_parse");
+    struct api_config config = {.proxies = proxies, .data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
         .max_upload_bytes = 8 << 20, .max_streams = stream_max, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
         .server_names = "lab.example.org"};
     rig_must(service_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "service_new");

@@ -28,7 +28,7 @@ refused 1 'bob has no token' unbaked token revoke bob --data "$data"
 grep -rqF "${alice#unbake_1_}" "$data" && fail "the token's secret is in the data folder"
 
 # --- with one ---
-start_daemon --set keepalive_sec=1 --set log_format=json
+start_daemon --set keepalive_sec=1 --set log_format=json --set trusted_proxies=127.0.0.1
 equal "$(stat -c %a "$data/admin.sock")" 600 "mode of the admin socket"
 admin=$(unbaked token add ada --role admin --data "$data")
 viewer=$(unbaked token add wall --role=viewer --data "$data")
@@ -53,10 +53,36 @@ as "$alice" GET /v1/jobs; expect 401 "after its revocation"
 unbaked token revoke 2 --data "$data" >/dev/null; as "$admin" GET /v1/jobs; expect 401
 unbaked token revoke wall --data "$data" >/dev/null; call GET /v1/jobs; expect 401 "when no token is left"
 
+# --- wrong tokens: logged with their address, braked, and nobody else with them ---
+carl=$(unbaked token add carl --data "$data")
+wrong=unbake_4_000000000000000000000000000000000000000000000000
+from() { local address=$1; shift; as "$@" -H "X-Forwarded-For: 192.0.2.99, $address"; }
+[ "$(awk '/login failed/ && /127.0.0.1/' "$work/log" | wc -l)" -ge 4 ] || fail "failed logins of before: $(grep login "$work/log")"
+found=$(for i in $(seq 24); do from 192.0.2.1 "$wrong" GET /v1/jobs; echo "$status"; done | uniq -c | xargs)
+equal "$found" "20 401 4 429" "24 wrong tokens"
+from 192.0.2.1 "$wrong" GET /v1/jobs; expect 429
+[[ $(header retry-after) =~ ^[12]$ ]] || fail "Retry-After is '$(header retry-after)'"
+equal "$(header connection)" close "Connection of a braked reply"
+equal "$(field .type)" urn:unbake:too-many-tokens "type of a braked reply"
+call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$wrong\"}"; expect 429 "by the page"
+from 192.0.2.1 "$carl" GET /v1/jobs; expect 200 "a good token, from the same address"
+call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$carl\"}"; expect 200 "a login, from there"
+from 192.0.2.2 "$wrong" GET /v1/jobs; expect 401 "another address"
+from 192.0.2.1 "$carl" POST /v1/jobs/7/cancel; expect 404
+equal "$(jq -s '[.[] | select((.msg | startswith("login failed")) and .client == "192.0.2.1")] | length' "$work/log")" 21 "lines of that address"
+jq -se 'any(.msg == "answered" and .user == "carl" and .client == "192.0.2.1")' "$work/log" >/dev/null || fail "no address of the client in the log"
+grep -qF "$wrong" "$work/log" && fail "a token is in the log"
+unbaked token revoke carl --data "$data" >/dev/null
+
 # --- backup ---
 equal "$(unbaked backup "$work/copy.db" --data "$data" | cut -d: -f1)" "$work/copy.db" "what backup prints"
 equal "$(stat -c %a "$work/copy.db")" 600 "mode of a backup"
-equal "$(sqlite3 "$work/copy.db" "PRAGMA integrity_check; SELECT count(*) FROM users")" $'ok\n3' "the backup"
+equal "$(sqlite3 "$work/copy.db" "PRAGMA integrity_check; SELECT count(*) FROM users")" $'ok\n4' "the backup"
+before=$(sha256sum <"$work/copy.db")
+refused 1 'is there already' unbaked backup "$work/copy.db" --data "$data"
+equal "$(sha256sum <"$work/copy.db")" "$before" "a backup that is there already"
+ln -s nowhere "$work/link.db"; refused 1 'is there already' unbaked backup "$work/link.db" --data "$data"
+equal "$(ls "$work" | grep -c part)" 0 "parts of backups"
 equal "$(find "$data/trash" -type f)" "" "left in trash/"
 refused 1 'cannot create' unbaked backup /proc/nowhere/file --data "$data"
 refused 2 'usage' unbaked backup --data "$data"
@@ -118,7 +144,8 @@ unbaked doctor word >"$work/out"; equal $? 2 "doctor's exit status with a word"
 unbaked check-config config/unbaked.conf >/dev/null || fail "check-config: $(cat "$work/err")"
 printf 'max_runing = 1\nlog_format = xml\n' >"$work/bad.conf"
 refused 2 'did you mean max_running' unbaked check-config "$work/bad.conf"
-grep -q 'log_format must be text, logfmt or json' "$work/err" || fail "$(cat "$work/err")"
+grep -q 'bad.conf:2: log_format must be text, logfmt or json' "$work/err" || fail "$(cat "$work/err")"
+equal "$(grep -vc "^$work/bad.conf:[12]: " "$work/err")" 0 "problems without a line"
 
 # --- TLS ---
 certificate() {
@@ -140,6 +167,16 @@ if command -v openssl >/dev/null; then
     head -c 3000000 /dev/zero | curl -sS -m 60 --cacert "$work/first.pem" -X POST -T - -H 'Transfer-Encoding: chunked' \
         -o "$work/body" -w '%{http_code}' "$url/v1/scenes" >"$work/out" 2>/dev/null
     equal "$(cat "$work/out")" 413 "a refusal in the middle of a body"
+    openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=rsa -keyout "$work/key.pem" -out "$work/cert.pem" 2>/dev/null
+    kill -HUP "$daemon_pid"; wait_for 60 grep -q 'certificate was read again' "$work/log"
+    suite() { openssl s_client -connect "${url#https://}" "$@" </dev/null 2>/dev/null | sed -n 's/^ *Cipher *: *//p' | head -n 1; }
+    for refused in "kRSA:@SECLEVEL=0" "ECDHE-RSA-AES256-SHA:@SECLEVEL=0" "DHE-RSA-AES128-SHA:@SECLEVEL=0" "AES256-SHA:@SECLEVEL=0"; do
+        [[ $(suite -tls1_2 -cipher "$refused") =~ ^(0000)?$ ]] || fail "TLS 1.2 with $refused is taken: $(suite -tls1_2 -cipher "$refused")"
+    done
+    equal "$(suite -tls1_2 -cipher ECDHE-RSA-AES128-GCM-SHA256)" ECDHE-RSA-AES128-GCM-SHA256 "the suite of TLS 1.2"
+    [[ $(suite -tls1_1 -cipher ALL:@SECLEVEL=0) =~ ^(0000)?$ ]] || fail "TLS 1.1 is taken"
+    mv "$work/first.pem" "$work/old.pem"; certificate first; cp "$work/cert.pem" "$work/first.pem"
+    kill -HUP "$daemon_pid"; wait_for 60 eval '[ "$(grep -c "certificate was read again" "$work/log")" -ge 2 ]'
     echo broken >"$work/key.pem"; kill -HUP "$daemon_pid"
     wait_for 60 grep -q 'the old certificate stays' "$work/log"
     call GET /healthz --cacert "$work/first.pem"; expect 200 "after a bad reload"
@@ -147,7 +184,7 @@ if command -v openssl >/dev/null; then
     chmod 644 "$work/key.pem"
     doctor 0 'warn +tls .*everybody here can read the key' --data "$data" --set min_free_mib=1 \
         --set tls_certificate="$work/cert.pem" --set tls_key="$work/key.pem"
-    wait_for 60 grep -q 'certificate was read again' "$work/log"
+    wait_for 60 eval '[ "$(grep -c "certificate was read again" "$work/log")" -ge 3 ]'
     call GET /healthz --cacert "$work/cert.pem"; expect 200 "the new certificate"
     call GET /healthz --cacert "$work/first.pem"; equal "$status" 000 "the old certificate, after a reload"
     unbaked doctor --data "$data" --set min_free_mib=1 --set tls_certificate="$work/cert.pem" --set tls_key="$work/first.pem" \

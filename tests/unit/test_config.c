@@ -129,12 +129,43 @@ static void check_faults(void) {
     config_set(&c, "listen", "0.0.0.0", "flag", &problems);
     config_set(&c, "access", "all", "flag", &problems);
     config_set(&c, "tls_key", "key.pem", "flag", &problems);
+    config_set(&c, "trusted_proxies", "::1 lab", "flag", &problems);
     config_check(&c, &problems);
-    CHECK(strstr(buf_text(&problems), "max_streams (1000) must be less than max_connections (1000)"));
-    CHECK(strstr(buf_text(&problems), "log_level must be"));
-    CHECK(strstr(buf_text(&problems), "listen must be like"));
-    CHECK(strstr(buf_text(&problems), "access must be auto, tokens or open, not \"all\""));
-    CHECK(strstr(buf_text(&problems), "one of them is missing"));
+    CHECK(strstr(buf_text(&problems), "flag: max_streams (1000) must be less than max_connections (1000)"));
+    CHECK(strstr(buf_text(&problems), "flag: log_level must be"));
+    CHECK(strstr(buf_text(&problems), "flag: listen must be like"));
+    CHECK(strstr(buf_text(&problems), "flag: access must be auto, tokens or open, not \"all\""));
+    CHECK(strstr(buf_text(&problems), "flag: tls_certificate and tls_key go together"));
+    CHECK(strstr(buf_text(&problems), "flag: trusted_proxies must be addresses like"));
+    buf_release(&problems);
+    config_release(&c);
+}
+
+/* Each problem names the line of the file, also one that is found when all is read; of two options that do not go
+ * together, the line of one. */
+static void check_lines(void) {
+    struct config c;
+    config_init(&c);
+    char *path = write_file("# a comment\nlisten = here\n\nmax_connections = 9\naccess = all\nlog_level = loud\nlog_format = xml\n"
+                            "data_dir =\ntls_certificate = a.pem\nproxy_field = Via\nmax_runing = 1\n");
+    struct buf problems;
+    struct error err;
+    buf_init(&problems, 65536);
+    CHECK(config_read(&c, path, &problems, &err) == STATUS_OK);
+    config_check(&c, &problems);
+    static const char *const wanted[] = {":2: listen", ":4: max_streams", ":5: access", ":6: log_level", ":7: log_format",
+                                         ":8: data_dir", ":9: tls_certificate", ":10: proxy_field", ":11: there is no option"};
+    size_t lines = 0;
+    for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
+        char *start = mem_printf("%s%s", path, wanted[i]);
+        CHECK_THAT(strstr(buf_text(&problems), start), "%s is not in: %s", start, buf_text(&problems));
+        mem_free(start);
+    }
+    for (const char *at = buf_text(&problems); *at; at++)
+        lines += *at == '\n';
+    CHECK_THAT(lines == sizeof wanted / sizeof *wanted, "%s", buf_text(&problems));
+    unlink(path);
+    mem_free(path);
     buf_release(&problems);
     config_release(&c);
 }
@@ -182,7 +213,7 @@ static void check_files(void) {
     int fd = open(path, O_WRONLY | O_CLOEXEC);
     CHECK(write(fd, "threads = 3\n\0", 13) == 13);
     close(fd);
-    CHECK(config_read(&c, path, &problems, &err) == STATUS_INPUT && strstr(err.message, "is not a text file"));
+    CHECK(config_read(&c, path, &problems, &err) == STATUS_INPUT && strstr(err.message, ":2: is not a text file"));
     unlink(path);
     CHECK(config_read(&c, path, &problems, &err) == STATUS_NOT_FOUND && strstr(err.message, path));
     CHECK(problems.length == 0 && c.threads == 0);
@@ -218,6 +249,7 @@ int main(void) {
     check_defaults();
     check_documented();
     check_faults();
+    check_lines();
     check_addresses();
     check_files();
     check_default_file();

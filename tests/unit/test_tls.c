@@ -86,11 +86,46 @@ static void check_days(enum status wanted, const char *word) {
     CHECK_THAT(strstr(err.message, certificate) && strstr(err.message, word), "%s", err.message);
 }
 
+/* What is offered: TLS 1.2 and 1.3, each suite with forward secrecy and without SHA-1, and no signature with it. */
+static void check_suites(void) {
+    gnutls_priority_t priorities;
+    const char *fault = NULL;
+    CHECK_THAT(gnutls_priority_init(&priorities, TLS_PRIORITIES, &fault) == 0, "%s", fault ? fault : "");
+    size_t of_12 = 0, of_13 = 0;
+    unsigned number;
+    for (unsigned i = 0; gnutls_priority_get_cipher_suite_index(priorities, i, &number) != GNUTLS_E_REQUESTED_DATA_NOT_AVAILABLE; i++) {
+        unsigned char id[2];
+        gnutls_kx_algorithm_t kx;
+        gnutls_cipher_algorithm_t cipher;
+        gnutls_mac_algorithm_t mac;
+        gnutls_protocol_t version;
+        const char *name = gnutls_cipher_suite_info(number, id, &kx, &cipher, &mac, &version);
+        if (!name)
+            continue;
+        of_13 += id[0] == 0x13;
+        of_12 += id[0] != 0x13;
+        CHECK_THAT(id[0] == 0x13 || kx == GNUTLS_KX_ECDHE_RSA || kx == GNUTLS_KX_ECDHE_ECDSA || kx == GNUTLS_KX_DHE_RSA, "%s", name);
+        CHECK_THAT(mac != GNUTLS_MAC_SHA1 && !strstr(name, "SHA1"), "%s", name);
+    }
+    CHECK_THAT(of_12 > 5 && of_13 >= 3, "%zu and %zu suites", of_12, of_13);
+    const unsigned *list;
+    int count = gnutls_priority_protocol_list(priorities, &list);
+    for (int i = 0; i < count; i++)
+        CHECK(list[i] == GNUTLS_TLS1_2 || list[i] == GNUTLS_TLS1_3);
+    count = gnutls_priority_sign_list(priorities, &list);
+    CHECK(count > 5);
+    for (int i = 0; i < count; i++)
+        CHECK_THAT(gnutls_sign_get_hash_algorithm((gnutls_sign_algorithm_t)list[i]) != GNUTLS_DIG_SHA1, "%s",
+                   gnutls_sign_get_name((gnutls_sign_algorithm_t)list[i]));
+    gnutls_priority_deinit(priorities);
+}
+
 int main(void) {
     struct tls *tls;
     double days = 0.0;
     if (!mkdtemp(dir))
         return 1;
+    check_suites();
     certificate = file_join(dir, "cert.pem");
     key = file_join(dir, "key.pem");
     CHECK(serial_given() == -1);
