@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -92,16 +93,33 @@ static enum status rename_synced(const char *temporary, const char *path, enum s
     return status;
 }
 
+/* As mkostemp, but of the mode that the umask leaves: a confined worker cannot change it afterwards. */
+static int create_temporary(char *name) {
+    static const char letters[] = "abcdefghijklmnopqrstuvwxyz012345";
+    char *end = name + strlen(name) - 6;
+    for (int tries = 0; tries < 100; tries++) {
+        unsigned char random[6];
+        if (getrandom(random, sizeof random, 0) != (ssize_t)sizeof random)
+            return -1;
+        for (size_t i = 0; i < sizeof random; i++)
+            end[i] = letters[random[i] % 32];
+        int fd = open(name, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        if (fd >= 0 || errno != EEXIST)
+            return fd;
+    }
+    return -1;
+}
+
 enum status file_replace(const char *path, const void *data, size_t length, struct error *err) {
     char *temporary = mem_printf("%s.tmp-XXXXXX", path);
     enum status status = STATUS_OK;
-    int fd = mkostemp(temporary, O_CLOEXEC);
+    int fd = create_temporary(temporary);
     if (fd < 0) {
         status = error_set_errno(err, errno, "cannot create a temporary file beside %s", path);
         goto out;
     }
     status = file_write_all(fd, data, length, path, err);
-    if (status == STATUS_OK && (fchmod(fd, 0640) != 0 || fsync(fd) != 0))
+    if (status == STATUS_OK && fsync(fd) != 0)
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (close(fd) != 0 && status == STATUS_OK)
         status = error_set_errno(err, errno, "cannot close %s", path);
@@ -114,7 +132,7 @@ out:
 enum status file_put_in_place(const char *temporary, const char *path, struct error *err) {
     int fd = open(temporary, O_RDONLY | O_CLOEXEC);
     enum status status = STATUS_OK;
-    if (fd < 0 || fchmod(fd, 0640) != 0 || fsync(fd) != 0)
+    if (fd < 0 || fsync(fd) != 0)
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (fd >= 0)
         close(fd);
