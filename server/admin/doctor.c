@@ -113,7 +113,7 @@ static void check_sandbox(struct doctor *d) {
              ? "keeps jobs from files that are not theirs"
              : "is missing (Linux 5.13, lsm=landlock): jobs may read files that are not theirs");
         tell(d, result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s", result.system_calls
-             ? "keeps jobs from the network and from new programs"
+             ? "keeps jobs from the network, from new programs and from other processes"
              : "is missing: jobs may use the network");
     }
     if (child > 0) {

@@ -13,9 +13,12 @@
 #include <unistd.h>
 
 #include "common/buf.h"
+#include "common/clock.h"
+#include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/url.h"
+#include "server/worker/sandbox.h"
 #include "server/worker/tasks.h"
 
 #define PATIENCE_SEC 10 /* for each step; the daemon's is for all */
@@ -107,6 +110,19 @@ static int call(const struct url *url, bool may_be_private, struct error *err) {
     return fd;
 }
 
+/* Reads some of the reply; 0 or less at its end. A record of TLS 1.3 may bring no data but tickets for later
+ * sessions, with GNUTLS_E_AGAIN, as a time that is up does, too. */
+static ssize_t receive(int fd, gnutls_session_t tls, char *to, size_t length) {
+    double until = clock_sec() + PATIENCE_SEC;
+    ssize_t n;
+    if (!tls)
+        return recv(fd, to, length, 0);
+    do
+        n = gnutls_record_recv(tls, to, length);
+    while (n < 0 && !gnutls_error_is_fatal((int)n) && clock_sec() < until);
+    return n;
+}
+
 /* Sends the request and reads the first line of the reply, past a plain socket or TLS. */
 static enum status talk(int fd, gnutls_session_t tls, const struct buf *request, int *code, struct error *err) {
     char line[64] = "";
@@ -120,8 +136,7 @@ static enum status talk(int fd, gnutls_session_t tls, const struct buf *request,
         sent += (size_t)n;
     }
     while (got < sizeof line - 1 && !memchr(line, '\n', got)) {
-        ssize_t n = tls ? gnutls_record_recv(tls, line + got, sizeof line - 1 - got)
-                        : recv(fd, line + got, sizeof line - 1 - got, 0);
+        ssize_t n = receive(fd, tls, line + got, sizeof line - 1 - got);
         if (n <= 0)
             break;
         got += (size_t)n;
@@ -185,6 +200,8 @@ enum status task_deliver(const struct order *order, struct progress *progress, s
                *url.target == '/' ? "" : "/", url.target, is_v6 ? "[" : "", url.host, is_v6 ? "]" : "", url.port,
                strlen(order->body), order->message_id, now, signature, order->body);
     int fd = call(&url, order->allow_private, err);
+    if (fd >= 0 && order->sandbox && !sandbox_keep_connection())
+        log_warning("sandbox: this system cannot keep the process to its connection (seccomp)");
     if (fd < 0)
         status = err->status;
     else

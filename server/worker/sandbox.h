@@ -1,8 +1,11 @@
-/* sandbox.h -- what a worker gives up before it reads what a stranger uploaded.
+/* sandbox.h -- what a worker gives up before it reads what a stranger uploaded or sends.
  *
  *  - files: it may read `read_dir` and the system's libraries, and write below `write_dir`
- *    (Landlock, Linux 5.13 and later);
- *  - network, new programs, other processes: refused (seccomp);
+ *    (Landlock, Linux 5.13 and later); modes, owners, times and attributes of files it changes nowhere;
+ *  - system calls: those of a list (seccomp). No network, no new programs, no processes of its own, nothing
+ *    that reaches another process: no signals by any way, no priorities, no tracing;
+ *  - a worker that calls others (`connect_port`): TCP to this port and to DNS's (Landlock, Linux 6.7 and
+ *    later), UDP, no Unix sockets; once it is connected, that connection alone (sandbox_keep_connection);
  *  - memory: private memory is limited (RLIMIT_DATA; allocation then fails and mem.h ends the
  *    process with its own exit status);
  *  - core dumps: none. They would hold the scene.
@@ -15,9 +18,9 @@
 #include <stdint.h>
 
 struct sandbox {
-    const char *write_dir;
+    const char *write_dir; /* NULL: none */
     const char *read_dir;  /* NULL: none */
-    bool network;          /* it may call others, and read what finding them takes */
+    uint16_t connect_port; /* of the server that it calls; 0: no network */
     uint64_t memory_bytes; /* 0: no limit */
 };
 
@@ -28,5 +31,9 @@ struct sandbox_result {
 
 /* For the calling thread and what it starts from now on: call it before the first thread. */
 void sandbox_enter(const struct sandbox *sandbox, struct sandbox_result *result);
+
+/* After sandbox_enter with a connect_port: from now on the process has the connections that it has, and makes
+ * no other. False where the system cannot. */
+bool sandbox_keep_connection(void);
 
 #endif

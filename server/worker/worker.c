@@ -13,6 +13,7 @@
 
 #include "common/log.h"
 #include "common/mem.h"
+#include "common/url.h"
 #include "server/worker/order.h"
 #include "server/worker/progress.h"
 #include "server/worker/sandbox.h"
@@ -42,9 +43,13 @@ static enum status take_folder(const char *dir, struct error *err) {
 
 static void confine(const struct order *order, struct progress *progress) {
     struct sandbox_result result;
-    struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene,
-                              .memory_bytes = order->memory_bytes,
-                              .network = strcmp(order->kind, "deliver") == 0};
+    struct url url;
+    struct sandbox sandbox = {.write_dir = order->dir, .read_dir = order->scene, .memory_bytes = order->memory_bytes};
+    if (strcmp(order->kind, "deliver") == 0) { /* one that is no URL is told when it is to be called */
+        sandbox.write_dir = NULL;
+        if (url_parse(order->url, &url, NULL) == STATUS_OK)
+            sandbox.connect_port = (uint16_t)strtoul(url.port, NULL, 10);
+    }
     if (!order->sandbox) {
         progress_log(progress, "warning", "sandbox: switched off by the daemon's configuration");
         return;
