@@ -1,7 +1,8 @@
 /* supervisor.h -- one worker process: start it, read its pipe, signal it, bury it.
  *
  * The child is BINARY worker DIR, in a session of its own, with stdin from /dev/null, stdout and
- * stderr appended to DIR/worker.log, its pipe at PROGRESS_FD and no other descriptor. The kernel
+ * stderr appended to DIR/worker.log, its pipe at PROGRESS_FD and no other descriptor, and of the
+ * environment what no secret is kept in. The kernel
  * kills it when the daemon's thread that started it ends (PR_SET_PDEATHSIG), so a dead daemon
  * leaves no writer behind; it is the first choice of the out-of-memory killer.
  *

@@ -69,6 +69,9 @@ static void test_start(void) {
     CHECK(heard.count == 1); /* standard input is empty */
     CHECK(exit_code("ls /proc/self/fd | while read fd; do [ $fd -le 4 ] || echo $fd; done >&3", &heard) == 0);
     CHECK_THAT(heard.count == 0, "descriptor %s was left open", heard.last); /* 4 is that of ls itself */
+    setenv("UNBAKE_TOKEN", "secret", 1);
+    setenv("LC_TIME", "C", 1);
+    CHECK(exit_code("[ -z \"$UNBAKE_TOKEN\" ] && [ \"$LC_TIME\" = C ] && [ -n \"$PATH\" ]", &heard) == 0);
     CHECK(exit_code("[ $(ps -o sid= -p $$) = $$ ] && [ $(cat /proc/self/oom_score_adj) -ge 500 ]", &heard) == 0 ||
           access("/bin/ps", X_OK) != 0);
     CHECK(exit_code("kill -SEGV $$", &heard) == -SIGSEGV);
