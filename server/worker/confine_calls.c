@@ -55,11 +55,11 @@ static const int plain[] = {
     SCMP_SYS(newfstatat), SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(rename), SCMP_SYS(renameat),
     SCMP_SYS(renameat2), SCMP_SYS(rmdir), SCMP_SYS(stat), SCMP_SYS(statfs), SCMP_SYS(statx), SCMP_SYS(unlink),
     SCMP_SYS(unlinkat),
-#ifdef __SANITIZE_ADDRESS__ /* its check for leaks traces its own threads from a process that shares their memory */
-    SCMP_SYS(pipe), SCMP_SYS(pipe2), SCMP_SYS(prctl), SCMP_SYS(ptrace), SCMP_SYS(wait4),
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) /* make their calls in ways of their own */
+    SCMP_SYS(getdents), SCMP_SYS(mincore), SCMP_SYS(open), SCMP_SYS(pipe), SCMP_SYS(pipe2),
 #endif
-#ifdef __SANITIZE_THREAD__ /* reads its own mappings in ways of its own */
-    SCMP_SYS(mincore), SCMP_SYS(pipe), SCMP_SYS(pipe2),
+#ifdef __SANITIZE_ADDRESS__ /* its check for leaks traces its own threads from a process that shares their memory */
+    SCMP_SYS(prctl), SCMP_SYS(ptrace), SCMP_SYS(wait4),
 #endif
 };
 
