@@ -64,7 +64,7 @@ own 'curl/' client/request.c
 own 'openexr' common/exr_stream.h
 own 'png\.h' common/png_memory.h
 own 'jpeglib\.h' common/jpeg.c
-own 'seccomp\.h' server/worker/sandbox.c
+own 'seccomp\.h' server/worker/confine_calls.c
 
 # Each unit and one that it includes, a pair a line.
 units() {

@@ -14,15 +14,7 @@
 #ifndef UNBAKE_WORKER_SANDBOX_H
 #define UNBAKE_WORKER_SANDBOX_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
-struct sandbox {
-    const char *write_dir; /* NULL: none */
-    const char *read_dir;  /* NULL: none */
-    uint16_t connect_port; /* of the server that it calls; 0: no network */
-    uint64_t memory_bytes; /* 0: no limit */
-};
+#include "server/worker/confine.h"
 
 struct sandbox_result {
     bool files, system_calls, memory;
