@@ -22,7 +22,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/worker/confine.h"
+#include "server/worker/sandbox.h"
 #include "tests/check.h"
 
 /* Numbers since Linux 5.1 are the same on all architectures, and newer than Debian 12's headers may be. */
