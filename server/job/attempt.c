@@ -11,6 +11,7 @@
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
 
+#define EVENTS_MAX 500000 /* of one attempt; at 2 a second, which is much, of three days */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
 
 static enum status write_order(const char *dir, cJSON *order, struct error *err) {
@@ -78,6 +79,7 @@ void attempt_empty(struct attempt *a) {
     cJSON_Delete(a->problems);
     cJSON_Delete(a->facts);
     cJSON_Delete(a->untaken);
+    cJSON_Delete(a->late_progress);
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
 }
 
@@ -145,6 +147,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     if (status != STATUS_OK)
         return status;
     *a = (struct attempt){.job_id = job_id, .number = number, .iteration = -1.0,
+                          .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
                           .worker = {.pid_fd = -1, .pipe_fd = -1},
                           .dir = mem_printf("%s/jobs/%lld", config->data_dir, (long long)job_id)};
     status = store_job_get(store, job_id, &job, &why);

@@ -36,7 +36,9 @@ struct attempt {
     char *settings;               /* of the job, as asked for; owned; NULL for a check */
     int thread_count, memory_step; /* what it was to have, and how often that was made smaller */
     uint64_t oom_kills;           /* of the machine, before it started */
-    long event_count;             /* what it has reported */
+    long event_count, event_max;  /* what it has reported; after how much of that it is thinned */
+    double thinned_at;            /* when something was entered last since then, as clock_sec */
+    bool said_thinned, said_unread; /* the job's events, and the log, say so */
     double iteration, rays;       /* the newest that it reported; negative iteration: none yet */
     bool complained;              /* a report could not be entered, and the log says so */
     /* What it said of itself. */
@@ -44,7 +46,9 @@ struct attempt {
     enum status end_status;
     char *end_message, *end_hint;
     cJSON *problems, *facts;      /* of a scene */
-    cJSON *untaken;               /* announced files that the store could not enter; NULL: none */
+    long problems_left_out;       /* more of them than are kept */
+    cJSON *untaken;               /* announced files that are still to be entered; NULL: none */
+    cJSON *late_progress;         /* the newest, where that is still to be entered; NULL: none */
 };
 
 /* Starts the job, which is queued in the store. STATUS_OK: it has left the queue, and the attempt

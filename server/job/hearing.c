@@ -1,15 +1,25 @@
-/* hearing.c -- see hearing.h. */
+/* hearing.c -- see hearing.h.
+ *
+ * A worker that says too much must not keep the daemon from its other work. Beyond event_max reports an attempt is
+ * heard once a second: what it reports more often is then
+ *
+ *      files       all entered, the newest of each name
+ *      progress    the newest is entered
+ *      the rest    left out, and one event says so
+ */
 #include "server/job/hearing.h"
 
 #include <errno.h>
 #include <string.h>
 #include <sys/stat.h>
 
+#include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 
-#define EVENTS_MAX 500000 /* of one attempt: an honest one stays far below */
+#define THINNED_SEC 1.0
+#define UNTAKEN_MAX 2000  /* files; an honest job has some hundred */
 #define PROBLEMS_MAX 1000 /* of one scene */
 
 struct listener {
@@ -18,23 +28,59 @@ struct listener {
     struct figures *figures;
 };
 
+static void complain(struct attempt *a, const char *type, const struct error *err) {
+    if (!a->complained) /* once: the next thousand reports would say the same */
+        log_warning("job %lld: cannot record a %s event: %s", (long long)a->job_id, type, err->message);
+    a->complained = true;
+}
+
 /* `data` is as the worker has it. What only the daemon says of an event is not for a worker to say:
  * it may be that of another job, or run by whoever sent the scene. */
-static void enter_event(const struct listener *l, const char *type, cJSON *data) {
+static void put_event(struct attempt *a, struct store *store, const char *type, cJSON *data) {
     static const char *const daemons[] = {"job", "attempt", "at", "snapshot"};
-    struct attempt *a = l->attempt;
     struct error err;
-    if (a->job_id == 0 || a->event_count++ >= EVENTS_MAX)
-        return;
     for (size_t i = 0; i < sizeof daemons / sizeof *daemons; i++)
         cJSON_DeleteItemFromObjectCaseSensitive(data, daemons[i]);
     char *text = json_text(data);
-    enum status status = store_event_add(l->store, a->job_id, a->number, type, text, &err);
+    if (store_event_add(store, a->job_id, a->number, type, text, &err) != STATUS_OK)
+        complain(a, type, &err);
     mem_free(text);
-    if (status != STATUS_OK && !a->complained) {
-        a->complained = true; /* once: the next thousand reports would say the same */
-        log_warning("job %lld: cannot record a %s event: %s", (long long)a->job_id, type,
-                    err.message);
+}
+
+static void say_thinned(struct attempt *a, struct store *store) {
+    if (a->said_thinned)
+        return;
+    a->said_thinned = true;
+    char *message = mem_printf("this attempt has reported %ld events: from here on its metrics and log lines are left out, "
+                               "and progress is entered once a second; outputs are all there", a->event_max);
+    cJSON *data = cJSON_CreateObject();
+    json_add_string(data, "level", "warning");
+    json_add_string(data, "message", message);
+    log_warning("job %lld: %s", (long long)a->job_id, message);
+    put_event(a, store, EVENT_LOG, data);
+    cJSON_Delete(data);
+    mem_free(message);
+}
+
+/* Whether one more report is one too many. */
+static bool is_thinned(struct attempt *a, struct store *store) {
+    if (a->event_count < a->event_max) {
+        a->event_count++;
+        return false;
+    }
+    say_thinned(a, store);
+    return true;
+}
+
+static void enter_event(const struct listener *l, const char *type, cJSON *data) {
+    struct attempt *a = l->attempt;
+    if (a->job_id == 0)
+        return;
+    if (!is_thinned(a, l->store)) {
+        put_event(a, l->store, type, data);
+    } else if (strcmp(type, EVENT_PROGRESS) == 0) {
+        cJSON_Delete(a->late_progress);
+        a->late_progress = cJSON_Duplicate(data, true);
     }
 }
 
@@ -85,33 +131,64 @@ static void log_file(const struct attempt *a, enum status status, const struct e
                     is_final(status) ? "" : " yet", err->message);
 }
 
-static void enter_file(const struct listener *l, const char *type, const cJSON *line) {
-    struct attempt *a = l->attempt;
-    struct error err;
-    if (a->job_id == 0 || a->event_count++ >= EVENTS_MAX)
-        return;
-    drop_untaken(a, line);
-    enum status status = put_file(a, l->store, type, line, false, &err);
-    log_file(a, status, &err);
-    if (is_final(status))
-        return;
+/* A file for later, in the place of an older one of that name. */
+static void keep_file(struct attempt *a, const char *type, const cJSON *line) {
     cJSON *kept = cJSON_Duplicate(line, true);
     json_add_string(kept, "type", type);
     a->untaken = a->untaken ? a->untaken : cJSON_CreateArray();
     cJSON_AddItemToArray(a->untaken, kept);
 }
 
-enum status hearing_make_up(struct attempt *a, struct store *store, struct error *err) {
+static void enter_file(const struct listener *l, const char *type, const cJSON *line) {
+    struct attempt *a = l->attempt;
+    struct error err;
+    if (a->job_id == 0)
+        return;
+    drop_untaken(a, line);
+    if (is_thinned(a, l->store) && cJSON_GetArraySize(a->untaken) < UNTAKEN_MAX) {
+        keep_file(a, type, line);
+        return;
+    }
+    enum status status = put_file(a, l->store, type, line, false, &err);
+    log_file(a, status, &err);
+    if (!is_final(status))
+        keep_file(a, type, line);
+}
+
+/* Takes the files off a->untaken that are entered, or never will be. */
+static enum status take_files(struct attempt *a, struct store *store, bool is_last, struct error *err) {
     const cJSON *line;
     while ((line = cJSON_GetArrayItem(a->untaken, 0)) != NULL) {
         const char *type = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(line, "type"));
-        enum status status = put_file(a, store, type, line, true, err);
+        enum status status = put_file(a, store, type, line, is_last, err);
         if (!is_final(status))
             return status;
         log_file(a, status, err);
         cJSON_DeleteItemFromArray(a->untaken, 0);
     }
     return STATUS_OK;
+}
+
+enum status hearing_make_up(struct attempt *a, struct store *store, struct error *err) {
+    if (a->late_progress)
+        put_event(a, store, EVENT_PROGRESS, a->late_progress);
+    cJSON_Delete(a->late_progress);
+    a->late_progress = NULL;
+    return take_files(a, store, true, err);
+}
+
+/* What a thinned attempt has said lately. */
+static void enter_late(struct attempt *a, struct store *store) {
+    struct error err;
+    double now = clock_sec();
+    if (!a->said_thinned || now - a->thinned_at < THINNED_SEC)
+        return;
+    a->thinned_at = now;
+    if (a->late_progress)
+        put_event(a, store, EVENT_PROGRESS, a->late_progress);
+    cJSON_Delete(a->late_progress);
+    a->late_progress = NULL;
+    (void)take_files(a, store, false, &err); /* what fails stays for the next time */
 }
 
 static void note_end(struct attempt *a, const cJSON *line) {
@@ -177,12 +254,23 @@ static bool note_figures(const struct listener *l, const cJSON *line) {
     return is_rays;
 }
 
+/* An honest worker says nothing that is not understood. Once: more would be of that kind. */
+static void say_unread(struct attempt *a, const char *what) {
+    if (!a->said_unread && a->job_id)
+        log_warning("job %lld: a line of its worker %s: it is left out", (long long)a->job_id, what);
+    else if (!a->said_unread)
+        log_warning("scene %.12s: a line of its check %s: it is left out", a->scene_id, what);
+    a->said_unread = true;
+}
+
 static void hear(void *user, const char *text, size_t length) {
     const struct listener *l = user;
     struct attempt *a = l->attempt;
     cJSON *line;
-    if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK)
-        return; /* and so is a line of an unknown type */
+    if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK) {
+        say_unread(a, "is no JSON object"); /* a line of an unknown type means nothing either */
+        return;
+    }
     /* Events have their type beside their data, not in it. */
     cJSON *kept = cJSON_DetachItemFromObjectCaseSensitive(line, "type");
     const char *type = kept && kept->valuestring ? kept->valuestring : "";
@@ -211,6 +299,8 @@ static void hear(void *user, const char *text, size_t length) {
         if (cJSON_GetArraySize(a->problems) < PROBLEMS_MAX) {
             cJSON_AddItemToArray(a->problems, line);
             line = NULL;
+        } else {
+            a->problems_left_out++;
         }
     } else if (strcmp(type, "scene") == 0) {
         cJSON_Delete(a->facts);
@@ -227,4 +317,8 @@ void hearing_listen(struct attempt *a, struct store *store, struct figures *figu
     supervisor_read(&a->worker, hear, &listener);
     if (supervisor_bury(&a->worker, &a->wait_status, hear, &listener))
         a->phase = ATTEMPT_ENDED;
+    else
+        enter_late(a, store);
+    if (a->worker.long_lines > 0)
+        say_unread(a, "is longer than a line may be");
 }

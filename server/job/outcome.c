@@ -169,6 +169,14 @@ static void add_problem(struct attempt *a, const char *reason, const char *hint)
     cJSON_AddItemToArray(a->problems, problem);
 }
 
+/* Once, though the entry may be tried again. */
+static void add_left_out(struct attempt *a) {
+    char *reason = mem_printf("%ld more problems are not listed", a->problems_left_out);
+    add_problem(a, reason, NULL);
+    mem_free(reason);
+    a->problems_left_out = 0;
+}
+
 /* Enters what a good scene takes of the disk. More than its owners may keep is a problem of the scene. */
 static enum status settle_size(struct attempt *a, struct store *store, struct error *err) {
     struct error why = {0};
@@ -211,6 +219,8 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
                         : v->reason[0] != 0 ? v->reason
                                             : "its check ended without a result",
                         waits ? "It is checked again when there is more room." : NULL);
+        if (a->problems_left_out > 0)
+            add_left_out(a);
         text = json_text(a->problems);
         status = waits ? store_scene_postpone(store, a->scene_id, text, err)
                        : store_scene_reject(store, a->scene_id, text, err);

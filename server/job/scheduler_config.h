@@ -17,6 +17,7 @@ struct scheduler_config {
     double stop_grace_sec;          /* SIGTERM to SIGKILL */
     double checkpoint_keep_sec;     /* of a job that has succeeded */
     double event_keep_sec;          /* of a job that has ended */
+    long attempt_events_max;        /* that one attempt reports before they are thinned; 0: 500,000 */
     uint64_t low_disk_bytes;        /* with less free space, work waits; 0: never */
     bool webhook_private;           /* webhooks may go to private addresses */
     bool sandbox;

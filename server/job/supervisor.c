@@ -171,8 +171,10 @@ static void take(struct worker *w, const char *data, size_t length,
     while (length > 0) {
         const char *newline = memchr(data, '\n', length);
         size_t part = newline ? (size_t)(newline - data) : length;
-        if (!w->skipping && !buf_append(&w->line, data, part))
+        if (!w->skipping && !buf_append(&w->line, data, part)) {
             w->skipping = true;
+            w->long_lines++;
+        }
         if (!newline)
             return;
         if (!w->skipping)

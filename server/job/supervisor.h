@@ -25,6 +25,7 @@ struct worker {
     int pipe_fd;     /* -1 after its end */
     struct buf line; /* what has come of the present line */
     bool skipping;   /* the present line is too long: dropped up to its end */
+    size_t long_lines; /* that were dropped so */
     char *log_path;
     double cpu_sec;  /* that it took in all, once it is buried */
     off_t log_start; /* where this process's part of the log begins */

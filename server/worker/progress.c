@@ -49,6 +49,11 @@ static char *cut(const char *text, size_t limit) {
 
 static void add_cut(cJSON *object, const char *key, const char *text) {
     char *copy = cut(text, 8000);
+    if (strlen(copy) < strlen(text)) { /* what is left out is said */
+        char *marked = mem_printf("%s [cut]", copy);
+        mem_free(copy);
+        copy = marked;
+    }
     json_add_string(object, key, copy);
     mem_free(copy);
 }

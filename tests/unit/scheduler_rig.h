@@ -102,6 +102,8 @@ static inline int worker(const char *dir) {
     return play(role, dir, (int)attempt);
 }
 
+#define RIG_EVENTS_MAX 100 /* of one attempt; see hearing.c */
+
 /* --- the daemon's side ------------------------------------------------------------------------ */
 
 struct daemon {
@@ -122,7 +124,7 @@ static inline void *run_scheduler(void *argument) {
 static inline void daemon_start(struct daemon *d, int max_running, const char *binary) {
     struct scheduler_config config = {
         .data_dir = d->dir, .worker_binary = binary, .max_running = max_running, .thread_count = 4,
-        .checkpoint_interval_sec = 60, .stop_grace_sec = 0.2, .sandbox = false};
+        .checkpoint_interval_sec = 60, .stop_grace_sec = 0.2, .attempt_events_max = RIG_EVENTS_MAX, .sandbox = false};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));
     CHECK(pthread_create(&d->thread, NULL, run_scheduler, d) == 0);

@@ -85,6 +85,7 @@ static void test_long_message(struct progress *p, int fd) {
     CHECK_STRING(text(line, "status"), "io");
     size_t length = strlen(text(line, "message"));
     CHECK(length > 1000 && (length - 1) % 2 == 0);
+    CHECK_STRING(text(line, "message") + length - 6, " [cut]");
     cJSON_Delete(line);
     mem_free(large);
 }

@@ -74,8 +74,26 @@ static int lie(struct progress *p, const char *dir) {
     return 0;
 }
 
+/* More than is heard, and then what must be. */
+static int talk(struct progress *p, const char *dir) {
+    progress_stage(p, "refine");
+    for (int i = 0; i < 3 * RIG_EVENTS_MAX; i++) {
+        progress_metric(p, "loss", i, 0.5);
+        progress_log(p, "info", "so far so good");
+        progress_step(p, "refine", i, 1000, 1);
+    }
+    announce(p, dir, "a.txt", "a.txt", 5); /* not so large */
+    announce(p, dir, "b.txt", "b.txt", 4);
+    announce(p, dir, "a.txt", "a.txt", 4);
+    progress_step(p, "export", 7, 7, 0);
+    progress_end(p, STATUS_OK, "", "");
+    return 0;
+}
+
 static int play(const char *role, const char *dir, int attempt) {
     struct progress p = {PROGRESS_FD};
+    if (strcmp(role, "talker") == 0)
+        return talk(&p, dir);
     signal(SIGTERM, on_term);
     if (strcmp(role, "once") == 0)
         role = attempt == 1 ? "segv" : "good";
@@ -165,6 +183,12 @@ static int play_check(const char *role, const char *dir) {
     }
     mem_free(files);
     mem_free(room);
+    if (strcmp(role, "ruin") == 0) {
+        for (int i = 0; i < 1005; i++)
+            progress_problem(&p, "images/1.png", "is truncated", NULL);
+        progress_end(&p, STATUS_INPUT, "1005 problems", "");
+        return PROGRESS_EXIT_INPUT;
+    }
     if (strcmp(role, "bad") == 0) {
         progress_problem(&p, "mesh.ply", "face 3 has no area", NULL);
         progress_problem(&p, "images/1.png", "is truncated", "copy it again");
@@ -193,6 +217,46 @@ static void tally_one(void *user, int64_t id, int64_t at_ms, int attempt, const 
     static const char *const daemons[] = {"\"type\"", "\"job\"", "\"attempt\"", "\"at\"", "\"snapshot\""};
     for (size_t i = 0; i < sizeof daemons / sizeof *daemons; i++)
         CHECK_THAT(strstr(data, daemons[i]) == NULL, "%s", data);
+}
+
+static void tally_talk(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
+    struct tally *t = user;
+    (void)id, (void)at_ms, (void)attempt;
+    t->metric += strcmp(type, EVENT_METRIC) == 0;
+    t->log += strcmp(type, EVENT_LOG) == 0 && strstr(data, "has reported 100 events: from here on") != NULL;
+    t->output += strcmp(type, EVENT_OUTPUT) == 0;
+}
+
+/* What is too much is left out, and one event says so; outputs and the newest progress are not. */
+static void check_talker(struct daemon *d) {
+    struct tally t = {0};
+    struct output_row *rows;
+    struct job job;
+    size_t count;
+    int64_t id = submit(d, SCENE_A, "talker");
+    expect(d, id, JOB_SUCCEEDED, 1, "", "");
+    OK(store_event_list(d->store, id, 0, 100000, tally_talk, &t, &err));
+    CHECK_THAT(t.log == 1 && t.metric > 10 && t.metric < RIG_EVENTS_MAX && t.output == 2, "%d, %d, %d", t.log, t.metric, t.output);
+    OK(store_output_list(d->store, id, &rows, &count, &err));
+    CHECK_THAT(count == 2, "%zu outputs", count);
+    for (size_t i = 0; i < count; i++)
+        output_row_release(&rows[i]);
+    mem_free(rows);
+    OK(store_job_get(d->store, id, &job, &err));
+    CHECK_STRING(job.stage, "export");
+    CHECK_NEAR(job.progress, 1.0, 1e-9);
+    job_release(&job);
+}
+
+/* So with the problems of a scene. */
+static void check_ruin(struct daemon *d) {
+    static const char id[] = "1111111111111111111111111111111111111111111111111111111111111111";
+    struct scene_row row;
+    add_scene(d, id, "ruin");
+    CHECK(wait_for_scene(d, id, SCENE_REJECTED));
+    OK(store_scene_get(d->store, id, &row, &err));
+    CHECK(strstr(row.problems, "\"5 more problems are not listed\"") != NULL);
+    scene_row_release(&row);
 }
 
 static void check_whole_life(struct daemon *d, int64_t id, int states) {
@@ -275,6 +339,8 @@ static void test_outcomes(struct daemon *d) {
     if (early)
         expect(d, early, JOB_FAILED, 1, "was rejected", "problems");
 
+    check_talker(d);
+    check_ruin(d);
     int64_t good = submit(d, SCENE_A, "good"), once = submit(d, SCENE_A, "once");
     int64_t segv = submit(d, SCENE_A, "segv"), liar = submit(d, SCENE_A, "liar");
     int64_t input = submit(d, SCENE_A, "input"), full = submit(d, SCENE_A, "full");
