@@ -39,6 +39,8 @@ static const struct option table[] = {
     TEXT(log_level, "info", "error, warning, info or debug; the log goes to stderr."),
     TEXT(log_format, "text", "text, logfmt or json: how a line of the log is written."),
     INT(max_running, "jobs", 1, 64, "1", "Jobs that run at the same time."),
+    INT(max_checks, "scenes", 1, 64, "2",
+        "Scenes that are checked at the same time; of one user one fewer, where there are several."),
     INT(threads, "threads", 0, 1024, "0", "Threads shared by the running jobs. 0: one a processor."),
     INT(max_attempts, "attempts", 1, 100, "3", "Crashes after which a job is given up."),
     INT(queue_limit, "jobs", 1, 1000000, "1000", "Jobs that may wait; more are refused with 429."),

@@ -104,6 +104,7 @@ static struct scheduler_config scheduler_options(const struct config *c) {
         .worker_binary = "/proc/self/exe",
         .max_running = (int)c->max_running,
         .user_max_running = (int)c->user_max_running,
+        .max_checks = (int)c->max_checks,
         .thread_count = (int)c->threads,
         .user_max_bytes = (uint64_t)c->user_max_mib << 20,
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,

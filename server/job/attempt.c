@@ -184,9 +184,10 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
 }
 
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
-                                const char *scene_id, int thread_count, struct error *err) {
+                                const struct unchecked *scene, int thread_count, struct error *err) {
     struct error why = {0};
-    *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1},
+    const char *scene_id = scene->id;
+    *a = (struct attempt){.owner_id = scene->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
                           .dir = scene_dir(config, scene_id), .user_max_bytes = config->user_max_bytes, .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);

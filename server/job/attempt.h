@@ -22,7 +22,7 @@ enum attempt_phase { ATTEMPT_EMPTY, ATTEMPT_ALIVE, ATTEMPT_ENDED };
 struct attempt {
     enum attempt_phase phase;
     int64_t job_id;               /* 0: the check of a scene */
-    int64_t owner_id;             /* whose job it is */
+    int64_t owner_id;             /* whose job or scene it is */
     double charged_sec;           /* CPU time that was entered for that user */
     int number;                   /* fences what is entered for the job */
     char scene_id[SCENE_ID_SIZE];
@@ -59,7 +59,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
                               int thread_count, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
-                                const char *scene_id, int thread_count, struct error *err);
+                                const struct unchecked *scene, int thread_count, struct error *err);
 
 /* Enters the CPU time since the last call for the job's owner. Where the store fails, it keeps it and enters
  * it later. */

@@ -4,8 +4,8 @@
  * until a worker says something, ends, must be killed, or somebody calls. While nothing happens
  * it does not wake up.
  *
- * Slots 0 .. max_running - 1 run jobs, the last one checks scenes: a check is short and must not
- * wait behind hours of work. */
+ * Slots 0 .. max_running - 1 run jobs, the others check scenes: a check is short and must not
+ * wait behind hours of work, nor behind another user's checks: checks.c. */
 #include "server/job/scheduler.h"
 
 #include <errno.h>
@@ -22,6 +22,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/job/attempt.h"
+#include "server/job/checks.h"
 #include "server/job/delivery.h"
 #include "server/job/disk.h"
 #include "server/job/hearing.h"
@@ -42,8 +43,9 @@ struct scheduler {
     atomic_int running;
     struct figures figures;
     atomic_ulong rounds;
-    size_t slot_count;
-    struct attempt *slot; /* [slot_count] */
+    size_t job_slots, slot_count;
+    struct attempt *slot; /* [slot_count]; the first job_slots are of jobs */
+    struct checks checks;
     bool must_retry;      /* something failed that may work later */
     double housekeeping_at; /* as clock_sec */
     struct disk_watch disk;
@@ -69,7 +71,8 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
         cpu_set_t set;
         s->config.thread_count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
     }
-    s->slot_count = (size_t)(config->max_running > 0 ? config->max_running : 1) + 1;
+    s->job_slots = (size_t)(config->max_running > 0 ? config->max_running : 1);
+    s->slot_count = s->job_slots + (size_t)(config->max_checks > 0 ? config->max_checks : CHECKS_AT_ONCE);
     s->slot = mem_calloc(s->slot_count, sizeof *s->slot);
     for (size_t i = 0; i < DELIVERIES; i++)
         s->delivery[i].worker = (struct worker){.pid_fd = -1, .pipe_fd = -1};
@@ -122,7 +125,7 @@ static void retry_later(struct scheduler *s, const char *what, const struct erro
  * what it was started with, so the shares are fair, not exact. */
 static int thread_share(struct scheduler *s) {
     struct store_counts counts;
-    int64_t limit = (int64_t)s->slot_count - 1, sharing = 1;
+    int64_t limit = (int64_t)s->job_slots, sharing = 1;
     if (store_count(s->store, &counts, NULL) == STATUS_OK)
         sharing = counts.jobs_by_state[JOB_QUEUED] + counts.jobs_by_state[JOB_RUNNING];
     sharing = sharing < 1 ? 1 : sharing > limit ? limit : sharing;
@@ -144,7 +147,7 @@ static void charge_all(struct scheduler *s) {
 static void start_jobs(struct scheduler *s) {
     if (s->disk.is_low)
         return;
-    for (size_t i = 0; i + 1 < s->slot_count; i++) {
+    for (size_t i = 0; i < s->job_slots; i++) {
         struct error err;
         /* A job that came to nothing has left the queue: look at the next one. */
         while (s->slot[i].phase == ATTEMPT_EMPTY) {
@@ -187,20 +190,19 @@ static enum status check_again(struct scheduler *s, struct error *err) {
     return status;
 }
 
-static void start_check(struct scheduler *s) {
-    struct attempt *slot = &s->slot[s->slot_count - 1];
-    char id[SCENE_ID_SIZE];
+static void start_checks(struct scheduler *s) {
+    struct attempt *slots = s->slot + s->job_slots;
     struct error err;
-    if (slot->phase != ATTEMPT_EMPTY)
-        return;
     enum status status = check_again(s, &err);
-    if (status == STATUS_OK)
-        status = store_scene_next_unchecked(s->store, id, &err);
-    if (status == STATUS_NOT_FOUND)
-        return;
-    if (status == STATUS_OK)
-        status = attempt_start_check(slot, &s->config, id, s->config.thread_count, &err);
-    if (status != STATUS_OK)
+    for (size_t i = 0; i < s->slot_count - s->job_slots && status == STATUS_OK; i++) {
+        struct unchecked next;
+        if (slots[i].phase != ATTEMPT_EMPTY)
+            continue;
+        status = checks_next(&s->checks, s->store, slots, s->slot_count - s->job_slots, &next, &err);
+        if (status == STATUS_OK)
+            status = attempt_start_check(&slots[i], &s->config, &next, s->config.thread_count, &err);
+    }
+    if (status != STATUS_OK && status != STATUS_NOT_FOUND)
         retry_later(s, "cannot check a scene", &err);
 }
 
@@ -251,7 +253,7 @@ static void follow_wishes(struct scheduler *s) {
     }
     for (size_t i = 0; i < count; i++) {
         struct attempt *a = NULL;
-        for (size_t k = 0; k + 1 < s->slot_count && !a; k++)
+        for (size_t k = 0; k < s->job_slots && !a; k++)
             if (s->slot[k].phase != ATTEMPT_EMPTY && s->slot[k].job_id == ids[i])
                 a = &s->slot[k];
         if (!a)
@@ -277,7 +279,7 @@ static void watch_disk(struct scheduler *s) {
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
-    for (size_t i = 0; s->disk.is_low && i + 1 < s->slot_count; i++)
+    for (size_t i = 0; s->disk.is_low && i < s->job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
     if (store_job_explain(s->store, s->disk.is_low ? s->disk.reason : "", DISK_REASON,
                           s->disk.is_low ? DISK_HINT : "", &err) != STATUS_OK)
@@ -346,7 +348,7 @@ static void listen_and_settle(struct scheduler *s) {
         struct attempt *a = &s->slot[i];
         struct error err;
         hearing_listen(a, s->store, &s->figures);
-        bool is_postponed = i + 1 == s->slot_count && outcome_lacks_room(a);
+        bool is_postponed = i >= s->job_slots && outcome_lacks_room(a);
         if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, &s->figures, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)
@@ -418,7 +420,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err) {
                 break;
         } else {
             watch_disk(s);
-            start_check(s);
+            start_checks(s);
             start_jobs(s);
             keep_house(s);
             deliver(s);

@@ -10,6 +10,7 @@ struct scheduler_config {
     const char *worker_binary;      /* /proc/self/exe */
     int max_running;                /* jobs at once */
     int user_max_running;           /* of them, of one user; 0: all */
+    int max_checks;                 /* of scenes, at once; 0: CHECKS_AT_ONCE */
     int thread_count;               /* shared between running jobs; 0: all processors */
     uint64_t user_max_bytes;        /* that one user keeps; 0: no limit */
     uint64_t worker_memory_bytes;   /* 0: no limit */

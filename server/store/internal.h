@@ -17,6 +17,7 @@ struct reserve {
     int64_t wal_frames;  /* that the log holds */
     int64_t wal_bytes;   /* that it has space for */
     int64_t page_count;  /* that the database file has space for */
+    int64_t pages_used;  /* by the database, with the present transaction */
 };
 
 struct store {
@@ -80,10 +81,12 @@ int64_t store_now_ms(void); /* Unix time */
 /* users.c, while the store is opened: sets has_users. */
 enum status store_look_for_users(struct store *store, struct error *err);
 
-/* reserve.c, under the mutex. After the database was opened. What cannot be had now is tried again after each commit. */
-void reserve_open(struct store *store, const char *dir);
-void reserve_close(struct store *store); /* after the database was closed */
-void reserve_keep(struct store *store);  /* after a commit */
+/* reserve.c, under the mutex. After the database was opened; after it was closed. */
+enum status reserve_open(struct store *store, const char *dir, struct error *err);
+void reserve_close(struct store *store);
+/* Before a commit; after it. What cannot be had is tried again after the next. */
+enum status reserve_look(struct store *store, struct error *err);
+void reserve_keep(struct store *store);
 /* Before an ordinary transaction: STATUS_NO_SPACE while it is tight. */
 enum status reserve_check(struct store *store, struct error *err);
 

@@ -78,11 +78,9 @@ static bool extend_wal(struct store *store) {
 /* The same for the database file, which a checkpoint writes to. */
 static bool extend_database(struct store *store) {
     struct reserve *r = &store->reserve;
-    int64_t pages = 0;
-    if (sql_int(&store->sql, 0, &pages, NULL, "PRAGMA page_count", "") != STATUS_OK ||
-        pages + SPARE_PAGES <= r->page_count)
+    int64_t pages = r->pages_used + SPARE_PAGES;
+    if (pages <= r->page_count)
         return true;
-    pages += SPARE_PAGES;
     int64_t bytes = pages * r->page_bytes;
     errno = 0;
     int code = sqlite3_file_control(store->sql.db, "main", SQLITE_FCNTL_SIZE_HINT, &bytes);
@@ -93,6 +91,10 @@ static bool extend_database(struct store *store) {
     /* SQLite does not hand the reason on. */
     uint64_t room = 0;
     return !(is_full(errno) || (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)CUSHION_BYTES));
+}
+
+enum status reserve_look(struct store *store, struct error *err) {
+    return sql_int(&store->sql, 0, &store->reserve.pages_used, err, "PRAGMA page_count", "");
 }
 
 void reserve_keep(struct store *store) {
@@ -114,17 +116,18 @@ enum status reserve_check(struct store *store, struct error *err) {
     return error_hint(err, "Free some space on the disk that holds the file: cancel or delete jobs, delete scenes.");
 }
 
-void reserve_open(struct store *store, const char *dir) {
+enum status reserve_open(struct store *store, const char *dir, struct error *err) {
     struct reserve *r = &store->reserve;
-    int64_t page_bytes = 0;
+    int64_t page_bytes;
     int chunk = CHUNK_BYTES;
     r->dir = mem_strdup(dir);
-    if (sql_int(&store->sql, 4096, &page_bytes, NULL, "PRAGMA page_size", "") != STATUS_OK)
-        page_bytes = 4096;
+    enum status status = sql_int(&store->sql, 0, &page_bytes, err, "PRAGMA page_size", "");
+    if (status != STATUS_OK)
+        return status;
     r->page_bytes = (int)page_bytes;
     sqlite3_file_control(store->sql.db, "main", SQLITE_FCNTL_CHUNK_SIZE, &chunk);
     sqlite3_wal_hook(store->sql.db, committed, r);
-    reserve_keep(store);
+    return STATUS_OK;
 }
 
 void reserve_close(struct store *store) {

@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/json.h"
 #include "common/mem.h"
 #include "server/store/internal.h"
 #include "server/store/store.h"
@@ -322,21 +323,34 @@ enum status store_scene_delete(struct store *store, const char *id, int64_t owne
     return status;
 }
 
-enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
-                                       struct error *err) {
+enum status store_scene_unchecked(struct store *store, const struct unchecked *skip, size_t skip_count, size_t limit,
+                                  struct unchecked *list, size_t *count, struct error *err) {
     sqlite3_stmt *stmt;
-    bool found = false;
+    cJSON *ids = cJSON_CreateArray();
+    for (size_t i = 0; i < skip_count; i++)
+        cJSON_AddItemToArray(ids, cJSON_CreateString(skip[i].id));
+    char *skipped = json_text(ids);
+    *count = 0;
     store_lock(store);
-    enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT id FROM scenes WHERE state = ? AND problems = '[]'"
-                                   " ORDER BY created_ms, id LIMIT 1",
-                                   "n", (int)SCENE_CHECKING);
-    if (found) {
-        snprintf(id, SCENE_ID_SIZE, "%s", sql_text(stmt, 0));
-        sqlite3_reset(stmt);
+    /* The other columns are those of the row that has the minimum: sqlite.org/lang_select.html, 3.2 */
+    enum status status = sql_query(&store->sql, &stmt, err,
+                                   "SELECT id, owner, min(created_ms) AS oldest FROM (SELECT id, created_ms,"
+                                   " ifnull((SELECT user_id FROM scene_owners WHERE scene_id = scenes.id"
+                                   "  ORDER BY created_ms, user_id LIMIT 1), 0) AS owner FROM scenes"
+                                   "  WHERE state = ? AND problems = '[]' AND id NOT IN (SELECT value FROM json_each(?)))"
+                                   " GROUP BY owner ORDER BY oldest, id LIMIT ?",
+                                   "nti", (int)SCENE_CHECKING, skipped, (int64_t)limit);
+    bool row = status == STATUS_OK;
+    while (row) {
+        status = sql_step(&store->sql, stmt, &row, err);
+        if (!row)
+            break;
+        struct unchecked *u = &list[(*count)++];
+        snprintf(u->id, sizeof u->id, "%s", sql_text(stmt, 0));
+        u->owner_id = sqlite3_column_int64(stmt, 1);
     }
     store_unlock(store);
-    return status == STATUS_OK && !found
-               ? error_set(err, STATUS_NOT_FOUND, "no scene waits to be checked")
-               : status;
+    mem_free(skipped);
+    cJSON_Delete(ids);
+    return status;
 }

@@ -78,7 +78,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = sql_script(&store->sql, "PRAGMA secure_delete=FAST", err);
     if (status == STATUS_OK)
-        reserve_open(store, dir);
+        status = reserve_open(store, dir, err);
     if (status == STATUS_OK)
         status = file_sync_parent(path, err); /* a new file's name is on disk too */
     mem_free(path);

@@ -108,9 +108,14 @@ enum status store_scene_patch(struct store *store, const struct caller *who, con
  * dry run changes nothing. */
 enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
                                bool *is_gone, struct error *err);
-/* The oldest scene in `checking` that does not wait for room; STATUS_NOT_FOUND when there is none. */
-enum status store_scene_next_unchecked(struct store *store, char id[SCENE_ID_SIZE],
-                                       struct error *err);
+/* Scenes in `checking` that do not wait for room: of each user the oldest, except those of skip[skip_count].
+ * list[limit] out, the oldest first. A scene of several users is here the first one's. */
+struct unchecked {
+    char id[SCENE_ID_SIZE];
+    int64_t owner_id; /* 0: nobody */
+};
+enum status store_scene_unchecked(struct store *store, const struct unchecked *skip, size_t skip_count, size_t limit,
+                                  struct unchecked *list, size_t *count, struct error *err);
 /* A check that found too little room, as `problems` says: the scene stays in `checking`, can be removed
  * while it waits, and is no next one before store_scene_check_again, which makes all of them so. */
 enum status store_scene_postpone(struct store *store, const char *id, const char *problems,

@@ -37,6 +37,8 @@ enum status store_begin_freeing(struct store *store, struct error *err) {
 
 enum status store_end(struct store *store, enum status status, int64_t changed_job,
                       struct error *err) {
+    if (status == STATUS_OK)
+        status = reserve_look(store, err);
     status = sql_end(&store->sql, status, err);
     if (status == STATUS_OK)
         reserve_keep(store);

@@ -138,16 +138,20 @@ static inline void daemon_stop(struct daemon *d) {
     store_close(d->store);
 }
 
-static inline void add_scene(struct daemon *d, const char *id, const char *role) {
+static inline void add_scene_of(struct daemon *d, const char *id, const char *role, int64_t owner) {
     bool existed;
     char *path = mem_printf("%s/scenes/%s/archive", d->dir, id);
     char *dir = mem_printf("%s/scenes/%s", d->dir, id);
     OK(file_make_dirs(dir, &err));
     OK(file_replace(path, role, strlen(role), &err));
-    OK(store_scene_add(d->store, id, "scene", strlen(role), 0, &existed, &err));
+    OK(store_scene_add(d->store, id, "scene", strlen(role), owner, &existed, &err));
     scheduler_wake(d->scheduler);
     mem_free(path);
     mem_free(dir);
+}
+
+static inline void add_scene(struct daemon *d, const char *id, const char *role) {
+    add_scene_of(d, id, role, 0);
 }
 
 /* 0 when the store refuses because the scene has been rejected by now. */

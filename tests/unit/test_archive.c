@@ -239,6 +239,11 @@ static void test_limits(void) {
     static const struct item items[] = {{"a", 'f', "12345"}, {"b", 'f', "67890"}, {"c", 'f', "x"}};
     char *path = pack("limits.tar", TAR, items, 3);
     refuse("limits.tar", path, &(struct archive_limits){2, 1000, 100.0}, STATUS_LIMIT, "more than 2 files");
+    /* By the headers, before anything is made: there is no place for it here. */
+    struct error err;
+    static const struct archive_limits two = {2, 1000, 100.0};
+    CHECK(archive_unpack(path, "limits.tar", "/nowhere/at/all", &two, &err) == STATUS_LIMIT);
+    CHECK_THAT(strstr(err.message, "more than 2 files"), "%s", err.message);
     refuse("limits.tar", path, &(struct archive_limits){9, 9, 100.0}, STATUS_LIMIT, "more than 9 bytes");
     refuse("limits.tar", path, &(struct archive_limits){9, 4, 100.0}, STATUS_LIMIT, "says it is 5 bytes");
     mem_free(path);

@@ -156,6 +156,12 @@ static enum scene_state scene_state(const char *id) {
     return state;
 }
 
+static const struct unchecked *unchecked(const char *id) {
+    static struct unchecked scene;
+    snprintf(scene.id, sizeof scene.id, "%s", id);
+    return &scene;
+}
+
 static bool check_once(bool is_sql, long n, bool stays) {
     static long number;
     char id[SCENE_ID_SIZE];
@@ -165,12 +171,12 @@ static bool check_once(bool is_sql, long n, bool stays) {
     snprintf(id, sizeof id, "%08lx%.56s", ++number, SCENE_A);
     add_scene(id);
     strike(is_sql, n, stays);
-    enum status status = attempt_start_check(&a, &config, id, 1, n % 3 ? &why : NULL);
+    enum status status = attempt_start_check(&a, &config, unchecked(id), 1, n % 3 ? &why : NULL);
     bool struck = lift();
     if (status != STATUS_OK) {
         CHECK_THAT(struck && !has_child() && count_descriptors() == before, "call %ld: something is left", n);
         CHECK((n % 3 == 0 || *why.message) && scene_state(id) == SCENE_CHECKING);
-        OK(attempt_start_check(&a, &config, id, 1, &err));
+        OK(attempt_start_check(&a, &config, unchecked(id), 1, &err));
     }
     hear_to_the_end(&a);
     strike(is_sql, n, stays);
@@ -279,7 +285,7 @@ static void check_unpacked(void) {
         snprintf(id, sizeof id, "ffff%04x%.56s", (unsigned)i, SCENE_A);
         add_scene(id);
         char *files = mem_printf("%s/scenes/%s/files", dir, id);
-        OK(attempt_start_check(&a, &config, id, 1, &err));
+        OK(attempt_start_check(&a, &config, unchecked(id), 1, &err));
         hear_to_the_end(&a);
         if (i == 0)
             strike_system("unlinkat", 1, true);

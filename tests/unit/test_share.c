@@ -114,6 +114,12 @@ static bool run_job(int64_t id, uint64_t limit) {
     return true;
 }
 
+static const struct unchecked *unchecked(const char *id) {
+    static struct unchecked scene;
+    snprintf(scene.id, sizeof scene.id, "%s", id);
+    return &scene;
+}
+
 /* Sends an archive of 16 KiB and checks it; then it belongs to `second`, too, before it is checked (-1: to nobody else). */
 static void check_scene(const char *id, int64_t owner, int64_t second, uint64_t limit, struct scene_row *row) {
     const struct scheduler_config with = limited(limit);
@@ -125,7 +131,7 @@ static void check_scene(const char *id, int64_t owner, int64_t second, uint64_t 
     OK(store_scene_add(store, id, "scene", 16 * KIB, owner, &existed, &err));
     if (second >= 0)
         OK(store_scene_add(store, id, "scene", 16 * KIB, second, &existed, &err));
-    OK(attempt_start_check(&a, &with, id, 1, &err));
+    OK(attempt_start_check(&a, &with, unchecked(id), 1, &err));
     settle(&a);
     OK(store_scene_get(store, id, row, &err));
     mem_free(folder);

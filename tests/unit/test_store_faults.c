@@ -33,8 +33,9 @@ static enum status add_other_scene(void) {
     return store_scene_add(store, SCENE_B, "other", 10, 0, &existed, &err);
 }
 static enum status next_unchecked(void) {
-    char id[SCENE_ID_SIZE];
-    return store_scene_next_unchecked(store, id, &err);
+    struct unchecked one;
+    size_t count;
+    return store_scene_unchecked(store, NULL, 0, 1, &one, &count, &err);
 }
 static enum status postpone(void) { return store_scene_postpone(store, SCENE_A, "[{\"file\":\"a\"}]", &err); }
 static enum status check_again(void) { return store_scene_check_again(store, &err); }
