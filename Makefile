@@ -50,7 +50,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
 .PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms paper chaos soak asan tsan asan-build tsan-build fuzz \
-        fuzzers fuzz-build coverage coverage-build install clean
+        fuzzers fuzz-build portable coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -200,6 +200,10 @@ coverage: deps ## run the tests and say what share of the code they reach; write
 	@deploy/install-deps.sh coverage
 	@+$(BUILD) coverage-build
 	@tests/coverage.sh build/coverage "$(T)"
+
+portable: deps ## build and check on the next Debian (trixie), in a throw-away root under build/portable; needs root
+	@deploy/install-deps.sh portable
+	@tests/portable.sh $(B)
 
 # Counts are written when a process ends, and (as fork and execv are the compiler's in GNU C) before it becomes
 # another program. Threads may lose some, which does not matter: a line that ran is not 0.

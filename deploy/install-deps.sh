@@ -7,19 +7,42 @@
 # is said and the exit status is still 0.
 set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
-libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev libcurl4-openssl-dev libseccomp-dev
+libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev|libjpeg-dev libcurl4-openssl-dev libseccomp-dev
 zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
-fuzz_packages="clang libclang-rt-14-dev"
+fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 coverage_packages="gcovr"
+portable_packages="mmdebstrap"
 room_packages="libllvm19 python3-venv sweethome3d-furniture"
 bench_packages="libllvm19 python3-venv libmeshoptimizer-dev"
 
-# install PACKAGE...: those that are missing
+is_installed() {
+    [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null || true)" = installed ]
+}
+
+# any_installed A|B...: whether one of the names that a package has in different releases is
+any_installed() {
+    for name in $(echo "$1" | tr '|' ' '); do
+        if is_installed "$name"; then return 0; fi
+    done
+    return 1
+}
+
+# choose A|B...: the first that this release has, or A
+choose() {
+    for name in $(echo "$1" | tr '|' ' '); do
+        if apt-cache show "$name" >/dev/null 2>&1; then
+            echo "$name"
+            return
+        fi
+    done
+    echo "${1%%|*}"
+}
+
+# install PACKAGE...: those that are missing; A|B: whichever of the two names this release has
 install() {
     missing=""
     for package in "$@"; do
-        state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
-        [ "$state" = installed ] || missing="$missing $package"
+        any_installed "$package" || missing="$missing $package"
     done
     [ -n "$missing" ] || return 0
 
@@ -33,9 +56,13 @@ install() {
         run="sudo"
     fi
     $run apt-get update -qq || return 1
+    chosen=""
+    for package in $missing; do
+        chosen="$chosen $(choose "$package")"
+    done
     # shellcheck disable=SC2086
     $run env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-        $missing >/dev/null
+        $chosen >/dev/null
 }
 
 # shellcheck disable=SC2086
@@ -44,6 +71,7 @@ install $packages
 case ${1:-} in
 fuzz) install $fuzz_packages ;;
 coverage) install $coverage_packages ;;
+portable) install $portable_packages ;;
 rooms) install $room_packages ;;
 esac
 if [ "${1:-}" = bench ]; then

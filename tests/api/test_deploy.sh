@@ -10,7 +10,7 @@ failures=0
 fail() { echo "$*"; failures=$((failures + 1)); }
 
 # --- every library that a build needs is named wherever a build is described ---
-libraries=$(sed -n '/^packages="/,/"$/p' deploy/install-deps.sh | grep -o '[a-z0-9.+-]*-dev\b' | grep -v '^libc6-dev$')
+libraries=$(sed -n '/^packages="/,/"$/p' deploy/install-deps.sh | tr ' ' '\n' | sed 's/|.*//' | grep -o '[a-z0-9.+-]*-dev\b' | grep -v '^libc6-dev$')
 [ "$(wc -w <<<"$libraries")" -gt 8 ] || fail "install-deps.sh names only: $libraries"
 for library in $libraries; do
     name=${library/62-turbo/} # the package has it by its virtual name
