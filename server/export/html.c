@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "common/base64.h"
 #include "common/file.h"
 #include "common/mem.h"
 
@@ -70,21 +71,6 @@ void html_value(struct buf *out, const cJSON *value) {
     }
 }
 
-static void put_base64(struct buf *out, const unsigned char *data, size_t length) {
-    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < length; i += 3) {
-        uint32_t word = (uint32_t)data[i] << 16;
-        if (i + 1 < length)
-            word |= (uint32_t)data[i + 1] << 8;
-        if (i + 2 < length)
-            word |= data[i + 2];
-        char four[4] = {digit[word >> 18], digit[word >> 12 & 63],
-                        i + 1 < length ? digit[word >> 6 & 63] : '=',
-                        i + 2 < length ? digit[word & 63] : '='};
-        buf_append(out, four, 4);
-    }
-}
-
 enum status html_picture(struct buf *out, const char *path, const char *title, struct error *err) {
     struct buf file;
     buf_init(&file, PICTURE_LIMIT);
@@ -93,7 +79,7 @@ enum status html_picture(struct buf *out, const char *path, const char *title, s
         buf_puts(out, "<img alt=\"");
         html_text(out, title);
         buf_puts(out, "\" src=\"data:image/png;base64,");
-        put_base64(out, (const unsigned char *)file.data, file.length);
+        base64_append(out, file.data, file.length);
         buf_puts(out, "\">");
     }
     buf_release(&file);

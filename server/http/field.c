@@ -6,6 +6,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "common/base64.h"
+
 static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
@@ -101,33 +103,6 @@ enum field_range field_range(const char *range, uint64_t size, uint64_t *first, 
     return FIELD_RANGE_PART;
 }
 
-static const char base64_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-bool field_base64(const char *text, size_t length, void *bytes, size_t room, size_t *used) {
-    uint32_t bits = 0;
-    unsigned held = 0;
-    size_t padding = 0;
-    *used = 0;
-    while (padding < 2 && padding < length && text[length - 1 - padding] == '=')
-        padding++;
-    if (length % 4 != 0)
-        return false;
-    for (size_t i = 0; i < length - padding; i++) {
-        const char *digit = text[i] ? strchr(base64_digits, text[i]) : NULL;
-        if (!digit)
-            return false;
-        bits = bits << 6 | (uint32_t)(digit - base64_digits);
-        held += 6;
-        if (held < 8)
-            continue;
-        held -= 8;
-        if (*used == room)
-            return false;
-        ((uint8_t *)bytes)[(*used)++] = (uint8_t)(bits >> held & 0xff);
-    }
-    return true;
-}
-
 bool field_digest(const char *repr_digest, char hex[65]) {
     const char *at = strstr(repr_digest, "sha-256=:");
     if (!at || (at > repr_digest && !strchr(" ,\t", at[-1])))
@@ -135,28 +110,28 @@ bool field_digest(const char *repr_digest, char hex[65]) {
     at += 9;
     uint8_t bytes[32];
     size_t length = strcspn(at, ":"), used;
-    if (at[length] != ':' || !field_base64(at, length, bytes, sizeof bytes, &used) || used != sizeof bytes)
+    if (at[length] != ':' || !base64_decode(at, length, bytes, sizeof bytes, &used) || used != sizeof bytes)
         return false;
     for (size_t i = 0; i < sizeof bytes; i++)
         snprintf(hex + 2 * i, 3, "%02x", bytes[i]);
     return true;
 }
 
+static unsigned hex_value(char c) {
+    return (unsigned)(is_digit(c) ? c - '0' : c - 'a' + 10);
+}
+
 void field_digest_format(const char *hex, char text[64]) {
-    char *out = text + sprintf(text, "sha-256=:");
-    uint32_t bits = 0;
-    unsigned held = 0;
-    for (size_t i = 0; i < 64; i++) {
-        char c = hex[i];
-        bits = bits << 4 | (uint32_t)(is_digit(c) ? c - '0' : c - 'a' + 10);
-        held += 4;
-        if (held >= 6) {
-            held -= 6;
-            *out++ = base64_digits[bits >> held & 63];
-        }
-    }
-    *out++ = base64_digits[bits << (6 - held) & 63];
-    memcpy(out, "=:", 3);
+    uint8_t bytes[32];
+    struct buf value;
+    buf_init(&value, 64);
+    for (size_t i = 0; i < sizeof bytes; i++)
+        bytes[i] = (uint8_t)(hex_value(hex[2 * i]) << 4 | hex_value(hex[2 * i + 1]));
+    buf_puts(&value, "sha-256=:");
+    base64_append(&value, bytes, sizeof bytes);
+    buf_puts(&value, ":");
+    snprintf(text, 64, "%s", buf_text(&value));
+    buf_release(&value);
 }
 
 bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *value) {

@@ -30,10 +30,6 @@ bool field_digest(const char *repr_digest, char hex[65]);
 /* The other way round; `text` holds at least 64 characters. */
 void field_digest_format(const char *hex, char text[64]);
 
-/* Decodes base64 (RFC 4648, section 4, with its padding) of `length` characters. At most `room`
- * bytes go to `bytes`; false when it is broken or longer. */
-bool field_base64(const char *text, size_t length, void *bytes, size_t room, size_t *used);
-
 /* A decimal number of [minimum, maximum] and nothing else. */
 bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *value);
 

@@ -9,6 +9,7 @@
 #include <strings.h>
 #include <time.h>
 
+#include "common/base64.h"
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "common/sha1.h"
@@ -111,7 +112,7 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
                       size_t value_length) {
     char bytes[METADATA_MAX + 1];
     size_t used;
-    if (!field_base64(value, value_length, bytes, METADATA_MAX, &used))
+    if (!base64_decode(value, value_length, bytes, METADATA_MAX, &used))
         return false;
     bytes[used] = '\0';
     bool is_text = strlen(bytes) == used && utf8_valid(bytes, used, NULL);
@@ -265,7 +266,7 @@ static struct response *read_checksum(const struct request *r, struct patch *p) 
     else
         return problem(r, 400, "Upload-Checksum must be of sha1 or sha256");
     const char *value = text + name + strspn(text + name, " ");
-    if (!field_base64(value, strlen(value), p->wanted, size, &used) || used != size)
+    if (!base64_decode(value, strlen(value), p->wanted, size, &used) || used != size)
         return problem(r, 400, "Upload-Checksum is not the base64 of %zu bytes", size);
     sha1_init(&p->sha1);
     sha256_init(&p->sha256);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "common/base64.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/path.h"
@@ -54,32 +55,6 @@ static enum status split_glb(const uint8_t *data, size_t size, const char *name,
 
 /* --- buffers (3.6.1) ------------------------------------------------------------------------ */
 
-/* Decodes base64 (RFC 4648, section 4); NULL where the text is none. *size: bytes. */
-static uint8_t *decode_base64(const char *text, size_t *size) {
-    size_t length = strlen(text), used = 0;
-    uint8_t *out = mem_alloc(length / 4 * 3 + 3);
-    uint32_t bits = 0;
-    int have = 0;
-    while (length > 0 && text[length - 1] == '=')
-        length--;
-    for (size_t i = 0; i < length; i++) {
-        static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        const char *digit = strchr(digits, text[i]);
-        if (!digit) {
-            mem_free(out);
-            return NULL;
-        }
-        bits = bits << 6 | (uint32_t)(digit - digits);
-        have += 6;
-        if (have >= 8) {
-            have -= 8;
-            out[used++] = (uint8_t)(bits >> have);
-        }
-    }
-    *size = used;
-    return out;
-}
-
 /* Undoes %41 in place; what is no escape stays. */
 static void unescape(char *text) {
     char *to = text;
@@ -128,9 +103,9 @@ static enum status open_buffer(struct gltf_file *g, size_t i, const struct chunk
     if (strncmp(uri, "data:", 5) != 0)
         return open_file_buffer(g, b, uri, err);
     const char *text = strstr(uri, ";base64,");
-    if (text)
-        b->decoded = decode_base64(text + 8, &b->size);
-    if (!b->decoded)
+    size_t length = text ? strlen(text + 8) : 0;
+    b->decoded = mem_alloc(length / 4 * 3 + 3);
+    if (!text || !base64_decode(text + 8, length, b->decoded, length / 4 * 3, &b->size))
         return error_set(err, STATUS_INPUT, "%s: buffers[%zu] is a data: URI that is not base64", g->name, i);
     b->data = b->decoded;
     return STATUS_OK;
