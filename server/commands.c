@@ -10,7 +10,7 @@
 #include "server/evaluate/relight.h"
 #include "server/worker/worker.h"
 
-static const struct command table[] = {
+static const struct server_command table[] = {
     {"", "", "take scenes over HTTP and reconstruct their materials and lighting",
      "Runs in the foreground and logs to stderr. SIGTERM and SIGINT stop it: running jobs write a\n"
      "checkpoint and go back to the queue. SIGHUP reads the TLS certificate again.\n",
@@ -48,12 +48,12 @@ static const struct command table[] = {
 };
 #define COMMAND_COUNT (sizeof table / sizeof *table)
 
-const struct command *command_table(size_t *count) {
+const struct server_command *commands_table(size_t *count) {
     *count = COMMAND_COUNT;
     return table;
 }
 
-const struct command *command_find(const char *name) {
+const struct server_command *commands_find(const char *name) {
     for (size_t i = 1; i < COMMAND_COUNT; i++)
         if (strcmp(table[i].name, name) == 0)
             return &table[i];
@@ -81,7 +81,7 @@ static void print_commands_and_options(FILE *out) {
                 *options[i].unit ? " " : "", options[i].unit);
 }
 
-void command_help(const struct command *command, FILE *out) {
+void commands_help(const struct server_command *command, FILE *out) {
     bool is_daemon = command == table;
     fprintf(out, "usage: unbaked%s%s%s%s%s\n\n%s.\n", is_daemon ? "" : " ", command->name,
             *command->arguments ? " " : "", command->arguments, command->flags ? " [OPTION]..." : "",

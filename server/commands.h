@@ -7,7 +7,7 @@
 
 #include "server/invocation.h"
 
-struct command {
+struct server_command {
     const char *name;      /* "" is the daemon itself */
     const char *arguments; /* "add NAME|list|revoke WHICH"; "" if it takes none */
     const char *summary;   /* one line */
@@ -19,10 +19,10 @@ struct command {
 };
 
 /* The first is the daemon. */
-const struct command *command_table(size_t *count);
-const struct command *command_find(const char *name); /* NULL where there is none */
+const struct server_command *commands_table(size_t *count);
+const struct server_command *commands_find(const char *name); /* NULL where there is none */
 /* Of one command; of the whole program for the daemon's. */
-void command_help(const struct command *command, FILE *out);
+void commands_help(const struct server_command *command, FILE *out);
 
 /* manual.c: `unbaked manual PAGE` writes unbaked.8, unbaked.conf.5 or a completion. */
 int manual_command(int argc, char **argv);

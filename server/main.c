@@ -329,7 +329,7 @@ int daemon_command(int argc, char **argv) {
     struct invocation in;
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
     if (code < 0 && in.word_count > 0) {
-        if (command_find(in.words[0]))
+        if (commands_find(in.words[0]))
             fprintf(stderr, "unbaked: a command goes before its options: unbaked %s ...\n", in.words[0]);
         else
             fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
@@ -349,13 +349,13 @@ int daemon_command(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
-    const struct command *command = argc > 1 ? command_find(argv[1]) : NULL;
+    const struct server_command *command = argc > 1 ? commands_find(argv[1]) : NULL;
     int words = command ? 1 : 0; /* that name the command */
     if (!command)
-        command = command_table(&(size_t){0});
+        command = commands_table(&(size_t){0});
     int code = command->run(argc - words, argv + words);
     if (code != COMMAND_HELP && code != COMMAND_MISUSED)
         return code;
-    command_help(command, code == COMMAND_HELP ? stdout : stderr);
+    commands_help(command, code == COMMAND_HELP ? stdout : stderr);
     return code == COMMAND_HELP ? EXIT_SUCCESS : EXIT_USAGE;
 }

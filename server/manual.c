@@ -14,7 +14,7 @@ static void flag_list(const struct flag *flags) {
 
 static void page_8(void) {
     size_t count;
-    const struct command *table = command_table(&count);
+    const struct server_command *table = commands_table(&count);
     manual_head(stdout, "UNBAKED", 8, "unbaked", "take the light out of scanned rooms: the daemon");
     manual_section(stdout, "SYNOPSIS");
     for (size_t i = 0; i < count; i++)
@@ -78,7 +78,7 @@ static void completion(bool zsh) {
     static const char *const actions[] = {"add", "list", "revoke", NULL};
     static const char *const roles[] = {"viewer", "user", "admin", NULL};
     size_t count, option_count;
-    const struct command *table = command_table(&count);
+    const struct server_command *table = commands_table(&count);
     const struct option *options = config_table(&option_count);
     completion_begin(stdout, "unbaked", zsh);
     for (size_t i = count; i-- > 0;) { /* the daemon, whose pattern is *, comes last */

@@ -123,8 +123,8 @@ static void step(const struct guests *all, struct guest *g, const struct glance 
         a[i][i] += POSE_DAMPING * a[i][i] + prior;
         b[i] -= prior * g->frame.total[i];
     }
-    pose_factorise(a);
-    pose_substitute((const double(*)[POSE_UNKNOWNS])a, b);
+    pose_factor(a);
+    cholesky_solve(POSE_UNKNOWNS, POSE_UNKNOWNS, &a[0][0], b);
     pose_twist(&g->frame, b, POSE_STEP_PX * (1 << all->level) / (double)g->pyramid.scale);
 }
 

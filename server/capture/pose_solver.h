@@ -13,9 +13,11 @@
 #ifndef UNBAKE_CAPTURE_POSE_SOLVER_H
 #define UNBAKE_CAPTURE_POSE_SOLVER_H
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 
+#include "common/cholesky.h"
 #include "common/parallel.h"
 #include "server/capture/tracks.h"
 
@@ -90,10 +92,12 @@ void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
 /* What a frame's twist in all is held to 0 by, on the diagonal of the equations. */
 double pose_prior(const struct pose_frame *frame);
 
-/* Lower Cholesky factor of a positive matrix, in its place; and the solution of the equations that have it, in place of
- * their right side. */
-void pose_factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]);
-void pose_substitute(const double factor[POSE_UNKNOWNS][POSE_UNKNOWNS], double x[POSE_UNKNOWNS]);
+/* The lower Cholesky factor of a frame's equations in their place; pose_prior on their diagonal keeps them positive. */
+static inline void pose_factor(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
+    bool is_positive = cholesky_factor(POSE_UNKNOWNS, POSE_UNKNOWNS, &a[0][0]);
+    assert(is_positive);
+    (void)is_positive;
+}
 
 /* Solves for x: twists by which frames should move, and offsets. */
 void pose_solve(struct pose_solver *s);

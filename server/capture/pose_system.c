@@ -87,30 +87,6 @@ static void multiply(const void *user, const double *x, double *out) {
     project(s, out);
 }
 
-void pose_factorise(double a[POSE_UNKNOWNS][POSE_UNKNOWNS]) {
-    for (int i = 0; i < POSE_UNKNOWNS; i++) {
-        for (int j = 0; j <= i; j++) {
-            double sum = a[i][j];
-            for (int k = 0; k < j; k++)
-                sum -= a[i][k] * a[j][k];
-            a[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / a[j][j];
-        }
-    }
-}
-
-void pose_substitute(const double a[POSE_UNKNOWNS][POSE_UNKNOWNS], double x[POSE_UNKNOWNS]) {
-    for (int i = 0; i < POSE_UNKNOWNS; i++) {
-        for (int k = 0; k < i; k++)
-            x[i] -= a[i][k] * x[k];
-        x[i] /= a[i][i];
-    }
-    for (int i = POSE_UNKNOWNS - 1; i >= 0; i--) {
-        for (int k = i + 1; k < POSE_UNKNOWNS; k++)
-            x[i] -= a[k][i] * x[k];
-        x[i] /= a[i][i];
-    }
-}
-
 static void preconditioner_init(struct preconditioner *p, const struct pose_solver *s, double *damping) {
     p->block = mem_calloc(s->frames + 1, sizeof *p->block);
     p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
@@ -131,7 +107,7 @@ static void preconditioner_init(struct preconditioner *p, const struct pose_solv
             damping[POSE_UNKNOWNS * f + (size_t)i] = POSE_DAMPING * p->block[f][i][i];
             p->block[f][i][i] += pose_prior(&s->frame[f]) + POSE_DAMPING * p->block[f][i][i];
         }
-        pose_factorise(p->block[f]);
+        pose_factor(p->block[f]);
     }
     for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
         p->diagonal[i] += 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA);
@@ -149,7 +125,7 @@ static void precondition(const void *user, const double *r, double *z) {
     for (size_t f = 0; f < s->frames; f++) {
         double *b = z + POSE_UNKNOWNS * f;
         memcpy(b, r + POSE_UNKNOWNS * f, POSE_UNKNOWNS * sizeof *b);
-        pose_substitute((const double(*)[POSE_UNKNOWNS])p->block[f], b);
+        cholesky_solve(POSE_UNKNOWNS, POSE_UNKNOWNS, &p->block[f][0][0], b);
     }
     for (size_t i = POSE_UNKNOWNS * s->frames; i < s->unknowns; i++)
         z[i] = r[i] / p->diagonal[i];

@@ -4,33 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-bool cholesky_factor(size_t n, double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]) {
-    for (size_t i = 0; i < n; i++) {
-        double whole = a[i][i];
-        for (size_t j = 0; j <= i; j++) {
-            double sum = a[i][j];
-            for (size_t k = 0; k < j; k++)
-                sum -= a[i][k] * a[j][k];
-            if (i == j && sum <= 1e-9 * whole)
-                return false;
-            a[i][j] = i == j ? sqrt(sum) : sum / a[j][j];
-        }
-    }
-    return true;
-}
-
-void cholesky_solve(size_t n, const double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID], double *x) {
-    for (size_t i = 0; i < n; i++) {
-        for (size_t k = 0; k < i; k++)
-            x[i] -= a[i][k] * x[k];
-        x[i] /= a[i][i];
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t k = i + 1; k < n; k++)
-            x[i] -= a[k][i] * x[k];
-        x[i] /= a[i][i];
-    }
-}
+#include "common/cholesky.h"
 
 void height_frame_init(struct height_frame *f, vec3 normal, const vec3 *position, const uint32_t *vertex, size_t count) {
     vec3 first = position[vertex[0]];
@@ -75,7 +49,7 @@ double height_variance(const struct height_fit *fit, const struct height_frame *
     double term[HEIGHT_PARABOLOID], solved[HEIGHT_PARABOLOID], sum = 0.0;
     terms_at(f, at, term);
     memcpy(solved, term, sizeof solved);
-    cholesky_solve(fit->terms, fit->factor, solved);
+    cholesky_solve(fit->terms, HEIGHT_PARABOLOID, &fit->factor[0][0], solved);
     for (size_t k = 0; k < fit->terms; k++)
         sum += term[k] * solved[k];
     return sum;
@@ -95,9 +69,9 @@ bool height_fit(struct height_fit *fit, size_t terms, const struct height_frame 
                 fit->factor[r][c] += term[r] * term[c];
         }
     }
-    if (count <= terms || !cholesky_factor(terms, fit->factor))
+    if (count <= terms || !cholesky_factor(terms, HEIGHT_PARABOLOID, &fit->factor[0][0]))
         return false;
-    cholesky_solve(terms, fit->factor, fit->by);
+    cholesky_solve(terms, HEIGHT_PARABOLOID, &fit->factor[0][0], fit->by);
     for (size_t i = 0; i < count; i++) {
         vec3 at = position[vertex[i]];
         double off = height_over(f, at) - height_fitted(fit, f, at);

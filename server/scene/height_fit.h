@@ -44,9 +44,4 @@ double height_fitted(const struct height_fit *fit, const struct height_frame *f,
 /* The variance of that, over that of a vertex. */
 double height_variance(const struct height_fit *fit, const struct height_frame *f, vec3 at);
 
-/* Of a symmetric positive definite matrix, n <= HEIGHT_PARABOLOID: its lower factor in its place, false where it is
- * singular; and from the right side to the solution, in place. */
-bool cholesky_factor(size_t n, double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]);
-void cholesky_solve(size_t n, const double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID], double *x);
-
 #endif

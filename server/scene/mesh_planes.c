@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/cholesky.h"
 #include "common/mem.h"
 
 #define UNTRIED (UINT32_MAX - 1) /* part of a triangle that none has reached yet */
@@ -189,7 +190,7 @@ static struct seed *seeds_make(const struct growing *g) {
 /* --- vertices ----------------------------------------------------------------------------------- */
 
 /* Adds that the vertex at `at` lies in the plane to the normal equations of its move, a x = b. */
-static void add_plane(const struct mesh_plane *p, vec3 at, double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID], double b[3]) {
+static void add_plane(const struct mesh_plane *p, vec3 at, double a[3][3], double b[3]) {
     vec3 normal = p->frame.normal;
     double weight = 1.0 / height_variance(&p->fit, &p->frame, at), n[3] = {(double)normal.x, (double)normal.y, (double)normal.z};
     for (int r = 0; r < 3; r++) {
@@ -204,7 +205,7 @@ static vec3 place(const struct mesh_planes *planes, const struct mesh *mesh, con
     uint32_t part[PLANES_MOST];
     size_t parts = 0;
     vec3 at = mesh->position[v];
-    double a[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID] = {{0.0}}, move[3] = {0.0, 0.0, 0.0};
+    double a[3][3] = {{0.0}}, move[3] = {0.0, 0.0, 0.0};
     for (int i = 0; i < 3; i++)
         a[i][i] = 1.0 / (VERTEX_NOISE * VERTEX_NOISE);
     for (uint32_t k = f->first[v]; k < f->first[v + 1]; k++) {
@@ -217,9 +218,9 @@ static vec3 place(const struct mesh_planes *planes, const struct mesh *mesh, con
         part[parts++] = other;
         add_plane(&planes->plane[other], at, a, move);
     }
-    if (parts == 0 || !cholesky_factor(3, a))
+    if (parts == 0 || !cholesky_factor(3, 3, &a[0][0]))
         return at;
-    cholesky_solve(3, a, move);
+    cholesky_solve(3, 3, &a[0][0], move);
     return vec3_add(at, vec3_make((float)move[0], (float)move[1], (float)move[2]));
 }
 
