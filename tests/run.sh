@@ -40,16 +40,18 @@ is_wanted() { # NAME
     return 1
 }
 
-# One test: prints its line in one piece and adds its outcome to $outcomes.
+# One test: prints its line, with the seconds that it took and those of processor time, in one piece and adds its outcome
+# to $outcomes.
 run_one() {
     local name=$1
     shift
-    local log=$logs/${name//\//_}.log start=$SECONDS code text
-    timeout "${TEST_TIMEOUT:-600}" "$@" >"$log" 2>&1 </dev/null
+    local log=$logs/${name//\//_}.log code text took used TIMEFORMAT='%R %U %S'
+    { time timeout "${TEST_TIMEOUT:-600}" "$@" >"$log" 2>&1 </dev/null; } 2>"$log.time"
     code=$?
-    local took=$((SECONDS - start))
+    read -r took used < <(awk '{printf "%.0f %.0f\n", $1, $2 + $3}' "$log.time")
+    rm -f "$log.time"
     case $code in
-    0) printf -v text 'ok    %-40s %4d s\n' "$name" "$took" ;;
+    0) printf -v text 'ok    %-40s %4d s %4d s cpu\n' "$name" "$took" "$used" ;;
     77) printf -v text 'skip  %-40s %s\n' "$name" "$(tail -n 1 "$log")" ;;
     *) printf -v text 'FAIL  %-40s %4d s, exit %d\n%s\n' "$name" "$took" "$code" "$(tail -n 40 "$log" | sed 's/^/      /')" ;;
     esac
