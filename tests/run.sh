@@ -17,7 +17,7 @@ render/test_sparks_left_out render/test_sun render/test_split api/test_resume ap
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill"
 # The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
 # api/test_webhooks, of a small room, do not tell.
-slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
+slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults unit/test_outputs_read_back
 gradient/test_path render/test_calibrate_light render/test_changing_light render/test_detail
 render/test_emitters render/test_hidden_lamp render/test_sky_doubt unit/test_evaluate api/test_metrics
 api/test_http_faults api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
