@@ -22,14 +22,14 @@ ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
 EXR_CFLAGS = $(shell pkg-config --cflags OpenEXR)
 EXR_LIBS = -lOpenEXRCore
 COMMON_LIBS = -lcjson -lm
-IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -lz
+IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -llcms2 -lz
 SERVER_LIBS = -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
 CLIENT_LIBS = -lcurl -larchive $(COMMON_LIBS)
 EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/embree4/rtcore.h),-lembree4,-lembree3)
 
 COMMON_SRC = $(wildcard common/*.c)
 # The engine's libraries stay out of the client: it links only these.
-CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_codec.c common/image_read.c common/exr_%.c common/png_%.c common/jpeg.c common/hdr.c common/exif.c,$(COMMON_SRC))
+CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_codec.c common/image_read.c common/exr_%.c common/png_%.c common/jpeg.c common/hdr.c common/exif.c common/color.c common/color_icc.c,$(COMMON_SRC))
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))

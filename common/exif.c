@@ -1,12 +1,16 @@
 /* exif.c -- the few EXIF fields that a reconstruction needs (CIPA DC-008, Exif 2.32, a TIFF
  * structure: sections 4.5 and 4.6.2). Every offset is checked against the block's size; both
- * byte orders; no field is required. Only IFD0 and the Exif IFD it points to are read, so there
- * are no chains to follow in circles. */
+ * byte orders; no field is required. Only IFD0, the Exif IFD it points to and the interoperability
+ * IFD that one points to are read, so there are no chains to follow in circles. */
+#include <string.h>
+
 #include "common/image_codec.h"
 
 enum {
     TAG_ORIENTATION = 0x0112,
     TAG_EXIF_IFD = 0x8769,
+    TAG_INTEROPERABILITY_IFD = 0xa005,
+    TAG_INTEROPERABILITY_INDEX = 0x0001,
     TAG_EXPOSURE_TIME = 0x829a,
     TAG_F_NUMBER = 0x829d,
     TAG_SENSITIVITY = 0x8827,       /* PhotographicSensitivity; 65535 when it does not fit */
@@ -14,7 +18,7 @@ enum {
     TAG_STANDARD_SENSITIVITY = 0x8831,
     TAG_RECOMMENDED_INDEX = 0x8832
 };
-enum { TYPE_SHORT = 3, TYPE_LONG = 4, TYPE_RATIONAL = 5 };
+enum { TYPE_ASCII = 2, TYPE_SHORT = 3, TYPE_LONG = 4, TYPE_RATIONAL = 5 };
 
 struct block {
     const uint8_t *data;
@@ -55,10 +59,29 @@ struct sensitivity {
     double photographic, iso_speed, standard, recommended;
 };
 
-/* Reads one directory; returns the offset of the Exif IFD if it names one, else 0. */
-static size_t read_directory(const struct block *b, size_t offset, struct image_info *info,
+/* Whether the directory's InteroperabilityIndex is "R03": the picture is of Adobe RGB (DCF 2.0). */
+static bool says_adobe_rgb(const struct block *b, size_t offset) {
+    size_t count = integer_at(b, offset, 2);
+    for (size_t i = 0; i < count; i++) {
+        size_t entry = offset + 2 + 12 * i;
+        if (entry > b->size || b->size - entry < 12)
+            return false;
+        if (integer_at(b, entry, 2) == TAG_INTEROPERABILITY_INDEX && integer_at(b, entry + 2, 2) == TYPE_ASCII)
+            return memcmp(b->data + entry + 8, "R03", 4) == 0;
+    }
+    return false;
+}
+
+/* What directories point to. */
+struct next {
+    size_t exif, interoperability; /* offsets; 0: none */
+};
+
+/* Reads one directory. */
+static struct next read_directory(const struct block *b, size_t offset, struct image_info *info,
                              struct sensitivity *iso) {
-    size_t exif = 0, count = integer_at(b, offset, 2);
+    struct next next = {0, 0};
+    size_t count = integer_at(b, offset, 2);
     for (size_t i = 0; i < count; i++) {
         size_t entry = offset + 2 + 12 * i;
         if (entry > b->size || b->size - entry < 12)
@@ -71,7 +94,8 @@ static size_t read_directory(const struct block *b, size_t offset, struct image_
             if (value >= 1 && value <= 8) /* a rational may lie below 1 */
                 info->orientation = (int)value;
             break;
-        case TAG_EXIF_IFD: exif = (size_t)value; break;
+        case TAG_EXIF_IFD: next.exif = (size_t)value; break;
+        case TAG_INTEROPERABILITY_IFD: next.interoperability = (size_t)value; break;
         case TAG_EXPOSURE_TIME: info->exposure_time_sec = value; break;
         case TAG_F_NUMBER: info->f_number = value; break;
         case TAG_SENSITIVITY: iso->photographic = value < 65535 ? value : 0; break;
@@ -81,7 +105,7 @@ static size_t read_directory(const struct block *b, size_t offset, struct image_
         default: break;
         }
     }
-    return exif;
+    return next;
 }
 
 void image_parse_exif(const uint8_t *data, size_t size, struct image_info *info) {
@@ -92,9 +116,11 @@ void image_parse_exif(const uint8_t *data, size_t size, struct image_info *info)
     if (!named || integer_at(&b, 2, 2) != 42)
         return;
     struct sensitivity iso = {0};
-    size_t exif = read_directory(&b, integer_at(&b, 4, 4), info, &iso);
-    if (exif != 0)
-        read_directory(&b, exif, info, &iso);
+    struct next first = read_directory(&b, integer_at(&b, 4, 4), info, &iso), second = {0, 0};
+    if (first.exif != 0)
+        second = read_directory(&b, first.exif, info, &iso);
+    if (second.interoperability != 0)
+        info->is_adobe_rgb = says_adobe_rgb(&b, second.interoperability);
     info->iso = iso.photographic > 0 ? iso.photographic
                 : iso.iso_speed > 0  ? iso.iso_speed
                 : iso.standard > 0   ? iso.standard

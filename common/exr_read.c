@@ -1,4 +1,5 @@
 /* exr_read.c -- OpenEXR pictures into memory: the display window of the part that exr_header.c chose. */
+#include <stdio.h>
 #include <string.h>
 
 #include "common/exr_reader.h"
@@ -78,6 +79,28 @@ static enum status read_pixels(const struct exr_reader *r, struct image *image, 
     return status;
 }
 
+/* To Rec. 709 where the file says that its primaries are others; without `chromaticities` they are Rec. 709's (Technical
+ * Introduction to OpenEXR, "RGB Color"). */
+static void convert(const struct exr_reader *r, struct image *image, struct image_info *info) {
+    exr_attr_chromaticities_t c;
+    float matrix[3][3];
+    bool is_same = true;
+    if (r->grey >= 0 || image_channel(image, "B") != 2 ||
+        exr_attr_get_chromaticities(r->context, r->part, "chromaticities", &c) != EXR_ERR_SUCCESS)
+        return;
+    const struct color_primaries primaries = {
+        {(double)c.red_x, (double)c.red_y}, {(double)c.green_x, (double)c.green_y},
+        {(double)c.blue_x, (double)c.blue_y}, {(double)c.white_x, (double)c.white_y}};
+    if (!color_matrix(&primaries, matrix, &is_same)) {
+        snprintf(info->color_warning, sizeof info->color_warning, "its chromaticities cannot be");
+        return;
+    }
+    if (is_same)
+        return;
+    snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
+    color_turn(matrix, image->pixel, image->channel_count, (size_t)image->width * image->height, &info->outside_count);
+}
+
 enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
     struct exr_stream stream = {.source = source, .fd = -1};
@@ -89,6 +112,8 @@ enum status image_read_exr(struct image_source *source, bool probe, struct image
     enum status status = exr_read_header(&r, image, info, err);
     if (status == STATUS_OK && !probe)
         status = read_pixels(&r, image, err);
+    if (status == STATUS_OK && !probe)
+        convert(&r, image, info);
     exr_finish(&r.context);
     return status;
 }

@@ -16,6 +16,8 @@ struct encoder {
 
 static exr_result_t write_header(exr_context_t context, const struct image *image,
                                  enum image_exr_type type, bool tiled) {
+    /* ITU-R BT.709: red, green, blue, white. */
+    static const exr_attr_chromaticities_t rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
     int part = 0;
     exr_result_t code = exr_add_part(context, NULL,
                                      tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
@@ -25,6 +27,9 @@ static exr_result_t write_header(exr_context_t context, const struct image *imag
     if (code == EXR_ERR_SUCCESS && tiled)
         code = exr_set_tile_descriptor(context, part, TILE_SIDE, TILE_SIDE, EXR_TILE_ONE_LEVEL,
                                        EXR_TILE_ROUND_DOWN);
+    if (code == EXR_ERR_SUCCESS && image_channel(image, "R") >= 0 && image_channel(image, "G") >= 0 &&
+        image_channel(image, "B") >= 0)
+        code = exr_attr_set_chromaticities(context, part, "chromaticities", &rec709);
     for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
         code = exr_add_channel(context, part, image->channel[c],
                                type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,

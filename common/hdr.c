@@ -24,6 +24,12 @@ struct stream {
     uint8_t buffer[32768];
 };
 
+struct header {
+    float scale;        /* of values */
+    bool is_other;      /* the primaries are not Rec. 709's: */
+    float matrix[3][3]; /* to these */
+};
+
 /* The next byte, or -1 at the end. */
 static int next_byte(struct stream *s) {
     if (s->at == s->end) {
@@ -61,7 +67,20 @@ static bool next_line(struct stream *s, char *line, size_t size) {
     return false;
 }
 
-static enum status read_header(struct stream *s, struct image *image, float *scale,
+/* Where no PRIMARIES= line is, files are of Rec. 709's, whatever filefmts.pdf says: nobody writes Radiance's own. */
+static void read_primaries(const char *text, struct header *h, struct image_info *info) {
+    struct color_primaries p;
+    bool is_same = true;
+    if (sscanf(text, "%lf %lf %lf %lf %lf %lf %lf %lf", &p.red[0], &p.red[1], &p.green[0], &p.green[1], &p.blue[0],
+               &p.blue[1], &p.white[0], &p.white[1]) == 8 &&
+        color_matrix(&p, h->matrix, &is_same)) {
+        h->is_other = !is_same;
+        return;
+    }
+    snprintf(info->color_warning, sizeof info->color_warning, "its PRIMARIES cannot be");
+}
+
+static enum status read_header(struct stream *s, struct image *image, struct header *h, struct image_info *info,
                                struct error *err) {
     const char *name = s->source->name;
     char line[512];
@@ -77,6 +96,8 @@ static enum status read_header(struct stream *s, struct image *image, float *sca
                              "32-bit_rle_rgbe", name, line + 7);
         if (strncmp(line, "EXPOSURE=", 9) == 0)
             exposure *= strtod(line + 9, NULL);
+        if (strncmp(line, "PRIMARIES=", 10) == 0)
+            read_primaries(line + 10, h, info);
     }
     ok = ok && next_line(s, line, sizeof line);
     if (!ok)
@@ -84,7 +105,7 @@ static enum status read_header(struct stream *s, struct image *image, float *sca
     if (!(exposure > 1e-30 && exposure < 1e30))
         return error_set(err, STATUS_INPUT, "%s: the Radiance header's EXPOSURE is not a positive "
                          "number", name);
-    *scale = (float)(1 / exposure);
+    h->scale = (float)(1 / exposure);
     unsigned long width = 0, height = 0;
     char rest = '\0';
     int found = sscanf(line, "-Y %9lu +X %9lu%c", &height, &width, &rest);
@@ -154,8 +175,8 @@ static bool read_row(struct stream *s, uint8_t *row, size_t width) {
 enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
     struct stream s = {.source = source};
-    float scale = 1;
-    enum status status = read_header(&s, image, &scale, err);
+    struct header header = {.scale = 1};
+    enum status status = read_header(&s, image, &header, info, err);
     if (status != STATUS_OK)
         return status;
     info->encoding = IMAGE_LINEAR;
@@ -165,7 +186,7 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
     float factor[256]; /* of a mantissa, by exponent; exponent 0 means black */
     factor[0] = 0;
     for (int e = 1; e < 256; e++)
-        factor[e] = ldexpf(scale, e - 136);
+        factor[e] = ldexpf(header.scale, e - 136);
     image_allocate(image);
     size_t width = image->width;
     uint8_t *row = mem_array(width, 4);
@@ -180,5 +201,9 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
                     pixel[c] = (float)row[4 * x + c] * factor[row[4 * x + 3]];
     }
     mem_free(row);
+    if (status == STATUS_OK && header.is_other) {
+        snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
+        color_turn(header.matrix, image->pixel, 3, width * image->height, &info->outside_count);
+    }
     return status;
 }

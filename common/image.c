@@ -40,6 +40,7 @@ void image_take_rgb(const struct image *from, struct image *image) {
 void image_release(struct image *image) {
     mem_free(image->channel);
     mem_free(image->pixel);
+    mem_free(image->clipped);
     *image = (struct image){0};
 }
 

@@ -23,12 +23,22 @@ struct image {
     uint32_t channel_count;
     char (*channel)[64]; /* [channel_count] names, "R" "G" "B" "A" "base_color.R"; owned */
     float *pixel;        /* [height][width][channel_count]; owned */
+    uint8_t *clipped;    /* [height][width] bit c: channel c is at its largest as the file stores it (IMAGE_CLIP_SHARE);
+                          * of IMAGE_CONVERTED pictures, else NULL; owned */
 };
+
+/* The code value (of 255) from which a channel of an ordinary photograph counts as clipped. A
+ * clipped surface is 255 in the camera, but JPEG's quantisation and the resizing that poses are
+ * often computed after leave it a few levels lower; 250 takes those in, and what it takes too
+ * many is above 95 % of the clip in linear light, where the bound says nearly what the value
+ * would. */
+#define IMAGE_CLIP_SHARE (250.0f / 255.0f)
 
 /* How the values of a file relate to linear light, as the reader found them. */
 enum image_encoding {
-    IMAGE_LINEAR, /* EXR, Radiance: linear light, unbounded */
-    IMAGE_SRGB    /* PNG, JPEG: as stored, in [0, 1]; linear only after image_srgb_to_linear */
+    IMAGE_LINEAR,   /* EXR, Radiance: linear light, unbounded */
+    IMAGE_SRGB,     /* PNG, JPEG: as stored, in [0, 1]; linear only after image_srgb_to_linear */
+    IMAGE_CONVERTED /* PNG, JPEG of another colour space: linear light, converted; image.clipped says where it is bounded */
 };
 
 struct image_info {
@@ -37,6 +47,12 @@ struct image_info {
     /* From EXIF where present, else 0. */
     double exposure_time_sec, iso, f_number;
     int orientation;       /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
+    bool is_adobe_rgb;     /* EXIF says so, as cameras do that write no profile */
+    /* Of pictures that were read, not only probed: */
+    char color_space[64];    /* that pixels were converted from to Rec. 709, for people: "Display P3"; "" where they were not */
+    char color_warning[160]; /* what the file says of its colours and cannot be used, so that they pass for sRGB; or "" */
+    size_t outside_count;    /* pixels of colours that Rec. 709 cannot show: a channel is below 0 */
+    float clip;              /* of IMAGE_CONVERTED: what IMAGE_CLIP_SHARE in all channels became */
 };
 
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
@@ -62,9 +78,16 @@ int image_channel(const struct image *image, const char *name);
  * with Y in place of R, G, B become R = G = B. An EXR's picture is its display window, for
  * which cameras are given: what its data window leaves out is 0, what it adds is dropped; of
  * several parts the first with R, G, B is taken. info may be NULL. On error *image is empty
- * (releasing it does no harm). */
+ * (releasing it does no harm).
+ *
+ * Colours are of Rec. 709's primaries and white D65. A file that says that its own are others (ICC profile; PNG's cICP,
+ * cHRM and gAMA; EXIF for Adobe RGB; EXR's chromaticities) is converted to linear light of these; what cannot be used is
+ * a warning in info. */
 enum status image_read(const char *path, struct image *image, struct image_info *info,
                        struct error *err);
+
+/* The same with a PNG's or JPEG's values as stored, whatever the file says of its colours: for masks. */
+enum status image_read_stored(const char *path, struct image *image, struct error *err);
 
 /* The same from memory; `name` stands for the path in messages. */
 enum status image_read_memory(const char *name, const void *data, size_t size,

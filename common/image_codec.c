@@ -3,9 +3,12 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <math.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+#include "common/mem.h"
 
 const char *const image_rgba[4] = {"R", "G", "B", "A"};
 
@@ -29,6 +32,36 @@ enum status image_source_open(struct image_source *source, const char *path, str
 
 void image_source_close(struct image_source *source) {
     close(source->fd);
+}
+
+/* Which channels of the file are at their largest, by the channel of Rec. 709 that each is the most of. With the matrix of
+ * a space that is wider than Rec. 709 each is most of its own. The others that it is a little of, by .23 at most for
+ * Display P3, pass for known though what is beyond the clip is missing in them too: as in every camera, whose sensor
+ * clips before its matrix. */
+static void find_clipped(struct image *image) {
+    size_t count = (size_t)image->width * image->height;
+    image->clipped = mem_alloc(count);
+    for (size_t i = 0; i < count; i++) {
+        const float *pixel = image->pixel + i * image->channel_count;
+        image->clipped[i] = (uint8_t)((pixel[0] >= IMAGE_CLIP_SHARE) | (pixel[1] >= IMAGE_CLIP_SHARE) << 1 |
+                                      (pixel[2] >= IMAGE_CLIP_SHARE) << 2);
+    }
+}
+
+void image_convert(struct image *image, struct image_info *info, struct color *color) {
+    size_t ignored = 0;
+    float clip[3] = {IMAGE_CLIP_SHARE, IMAGE_CLIP_SHARE, IMAGE_CLIP_SHARE};
+    memcpy(info->color_space, color->name, sizeof info->color_space);
+    memcpy(info->color_warning, color->warning, sizeof info->color_warning);
+    if (!color->is_srgb) {
+        find_clipped(image);
+        color_convert(color, image->pixel, image->channel_count, (size_t)image->width * image->height,
+                      &info->outside_count);
+        color_convert(color, clip, 3, 1, &ignored);
+        info->clip = fminf(clip[0], fminf(clip[1], clip[2]));
+        info->encoding = IMAGE_CONVERTED;
+    }
+    color_release(color);
 }
 
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,

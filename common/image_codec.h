@@ -7,6 +7,7 @@
 #ifndef UNBAKE_COMMON_IMAGE_CODEC_H
 #define UNBAKE_COMMON_IMAGE_CODEC_H
 
+#include "common/color.h"
 #include "common/image.h"
 
 struct image_source {
@@ -15,6 +16,7 @@ struct image_source {
     int fd;
     uint64_t size;         /* bytes */
     int io_error;          /* errno of the first read that the system refused, else 0 */
+    bool as_stored;        /* values of PNG and JPEG stay what they are, whatever the colours */
 };
 
 /* Opens a file (a FIFO under a picture's name does not block) that must be a regular one; `path` is borrowed. */
@@ -24,6 +26,9 @@ void image_source_close(struct image_source *source);
 /* Reads up to `length` bytes at `offset`; fewer only at the end or after an I/O error. */
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
                          size_t length);
+
+/* Converts a picture that was read, of values from 0 to 1, as *color says, and tells it in *info; releases *color. */
+void image_convert(struct image *image, struct image_info *info, struct color *color);
 
 /* The names of a colour picture's channels, for image_header. */
 extern const char *const image_rgba[4];

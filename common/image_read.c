@@ -43,13 +43,14 @@ static enum status read_source(struct image_source *source, bool probe, struct i
     return status;
 }
 
-static enum status read_path(const char *path, bool probe, struct image *image,
+static enum status read_path(const char *path, bool probe, bool as_stored, struct image *image,
                              struct image_info *info, struct error *err) {
     *image = (struct image){0};
     struct image_source source;
     enum status status = image_source_open(&source, path, err);
     if (status != STATUS_OK)
         return status;
+    source.as_stored = as_stored;
     status = read_source(&source, probe, image, info, err);
     image_source_close(&source);
     return status;
@@ -57,12 +58,16 @@ static enum status read_path(const char *path, bool probe, struct image *image,
 
 enum status image_read(const char *path, struct image *image, struct image_info *info,
                        struct error *err) {
-    return read_path(path, false, image, info, err);
+    return read_path(path, false, false, image, info, err);
+}
+
+enum status image_read_stored(const char *path, struct image *image, struct error *err) {
+    return read_path(path, false, true, image, NULL, err);
 }
 
 enum status image_probe(const char *path, struct image *image, struct image_info *info,
                         struct error *err) {
-    return read_path(path, true, image, info, err);
+    return read_path(path, true, false, image, info, err);
 }
 
 enum status image_read_memory(const char *name, const void *data, size_t size,

@@ -5,6 +5,7 @@
  * error here. Errors arrive by longjmp; what must survive one is in struct reader. */
 #include <setjmp.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <jpeglib.h>
@@ -32,6 +33,9 @@ struct reader {
     struct error *err;
     enum status status;
     JSAMPLE *row;
+    JOCTET *profile; /* ICC; libjpeg's (malloc) */
+    bool is_profile_damaged;
+    struct color color;
     JOCTET buffer[16384];
 };
 
@@ -52,11 +56,14 @@ static void damaged(j_common_ptr common) {
 }
 
 static void on_message(j_common_ptr common, int level) {
+    struct reader *r = common->client_data;
     if (level >= 0)
         return; /* a trace */
     switch (common->err->msg_code) {
+    case JWRN_BOGUS_ICC: /* parts of a profile that do not make one */
+        r->is_profile_damaged = true;
+        return;
     case JWRN_ADOBE_XFORM:     /* an unknown colour transform: the default is right */
-    case JWRN_BOGUS_ICC:       /* we take no profile */
     case JWRN_EXTRANEOUS_DATA: /* padding between segments, as some cameras write it */
     case JWRN_JFIF_MAJOR:
         return;
@@ -117,6 +124,7 @@ static void start(struct reader *r) {
     r->progress.progress_monitor = on_progress;
     r->jpeg.progress = &r->progress;
     jpeg_save_markers(&r->jpeg, JPEG_APP0 + 1, 0xffff);
+    jpeg_save_markers(&r->jpeg, JPEG_APP0 + 2, 0xffff);
 }
 
 static void read_exif(struct reader *r) {
@@ -147,6 +155,18 @@ static void read_header(struct reader *r) {
     r->info->encoding = IMAGE_SRGB;
     r->info->bits = 8;
     read_exif(r);
+}
+
+/* Before decompression ends, which drops the segments. */
+static void read_color(struct reader *r) {
+    unsigned length = 0;
+    color_init(&r->color);
+    if (jpeg_read_icc_profile(&r->jpeg, &r->profile, &length))
+        color_set_profile(&r->color, r->profile, length, r->jpeg.num_components == 1, 8);
+    else if (r->is_profile_damaged)
+        snprintf(r->color.warning, sizeof r->color.warning, "the segments of its ICC profile do not fit together");
+    else if (r->info->is_adobe_rgb)
+        color_set_adobe_rgb(&r->color, 8);
 }
 
 static void read_pixels(struct reader *r) {
@@ -180,11 +200,17 @@ enum status image_read_jpeg(struct image_source *source, bool probe, struct imag
     if (setjmp(r->jump) == 0) {
         start(r);
         read_header(r);
+        if (!probe && !source->as_stored)
+            read_color(r);
         if (!probe)
             read_pixels(r);
+        if (!probe && !source->as_stored)
+            image_convert(r->image, r->info, &r->color);
     }
     jpeg_destroy_decompress(&r->jpeg);
     mem_free(r->row);
+    free(r->profile);
+    color_release(&r->color);
     enum status status = r->status;
     mem_free(r);
     return status;

@@ -9,6 +9,7 @@
 
 #include "common/image_codec.h"
 #include "common/mem.h"
+#include "common/png_color.h"
 #include "common/png_memory.h"
 
 /* Deflate's best ratio is 1032 : 1. */
@@ -27,6 +28,8 @@ struct reader {
     png_structp png;
     png_infop png_info;
     uint8_t *row;      /* [row_bytes] one row as stored */
+    bool is_grey;
+    struct color color;
     char warning[128]; /* the last one: it often says what the error that follows means */
 };
 
@@ -99,6 +102,7 @@ static void read_header(struct reader *r) {
     uint64_t bytes = (uint64_t)png_get_rowbytes(r->png, r->png_info) * height;
     if (bytes / MAX_RATIO > r->source->size)
         png_error(r->png, "the file is too short for its picture's size");
+    r->is_grey = !(color & PNG_COLOR_MASK_COLOR);
     r->info->encoding = IMAGE_SRGB;
     r->info->bits = depth == 16 ? 16 : 8;
     png_uint_32 exif_size = 0;
@@ -144,6 +148,12 @@ static void read_pixels(struct reader *r) {
     png_read_end(r->png, NULL);
 }
 
+static void convert(struct reader *r) {
+    if (!png_color_read(r->source, r->is_grey, r->info->bits, &r->color) && r->info->is_adobe_rgb)
+        color_set_adobe_rgb(&r->color, r->info->bits);
+    image_convert(r->image, r->info, &r->color);
+}
+
 enum status image_read_png(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
     struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
@@ -159,10 +169,13 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
         png_set_read_fn(r.png, &r, read_bytes);
         png_set_user_limits(r.png, IMAGE_MAX_SIDE, IMAGE_MAX_SIDE);
         png_set_chunk_malloc_max(r.png, MAX_CHUNK_BYTES);
+        png_set_keep_unknown_chunks(r.png, PNG_HANDLE_CHUNK_NEVER, (png_const_bytep) "cHRM\0gAMA\0iCCP\0sRGB\0cICP", 5);
         png_set_crc_action(r.png, PNG_CRC_ERROR_QUIT, PNG_CRC_WARN_DISCARD);
         read_header(&r);
         if (!probe)
             read_pixels(&r);
+        if (!probe && !source->as_stored)
+            convert(&r);
     }
     png_destroy_read_struct(&kept->png, &kept->png_info, NULL);
     mem_free(kept->row);

@@ -63,6 +63,7 @@ own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoin
 own 'curl/' client/request.c
 own 'openexr' common/exr_stream.h
 own 'png\.h' common/png_memory.h
+own 'lcms2' common/color_icc.c
 own 'jpeglib\.h' common/jpeg.c
 own 'seccomp\.h' server/worker/confine_calls.c
 

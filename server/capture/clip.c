@@ -34,7 +34,7 @@ static struct around look_around(const struct clip_job *job, long x0, long y0, i
             if (owner[at] != own || edge[at] == VIEWS_EDGE || (job->photo->mask && !job->photo->mask[at]))
                 continue;
             float value = image_float_from_half(job->photo->pixel[at][channel]);
-            bool saturates = value >= job->photo->clip;
+            bool saturates = photograph_clips(job->photo, at, channel, value);
             a.count += 1.0f;
             a.saturated += saturates;
             a.below += saturates ? 0.0f : value;
@@ -45,15 +45,17 @@ static struct around look_around(const struct clip_job *job, long x0, long y0, i
 
 static bool is_white(const struct clip_job *job, long x, long y, int channel) {
     float clip = job->photo->clip;
-    float value = image_float_from_half(job->photo->pixel[y * (long)job->photo->camera.width + x][channel]);
+    size_t at = (size_t)(y * (long)job->photo->camera.width + x);
+    float value = image_float_from_half(job->photo->pixel[at][channel]);
+    bool clips = photograph_clips(job->photo, at, channel, value);
     struct around a = look_around(job, x, y, channel);
     if (a.saturated == 0.0f || a.count < WINDOW_LEAST)
-        return value >= clip;
+        return clips;
     float noise = noise_deviation_of_value(job->noise, job->train, &job->photo->camera, (float)x, (float)y, clip);
     float least = clip - DEVIATIONS * noise;
     if (a.saturated >= SATURATED_LEAST * a.count)
         return value >= least;
-    return value >= clip && a.below / (a.count - a.saturated) < least;
+    return clips && a.below / (a.count - a.saturated) < least;
 }
 
 static void mark_row(void *user, size_t row, int thread) {

@@ -3,6 +3,9 @@
 
 #include <math.h>
 
+#include "common/mem.h"
+#include "server/ingest/photo_color.h"
+
 static cJSON *vec3_facts(vec3 v) {
     cJSON *array = cJSON_CreateArray();
     cJSON_AddItemToArray(array, cJSON_CreateNumber((double)v.x));
@@ -67,6 +70,10 @@ cJSON *facts_of(const struct scene *scene) {
     json_add_int(facts, "mask_count", (int64_t)mask_count);
     json_add_int(facts, "pixel_count", (int64_t)pixel_count);
     json_add(facts, "exposure", exposure_facts(scene));
+    char *color = photo_color_fact(scene);
+    if (color)
+        json_add_string(facts, "photographs", color);
+    mem_free(color);
     for (size_t i = 0; i < scene->warning_count; i++)
         cJSON_AddItemToArray(warnings, json_new_string(scene->warning[i]));
     json_add(facts, "warnings", warnings);

@@ -11,15 +11,9 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/path.h"
+#include "server/ingest/photo_color.h"
 
 #define HALF_LARGEST 65504.0f
-
-/* The code value (of 255) from which a channel of an ordinary photograph counts as clipped. A
- * clipped surface is 255 in the camera, but JPEG's quantisation and the resizing that poses are
- * often computed after leave it a few levels lower; 250 takes those in, and what it takes too
- * many is above 95 % of the clip in linear light, where the bound says nearly what the value
- * would. */
-#define CLIP_CODE 250.0f
 
 /* What one frame's loading found; only its own body writes it. */
 struct outcome {
@@ -38,6 +32,7 @@ struct loading {
     char **path;            /* [frame_count] of the picture, below dir; NULL where absent */
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
+    struct photo_color *color;     /* [frame_count] */
     uint16_t *half_of_srgb; /* [65536] linear half of a code value in 65535ths */
     float clip;
 };
@@ -108,7 +103,7 @@ static void convert_srgb(const struct loading *l, const struct image *image,
 }
 
 /* Values beyond what a half holds become lower bounds, as clipped ones are; negative ones, left
- * by reconstruction filters, become 0. */
+ * by reconstruction filters or of colours outside of Rec. 709, become 0. */
 static void convert_linear(const struct image *image, struct photograph *photo,
                            struct outcome *outcome) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
@@ -122,7 +117,7 @@ static void convert_linear(const struct image *image, struct photograph *photo,
             photo->pixel[i][c] = image_half_from_float(value);
         }
     }
-    if (outcome->clamped_count > 0)
+    if (outcome->clamped_count > 0 && photo->is_hdr)
         photo->clip = HALF_LARGEST;
 }
 
@@ -153,7 +148,7 @@ static enum status load_mask(const struct loading *l, const char *name, struct p
                            image.width, image.height, photo->camera.width, photo->camera.height);
     image_release(&image);
     if (status == STATUS_OK)
-        status = image_read(path, &image, NULL, err);
+        status = image_read_stored(path, &image, err);
     if (status != STATUS_OK)
         goto out;
     size_t count = (size_t)image.width * image.height;
@@ -205,6 +200,16 @@ static enum status check_size(const struct loading *l, const struct transforms_f
     return status;
 }
 
+/* Where the file clips, and what was done to its colours; takes image->clipped. */
+static void keep_clip(const struct loading *l, struct image *image, const struct image_info *info, struct photograph *photo) {
+    photo->is_hdr = info->encoding == IMAGE_LINEAR;
+    photo->clip = photo->is_hdr ? INFINITY : info->encoding == IMAGE_CONVERTED ? info->clip : l->clip;
+    photo->clipped = image->clipped;
+    image->clipped = NULL;
+    if (info->color_space[0])
+        photo->color_space = mem_strdup(info->color_space);
+}
+
 static enum status load_photograph(const struct loading *l, size_t index) {
     const struct transforms_frame *frame = &l->transforms->frame[index];
     struct photograph *photo = &l->photograph[index];
@@ -220,9 +225,9 @@ static enum status load_photograph(const struct loading *l, size_t index) {
         return status;
     photo->name = mem_strdup(frame->file);
     photo->is_test = frame->is_test;
-    photo->is_hdr = info.encoding == IMAGE_LINEAR;
     photo->gain = rgb_gray(1.0f);
-    photo->clip = photo->is_hdr ? INFINITY : l->clip;
+    keep_clip(l, &image, &info, photo);
+    photo_color_note(&l->color[index], frame->file, &image, &info);
     outcome->orientation = info.orientation;
     set_exposure(frame, &info, photo, outcome);
     /* Colour comes first where there is any (image_read). */
@@ -230,12 +235,12 @@ static enum status load_photograph(const struct loading *l, size_t index) {
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
     } else {
         photo->pixel = mem_array((size_t)image.width * image.height, sizeof *photo->pixel);
-        if (photo->is_hdr) {
-            convert_linear(&image, photo, outcome);
-        } else {
+        if (info.encoding == IMAGE_SRGB)
             convert_srgb(l, &image, photo);
+        else
+            convert_linear(&image, photo, outcome);
+        if (!photo->is_hdr)
             mask_by_alpha(&image, photo);
-        }
     }
     image_release(&image);
     if (status == STATUS_OK && frame->mask) {
@@ -357,18 +362,21 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
         .half_of_srgb = make_srgb_table(),
     };
     /* Through the table, so that a pixel of just this code value is not rounded below it. */
-    l.clip = image_float_from_half(l.half_of_srgb[(size_t)(CLIP_CODE / 255.0f * 65535.0f + 0.5f)]);
+    l.clip = image_float_from_half(l.half_of_srgb[(size_t)(IMAGE_CLIP_SHARE * 65535.0f + 0.5f)]);
     for (size_t i = 0; i < t->frame_count; i++)
         l.path[i] = find_picture(dir, t->frame[i].file);
+    l.color = mem_calloc(t->frame_count, sizeof *l.color);
     find_duplicates(&l, name, f);
     parallel_for(pool, t->frame_count, load_body, &l);
     enum status status = collect(&l, name, f, err);
     keep_loaded(&l, scene);
     check_count(scene, name, t->named_count, f);
     warn_about_pixels(&l, f);
+    photo_color_warn(l.color, t->frame_count, f);
     for (size_t i = 0; i < t->frame_count; i++)
         mem_free(l.path[i]);
     mem_free(l.path);
+    mem_free(l.color);
     mem_free(l.outcome);
     mem_free(l.half_of_srgb);
     return status;

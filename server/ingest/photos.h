@@ -1,6 +1,7 @@
 /* photos.h -- loading the photographs that transforms.json names.
  *
- * EXR and Radiance are linear light; PNG and JPEG are taken as sRGB and made linear. The stored
+ * EXR and Radiance are linear light; PNG and JPEG are taken as sRGB and made linear, or as what their
+ * ICC profile or their numbers say (image.h), which is told. The stored
  * pixels are what the poses are for: an EXIF orientation is not applied. */
 #ifndef UNBAKE_INGEST_PHOTOS_H
 #define UNBAKE_INGEST_PHOTOS_H

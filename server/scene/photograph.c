@@ -12,6 +12,8 @@ void photograph_release(struct photograph *photo) {
     mem_free(photo->name);
     mem_free(photo->pixel);
     mem_free(photo->white);
+    mem_free(photo->clipped);
+    mem_free(photo->color_space);
     mem_free(photo->spark);
     mem_free(photo->mask);
     *photo = (struct photograph){0};
@@ -40,7 +42,7 @@ static inline float read_tap(const struct photograph *photo, uint16_t half) {
 
 /* Whether a channel saturates; what it reads is no less than the clip then. */
 static inline bool saturates(const struct photograph *photo, size_t at, int channel, float *tap) {
-    bool is_white = photo->white ? photo->white[at] >> channel & 1 : *tap >= photo->clip;
+    bool is_white = photo->white ? photo->white[at] >> channel & 1 : photograph_clips(photo, at, channel, *tap);
     if (is_white)
         *tap = fmaxf(*tap, photo->clip);
     return is_white;

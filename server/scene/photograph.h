@@ -12,6 +12,7 @@
 #define UNBAKE_SCENE_PHOTOGRAPH_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "common/vec.h"
@@ -33,6 +34,10 @@ struct photograph {
     uint8_t *white;         /* [height][width] bit c: channel c saturates, by what is around (clip.h); NULL: where its value
                              * is at the clip; owned */
     bool *spark;            /* [height][width] it shines by chance (sparks.h); NULL: not asked; owned */
+    uint8_t *clipped;       /* [height][width] bit c: channel c was at its largest as the file stores it; NULL: where its
+                             * value is at the clip. Of a file of wider primaries than Rec. 709 values may pass the clip
+                             * without; owned */
+    char *color_space;      /* of the file, which was converted, for people: "Display P3"; NULL: it was not; owned */
     uint8_t *mask;          /* [height][width] 0 where the pixel must not be used, or NULL; owned */
 };
 
@@ -43,6 +48,11 @@ struct photograph_sample {
 };
 
 void photograph_release(struct photograph *photo);
+
+/* Whether the file clips this channel of the pixel number `at`, whose value that is. */
+static inline bool photograph_clips(const struct photograph *photo, size_t at, int channel, float value) {
+    return photo->clipped ? photo->clipped[at] >> channel & 1 : value >= photo->clip;
+}
 
 /* s of the falloff at pixel place (x, y): 1 in the corners. */
 static inline float photograph_radius(const struct photograph *photo, float x, float y) {

@@ -39,4 +39,5 @@ void fuzz_seeds(struct seeds *s) {
     picture_seed(s, 3, write_png);
     seeds_path(s, "tests/data/image", ".png");
     seeds_data(s, "vectors/png-suite", ".png");
+    seeds_data(s, "captures/png16_linear_gama/images", ".png");
 }

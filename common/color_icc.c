@@ -1,0 +1,218 @@
+/* color_icc.c -- see color_icc.h; color_set_profile of color.h.
+ *
+ * Most profiles of cameras are three curves and a matrix: these are taken out of the profile, since the library, which
+ * walks its tables for each pixel, takes 20 times as long. Others (tables of three dimensions, grey) go through it. The
+ * intent is relative colorimetric: the file's white becomes Rec. 709's. The library sees memory only, ours.
+ *
+ * A profile comes from whoever made the picture: the library's complaint becomes a warning, and the picture sRGB. */
+#include "common/color_icc.h"
+
+#include <lcms2.h>
+#include <lcms2_plugin.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/image.h"
+#include "common/mem.h"
+
+/* What the library may ask for at once. */
+#define MAX_ALLOCATION ((size_t)256 << 20)
+/* Curves this near sRGB's are sRGB's: their tables are rounded so. */
+#define SAME_CURVE 1e-3f
+
+struct color_icc {
+    cmsContext context;
+    cmsHPROFILE profile, rec709;
+    cmsHTRANSFORM transform;
+    bool is_grey;
+    char complaint[96]; /* the library's first */
+};
+
+/* --- the library --------------------------------------------------------------------------- */
+
+static void *allocate(cmsContext context, cmsUInt32Number bytes) {
+    (void)context;
+    return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL;
+}
+
+static void release(cmsContext context, void *memory) {
+    (void)context;
+    mem_free(memory);
+}
+
+static void *reallocate(cmsContext context, void *memory, cmsUInt32Number bytes) {
+    (void)context;
+    return bytes <= MAX_ALLOCATION ? mem_realloc_array(memory, bytes, 1) : NULL;
+}
+
+static void note_complaint(cmsContext context, cmsUInt32Number code, const char *text) {
+    struct color_icc *icc = cmsGetContextUserData(context);
+    (void)code;
+    if (icc && icc->complaint[0] == '\0')
+        for (size_t i = 0; text[i] && i < sizeof icc->complaint - 1; i++)
+            icc->complaint[i] = text[i] >= ' ' && text[i] <= '~' ? text[i] : '?';
+}
+
+static struct color_icc *start(void) {
+    cmsPluginMemHandler memory = {
+        .base = {.Magic = cmsPluginMagicNumber, .ExpectedVersion = 2060, .Type = cmsPluginMemHandlerSig},
+        .MallocPtr = allocate, .FreePtr = release, .ReallocPtr = reallocate,
+    };
+    struct color_icc *icc = mem_calloc(1, sizeof *icc);
+    icc->context = cmsCreateContext(&memory, icc);
+    if (icc->context)
+        cmsSetLogErrorHandlerTHR(icc->context, note_complaint);
+    return icc;
+}
+
+void color_icc_free(struct color_icc *icc) {
+    if (!icc)
+        return;
+    if (icc->transform)
+        cmsDeleteTransform(icc->transform);
+    if (icc->rec709)
+        cmsCloseProfile(icc->rec709);
+    if (icc->profile)
+        cmsCloseProfile(icc->profile);
+    if (icc->context)
+        cmsDeleteContext(icc->context);
+    mem_free(icc);
+}
+
+/* Rec. 709 as a profile of linear light. */
+static cmsHPROFILE make_rec709(cmsContext context) {
+    const struct color_primaries *p = &color_rec709;
+    cmsCIExyY white = {p->white[0], p->white[1], 1.0};
+    cmsCIExyYTRIPLE primaries = {
+        {p->red[0], p->red[1], 1.0}, {p->green[0], p->green[1], 1.0}, {p->blue[0], p->blue[1], 1.0}};
+    cmsToneCurve *linear = cmsBuildGamma(context, 1.0);
+    cmsToneCurve *curves[3] = {linear, linear, linear};
+    cmsHPROFILE profile = linear ? cmsCreateRGBProfileTHR(context, &white, &primaries, curves) : NULL;
+    if (linear)
+        cmsFreeToneCurve(linear);
+    return profile;
+}
+
+/* --- what a profile is ---------------------------------------------------------------------- */
+
+/* NULL, or why the profile says nothing of a picture like this. */
+static const char *misfit(cmsHPROFILE profile, bool is_grey) {
+    static char const other[] = "is not of red, green and blue";
+    cmsProfileClassSignature class = cmsGetDeviceClass(profile);
+    cmsColorSpaceSignature space = cmsGetColorSpace(profile);
+    if (class != cmsSigInputClass && class != cmsSigDisplayClass && class != cmsSigOutputClass &&
+        class != cmsSigColorSpaceClass)
+        return "is not that of a picture";
+    return space == cmsSigRgbData || (space == cmsSigGrayData && is_grey) ? NULL : other;
+}
+
+static void read_name(cmsHPROFILE profile, char name[COLOR_NAME_SIZE]) {
+    char text[COLOR_NAME_SIZE] = "";
+    cmsGetProfileInfoASCII(profile, cmsInfoDescription, "en", "US", text, sizeof text);
+    text[sizeof text - 1] = '\0';
+    for (size_t i = 0; text[i]; i++)
+        if (text[i] < ' ' || text[i] > '~')
+            text[i] = '?';
+    snprintf(name, COLOR_NAME_SIZE, "%s", text[0] ? text : "an ICC profile without a name");
+}
+
+/* Fills the curves and the matrix; false where the profile is none of these. *is_srgb: whether they are sRGB's. */
+static bool take_curves(cmsHPROFILE profile, struct color *color, bool *is_srgb) {
+    static const cmsTagSignature colorant[3] = {cmsSigRedColorantTag, cmsSigGreenColorantTag, cmsSigBlueColorantTag};
+    static const cmsTagSignature tone[3] = {cmsSigRedTRCTag, cmsSigGreenTRCTag, cmsSigBlueTRCTag};
+    double xyz[3][3];
+    if (cmsGetColorSpace(profile) != cmsSigRgbData || !cmsIsMatrixShaper(profile) ||
+        cmsIsCLUT(profile, INTENT_RELATIVE_COLORIMETRIC, LCMS_USED_AS_INPUT))
+        return false;
+    float off = 0.0f;
+    for (int c = 0; c < 3; c++) {
+        const cmsCIEXYZ *at = cmsReadTag(profile, colorant[c]);
+        const cmsToneCurve *curve = cmsReadTag(profile, tone[c]);
+        if (!at || !curve)
+            return false;
+        xyz[0][c] = at->X;
+        xyz[1][c] = at->Y;
+        xyz[2][c] = at->Z;
+        for (uint32_t i = 0; i < color->step_count; i++) {
+            float stored = (float)i / (float)(color->step_count - 1), value = cmsEvalToneCurveFloat(curve, stored);
+            if (!isfinite(value))
+                return false;
+            color->curve[(size_t)c * color->step_count + i] = value;
+            off = fmaxf(off, fabsf(value - image_srgb_to_linear(stored)));
+        }
+    }
+    color_matrix_d50(xyz, color->matrix, is_srgb);
+    *is_srgb = *is_srgb && off < SAME_CURVE;
+    return true;
+}
+
+static bool make_transform(struct color_icc *icc) {
+    icc->is_grey = cmsGetColorSpace(icc->profile) == cmsSigGrayData;
+    icc->rec709 = make_rec709(icc->context);
+    if (icc->rec709)
+        icc->transform = cmsCreateTransformTHR(icc->context, icc->profile, icc->is_grey ? TYPE_GRAY_FLT : TYPE_RGB_FLT,
+                                               icc->rec709, TYPE_RGB_FLT, INTENT_RELATIVE_COLORIMETRIC,
+                                               cmsFLAGS_NOOPTIMIZE | cmsFLAGS_NOCACHE);
+    float probe[3][3] = {{0.0f, 0.0f, 0.0f}, {0.5f, 0.5f, 0.5f}, {1.0f, 1.0f, 1.0f}}, sum = 0.0f;
+    if (!icc->transform)
+        return false;
+    color_icc_convert(icc, probe, 3);
+    for (int i = 0; i < 9; i++)
+        sum += probe[i / 3][i % 3];
+    return isfinite(sum);
+}
+
+/* Sets what of `color` the profile tells; else returns why not. */
+static const char *use(struct color_icc *icc, struct color *color, const void *data, size_t size, bool is_grey) {
+    static const char damaged[] = "is damaged";
+    bool is_srgb = false;
+    if (size > UINT32_MAX || !icc->context)
+        return damaged;
+    icc->profile = cmsOpenProfileFromMemTHR(icc->context, data, (cmsUInt32Number)size);
+    if (!icc->profile)
+        return damaged;
+    const char *why = misfit(icc->profile, is_grey);
+    if (why)
+        return why;
+    read_name(icc->profile, color->name);
+    if (take_curves(icc->profile, color, &is_srgb)) {
+        color->is_srgb = is_srgb;
+        return NULL;
+    }
+    if (!make_transform(icc))
+        return damaged;
+    color->is_srgb = false;
+    color->profile = icc;
+    return NULL;
+}
+
+void color_set_profile(struct color *color, const void *profile, size_t size, bool is_grey, int bits) {
+    struct color_icc *icc = start();
+    color_release(color);
+    color->step_count = bits > 8 ? 65536 : 256;
+    color->curve = mem_array(3 * (size_t)color->step_count, sizeof *color->curve);
+    const char *why = use(icc, color, profile, size, is_grey);
+    if (color->profile != icc) {
+        if (why)
+            snprintf(color->warning, sizeof color->warning, "its ICC profile %s%s%s", why, icc->complaint[0] ? ": " : "",
+                     icc->complaint);
+        color_icc_free(icc);
+    }
+    if (why || color->is_srgb)
+        color->name[0] = '\0';
+    if (why || color->is_srgb || color->profile) {
+        mem_free(color->curve);
+        color->curve = NULL;
+    }
+}
+
+void color_icc_convert(const struct color_icc *icc, float (*pixel)[3], size_t count) {
+    if (icc->is_grey) /* one value in, three out: not in place */
+        for (size_t i = 0; i < count; i++) {
+            float grey = pixel[i][0];
+            cmsDoTransform(icc->transform, &grey, pixel[i], 1);
+        }
+    else
+        cmsDoTransform(icc->transform, pixel, pixel, (cmsUInt32Number)count);
+}
