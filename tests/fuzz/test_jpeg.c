@@ -11,4 +11,5 @@ void fuzz_seeds(struct seeds *s) {
     s->mutants = 1500;
     seeds_path(s, "tests/data/image", ".jpg");
     seeds_data(s, "vectors/assimp/OBJ", ".jpg");
+    seeds_data(s, "captures/icc_p3/images", ".jpg");
 }
