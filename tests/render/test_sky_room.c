@@ -70,7 +70,7 @@ static void test_relight(const struct reconstruction *r, struct parallel *pool) 
     static float pixel[16 * 8 * 3];
     for (int i = 0; i < 16 * 8; i++)
         pixel[3 * i] = 5.0f;
-    struct image sky = {16, 8, 3, (char[3][64]){"R", "G", "B"}, pixel};
+    struct image sky = {.width = 16, .height = 8, .channel_count = 3, .channel = (char[3][64]){"R", "G", "B"}, .pixel = pixel};
     CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
     s.environment = red;
     s.lights = false;
