@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "common/color_icc.h"
 #include "common/image.h"
 #include "common/mem.h"
 
@@ -30,7 +29,8 @@ void color_init(struct color *color) {
 }
 
 void color_release(struct color *color) {
-    color_icc_free(color->profile);
+    if (color->profile)
+        color->profile_free(color->profile);
     mem_free(color->curve);
     color_init(color);
 }
@@ -211,7 +211,7 @@ static void convert_by_profile(const struct color *color, float *pixel, size_t s
         size_t some = count - done < BLOCK ? count - done : BLOCK;
         for (size_t i = 0; i < some; i++)
             memcpy(block[i], pixel + (done + i) * stride, sizeof block[i]);
-        color_icc_convert(color->profile, block, some);
+        color->profile_convert(color->profile, block, some);
         for (size_t i = 0; i < some; i++) {
             memcpy(pixel + (done + i) * stride, block[i], sizeof block[i]);
             *outside += fminf(block[i][0], fminf(block[i][1], block[i][2])) < OUTSIDE;

@@ -1,5 +1,5 @@
 /* color.h -- what the numbers of a picture's file mean, and the way from them to linear light of Rec. 709's primaries and
- * white (D65). A file says it by an ICC profile (color_icc.c) or by numbers: primaries, white and a curve.
+ * white (D65). A file says it by an ICC profile (color_icc.h) or by numbers: primaries, white and a curve.
  *
  * Whites are adapted by Bradford's matrix (as ICC profiles are). Colours outside of Rec. 709 come out below 0 or above 1:
  * what to do with them is the caller's affair. Private to the picture codecs. */
@@ -36,7 +36,9 @@ struct color {
     uint32_t step_count;              /* of a curve: stored value 0 to 1 */
     float *curve;                     /* [3][step_count] linear light; NULL with a profile that is no curve and matrix; owned */
     float matrix[3][3];               /* Rec. 709 from the file's primaries, by rows */
-    struct color_icc *profile;        /* where curve is NULL; owned */
+    void *profile;                    /* where curve is NULL, of color_icc.c; owned */
+    void (*profile_convert)(const void *profile, float (*pixel)[3], size_t count); /* stored values to linear light */
+    void (*profile_free)(void *profile);
 };
 
 /* A file that says nothing: sRGB. */
@@ -50,9 +52,6 @@ void color_set(struct color *color, const char *name, const struct color_primari
 
 /* Adobe RGB (1998), whose curve is the power 563 / 256. */
 void color_set_adobe_rgb(struct color *color, int bits);
-
-/* By an ICC profile, that is borrowed. What cannot be used is a warning, and sRGB. */
-void color_set_profile(struct color *color, const void *profile, size_t size, bool is_grey, int bits);
 
 /* The matrix from these primaries to Rec. 709's, by rows; false where there is none. `is_same`: whether nothing changes. */
 bool color_matrix(const struct color_primaries *from, float matrix[3][3], bool *is_same);

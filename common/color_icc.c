@@ -1,4 +1,4 @@
-/* color_icc.c -- see color_icc.h; color_set_profile of color.h.
+/* color_icc.c -- see color_icc.h.
  *
  * Most profiles of cameras are three curves and a matrix: these are taken out of the profile, since the library, which
  * walks its tables for each pixel, takes 20 times as long. Others (tables of three dimensions, grey) go through it. The
@@ -66,9 +66,8 @@ static struct color_icc *start(void) {
     return icc;
 }
 
-void color_icc_free(struct color_icc *icc) {
-    if (!icc)
-        return;
+static void release_profile(void *profile) {
+    struct color_icc *icc = profile;
     if (icc->transform)
         cmsDeleteTransform(icc->transform);
     if (icc->rec709)
@@ -147,6 +146,17 @@ static bool take_curves(cmsHPROFILE profile, struct color *color, bool *is_srgb)
     return true;
 }
 
+static void convert(const void *profile, float (*pixel)[3], size_t count) {
+    const struct color_icc *icc = profile;
+    if (icc->is_grey) /* one value in, three out: not in place */
+        for (size_t i = 0; i < count; i++) {
+            float grey = pixel[i][0];
+            cmsDoTransform(icc->transform, &grey, pixel[i], 1);
+        }
+    else
+        cmsDoTransform(icc->transform, pixel, pixel, (cmsUInt32Number)count);
+}
+
 static bool make_transform(struct color_icc *icc) {
     icc->is_grey = cmsGetColorSpace(icc->profile) == cmsSigGrayData;
     icc->rec709 = make_rec709(icc->context);
@@ -157,7 +167,7 @@ static bool make_transform(struct color_icc *icc) {
     float probe[3][3] = {{0.0f, 0.0f, 0.0f}, {0.5f, 0.5f, 0.5f}, {1.0f, 1.0f, 1.0f}}, sum = 0.0f;
     if (!icc->transform)
         return false;
-    color_icc_convert(icc, probe, 3);
+    convert(icc, probe, 3);
     for (int i = 0; i < 9; i++)
         sum += probe[i / 3][i % 3];
     return isfinite(sum);
@@ -184,6 +194,8 @@ static const char *use(struct color_icc *icc, struct color *color, const void *d
         return damaged;
     color->is_srgb = false;
     color->profile = icc;
+    color->profile_convert = convert;
+    color->profile_free = release_profile;
     return NULL;
 }
 
@@ -197,7 +209,7 @@ void color_set_profile(struct color *color, const void *profile, size_t size, bo
         if (why)
             snprintf(color->warning, sizeof color->warning, "its ICC profile %s%s%s", why, icc->complaint[0] ? ": " : "",
                      icc->complaint);
-        color_icc_free(icc);
+        release_profile(icc);
     }
     if (why || color->is_srgb)
         color->name[0] = '\0';
@@ -205,14 +217,4 @@ void color_set_profile(struct color *color, const void *profile, size_t size, bo
         mem_free(color->curve);
         color->curve = NULL;
     }
-}
-
-void color_icc_convert(const struct color_icc *icc, float (*pixel)[3], size_t count) {
-    if (icc->is_grey) /* one value in, three out: not in place */
-        for (size_t i = 0; i < count; i++) {
-            float grey = pixel[i][0];
-            cmsDoTransform(icc->transform, &grey, pixel[i], 1);
-        }
-    else
-        cmsDoTransform(icc->transform, pixel, pixel, (cmsUInt32Number)count);
 }

@@ -12,6 +12,7 @@
 
 #include <jerror.h>
 
+#include "common/color_icc.h"
 #include "common/image_codec.h"
 #include "common/mem.h"
 

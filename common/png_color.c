@@ -9,6 +9,7 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "common/color_icc.h"
 #include "common/mem.h"
 
 #define CHUNK_MAX ((size_t)8 << 20)    /* bytes; a longer profile is none of a picture */

@@ -1,7 +1,7 @@
 /* test_icc.c -- ICC profiles, as a picture brings them: whatever they are, a warning or a conversion, and never a crash. */
 #include <lcms2.h>
 
-#include "common/color.h"
+#include "common/color_icc.h"
 #include "common/mem.h"
 #include "tests/fuzz/fuzz.h"
 
