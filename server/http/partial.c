@@ -8,7 +8,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include "common/buf.h"
+#include "common/boot.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -83,15 +83,13 @@ static enum status settle(struct intake *e, struct error *err) {
 
 struct partials *partials_new(struct api *api) {
     struct partials *p = mem_calloc(1, sizeof *p);
-    struct buf boot;
     p->api = api;
     pthread_mutex_init(&p->mutex, NULL);
     pthread_mutex_init(&p->finishing, NULL);
-    buf_init(&boot, 256);
-    /* Where it cannot be read, no tail is ever believed. */
-    if (file_read("/proc/sys/kernel/random/boot_id", &boot, NULL) == STATUS_OK)
-        snprintf(p->boot, sizeof p->boot, "%.*s", (int)strcspn(buf_text(&boot), "\n"), buf_text(&boot));
-    buf_release(&boot);
+    boot_id(p->boot);
+    if (!*p->boot)
+        log_warning("the kernel's boot id cannot be read: what a daemon that is killed has received of an upload and not "
+                    "yet counted is sent again");
     return p;
 }
 

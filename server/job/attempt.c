@@ -10,6 +10,7 @@
 #include "common/mem.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
+#include "server/job/oom.h"
 
 #define EVENTS_MAX 500000 /* of one attempt; at 2 a second, which is much, of three days */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
@@ -160,7 +161,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         a->settings = mem_strdup(job.settings);
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
-        a->oom_kills = memory_oom_kills();
+        a->oom_kills = oom_kills("");
         status = check_scene(store, job.scene_id, &why);
     }
     if (status == STATUS_OK) /* what it has written itself does not stop a job that has begun */

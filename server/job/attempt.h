@@ -35,7 +35,7 @@ struct attempt {
     double kill_at_sec;           /* as clock_sec; 0: never */
     char *settings;               /* of the job, as asked for; owned; NULL for a check */
     int thread_count, memory_step; /* what it was to have, and how often that was made smaller */
-    uint64_t oom_kills;           /* of the machine, before it started */
+    uint64_t oom_kills;           /* before it started */
     long event_count, event_max;  /* what it has reported; after how much of that it is thinned */
     double thinned_at;            /* when something was entered last since then, as clock_sec */
     bool said_thinned, said_unread; /* the job's events, and the log, say so */

@@ -1,7 +1,6 @@
 /* memory.c -- see memory.h. */
 #include "server/job/memory.h"
 
-#include <stdio.h>
 #include <string.h>
 
 #include "common/settings.h"
@@ -53,16 +52,4 @@ bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct
     bool differs = strcmp(buf_text(&present), buf_text(what)) != 0;
     buf_release(&present);
     return differs;
-}
-
-uint64_t memory_oom_kills(void) {
-    char line[128];
-    unsigned long long count = 0;
-    FILE *file = fopen("/proc/vmstat", "re");
-    if (!file)
-        return 0;
-    while (fgets(line, sizeof line, file) && sscanf(line, "oom_kill %llu", &count) != 1)
-        ;
-    fclose(file);
-    return count;
 }

@@ -7,8 +7,6 @@
 #ifndef UNBAKE_JOB_MEMORY_H
 #define UNBAKE_JOB_MEMORY_H
 
-#include <stdint.h>
-
 #include "common/buf.h"
 #include "common/json.h"
 
@@ -18,9 +16,5 @@ cJSON *memory_reduce(const cJSON *settings, int step, int *thread_count, struct 
 
 /* Whether step + 1 is smaller than step; then *what (appended to) is how. */
 bool memory_can_reduce(const cJSON *settings, int step, int thread_count, struct buf *what);
-
-/* How many processes the kernel has killed for want of memory since it started; 0 where it does
- * not say. */
-uint64_t memory_oom_kills(void);
 
 #endif

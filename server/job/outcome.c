@@ -13,6 +13,7 @@
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/memory.h"
+#include "server/job/oom.h"
 #include "server/worker/progress.h"
 
 #define LAST_WORDS_MAX 400 /* bytes */
@@ -43,9 +44,9 @@ static void judge_signal(const struct attempt *a, struct verdict *v) {
     int number = WTERMSIG(a->wait_status);
     char text[256];
     if (number == SIGKILL) {
-        bool by_kernel = memory_oom_kills() > a->oom_kills;
+        bool by_kernel = oom_kills("") > a->oom_kills;
         say(v, by_kernel ? OUTCOME_MEMORY : OUTCOME_CRASH,
-            by_kernel ? "killed because the machine ran out of memory"
+            by_kernel ? "killed by the kernel, which ran out of memory"
                       : "killed from outside, or by a limit of memory that does not say so",
             HINT_MEMORY);
         return;

@@ -350,7 +350,7 @@ enum status store_output_list(struct store *store, int64_t job_id, struct output
 /* --- uploads in parts ---------------------------------------------------------------------- */
 
 #define UPLOAD_ID_SIZE 33   /* 32 hex digits and the NUL */
-#define UPLOAD_BOOT_SIZE 40 /* the kernel's boot_id, or "" */
+#define UPLOAD_BOOT_SIZE 40 /* as boot.h has it */
 
 struct upload_row {
     char id[UPLOAD_ID_SIZE];

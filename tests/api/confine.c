@@ -1,66 +1,48 @@
 /* confine.c -- what systemd does around a service, for test_service.sh, where there is no systemd:
  *
- *   confine SYSCALLS LOG WATCHDOG_SEC PROGRAM ARGUMENT...
+ *   confine UNIT SYSCALLS LOG WRITABLE PROGRAM ARGUMENT...
  *
- * Runs the program under a seccomp filter that lets through only the system calls named in the
- * file SYSCALLS (others: EPERM, as SystemCallErrorNumber= says) and no memory that is writable and
- * executable; appends what it says on its notify socket to LOG; hands SIGTERM and SIGHUP on. */
-#include <errno.h>
+ * Runs the program as the unit's [Service] section says (confine_unit.h): its environment, its view of the files (for
+ * root alone: elsewhere it keeps that of the caller), its rights, and a seccomp filter that lets through the system calls
+ * named in the file SYSCALLS. Of files only what is below the folder WRITABLE can be written. Appends what the program
+ * says on its notify socket to LOG (in WRITABLE), with a watchdog of WATCHDOG_SEC; hands SIGTERM and SIGHUP on. */
 #include <poll.h>
-#include <seccomp.h>
+#include <libgen.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/signalfd.h>
-#include <sys/socket.h>
 #include <sys/un.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-static void must(int good, const char *what) {
-    if (good)
-        return;
-    perror(what);
-    exit(125);
-}
+#include "tests/api/confine_unit.h"
 
-static void restrict_calls(const char *names) {
-    scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
-    FILE *file = fopen(names, "re");
-    char name[64];
-    must(filter && file, names);
-    while (fscanf(file, "%63s", name) == 1) {
-        int number = seccomp_syscall_resolve_name(name);
-        if (number == __NR_SCMP_ERROR || number < 0)
-            continue; /* of another architecture */
-        if (strcmp(name, "mmap") == 0) {
-            must(seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 1,
-                                  SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0)) == 0 &&
-                     seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 1,
-                                      SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC | PROT_WRITE, PROT_EXEC)) == 0,
-                 "mmap");
-        } else if (strcmp(name, "mprotect") == 0) {
-            must(seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 1,
-                                  SCMP_A2(SCMP_CMP_MASKED_EQ, PROT_EXEC, 0)) == 0, "mprotect");
-        } else {
-            must(seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, 0) == 0, name);
-        }
+#define WATCHDOG_SEC 3
+#define PROGRAMS "/tmp/programs" /* where the program's folder is, in its view */
+
+/* In the child. */
+static void become_service(const char *unit_path, const char *calls, const char *writable, char **argv) {
+    struct unit unit;
+    char path[1024], folder[1024];
+    unit_read(&unit, unit_path);
+    unit_check_names(&unit);
+    unit_set_environment(&unit);
+    snprintf(path, sizeof path, "%s", argv[0]);
+    if (geteuid() == 0) {
+        snprintf(folder, sizeof folder, "%s", argv[0]);
+        snprintf(path, sizeof path, "%s/%s", PROGRAMS, basename(argv[0]));
+        unit_hide(&unit, writable, dirname(folder), PROGRAMS);
+        unit_drop_rights(&unit);
     }
-    fclose(file);
-    must(prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0, "PR_SET_NO_NEW_PRIVS");
-    must(seccomp_load(filter) == 0, "seccomp_load");
-    seccomp_release(filter);
+    unit_restrict_calls(&unit, calls);
+    execv(path, argv);
+    must(0, path);
 }
 
 int main(int argc, char **argv) {
-    if (argc < 5)
+    if (argc < 6)
         return 125;
-    FILE *log = fopen(argv[2], "ae");
+    FILE *log = fopen(argv[3], "ae");
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    int length = snprintf(address.sun_path, sizeof address.sun_path, "%s.socket", argv[2]);
+    int length = snprintf(address.sun_path, sizeof address.sun_path, "%s.socket", argv[3]);
     int notified = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     must(log && length < (int)sizeof address.sun_path && notified >= 0, "cannot start");
     unlink(address.sun_path);
@@ -74,15 +56,13 @@ int main(int argc, char **argv) {
     pid_t child = fork();
     if (child == 0) {
         char usec[32], pid[16];
-        snprintf(usec, sizeof usec, "%.0f", 1e6 * strtod(argv[3], NULL));
+        snprintf(usec, sizeof usec, "%d", WATCHDOG_SEC * 1000000);
         snprintf(pid, sizeof pid, "%d", (int)getpid());
         setenv("NOTIFY_SOCKET", address.sun_path, 1);
         setenv("WATCHDOG_USEC", usec, 1);
         setenv("WATCHDOG_PID", pid, 1);
         sigprocmask(SIG_SETMASK, &old, NULL);
-        restrict_calls(argv[1]);
-        execv(argv[4], argv + 4);
-        must(0, argv[4]);
+        become_service(argv[1], argv[2], argv[4], argv + 5);
     }
     struct pollfd wait[2] = {{.fd = notified, .events = POLLIN},
                              {.fd = signalfd(-1, &set, SFD_CLOEXEC), .events = POLLIN}};

@@ -19,6 +19,7 @@ cleanup() {
     [ -n "$daemon_pid" ] && kill -KILL "$daemon_pid" 2>/dev/null
     [ -n "${background:-}" ] && kill $background 2>/dev/null
     [ -n "${mounted:-}" ] && umount "$mounted"
+    [ -n "${group:-}" ] && rmdir "$group" 2>/dev/null
     rm -rf "$work"
 }
 trap cleanup EXIT

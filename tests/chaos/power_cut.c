@@ -247,6 +247,7 @@ static void record(const char *build, const char *archive) {
     char library[PATH_MAX], page[128], boot[128];
     struct error err;
     daemon_init(&daemon_, build);
+    static const char before[] = "00000000-0000-4000-8000-000000000001\n"; /* another boot than the machine's */
     const char *settings[] = {"min_free_mib=0", "low_disk_mib=0", "max_running=1", "threads=1", "log_level=warning",
                               "checkpoint_interval_sec=0.1"};
     memcpy(daemon_.settings, settings, sizeof settings);
@@ -256,7 +257,7 @@ static void record(const char *build, const char *archive) {
     snprintf(log_path, sizeof log_path, "%s/operations", daemon_.dir);
     faults = faults_new(page, daemon_.data, log_path);
     log_fd = open(log_path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
-    if (!faults || log_fd < 0 || file_replace(boot, "before the cut\n", 15, &err) != STATUS_OK)
+    if (!faults || log_fd < 0 || file_replace(boot, before, strlen(before), &err) != STATUS_OK)
         exit(1);
     setenv("UNBAKE_FAULTS", page, 1);
     setenv("UNBAKE_BOOT_ID", boot, 1);

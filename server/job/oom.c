@@ -1,0 +1,62 @@
+/* oom.c -- see oom.h. A service may not see /proc/vmstat (ProcSubset=pid of its systemd unit), but sees its own
+ * cgroup; and what is killed elsewhere on the machine is no matter of its workers. Both kinds of cgroup count kills for
+ * the group's own limit and for want of memory of the whole machine, before the process gets its signal. */
+#include "server/job/oom.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "common/mem.h"
+
+/* The number on the line "oom_kill N". */
+static bool read_count(const char *root, const char *folder, const char *name, uint64_t *count) {
+    char line[128];
+    unsigned long long number;
+    bool found = false;
+    char *path = mem_printf("%s%s/%s", root, folder, name);
+    FILE *file = fopen(path, "re");
+    mem_free(path);
+    while (file && !found && fgets(line, sizeof line, file))
+        found = sscanf(line, "oom_kill %llu", &number) == 1;
+    if (file)
+        fclose(file);
+    if (found)
+        *count = number;
+    return found;
+}
+
+/* By a line of /proc/self/cgroup, "0::/a/b" (version 2) or "4:memory:/a/b" (version 1). In a container the path may be
+ * one of the host's: then what is mounted is the container's own group. */
+static bool read_group(const char *root, char *line, uint64_t *count) {
+    line[strcspn(line, "\n")] = '\0';
+    char *controllers = strchr(line, ':'), *path = controllers ? strchr(controllers + 1, ':') : NULL;
+    if (!path)
+        return false;
+    *path++ = '\0';
+    bool is_v2 = controllers[1] == '\0';
+    if (!is_v2 && strcmp(controllers + 1, "memory") != 0)
+        return false;
+    const char *mount = is_v2 ? "/sys/fs/cgroup" : "/sys/fs/cgroup/memory";
+    const char *name = is_v2 ? "memory.events" : "memory.oom_control";
+    char *folder = mem_printf("%s%s", mount, path);
+    bool found = read_count(root, folder, name, count) || read_count(root, mount, name, count);
+    mem_free(folder);
+    return found;
+}
+
+uint64_t oom_kills(const char *root) {
+    char line[4096];
+    uint64_t count = 0;
+    bool found = false;
+    char *path = mem_printf("%s/proc/self/cgroup", root);
+    FILE *file = fopen(path, "re");
+    mem_free(path);
+    while (file && !found && fgets(line, sizeof line, file))
+        found = read_group(root, line, &count);
+    if (file)
+        fclose(file);
+    if (!found)
+        read_count(root, "/proc", "vmstat", &count);
+    return count;
+}
