@@ -76,6 +76,19 @@ int main(void) {
     CHECK_THAT(prior[FRAME].mean.g < 0.05f, "%g", (double)prior[FRAME].mean.g);
     CHECK_THAT(prior[LAMP].mean.g > 0.3f && prior[LAMP].mean.g < 0.7f, "%g", (double)prior[LAMP].mean.g);
 
+    /* Its own mean counts with the square of the share of its texels that is known: of one black texel among 1024, beside a
+     * white wall, with .325^2 / (1 + .325^2) and not .325 / 1.325. (It is none that the grids take in.) */
+    mem_free(prior);
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){.weight = 1.0f};
+    CHECK((HIDDEN * SIDE * SIDE + 1) % 3 != 0);
+    double share = 1.0 / 1025.0 / 0.003, part = share * share / (1.0 + share * share);
+    prior = color_priors(&r, measured);
+    float beside = prior[HIDDEN].mean.g;
+    measured[HIDDEN * SIDE * SIDE + 1] = (struct measured){0};
+    mem_free(prior);
+    prior = color_priors(&r, measured);
+    CHECK_NEAR(beside / prior[HIDDEN].mean.g, 1.0 - part, 0.01);
+
     /* Where nothing is known at all, grey; and nothing is known well. */
     mem_free(prior);
     memset(measured, 0, sizeof measured);

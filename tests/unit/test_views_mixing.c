@@ -1,4 +1,4 @@
-/* views.h: how much of what a look-up shows may be light of others grows towards an edge, and the more
+/* views.h: a look-up is trusted the less, and how much of what a look-up shows may be light of others grows towards an edge, and the more
  * the brighter the other side of the edge is. */
 #include "common/image.h"
 #include "common/mem.h"
@@ -53,6 +53,14 @@ int main(void) {
     CHECK(far == 0.0f && bright > 0.0f);
     CHECK_THAT(near > 2.0f * bright, "%g beside light, %g beside dark", (double)near, (double)bright);
     CHECK_THAT(beside >= near && beside == 1.0f, "%g, further off %g", (double)beside, (double)near);
+
+    /* A look-up is trusted the less the nearer it is to the edge, by the classes of views.h. */
+    for (int k = 0; k < 4; k++) {
+        static const float trust[4] = {1.0f, 0.5f, 0.05f, 0.001f};
+        struct view view = {.train = 0, .x = (float)EDGE_AT + 0.5f - (float)(4 - k), .y = HEIGHT / 2, .weight = 1.0f};
+        CHECK(views_edge(&v, &view, 0) == k);
+        CHECK_NEAR(views_trust(&v, &view, 0), trust[k], 1e-6f);
+    }
 
     /* As bright on both sides: only the distance from the edge counts. */
     for (int i = 0; i < WIDTH * HEIGHT; i++)
