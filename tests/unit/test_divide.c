@@ -9,7 +9,7 @@
 #define PHOTOGRAPHS 24
 #define ROUGHNESS 0.7f
 
-static const rgb base_color = {0.6f, 0.35f, 0.12f}, flux = {3.0f, 2.0f, 5.0f}, light_noise = {0.09f, -0.02f, 0.1f};
+static const rgb base_color = {0.12f, 0.35f, 0.6f}, flux = {3.0f, 2.0f, 5.0f}, light_noise = {0.09f, -0.02f, 0.1f};
 
 /* To the light, 50 degrees from the normal. */
 static vec3 to_light(void) { return (vec3){sinf(0.87f), 0.0f, cosf(0.87f)}; }
@@ -57,7 +57,7 @@ static void photograph_plane(struct plane_rig *rig, enum faults faults) {
             continue;
         photo = plane_rig_add(rig, from, (vec3){0.1f, 0.1f, 0.0f}, 0.02f, paint_wrong, &from); /* sharper, and wrong */
         if (faults == SATURATED)
-            photo->is_hdr = false, photo->clip = image_float_from_half(photo->pixel[0][1]) * 0.5f;
+            photo->is_hdr = false, photo->clip = image_float_from_half(photo->pixel[0][2]) * 0.5f; /* blue alone */
         else
             photo->mask = mask;
     }

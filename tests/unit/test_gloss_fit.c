@@ -1,0 +1,97 @@
+/* gloss.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the reflection
+ * model says, integrated over the disc: a polished, a satin and a matt one come back. */
+#include "server/material/gloss.h"
+#include "server/render/bsdf.h"
+#include "server/scene/latlong.h"
+#include "tests/unit/plane_rig.h"
+
+#define MAP_WIDTH 128
+#define MAP_HEIGHT 64
+#define DISC_COSINE 0.97f /* 14 degrees */
+#define RADIANCE 30.0f
+#define PHOTOGRAPHS 30
+
+static const rgb base_color = {0.4f, 0.3f, 0.2f};
+
+struct disc {
+    size_t count;
+    vec3 direction[512];
+    float angle[512]; /* sr */
+};
+
+/* What a place of the plane shows. */
+struct seen_from {
+    vec3 place;
+    const struct disc *disc;
+    float roughness, specular;
+};
+
+static rgb paint(void *user, vec3 place) {
+    const struct seen_from *from = user;
+    vec3 wo = vec3_normalize(vec3_sub(from->place, place));
+    struct bsdf model = bsdf_make(base_color, from->roughness, from->specular, wo.z);
+    rgb sum = rgb_gray(0.0f);
+    for (size_t i = 0; i < from->disc->count; i++) {
+        struct bsdf_value f = bsdf_eval(&model, wo, from->disc->direction[i]);
+        float light = RADIANCE * from->disc->angle[i], shine = from->specular > 0.0f ? f.specular : 0.0f;
+        sum = rgb_mad(rgb_add(sum, rgb_gray(light * shine)), light * f.diffuse, base_color);
+    }
+    return sum;
+}
+
+static void make_sky(struct image *sky, struct disc *disc) {
+    vec3 middle = vec3_normalize((vec3){0.5f, 0.1f, 1.0f});
+    disc->count = 0;
+    image_init_rgb(sky, MAP_WIDTH, MAP_HEIGHT);
+    for (uint32_t i = 0; i < MAP_WIDTH * MAP_HEIGHT; i++) {
+        vec3 d = latlong_pixel(MAP_WIDTH, MAP_HEIGHT, i % MAP_WIDTH, i / MAP_WIDTH);
+        if (vec3_dot(d, middle) < DISC_COSINE)
+            continue;
+        disc->direction[disc->count] = d;
+        disc->angle[disc->count++] = (float)latlong_pixel_angle(MAP_WIDTH, MAP_HEIGHT, i / MAP_WIDTH);
+        for (size_t c = 0; c < 3; c++)
+            sky->pixel[3 * i + c] = RADIANCE;
+    }
+    CHECK(disc->count > 30 && disc->count < 512);
+}
+
+static void test_fit(const struct image *sky, const struct disc *disc, float roughness, float specular) {
+    struct plane_rig rig;
+    struct probes probes;
+    plane_rig_init(&rig, PHOTOGRAPHS, 1);
+    struct reconstruction *r = &rig.r;
+    world_set_environment(&r->world, sky, rig.pool);
+    for (int i = 0; i < PHOTOGRAPHS; i++) {
+        float turn = 2.4f * (float)i, slant = 1.0f * sqrtf(((float)i + 0.5f) / PHOTOGRAPHS);
+        struct seen_from from = {{6.0f * sinf(slant) * cosf(turn), 6.0f * sinf(slant) * sinf(turn), 6.0f * cosf(slant)},
+                                 disc, roughness, specular};
+        plane_rig_add(&rig, from.place, (vec3){0.0f, 0.0f, 0.0f}, 0.35f, paint, &from);
+    }
+    plane_rig_look(&rig, 0.01f);
+    probes_init(&probes, 8, &rig.scene.mesh, &r->atlas, &r->inverse, &r->fused);
+    for (size_t i = 0; i < probes.count; i++)
+        for (size_t k = 0; k < disc->count; k++)
+            irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, disc->direction[k], rgb_gray(RADIANCE * disc->angle[k]));
+    uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
+    struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
+    gloss_fit(r, &rig.views, &probes, &field);
+    printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
+           (double)r->materials.specular[0], (double)roughness, (double)specular);
+    CHECK_NEAR(r->materials.specular[0], specular, 0.06f);
+    if (specular > 0.0f)
+        CHECK_NEAR(r->materials.roughness[0], roughness, 0.03f);
+    mem_free(sent);
+    probes_release(&probes);
+    plane_rig_release(&rig);
+}
+
+int main(void) {
+    struct image sky;
+    struct disc disc;
+    make_sky(&sky, &disc);
+    test_fit(&sky, &disc, 0.25f, 0.5f);
+    test_fit(&sky, &disc, 0.45f, 1.0f);
+    test_fit(&sky, &disc, 1.0f, 0.0f);
+    image_release(&sky);
+    return check_result();
+}
