@@ -5,6 +5,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/capture/best.h"
 #include "server/capture/robust.h"
 #include "server/scene/surface.h"
 
@@ -14,6 +15,7 @@
 #define OUTLIER_SCALE 0.3f
 /* Noise of a look-up between four pixels over that of one, on average. */
 #define BILINEAR_DEVIATION 0.67f
+/* Photographs of which the mean is taken, those of the greatest weights: 24 KiB a thread, however many there are. */
 #define MAX_LOOKS 256
 #define CHUNK 1024 /* valid texels a work item */
 
@@ -25,32 +27,49 @@ struct fuse_job {
     const struct inverse_uv *inverse;
 };
 
-/* What the photographs show of a texel, the measured ones first. */
+/* What the photographs show of a texel: the best of those that measured it or, where none did, of the bounds. */
 struct looks {
-    size_t count, measured, clean;
+    bool measured;
+    struct best best;
+    struct best_item item[MAX_LOOKS];
     struct robust_sample look[MAX_LOOKS];
     struct view view[MAX_LOOKS];
-    float mixing[MAX_LOOKS]; /* see views_mixing */
+    float mixing[MAX_LOOKS];          /* see views_mixing */
+    size_t seen, clean;               /* of all photographs, as the next */
+    double gray_sum, gray_square_sum;
 };
 
-static void add_look(struct looks *l, const struct photograph_sample *s, const struct view *view, float weight,
-                     float mixing, float floor_radiance) {
-    size_t at = l->count++;
-    if (!s->saturated[0] && !s->saturated[1] && !s->saturated[2]) {
-        l->look[at] = l->look[l->measured];
-        l->view[at] = l->view[l->measured];
-        l->mixing[at] = l->mixing[l->measured];
-        at = l->measured++;
-    }
-    float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + floor_radiance);
-    l->look[at] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
-    l->view[at] = *view;
-    l->mixing[at] = mixing;
+/* The first that measured makes what bounds were met worthless. */
+static void add_look(const struct fuse_job *job, struct looks *l, const struct photograph_sample *s, const struct view *view,
+                     uint32_t triangle) {
+    const struct views *v = job->views;
+    bool measured = !s->saturated[0] && !s->saturated[1] && !s->saturated[2];
+    float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + LOG_FLOOR * v->median_radiance);
+    int edge = views_edge(v, view, triangle);
+    l->seen++;
+    l->clean += edge < VIEWS_EDGE;
+    l->gray_sum += (double)gray;
+    l->gray_square_sum += (double)gray * (double)gray;
+    if (measured && !l->measured)
+        best_init(&l->best, l->item, MAX_LOOKS);
+    l->measured |= measured;
+    if (measured != l->measured)
+        return;
+    /* The noise of the same radiance in all photographs: by its own, what noise made bright would be preferred. */
+    float weight = view->weight * views_trust(v, view, triangle);
+    size_t slot = best_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f),
+                           view->train);
+    if (slot == BEST_NONE)
+        return;
+    l->look[slot] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
+    l->view[slot] = *view;
+    l->mixing[slot] = views_mixing(v, view, triangle, s->radiance);
 }
 
-/* Weighs the first `count` looks by their noise, which depends on how bright the texel is: that is
+/* Weighs the looks by their noise, which depends on how bright the texel is: that is
  * told by all together, each by the light it had. */
-static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t count) {
+static void weigh_by_noise(const struct fuse_job *job, struct looks *l) {
+    size_t count = l->best.count;
     rgb sum = {0.0f, 0.0f, 0.0f};
     float weights = 0.0f;
     for (size_t i = 0; i < count; i++) {
@@ -71,28 +90,23 @@ static void weigh_by_noise(const struct fuse_job *job, struct looks *l, size_t c
 
 static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {
     const struct views *v = job->views;
-    l->count = l->measured = l->clean = 0;
-    for (uint32_t t = 0; t < v->train_count && l->count < MAX_LOOKS; t++) {
+    l->measured = false;
+    l->seen = l->clean = 0;
+    l->gray_sum = l->gray_square_sum = 0.0;
+    best_init(&l->best, l->item, MAX_LOOKS);
+    for (uint32_t t = 0; t < v->train_count; t++) {
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;
         struct photograph_sample s;
         if (views_sees(v, t, p->position, p->normal, &view) && !photograph_sparks(photo, view.x, view.y) &&
-            photograph_sample(photo, view.x, view.y, &s)) {
-            l->clean += views_edge(v, &view, p->triangle) < VIEWS_EDGE;
-            add_look(l, &s, &view, view.weight * views_trust(v, &view, p->triangle),
-                     views_mixing(v, &view, p->triangle, s.radiance), LOG_FLOOR * v->median_radiance);
-        }
+            photograph_sample(photo, view.x, view.y, &s))
+            add_look(job, l, &s, &view, p->triangle);
     }
 }
 
 static float spread_of(const struct looks *l) {
-    double sum = 0.0, squares = 0.0, n = (double)l->count;
-    for (size_t i = 0; i < l->count; i++) {
-        double gray = (double)l->look[i].gray;
-        sum += gray;
-        squares += gray * gray;
-    }
-    return n > 1.0 ? (float)sqrt(fmax(0.0, (squares - sum * sum / n) / (n - 1.0))) : 0.0f;
+    double n = (double)l->seen, sum = l->gray_sum;
+    return n > 1.0 ? (float)sqrt(fmax(0.0, (l->gray_square_sum - sum * sum / n) / (n - 1.0))) : 0.0f;
 }
 
 static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
@@ -101,14 +115,13 @@ static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
     if (!surface_at_texel(&job->views->scene->mesh, job->atlas, job->inverse, texel, &p))
         return;
     look_all(job, &p, &l);
-    if (l.count == 0)
+    if (l.best.count == 0)
         return;
     job->f->count[texel] = (float)l.clean;
     job->f->spread[texel] = spread_of(&l);
-    job->f->is_bound[texel] = l.measured == 0;
-    size_t count = l.measured > 0 ? l.measured : l.count;
-    weigh_by_noise(job, &l, count);
-    rgb mean = robust_mean(l.look, count, OUTLIER_SCALE);
+    job->f->is_bound[texel] = !l.measured;
+    weigh_by_noise(job, &l);
+    rgb mean = robust_mean(l.look, l.best.count, OUTLIER_SCALE);
     const float channel[3] = {mean.r, mean.g, mean.b};
     for (int c = 0; c < 3; c++)
         job->f->radiance[texel][c] = image_half_from_float(fmaxf(channel[c], 0.0f));

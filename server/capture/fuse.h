@@ -2,7 +2,8 @@
  *
  * The mean of all clean look-ups, weighted by the solid angle that a patch of the surface fills in
  * the photograph, by its noise, and by how well a look-up agrees with the others: a highlight that
- * one photograph has caught, or a pose that is off, counts little. A saturated value is a lower bound: it is left
+ * one photograph has caught, or a pose that is off, counts little. Of a few hundred the best are taken, by their weights
+ * before brightness is known; all are counted. A saturated value is a lower bound: it is left
  * out where others measured, and stands in where none did. Held-out photographs are never asked. */
 #ifndef UNBAKE_CAPTURE_FUSE_H
 #define UNBAKE_CAPTURE_FUSE_H

@@ -214,8 +214,7 @@ vec3 views_direction(const struct views *v, uint32_t train, vec3 point) {
     return vec3_normalize(vec3_sub(camera_origin(camera), point));
 }
 
-/* As views_sees, but for the visibility ray. */
-static bool faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
     const struct photograph *photo = &v->scene->photograph[v->train[train]];
     const struct camera *camera = &photo->camera;
     vec3 to_camera = vec3_sub(camera_origin(camera), point);
@@ -231,13 +230,15 @@ static bool faces(const struct views *v, uint32_t train, vec3 point, vec3 normal
     return true;
 }
 
-bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
-    if (!faces(v, train, point, normal, view))
-        return false;
+bool views_unhidden(const struct views *v, uint32_t train, vec3 point, vec3 normal) {
     vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
     float distance = vec3_length(to_camera);
     vec3 direction = vec3_scale(to_camera, 1.0f / distance);
     return !accel_occluded(v->accel, accel_offset(point, normal, direction), direction, 0.0f, distance);
+}
+
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
+    return views_faces(v, train, point, normal, view) && views_unhidden(v, train, point, normal);
 }
 
 int views_edge(const struct views *v, const struct view *view, uint32_t triangle) {

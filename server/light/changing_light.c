@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#include "common/rng.h"
+#include "server/capture/best.h"
 #include "server/gather/highlight.h"
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
@@ -63,6 +65,11 @@ static bool may_be_highlight(const struct divide *d, const struct surface_point 
     return shown < BRIGHTER * brightest;
 }
 
+/* A draw among those that show it lit: a film's first ones are taken from the same place, where one highlight is. */
+static float drawn_weight(uint32_t texel, uint32_t train) {
+    return 1.0f - rng_to_float((uint32_t)rng_key(KEY_CHANGING, texel, train));
+}
+
 /* Whether some photographs show the texel black, and others lit and not by a highlight. */
 static bool changed(const struct divide *d, uint32_t texel, int thread) {
     const struct reconstruction *r = d->r;
@@ -72,7 +79,10 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
         uint32_t train;
         float shown;
     } lit[LOOKS_ASKED];
-    size_t black_count = 0, lit_count = 0, own = 0;
+    struct best drawn;
+    struct best_item item[LOOKS_ASKED];
+    size_t black_count = 0, own = 0;
+    best_init(&drawn, item, LOOKS_ASKED);
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) || !divide_white(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
@@ -82,14 +92,13 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
                              ? kind_of(d, &view, at.triangle, rgb_mean(white), &shown)
                              : TELLS_NOTHING;
         black_count += kind == TELLS_BLACK;
-        if (kind == TELLS_LIT && lit_count < LOOKS_ASKED) {
-            lit[lit_count].train = t;
-            lit[lit_count++].shown = shown;
-        }
+        size_t slot = kind == TELLS_LIT ? best_put(&drawn, drawn_weight(texel, t), t) : BEST_NONE;
+        if (slot != BEST_NONE)
+            lit[slot].train = t, lit[slot].shown = shown;
     }
     if (black_count < LOOKS_LEAST)
         return false;
-    for (size_t i = 0; i < lit_count; i++)
+    for (size_t i = 0; i < drawn.count; i++)
         own += !may_be_highlight(d, &at, texel, lit[i].train, lit[i].shown, thread);
     return own >= LOOKS_LEAST;
 }

@@ -6,6 +6,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
+#include "server/capture/best.h"
 #include "server/gather/highlight.h"
 #include "server/material/color_prior.h"
 #include "server/render/bsdf.h"
@@ -86,60 +87,91 @@ static bool sharpen(const struct divide *d, const struct view *view, uint32_t tr
            photograph_sample_cubic(&d->r->scene->photograph[d->views->train[view->train]], view->x, view->y, shown);
 }
 
-static void add_look(const struct divide *d, uint32_t texel, const struct surface_point *at,
-                     const struct irradiance *light, const struct view *view, rgb shown,
-                     struct incident *scratch, struct measured_looks *looks) {
+/* A look before its highlight is known. */
+struct candidate {
+    struct view view;
+    rgb shown, white;
+    float weight, mixing;
+    bool sharp;
+};
+
+/* The best of a texel's photographs, by weight. */
+struct candidates {
+    struct best best;
+    struct best_item item[MEASURED_LOOKS];
+    struct candidate candidate[MEASURED_LOOKS];
+};
+
+/* Photograph `train` of the texel, unless it shows nothing of it or there are enough that weigh more. */
+static void offer_look(const struct divide *d, uint32_t segment, const struct surface_point *at,
+                       const struct irradiance *light, uint32_t train, struct candidates *of) {
+    const struct photograph *photo = &d->r->scene->photograph[d->views->train[train]];
+    struct candidate c;
+    struct photograph_sample s;
+    if (!views_faces(d->views, train, at->position, at->normal, &c.view))
+        return;
+    c.white = irradiance_diffuse(light, at->shading, d->r->materials.roughness[segment],
+                                 views_direction(d->views, train, at->position));
+    rgb typical = rgb_scale(c.white, TYPICAL_BASE_COLOR);
+    /* Edges and the light of others only lower it: no ray is needed to know that it is too low. */
+    if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
+        !views_unhidden(d->views, train, at->position, at->normal) || photograph_sparks(photo, c.view.x, c.view.y) ||
+        !photograph_sample(photo, c.view.x, c.view.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
+        return;
+    c.shown = s.radiance;
+    c.mixing = views_mixing(d->views, &c.view, at->triangle, c.shown);
+    c.sharp = sharpen(d, &c.view, at->triangle, &c.shown);
+    float times_typical = rgb_mean(c.shown) / fmaxf(rgb_mean(typical), DARKEST * d->views->median_radiance);
+    c.weight = c.view.weight * views_trust(d->views, &c.view, at->triangle) *
+               noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
+    size_t slot = best_put(&of->best, c.weight, train);
+    if (slot != BEST_NONE)
+        of->candidate[slot] = c;
+}
+
+static struct robust_sample look_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
+                                    const struct candidate *c, struct incident *scratch) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = reconstruction_segment(d->r, texel);
-    float median = d->views->median_radiance;
-    float weight = view->weight * views_trust(d->views, view, at->triangle);
-    float mixing = views_mixing(d->views, view, at->triangle, shown);
-    bool sharp = sharpen(d, view, at->triangle, &shown);
-    vec3 wo = views_direction(d->views, view->train, at->position);
-    rgb white = irradiance_diffuse(light, at->shading, m->roughness[segment], wo);
-    rgb typical = rgb_scale(white, TYPICAL_BASE_COLOR);
-    float times_typical = rgb_mean(shown) / fmaxf(rgb_mean(typical), DARKEST * median);
-    rgb gloss = rgb_gray(0.0f);
+    float median = d->views->median_radiance, weight = c->weight;
+    rgb white = c->white, gloss = rgb_gray(0.0f);
     if (m->specular[segment] > 0.0f) {
         struct highlight highlight;
         struct highlight_levels level = {1, 1, {m->roughness[segment]}, {m->specular[segment]}};
-        highlight_gather(&highlight, scratch, d->field, at, wo, &level,
-                         sampler_key(KEY_DIVIDE, texel, view->train), d->highlight_samples,
-                         d->highlight_samples / 2);
+        highlight_gather(&highlight, scratch, d->field, at, views_direction(d->views, c->view.train, at->position), &level,
+                         sampler_key(KEY_DIVIDE, texel, c->view.train), d->highlight_samples, d->highlight_samples / 2);
         gloss = highlight.radiance[0][0];
         float both = fmaxf(d->typical[segment] * rgb_mean(white) + rgb_mean(gloss), 0.01f * median);
         float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
-    rgb fused = fused_radiance(&d->r->fused, texel), deviation = noise_deviation(d->noise, d->views, view, fused);
+    rgb fused = fused_radiance(&d->r->fused, texel), deviation = noise_deviation(d->noise, d->views, &c->view, fused);
     rgb usual = rgb_clamp(divide_channels(fused, white, DARKEST * median), 0.0f, MOST);
-    rgb base = rgb_clamp(divide_channels(rgb_sub(shown, gloss), white, DARKEST * median), -MOST, MOST);
+    rgb base = rgb_clamp(divide_channels(rgb_sub(c->shown, gloss), white, DARKEST * median), -MOST, MOST);
     rgb noise = rgb_clamp(divide_channels(deviation, white, DARKEST * median), 0.0f, MOST);
-    looks->look[looks->count++] = (struct robust_sample){
+    return (struct robust_sample){
         .value = base,
         .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
         .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
-        .weight = weight * noise_weight(d->noise, d->views, view, typical, mixing * times_typical * times_typical),
-        .source = view->train,
-        .sharp = view->weight,
-        .noise = rgb_scale(noise, noise_draw(view, sharp)),
-        .mixing = mixing * rgb_dot(base, base)};
+        .weight = weight,
+        .source = c->view.train,
+        .sharp = c->view.weight,
+        .noise = rgb_scale(noise, noise_draw(&c->view, c->sharp)),
+        .mixing = c->mixing * rgb_dot(base, base)};
 }
 
 static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,
                      struct irradiance *light, struct measured_looks *looks) {
     struct surface_point at;
+    struct candidates candidates;
     looks->count = 0;
     if (!light_at(d, texel, &at, light))
         return;
-    for (uint32_t t = 0; t < d->views->train_count && looks->count < MEASURED_LOOKS; t++) {
-        const struct photograph *photo = &d->r->scene->photograph[d->views->train[t]];
-        struct view view;
-        struct photograph_sample s;
-        if (views_sees(d->views, t, at.position, at.normal, &view) && !photograph_sparks(photo, view.x, view.y) &&
-            photograph_sample(photo, view.x, view.y, &s) && !s.saturated[0] && !s.saturated[1] && !s.saturated[2])
-            add_look(d, texel, &at, light, &view, s.radiance, scratch, looks);
-    }
+    best_init(&candidates.best, candidates.item, MEASURED_LOOKS);
+    for (uint32_t t = 0; t < d->views->train_count; t++)
+        offer_look(d, reconstruction_segment(d->r, texel), &at, light, t, &candidates);
+    for (; looks->count < candidates.best.count; looks->count++)
+        looks->look[looks->count] = look_of(d, texel, &at, &candidates.candidate[looks->count], scratch);
 }
 
 static rgb texel_color(const struct reconstruction *r, uint32_t texel) {

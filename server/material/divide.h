@@ -2,7 +2,7 @@
  *
  * For each photograph of a texel, (shown - gloss) / white is its base colour; the robust mean over the
  * photographs is taken, weighted as in fuse.h and less where the highlight is a large part of what
- * is shown. Then the noise of the photographs is taken out (denoise.h). Texels that no photograph
+ * is shown. Of more than MEASURED_LOOKS photographs the best are taken, by their weights before highlights are known. Then the noise of the photographs is taken out (denoise.h). Texels that no photograph
  * measured get what is beside them, or what is to be expected of them (color_prior.h). */
 #ifndef UNBAKE_MATERIAL_DIVIDE_H
 #define UNBAKE_MATERIAL_DIVIDE_H

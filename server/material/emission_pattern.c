@@ -5,6 +5,7 @@
 
 #include "common/mem.h"
 #include "common/quantile.h"
+#include "server/capture/best.h"
 #include "server/material/denoise.h"
 #include "server/scene/by_segment.h"
 #include "server/scene/surface.h"
@@ -49,27 +50,31 @@ struct finder {
 
 /* --- what is shown --------------------------------------------------------------------------------- */
 
-/* Weighed by the noise of what the segment shows in the mean: by its own a bright place would outweigh dark ones beside
+/* By the noise of what the segment shows in the mean: by its own a bright place would outweigh dark ones beside
  * it, of which a larger share is noise, wherever neighbours are averaged. */
+static float weight_of(const struct emitter *e, const struct view *view, float mixing) {
+    const struct finder *f = e->finder;
+    return view->weight * noise_weight(&f->r->noise, f->views, view, f->r->evidence[e->segment].least, mixing);
+}
+
 static struct robust_sample look_of(const struct emitter *e, const struct view *view, float mixing, rgb shown,
                                     bool sharp, rgb fused) {
     const struct finder *f = e->finder;
-    rgb value = rgb_scale(shown, e->scale), typical = f->r->evidence[e->segment].least;
+    rgb value = rgb_scale(shown, e->scale);
     float times_typical = rgb_mean(value);
     rgb noise = rgb_scale(noise_deviation(&f->r->noise, f->views, view, fused), e->scale);
     return (struct robust_sample){
         .value = value,
         .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
         .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
-        .weight = view->weight *
-                  noise_weight(&f->r->noise, f->views, view, typical, mixing * times_typical * times_typical),
+        .weight = weight_of(e, view, mixing * times_typical * times_typical),
         .source = view->train,
         .sharp = view->weight,
         .noise = rgb_scale(noise, noise_draw(view, sharp)),
         .mixing = mixing * rgb_dot(value, value)};
 }
 
-/* What the photographs show of a texel, clear of all edges. Saturated, they tell how bright it is at least: the greatest
+/* What the photographs show of a texel, clear of all edges; the best of them where there are many. Saturated, they tell how bright it is at least: the greatest
  * of that is taken where nothing else is told, unless it is less than the segment is known to show: then it may be as
  * bright as the rest of it. */
 static void look_all(const struct emitter *e, uint32_t texel, struct measured_looks *looks) {
@@ -78,26 +83,32 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
     rgb fused = fused_radiance(&r->fused, texel);
     struct robust_sample bound = {.weight = 0.0f};
     struct surface_point at;
+    struct best best;
+    struct best_item item[MEASURED_LOOKS];
     looks->count = 0;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    for (uint32_t t = 0; t < views->train_count && looks->count < MEASURED_LOOKS; t++) {
+    best_init(&best, item, MEASURED_LOOKS);
+    for (uint32_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &r->scene->photograph[views->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (!views_sees(views, t, at.position, at.normal, &view) ||
+        if (!views_faces(views, t, at.position, at.normal, &view) ||
+            !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
-            !photograph_sample(photo, view.x, view.y, &s))
+            !views_unhidden(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
             continue;
         float mixing = views_mixing(views, &view, at.triangle, s.radiance);
         bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
         bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &s.radiance);
         struct robust_sample look = look_of(e, &view, mixing, s.radiance, sharp, fused);
-        if (!saturated)
-            looks->look[looks->count++] = look;
-        else if (bound.weight == 0.0f || look.gray > bound.gray)
+        size_t slot = saturated ? BEST_NONE : best_put(&best, look.weight, t);
+        if (slot != BEST_NONE)
+            looks->look[slot] = look;
+        else if (saturated && (bound.weight == 0.0f || look.gray > bound.gray))
             bound = look;
     }
+    looks->count = best.count;
     if (looks->count == 0 && bound.weight > 0.0f && rgb_mean(bound.value) > 1.0f)
         looks->look[looks->count++] = bound;
 }

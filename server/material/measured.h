@@ -22,7 +22,9 @@ static inline rgb measured_value(const struct measured *m) {
     return rgb_from_half(m->value);
 }
 
-/* What is gathered of one texel, a look a photograph. */
+/* What is gathered of one texel: a look a photograph, of no more photographs than this, those of the greatest weights
+ * (best.h) among all of the capture. It bounds the time that highlights take, and memory: 3 KiB a thread, however many
+ * photographs there are. */
 #define MEASURED_LOOKS 48
 struct measured_looks {
     size_t count;

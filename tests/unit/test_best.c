@@ -1,0 +1,74 @@
+/* best.h: of any number of items the best are kept by weight, as sorting all of them would choose, in whatever order they
+ * come; equal weights go by index; what weighs nothing, or is no number, is not taken. */
+#include "server/capture/best.h"
+#include "common/mem.h"
+#include "common/rng.h"
+#include "tests/check.h"
+
+#define MOST 48
+
+static int by_rank(const void *a, const void *b) {
+    const struct best_item *x = a, *y = b;
+    if (x->weight != y->weight)
+        return x->weight < y->weight ? 1 : -1;
+    return (x->index > y->index) - (x->index < y->index);
+}
+
+enum order { FORTH, BACK, SHUFFLED, ORDERS };
+
+static uint32_t item_at(enum order order, uint32_t i, uint32_t count) {
+    return order == FORTH ? i : order == BACK ? count - 1 - i : (uint32_t)((uint64_t)i * 7919 % count);
+}
+
+/* `levels` different weights among `count` items. */
+static void check_kept(uint32_t count, uint32_t levels) {
+    struct best_item *all = mem_array(count, sizeof *all);
+    for (uint32_t i = 0; i < count; i++)
+        all[i] = (struct best_item){.weight = 1.0f + (float)rng_below((uint32_t)rng_key(1, i, 0), levels), .index = i};
+    struct best_item *sorted = mem_array(count, sizeof *sorted);
+    memcpy(sorted, all, count * sizeof *all);
+    qsort(sorted, count, sizeof *sorted, by_rank);
+    for (enum order order = FORTH; order < ORDERS; order++) {
+        struct best best;
+        struct best_item item[MOST];
+        uint32_t kept[MOST];
+        best_init(&best, item, MOST);
+        for (uint32_t i = 0; i < count; i++) {
+            const struct best_item *offered = &all[item_at(order, i, count)];
+            bool takes = best_takes(&best, offered->weight, offered->index);
+            size_t slot = best_put(&best, offered->weight, offered->index);
+            CHECK(takes == (slot != BEST_NONE));
+            if (slot != BEST_NONE)
+                kept[slot] = offered->index;
+        }
+        CHECK(best.count == (count < MOST ? count : MOST));
+        for (size_t k = 0; k < best.count; k++) {
+            size_t found = 0;
+            while (found < best.count && kept[found] != sorted[k].index)
+                found++;
+            CHECK_THAT(found < best.count, "%u items, order %d: number %zu of the best, %u, is not kept", count, (int)order,
+                       k, sorted[k].index);
+            if (order == FORTH && count <= MOST)
+                CHECK(kept[k] == k);
+        }
+    }
+    mem_free(sorted);
+    mem_free(all);
+}
+
+int main(void) {
+    const uint32_t counts[] = {1, 2, 47, 48, 49, 257, 300, 2003, 20011};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        check_kept(counts[i], 1);
+        check_kept(counts[i], 5);
+        check_kept(counts[i], 1u << 24);
+    }
+    struct best best;
+    struct best_item item[2];
+    best_init(&best, item, 2);
+    CHECK(best_put(&best, NAN, 0) == BEST_NONE && best_put(&best, 0.0f, 1) == BEST_NONE);
+    CHECK(best_put(&best, -1.0f, 2) == BEST_NONE && best.count == 0);
+    CHECK(best_put(&best, 1.0f, 3) == 0 && best_put(&best, INFINITY, 4) == 1 && best_put(&best, 2.0f, 5) == 0);
+    CHECK(!best_takes(&best, 2.0f, 6) && best_takes(&best, 2.0f, 4) && !best_takes(&best, NAN, 0));
+    return check_result();
+}
