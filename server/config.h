@@ -32,13 +32,14 @@ struct config {
     char *trusted_proxies, *proxy_field;                              /* owned */
     char *data_dir, *log_level, *log_format;                          /* owned */
     int64_t max_running, max_checks, threads, max_attempts, queue_limit, worker_memory_mib;
-    int64_t user_max_running, user_queue_limit, user_max_jobs, user_max_mib;
+    int64_t user_max_running, user_queue_limit, user_max_jobs, user_max_mib, user_max_percent;
+    int64_t user_max_streams, user_max_uploads, user_max_checks, user_pledge_percent, admin_free_mib;
     int64_t max_upload_mib, min_free_mib, low_disk_mib;
-    int64_t max_connections, max_streams, body_min_bytes_per_sec;
+    int64_t max_connections, address_max_connections, max_streams, body_min_bytes_per_sec;
     int64_t events_per_job;
     double event_keep_hours;
     double checkpoint_interval_sec, checkpoint_keep_hours, stop_grace_sec;
-    double upload_keep_hours, job_keep_days, scene_keep_days, collect_interval_sec;
+    double upload_start_minutes, upload_keep_hours, job_keep_days, scene_keep_days, collect_interval_sec;
     double head_timeout_sec, idle_timeout_sec, keepalive_sec;
     bool webhook_private;
     bool sandbox;

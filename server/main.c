@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/statvfs.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -98,6 +99,15 @@ static void on_revoked(void *user) {
     hub_recheck(d->api->hub);
 }
 
+/* The smaller of both limits; 0: none. A disk that does not tell how large it is sets none. */
+static uint64_t user_max_bytes(const struct config *c) {
+    struct statvfs disk;
+    uint64_t limit = (uint64_t)c->user_max_mib << 20, share = 0;
+    if (c->user_max_percent > 0 && statvfs(c->data_dir, &disk) == 0)
+        share = (uint64_t)disk.f_blocks * disk.f_frsize / 100 * (uint64_t)c->user_max_percent;
+    return limit == 0 || (share > 0 && share < limit) ? share : limit;
+}
+
 static struct scheduler_config scheduler_options(const struct config *c) {
     return (struct scheduler_config){
         .data_dir = c->data_dir,
@@ -106,7 +116,7 @@ static struct scheduler_config scheduler_options(const struct config *c) {
         .user_max_running = (int)c->user_max_running,
         .max_checks = (int)c->max_checks,
         .thread_count = (int)c->threads,
-        .user_max_bytes = (uint64_t)c->user_max_mib << 20,
+        .user_max_bytes = user_max_bytes(c),
         .worker_memory_bytes = (uint64_t)c->worker_memory_mib << 20,
         .checkpoint_interval_sec = c->checkpoint_interval_sec,
         .stop_grace_sec = c->stop_grace_sec,
@@ -126,8 +136,14 @@ static struct api_config api_options(const struct config *c, const struct proxie
         .queue_limit = (size_t)c->queue_limit,
         .user_queue_limit = (size_t)c->user_queue_limit,
         .user_max_jobs = (size_t)c->user_max_jobs,
-        .user_max_bytes = (uint64_t)c->user_max_mib << 20,
+        .user_max_bytes = user_max_bytes(c),
         .max_upload_bytes = (uint64_t)c->max_upload_mib << 20,
+        .admin_free_bytes = (uint64_t)c->admin_free_mib << 20,
+        .user_pledge_percent = (unsigned)c->user_pledge_percent,
+        .user_max_streams = (size_t)c->user_max_streams,
+        .user_max_uploads = (size_t)c->user_max_uploads,
+        .user_max_checks = (size_t)c->user_max_checks,
+        .empty_upload_ms = (int64_t)(fmin(60e3 * c->upload_start_minutes, 3.6e6 * c->upload_keep_hours)),
         .min_free_bytes = (uint64_t)c->min_free_mib << 20,
         .max_streams = (size_t)c->max_streams,
         .upload_keep_ms = (int64_t)(c->upload_keep_hours * 3.6e6),
@@ -149,6 +165,7 @@ static void listener_options(const struct config *c, struct listener_config *net
     *network = (struct listener_config){
         .address = address,
         .connection_max = (unsigned)c->max_connections,
+        .address_connection_max = (unsigned)c->address_max_connections,
         .certificate_file = *c->tls_certificate ? c->tls_certificate : NULL,
         .key_file = c->tls_key,
         .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec,

@@ -32,12 +32,15 @@ struct api_config {
     uint64_t user_max_bytes;   /* that one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
     uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */
+    uint64_t admin_free_bytes; /* more of it, which is kept for admins */
+    unsigned user_pledge_percent; /* of the free space that one user's uploads may hold before they arrive; 0: all */
     size_t max_streams;        /* event streams at once */
+    size_t user_max_streams, user_max_uploads, user_max_checks; /* of one user; 0: no limit */
     double keepalive_sec;
     enum api_access access;
     const struct proxies *proxies; /* whose word on addresses counts (address.h); NULL: nobody's */
     bool is_tls;               /* connections are encrypted by this daemon */
-    int64_t scene_keep_ms, job_keep_ms, upload_keep_ms; /* see store/retention.h */
+    int64_t scene_keep_ms, job_keep_ms, upload_keep_ms, empty_upload_ms /* 0: as upload_keep_ms */; /* see store/retention.h */
     const char *server_names;  /* besides loopback; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;

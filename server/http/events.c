@@ -6,6 +6,7 @@
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
+#include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 
@@ -42,15 +43,6 @@ static struct response *read_request(struct api *api, const struct request *r, s
     what->is_past = !follows;
     what->wait_sec = (double)wait_sec;
     *is_resumed = place != NULL;
-    return NULL;
-}
-
-static struct response *check_room_for_stream(struct api *api, const struct request *r) {
-    size_t most = api->config.max_streams, of_one = (most + 1) / 2; /* so that nobody can have them all */
-    if (hub_count(api->hub) >= most)
-        return problem(r, 503, "there are %zu event streams already", most);
-    if (r->caller.user_id > 0 && hub_count_of(api->hub, r->caller.user_id) >= of_one)
-        return problem(r, 503, "%zu event streams are yours already", of_one);
     return NULL;
 }
 
@@ -91,7 +83,7 @@ struct response *events_get(struct api *api, struct request *r) {
             reply = response_new(204); /* which an EventSource takes as the end */
     }
     if (!reply)
-        reply = check_room_for_stream(api, r);
+        reply = limits_check_stream(api, r);
     if (!reply) {
         what.snapshot = view_job(&job);
         reply = stream_reply(api, r, what.is_ndjson ? MIME_NDJSON : MIME_SSE, &what);
@@ -105,7 +97,7 @@ struct response *events_all(struct api *api, struct request *r) {
     bool is_resumed;
     struct response *reply = read_request(api, r, &what, &is_resumed);
     if (!reply)
-        reply = check_room_for_stream(api, r);
+        reply = limits_check_stream(api, r);
     return reply ? reply : stream_reply(api, r, what.is_ndjson ? MIME_NDJSON : MIME_SSE, &what);
 }
 
@@ -120,7 +112,7 @@ struct response *events_wait(struct api *api, struct request *r, const struct jo
     /* It has come already: then it is an ordinary reply. */
     if (known ? !field_etag_listed(known, etag, true) : job_is_terminal(job->state))
         return NULL;
-    struct response *reply = check_room_for_stream(api, r);
+    struct response *reply = limits_check_stream(api, r);
     if (known)
         what.revision = job->revision;
     what.wait_sec = (double)wait_sec;

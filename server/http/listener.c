@@ -19,6 +19,7 @@
 #include "server/http/acceptor.h"
 #include "server/http/address.h"
 #include "server/http/auth.h"
+#include "server/http/crowd.h"
 #include "server/http/head.h"
 #include "server/http/hub.h"
 #include "server/http/problem.h"
@@ -60,6 +61,7 @@ struct listener {
     struct guard *guard;
     struct tls *tls; /* NULL: plain HTTP */
     struct acceptor *acceptor; /* has the listening socket */
+    struct crowd *crowd;
     uint16_t port;
     pthread_t clerks[CLERK_THREADS];
     size_t clerk_count;
@@ -460,15 +462,41 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
     } else {
         guard_remove(l->guard, *socket_context);
         *socket_context = NULL;
+        struct address from =
+            address_of_socket(MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
+        crowd_leave(l->crowd, &from);
         acceptor_ended(l->acceptor);
     }
 }
 
 /* --- starting and stopping --------------------------------------------------------------- */
 
+/* Says why, to who understands it, and closes. */
+static bool turn_away(const struct listener *l, int fd, enum crowd_answer answer) {
+    static const char *const reply[] = {
+        [CROWD_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
+                               "Connection: close\r\n\r\nthis address has as many connections as one may have; an"
+                               " administrator can raise the option address_max_connections\n",
+        [CROWD_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
+                       "Connection: close\r\n\r\nthere are as many connections as there may be; an administrator can"
+                       " raise the option max_connections\n"};
+    if (!l->tls) /* whoever is not there to read it has not waited for it */
+        (void)!send(fd, reply[answer], strlen(reply[answer]), MSG_NOSIGNAL | MSG_DONTWAIT);
+    shutdown(fd, SHUT_WR);
+    close(fd);
+    return false;
+}
+
 static bool on_accepted(void *user, int fd, const struct sockaddr *address, socklen_t size) {
     struct listener *l = user;
-    return MHD_add_connection(l->daemon, fd, address, size) == MHD_YES;
+    struct address from = address_of_socket(address);
+    enum crowd_answer answer = crowd_enter(l->crowd, &from);
+    if (answer != CROWD_OK)
+        return turn_away(l, fd, answer);
+    if (MHD_add_connection(l->daemon, fd, address, size) == MHD_YES)
+        return true;
+    crowd_leave(l->crowd, &from);
+    return false;
 }
 
 static void on_tick(void *user) {
@@ -520,6 +548,7 @@ enum status listener_start(struct listener **out, const struct listener_config *
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     l->port = config->port;
+    l->crowd = crowd_new(config->connection_max, config->address_connection_max, api->config.proxies);
     enum status status =
         acceptor_new(&l->acceptor, config->address, &l->port, config->connection_max, on_accepted, l, err);
     if (status == STATUS_OK && config->certificate_file)
@@ -592,6 +621,7 @@ void listener_stop(struct listener *l) {
     if (l->daemon)
         MHD_stop_daemon(l->daemon);
     acceptor_free(l->acceptor);
+    crowd_free(l->crowd);
     if (l->guard)
         guard_free(l->guard);
     tls_free(l->tls);

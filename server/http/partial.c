@@ -16,7 +16,7 @@
 #include "server/http/space.h"
 #include "server/http/upload.h"
 
-static const struct count_limits unfinished_max = {.all = 10000, .one_user = 1000};
+#define UNFINISHED_MAX 10000 /* uploads, of all users */
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
@@ -167,8 +167,9 @@ enum status partial_create(struct partials *p, struct upload_row *row, struct er
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (status == STATUS_OK)
         status = file_sync_parent(path, err);
+    const struct count_limits limits = {.all = UNFINISHED_MAX, .one_user = p->api->config.user_max_uploads};
     if (status == STATUS_OK)
-        status = store_upload_add(p->api->store, row, &hash, sizeof hash, &unfinished_max, err);
+        status = store_upload_add(p->api->store, row, &hash, sizeof hash, &limits, err);
     if (fd >= 0)
         close(fd);
     if (fd >= 0 && status != STATUS_OK)

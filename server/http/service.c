@@ -42,6 +42,8 @@ enum status service_new(struct api **out, const struct api_config *config, struc
                         struct scheduler *scheduler, struct error *err) {
     struct api *api = mem_calloc(1, sizeof *api);
     api->config = *config;
+    if (api->config.empty_upload_ms <= 0)
+        api->config.empty_upload_ms = config->upload_keep_ms;
     api->store = store;
     api->scheduler = scheduler;
     pthread_mutex_init(&api->scene_mutex, NULL);
@@ -52,6 +54,8 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     *out = api;
     enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
                                     config->upload_keep_ms, err);
+    if (status == STATUS_OK)
+        status = store_keep_empty(store, api->config.empty_upload_ms, err);
     if (status == STATUS_OK)
         status = partials_recover(api->partials, err);
     if (status == STATUS_OK)

@@ -8,6 +8,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/http/limits.h"
 #include "server/http/problem.h"
 
 enum status space_discard(struct api *api, const char *path, struct error *err) {
@@ -41,7 +42,7 @@ struct response *space_check_room(struct api *api, const struct request *r, uint
     uint64_t room;
     if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK)
         return problem_from(r, &err);
-    uint64_t keep = api->config.min_free_bytes;
+    uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);
     if (room >= keep && room - keep >= bytes)
         return NULL;
     char detail[256];
@@ -49,7 +50,8 @@ struct response *space_check_room(struct api *api, const struct request *r, uint
              "%llu MiB are wanted, and of the %llu MiB that are free, %llu MiB must stay so",
              (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20),
              (unsigned long long)(keep >> 20));
-    return problem_full(r, 507, detail, "delete jobs or scenes that nobody needs", NULL);
+    return problem_full(r, 507, detail, "delete jobs or scenes that nobody needs; an administrator can lower the options"
+                        " min_free_mib and admin_free_mib", NULL);
 }
 
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes) {

@@ -14,6 +14,7 @@
 #include "common/mem.h"
 #include "common/utf8.h"
 #include "server/http/field.h"
+#include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
 
@@ -66,6 +67,8 @@ static struct response *check_request(const struct request *r) {
 
 struct response *upload_begin(struct api *api, struct request *r) {
     struct response *refusal = check_request(r);
+    if (!refusal)
+        refusal = limits_check_upload(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (!refusal)
         refusal = space_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
     if (!refusal)

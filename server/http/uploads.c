@@ -20,6 +20,7 @@
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
+#include "server/http/limits.h"
 #include "server/http/partial.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
@@ -179,7 +180,9 @@ static struct response *read_creation(struct api *api, const struct request *r, 
 static struct response *create(struct api *api, const struct request *r, struct upload_row *row) {
     struct error err;
     pthread_mutex_lock(&api->scene_mutex); /* two at once would both find room */
-    struct response *refusal = space_check_room(api, r, row->length);
+    struct response *refusal = limits_check_upload(api, r, row->length);
+    if (!refusal)
+        refusal = space_check_room(api, r, row->length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, row->length);
     if (!refusal && partial_create(api->partials, row, &err) != STATUS_OK)
@@ -200,7 +203,7 @@ struct response *uploads_add(struct api *api, struct request *r) {
         clock_gettime(CLOCK_REALTIME, &now);
         reply = response_new(201);
         response_field(reply, "Location", "/v1/uploads/%s", row.id);
-        add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.upload_keep_ms);
+        add_expiry(reply, (int64_t)now.tv_sec * 1000 + api->config.empty_upload_ms);
     }
     upload_row_release(&row);
     return reply;

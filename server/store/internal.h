@@ -14,6 +14,7 @@ struct reserve {
     bool is_unsupported; /* the file system does not allocate beforehand */
     bool is_tight;
     int page_bytes;
+    int64_t cushion_bytes; /* that are kept */
     int64_t wal_frames;  /* that the log holds */
     int64_t wal_bytes;   /* that it has space for */
     int64_t page_count;  /* that the database file has space for */
@@ -72,7 +73,8 @@ int64_t store_now_ms(void); /* Unix time */
     " ifnull((SELECT max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
 #define UPLOAD_EXPIRES                                                                         \
     "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                         \
-    " ELSE updated_ms + (SELECT upload_ms FROM retention) END)"
+    " ELSE updated_ms + (SELECT iif(received = 0 AND scene_id = '', min(empty_upload_ms, upload_ms), upload_ms)"            \
+    " FROM retention) END)"
 /* What a struct keeping changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
 #define KEEPING_SET                                                                            \
     "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                            \

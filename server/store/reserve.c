@@ -5,8 +5,8 @@
  *       ▼  └─ (the disk has room again)
  *      tight     (they cannot be extended)                        only those that free or stop
  *
- * 1. After each commit the write-ahead log is extended to CUSHION_BYTES beyond what it holds, and the database file to
- *    SPARE_PAGES beyond its last. Ordinary transactions are refused with STATUS_NO_SPACE as soon as that cannot be done, so what is
+ * 1. After each commit the write-ahead log is extended to a cushion beyond what it holds, and the database file to
+ *    spare pages beyond its last. Ordinary transactions are refused with STATUS_NO_SPACE as soon as that cannot be done, so what is
  *    kept is left to the others, which need no block that the disk does not have already.
  * 2. While it is tight, each commit is followed by a checkpoint, so that the same part of the log is used again.
  * 3. Where the file system cannot allocate beforehand, or writes elsewhere even then (copy on write), DATA/reserve is
@@ -25,10 +25,11 @@
 #include "server/store/store.h"
 
 /* A cancelled job is some 12 pages; of a job that is removed most pages are freed, and those are not written. */
-#define CUSHION_BYTES ((int64_t)4 << 20)
-#define STEP_BYTES ((int64_t)1 << 20) /* of the log; so that not every commit extends it */
-#define SPARE_PAGES 256               /* of the database: what stops a job adds an event */
-#define CHUNK_BYTES (256 << 10)       /* by which its file grows */
+#define CUSHION_BYTES ((int64_t)4 << 20) /* on a disk that has 64 MiB free at the start; else a 16th of it */
+#define CUSHION_BYTES_MIN ((int64_t)128 << 10)
+#define STEP_SHARE 4                  /* of the cushion, by which the log grows, so that not every commit extends it */
+#define SPARE_SHARE 4                 /* of the cushion, for new pages of the database: what stops a job adds an event */
+#define CHUNK_BYTES (64 << 10)        /* by which the database's file grows */
 #define WAL_HEADER 32                 /* bytes: sqlite.org/fileformat2.html, 4.1 */
 #define FRAME_HEADER 24
 #define CHECKPOINT_FRAMES 1000        /* SQLite's own default */
@@ -58,7 +59,7 @@ static bool is_full(int number) {
 /* False where the disk has no room for it. */
 static bool extend_wal(struct store *store) {
     struct reserve *r = &store->reserve;
-    int64_t wanted = WAL_HEADER + r->wal_frames * (r->page_bytes + FRAME_HEADER) + CUSHION_BYTES;
+    int64_t wanted = WAL_HEADER + r->wal_frames * (r->page_bytes + FRAME_HEADER) + r->cushion_bytes;
     if (r->wal_fd < 0) {
         char *path = mem_printf("%s-wal", store->sql.path);
         r->wal_fd = open(path, O_RDWR | O_CLOEXEC); /* SQLite takes no locks on this file, so it may be closed again */
@@ -66,7 +67,7 @@ static bool extend_wal(struct store *store) {
     }
     if (wanted <= r->wal_bytes || r->is_unsupported || r->wal_fd < 0)
         return true;
-    wanted += STEP_BYTES;
+    wanted += r->cushion_bytes / STEP_SHARE;
     if (fallocate(r->wal_fd, 0, 0, wanted) == 0) {
         r->wal_bytes = wanted;
         return true;
@@ -78,7 +79,7 @@ static bool extend_wal(struct store *store) {
 /* The same for the database file, which a checkpoint writes to. */
 static bool extend_database(struct store *store) {
     struct reserve *r = &store->reserve;
-    int64_t pages = r->pages_used + SPARE_PAGES;
+    int64_t pages = r->pages_used + r->cushion_bytes / SPARE_SHARE / r->page_bytes;
     if (pages <= r->page_count)
         return true;
     int64_t bytes = pages * r->page_bytes;
@@ -90,7 +91,7 @@ static bool extend_database(struct store *store) {
     }
     /* SQLite does not hand the reason on. */
     uint64_t room = 0;
-    return !(is_full(errno) || (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)CUSHION_BYTES));
+    return !(is_full(errno) || (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)r->cushion_bytes));
 }
 
 enum status reserve_look(struct store *store, struct error *err) {
@@ -125,6 +126,10 @@ enum status reserve_open(struct store *store, const char *dir, struct error *err
     if (status != STATUS_OK)
         return status;
     r->page_bytes = (int)page_bytes;
+    r->cushion_bytes = CUSHION_BYTES;
+    uint64_t room;
+    if (file_free_bytes(dir, &room, NULL) == STATUS_OK && room / 16 < (uint64_t)CUSHION_BYTES)
+        r->cushion_bytes = (int64_t)(room / 16) > CUSHION_BYTES_MIN ? (int64_t)(room / 16) : CUSHION_BYTES_MIN;
     sqlite3_file_control(store->sql.db, "main", SQLITE_FCNTL_CHUNK_SIZE, &chunk);
     sqlite3_wal_hook(store->sql.db, committed, r);
     return STATUS_OK;

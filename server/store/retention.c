@@ -14,9 +14,16 @@ enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, in
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err,
-                     "INSERT OR REPLACE INTO retention (id, scene_ms, job_ms, upload_ms)"
-                     " VALUES (1, ?, ?, ?)",
+                     "UPDATE retention SET scene_ms = ?, job_ms = ?, upload_ms = ?",
                      "iii", scene_ms, job_ms, upload_ms);
+    return store_end(store, status, STORE_NOTHING_CHANGED, err);
+}
+
+enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err) {
+    enum status status = store_begin(store, err);
+    if (status != STATUS_OK)
+        return status;
+    status = sql_run(&store->sql, err, "UPDATE retention SET empty_upload_ms = ?", "i", upload_ms);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 

@@ -4,7 +4,7 @@
  *    whatever its times say; what is pinned is kept for good.
  * 2. Otherwise the time that was set for the very thing counts; failing that, the configuration's:
  *    a job is kept from its end on, a scene from its last owner's upload or the end of its last job on, an upload
- *    from its last byte on.
+ *    from its last byte on; one of which no byte has arrived goes much earlier, since it holds all of its space for nothing.
  * 3. What is listed as expired may be pinned or used the next moment: store_expired_delete looks
  *    again, in the transaction that deletes.
  *
@@ -23,6 +23,9 @@ struct store;
 /* How long after rule 2; 0: for ever (not for uploads). Once, before anything is listed. */
 enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
                        struct error *err);
+
+/* The same for an upload of which no byte has arrived. */
+enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err);
 
 enum keep_pin { KEEP_PIN_AS_IS, KEEP_PIN_ON, KEEP_PIN_OFF };
 /* A change for one thing; all zeros change nothing. */

@@ -203,7 +203,11 @@ static const char step_13[] =
     "ALTER TABLE outputs ADD COLUMN digest_wanted INTEGER NOT NULL DEFAULT 0 CHECK (digest_wanted IN (0, 1));"
     "CREATE INDEX outputs_to_hash ON outputs (bytes) WHERE digest_wanted = 1;";
 
+/* An upload of which nothing has arrived holds its space for minutes, not for hours. */
+static const char step_14[] =
+    "ALTER TABLE retention ADD COLUMN empty_upload_ms INTEGER NOT NULL DEFAULT 600000;";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
                                     step_6, step_7, step_8, step_9, step_10,
-                                    step_11, step_12, step_13};
+                                    step_11, step_12, step_13, step_14};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -30,6 +30,29 @@ enum status store_user_bytes(struct store *store, int64_t user_id, const char *b
     return status;
 }
 
+enum status store_user_pledged(struct store *store, int64_t user_id, uint64_t *bytes, struct error *err) {
+    int64_t sum = 0;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, &sum, err,
+                                 "SELECT ifnull(sum(length - received), 0) FROM uploads WHERE owner_id = ? AND scene_id = ''",
+                                 "i", user_id);
+    store_unlock(store);
+    *bytes = (uint64_t)sum;
+    return status;
+}
+
+enum status store_user_checks(struct store *store, int64_t user_id, size_t *count, struct error *err) {
+    int64_t found = 0;
+    store_lock(store);
+    enum status status = sql_int(&store->sql, 0, &found, err,
+                                 "SELECT count(*) FROM scenes JOIN scene_owners ON scene_id = scenes.id"
+                                 " WHERE user_id = ? AND state = ?",
+                                 "in", user_id, (int)SCENE_CHECKING);
+    store_unlock(store);
+    *count = (size_t)found;
+    return status;
+}
+
 /* STATUS_LIMIT where who keeps `kept` may not have `more`. */
 static enum status compare(uint64_t kept, uint64_t more, uint64_t limit, struct error *err) {
     if (kept < limit && more <= limit - kept)

@@ -63,9 +63,11 @@ enum status store_upload_add(struct store *store, const struct upload_row *row, 
     if (status == STATUS_OK && limits->one_user > 0 && row->owner_id > 0)
         status = sql_int(&store->sql, 0, &mine, err,
                          "SELECT count(*) FROM uploads WHERE scene_id = '' AND owner_id = ?", "i", row->owner_id);
-    if (status == STATUS_OK && mine > 0 && (uint64_t)mine >= limits->one_user)
-        status = error_set(err, STATUS_LIMIT, "%lld of your uploads are under way already, the limit is %zu",
-                           (long long)mine, limits->one_user);
+    if (status == STATUS_OK && mine > 0 && (uint64_t)mine >= limits->one_user) {
+        error_set(err, STATUS_LIMIT, "%lld of your uploads are under way already, and one user may have %zu", (long long)mine,
+                  limits->one_user);
+        status = error_hint(err, "finish or remove some; an administrator can raise the option user_max_uploads");
+    }
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT INTO uploads (id, owner_id, name, metadata, sha256, length, hash, boot,"

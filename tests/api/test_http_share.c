@@ -88,14 +88,14 @@ static void test_streams(struct rig *rig, const char *one, const char *other) {
     const char *const token[] = {one, one, other};
     struct buf reply;
     int fd[3];
-    rig->api->config.max_streams = 2;
+    rig->api->config.user_max_streams = 1;
     for (int i = 0; i < 3; i++) {
         char *text = mem_printf("GET /v1/events HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n\r\n", token[i]);
         fd[i] = rig_connect(rig);
         rig_send(fd[i], text, strlen(text));
         buf_init(&reply, 1 << 20);
         rig_receive(fd[i], &reply, i == 1 ? "yours already" : "retry:");
-        CHECK_THAT(rig_status(&reply) == (i == 1 ? 503 : 200), "stream %d: %d", i, rig_status(&reply));
+        CHECK_THAT(rig_status(&reply) == (i == 1 ? 429 : 200), "stream %d: %d", i, rig_status(&reply));
         buf_release(&reply);
         mem_free(text);
     }

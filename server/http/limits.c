@@ -1,0 +1,69 @@
+/* limits.c -- see limits.h. */
+#include "server/http/limits.h"
+
+#include <stdio.h>
+
+#include "common/file.h"
+#include "common/mem.h"
+#include "server/http/hub.h"
+#include "server/http/problem.h"
+
+#define ADMIN_STREAMS 10 /* one in so many is kept for admins */
+
+bool limits_bind(const struct request *r) {
+    return r->caller.user_id > 0 && r->caller.role != ROLE_ADMIN;
+}
+
+/* Names the option, and who can change it. */
+static struct response *refuse(const struct request *r, int status, const char *option, const char *hint, char *detail) {
+    char *full = mem_printf("%s%san administrator can raise the option %s", hint, *hint ? "; " : "", option);
+    struct response *reply = problem_full(r, status, detail, full, NULL);
+    mem_free(full);
+    mem_free(detail);
+    return reply;
+}
+
+static struct response *check_pledge(struct api *api, const struct request *r, uint64_t bytes) {
+    uint64_t room, pledged, keep = api->config.min_free_bytes + api->config.admin_free_bytes;
+    struct error err;
+    if (api->config.user_pledge_percent == 0)
+        return NULL;
+    if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK ||
+        store_user_pledged(api->store, r->caller.user_id, &pledged, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    /* What is pledged has its blocks already: it is not free any more. */
+    uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;
+    if (pledged + bytes <= share)
+        return NULL;
+    return refuse(r, 507, "user_pledge_percent", "finish or remove an upload that is under way",
+                  mem_printf("%llu MiB are still to come of your uploads, and %llu MiB more are wanted: one user's may take"
+                             " %u %% of the free space, which are %llu MiB",
+                             (unsigned long long)(pledged >> 20), (unsigned long long)(bytes >> 20),
+                             api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
+}
+
+struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes) {
+    size_t checks, most = api->config.user_max_checks;
+    struct error err;
+    if (!limits_bind(r))
+        return NULL;
+    if (most > 0 && store_user_checks(api->store, r->caller.user_id, &checks, &err) != STATUS_OK)
+        return problem_from(r, &err);
+    if (most > 0 && checks >= most)
+        return refuse(r, 429, "user_max_checks", "wait until some of them are checked",
+                      mem_printf("%zu scenes of yours wait to be checked already, and of one user's %zu may", checks, most));
+    return check_pledge(api, r, bytes);
+}
+
+struct response *limits_check_stream(struct api *api, const struct request *r) {
+    size_t most = api->config.max_streams, of_one = api->config.user_max_streams, all = hub_count(api->hub);
+    bool is_bound = limits_bind(r);
+    if (all >= most || (is_bound && all >= most - most / ADMIN_STREAMS))
+        return problem_full(r, 503, "there are as many event streams as there may be",
+                            "an administrator can raise the option max_streams", NULL);
+    size_t mine = is_bound && of_one > 0 ? hub_count_of(api->hub, r->caller.user_id) : 0;
+    if (mine > 0 && mine >= of_one)
+        return refuse(r, 429, "user_max_streams", "close some, or follow all jobs with one stream of /v1/events",
+                      mem_printf("%zu event streams are yours already, and one user may have %zu", mine, of_one));
+    return NULL;
+}

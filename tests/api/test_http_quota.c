@@ -1,0 +1,140 @@
+/* test_http_quota.c -- what one user may take of what all share, each with its own status, the option's name and who can
+ * raise it; admins are not bound. Uploads that never begin give their space back soon. */
+#include "server/http/collector.h"
+#include "tests/api/rig.h"
+
+static struct rig rig;
+static struct error err;
+static char anna[TOKEN_SIZE], chief[TOKEN_SIZE];
+
+/* POST /v1/uploads of so many bytes; its id goes to `id` where it is made. */
+static int create(const char *token, uint64_t bytes, char id[33], struct buf *reply) {
+    char *text = mem_printf("POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
+                            "Tus-Resumable: 1.0.0\r\nUpload-Length: %llu\r\n\r\n", token, (unsigned long long)bytes);
+    int status = rig_ask(&rig, text, strlen(text), reply);
+    const char *location = strstr(buf_text(reply), "\r\nLocation: /v1/uploads/");
+    CHECK((status == 201) == (location && sscanf(location + 24, "%32[0-9a-f]", id) == 1));
+    mem_free(text);
+    return status;
+}
+
+static void expect(const char *token, uint64_t bytes, int wanted, const char *option) {
+    char id[33];
+    struct buf reply;
+    int status = create(token, bytes, id, &reply);
+    CHECK_THAT(status == wanted && strstr(buf_text(&reply), option), "%llu bytes: %d, not %d with %s: %s",
+               (unsigned long long)bytes, status, wanted, option, buf_text(&reply));
+    CHECK(status != 429 || strstr(buf_text(&reply), "\r\nRetry-After: "));
+    CHECK(status == 201 || strstr(buf_text(&reply), "administrator"));
+    buf_release(&reply);
+    if (status == 201)
+        rig_must(store_upload_delete(rig.store, id, &err), &err, "store_upload_delete");
+}
+
+/* Two requests without a byte do not fill the disk. */
+static void test_pledges(void) {
+    char id[2][33];
+    struct buf reply;
+    uint64_t room;
+    rig_must(file_free_bytes(rig.dir, &room, &err), &err, "file_free_bytes");
+    rig.api->config.max_upload_bytes = INT64_MAX;
+    rig.api->config.user_pledge_percent = 50;
+    expect(anna, room / 100 * 60, 507, "user_pledge_percent");
+    rig.api->config.user_pledge_percent = 1;
+    CHECK(create(anna, room / 1000 * 6, id[0], &reply) == 201);
+    buf_release(&reply);
+    expect(anna, room / 1000 * 6, 507, "user_pledge_percent");
+    expect(chief, room / 1000 * 6, 201, "");
+    rig_must(store_upload_delete(rig.store, id[0], &err), &err, "store_upload_delete");
+    rig.api->config.user_pledge_percent = 0;
+
+    rig.api->config.admin_free_bytes = room;
+    expect(anna, 1000, 507, "must stay so");
+    expect(chief, 1000, 201, "");
+    rig.api->config.admin_free_bytes = 0;
+
+    rig.api->config.user_max_uploads = 2;
+    for (int i = 0; i < 2; i++) {
+        CHECK(create(anna, 1000, id[i], &reply) == 201);
+        buf_release(&reply);
+    }
+    expect(anna, 1000, 429, "user_max_uploads");
+    expect(chief, 1000, 201, "");
+    for (int i = 0; i < 2; i++)
+        rig_must(store_upload_delete(rig.store, id[i], &err), &err, "store_upload_delete");
+}
+
+static void test_checks(int64_t user) {
+    bool existed;
+    rig.api->config.user_max_checks = 1;
+    expect(anna, 1000, 201, "");
+    rig_must(store_scene_add(rig.store, RIG_SCENE, "room", 10, user, &existed, &err), &err, "store_scene_add");
+    expect(anna, 1000, 429, "user_max_checks");
+    expect(chief, 1000, 201, "");
+    rig_must(store_scene_ready(rig.store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
+    expect(anna, 1000, 201, "");
+}
+
+static bool is_there(const char *id) {
+    struct upload_row row;
+    enum status status = store_upload_get(rig.store, id, &row, NULL, 0, &err);
+    upload_row_release(&row);
+    return status == STATUS_OK;
+}
+
+/* Of one nothing has arrived, of the other a byte: that one is kept for as long as it was. */
+static void test_age(void) {
+    char empty[33], begun[33], hash[512] = "";
+    struct buf reply;
+    CHECK(create(anna, 1000, empty, &reply) == 201);
+    CHECK(strstr(buf_text(&reply), "\r\nUpload-Expires: "));
+    buf_release(&reply);
+    CHECK(create(anna, 1000, begun, &reply) == 201);
+    buf_release(&reply);
+    rig_must(store_upload_advance(rig.store, begun, 1, hash, 10, &err), &err, "store_upload_advance");
+    rig_must(collector_run(rig.api, false, NULL, &err), &err, "collector_run");
+    CHECK(is_there(empty) && is_there(begun));
+    rig_must(store_keep_empty(rig.store, 1, &err), &err, "store_keep_empty");
+    usleep(5000);
+    rig_must(collector_run(rig.api, false, NULL, &err), &err, "collector_run");
+    CHECK(!is_there(empty) && is_there(begun));
+}
+
+/* The last streams are kept for admins. */
+static void test_streams(void) {
+    struct buf reply;
+    int fd[3];
+    rig.api->config.max_streams = 10;
+    rig.api->config.user_max_streams = 0;
+    for (int i = 0; i < 11; i++) {
+        char *text = mem_printf("GET /v1/events HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n\r\n",
+                                i < 10 ? anna : chief);
+        int at = rig_connect(&rig);
+        rig_send(at, text, strlen(text));
+        buf_init(&reply, 1 << 20);
+        rig_receive(at, &reply, i == 9 ? "max_streams" : "retry:");
+        CHECK_THAT(rig_status(&reply) == (i == 9 ? 503 : 200), "stream %d: %d", i, rig_status(&reply));
+        buf_release(&reply);
+        mem_free(text);
+        if (i < 3)
+            fd[i] = at;
+    }
+    for (int i = 0; i < 3; i++)
+        close(fd[i]);
+}
+
+int main(void) {
+    int64_t id;
+    struct caller who;
+    rig_start(&rig, &rig_patient, 60);
+    log_set_level(LOG_ERROR);
+    rig_must(store_token_add(rig.store, "anna", ROLE_USER, anna, &id, &err), &err, "token");
+    rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, chief, &id, &err), &err, "token");
+    rig_must(store_token_find(rig.store, anna, &who, &err), &err, "token");
+    test_pledges();
+    test_checks(who.user_id);
+    test_age();
+    test_streams();
+    rig_stop(&rig);
+    return check_result();
+}
