@@ -103,7 +103,7 @@ static exr_result_t write_chunks(exr_context_t context, const struct image *imag
 
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
                             bool tiled, struct error *err) {
-    struct exr_stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0640)};
+    struct exr_stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
     if (stream.fd < 0)
         return error_set_errno(err, errno, "cannot create %s", path);
     exr_context_initializer_t init = exr_stream_writer(&stream);

@@ -147,7 +147,7 @@ enum status file_make_dirs(const char *path, struct error *err) {
             continue;
         char kept = *at;
         *at = '\0';
-        if (mkdir(partial, 0750) == 0)
+        if (mkdir(partial, 0777) == 0)
             status = file_sync_parent(partial, err);
         else if (errno != EEXIST)
             status = error_set_errno(err, errno, "cannot create folder %s", partial);

@@ -324,6 +324,8 @@ static int run_daemon(struct config *config, const char *port_file) {
     log_start(&d);
     enum status status = folder_lock(config->data_dir, &d.lock_fd, &err);
     if (status == STATUS_OK)
+        folder_close_to_others(config->data_dir);
+    if (status == STATUS_OK)
         status = build(&d, &err);
     if (status == STATUS_OK)
         status = serve(&d, port_file, &err);

@@ -164,8 +164,8 @@ static void check_disk(struct doctor *d) {
         return;
     }
     if (check_writable(d, dir))
-        tell(d, info.st_mode & 07 ? WARN : GOOD, "data", "%s can be written%s", dir,
-             info.st_mode & 07 ? ", and others can look into it: chmod o= it" : "");
+        tell(d, info.st_mode & 077 ? WARN : GOOD, "data", "%s can be written%s", dir,
+             info.st_mode & 077 ? ", and others can look into it: chmod go= it, as the daemon does when it starts" : "");
     if (is_remote(dir))
         tell(d, BAD, "data", "%s lies on a network file system, where SQLite's locks cannot be relied on", dir);
     if (file_free_bytes(dir, &room, &err) != STATUS_OK)

@@ -7,9 +7,11 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/file.h"
+#include "common/log.h"
 #include "common/mem.h"
 
 #define TRIES 20 /* of 50 ms */
@@ -27,12 +29,13 @@ static bool take(int fd) {
 
 enum status folder_lock(const char *dir, int *fd, struct error *err) {
     *fd = -1;
+    umask(077);
     if (file_make_dirs(dir, err) != STATUS_OK)
         return error_hint(err, "--data DIR takes another data folder");
     char *path = file_join(dir, "lock");
     char holder[32] = "";
     enum status status = STATUS_OK;
-    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0640);
+    *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
     if (*fd < 0) {
         status = error_set_errno(err, errno, "cannot open %s", path);
     } else if (!take(*fd)) {
@@ -50,4 +53,33 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
     }
     mem_free(path);
     return status;
+}
+
+/* Whether it was open, and is not any more. Links are left alone: what they name is elsewhere. */
+static bool close_one(const char *path, bool follow) {
+    struct stat info;
+    if ((follow ? stat(path, &info) : lstat(path, &info)) != 0 || S_ISLNK(info.st_mode) || (info.st_mode & 077) == 0)
+        return false;
+    if (chmod(path, info.st_mode & 0700) == 0)
+        return true;
+    log_warning("other users may look into %s, and its mode cannot be changed: %s", path, strerror(errno));
+    return false;
+}
+
+void folder_close_to_others(const char *dir) {
+    struct error err;
+    char **names;
+    size_t name_count, count = close_one(dir, true) ? 1 : 0;
+    if (file_list(dir, &names, &name_count, &err) != STATUS_OK) {
+        log_warning("%s", err.message);
+        return;
+    }
+    for (size_t i = 0; i < name_count; i++) {
+        char *path = file_join(dir, names[i]);
+        count += close_one(path, false);
+        mem_free(path);
+    }
+    file_free_names(names, name_count);
+    if (count > 0)
+        log_info("data folder %s: %zu of its files and folders were open to other users and are closed now", dir, count);
 }

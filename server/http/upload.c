@@ -154,7 +154,7 @@ enum status upload_place(struct api *api, const char *path, const char *id, stru
     char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
     char *archive = file_join(dir, "archive");
     enum status status = file_make_dirs(dir, err);
-    if (status == STATUS_OK && chmod(path, 0440) != 0)
+    if (status == STATUS_OK && chmod(path, 0400) != 0)
         status = error_set_errno(err, errno, "cannot set the mode of %s", path);
     if (status == STATUS_OK && rename(path, archive) != 0)
         status = error_set_errno(err, errno, "cannot move the upload to %s", archive);

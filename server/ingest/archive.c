@@ -175,7 +175,7 @@ static int open_folder(struct unpacking *u, const char *path, size_t length, enu
         n = start + n > length ? length - start : n;
         char *part = mem_strndup(path + start, n);
         int next = -1;
-        if (mkdirat(at, part, 0750) == 0 || errno == EEXIST)
+        if (mkdirat(at, part, 0700) == 0 || errno == EEXIST)
             next = openat(at, part, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
         mem_free(part);
         int number = errno;
@@ -229,7 +229,7 @@ static enum status unpack_file(struct unpacking *u, const char *path) {
     int folder = open_folder(u, path, folder_length, &status);
     if (folder < 0)
         return status;
-    int fd = openat(folder, base, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0640);
+    int fd = openat(folder, base, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
     if (fd < 0 && errno == EEXIST)
         status = error_set(u->err, STATUS_INPUT, "%s holds \"%s\" twice", u->name, path);
     else if (fd < 0)
@@ -344,7 +344,7 @@ static enum status count_and_unpack(struct unpacking *u, const char *path, const
     enum status status = read_archive(u, path, count_entries);
     if (status != STATUS_OK)
         return status;
-    if (mkdir(dir, 0750) != 0)
+    if (mkdir(dir, 0700) != 0)
         return error_set_errno(u->err, errno, "cannot create folder %s", dir);
     u->dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     status = u->dir_fd < 0 ? error_set_errno(u->err, errno, "cannot open folder %s", dir) : read_archive(u, path, unpack_all);

@@ -118,7 +118,7 @@ enum status supervisor_start(struct worker *w, const char *binary, const char *d
     enum status status = STATUS_OK;
     spawn.null_fd = out_of_the_way(open("/dev/null", O_RDONLY | O_CLOEXEC));
     spawn.log_fd = out_of_the_way(
-        open(w->log_path, O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0640));
+        open(w->log_path, O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (spawn.null_fd < 0 || spawn.log_fd < 0) {
         status = error_set_errno(err, errno, "cannot open %s", w->log_path);
         goto out;

@@ -229,7 +229,7 @@ static enum status open_file(struct checkpoint *c, const char *path, struct erro
     enum status status = STATUS_OK;
     for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0] && status == STATUS_OK; i++) {
         char *name = mem_printf("%s%s", path, suffixes[i]);
-        int fd = open(name, O_WRONLY | O_CREAT | O_CLOEXEC, 0640);
+        int fd = open(name, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
         if (fd < 0)
             status = error_set_errno(err, errno, "cannot open %s", name);
         else

@@ -125,7 +125,7 @@ mkdir -m 755 "$work/others"; mkdir -m 750 "$work/damaged"; echo 'this is no data
 doctor 0 'warn +data .* is not there' --data "$work/none"
 doctor 0 'warn +sandbox .*sandbox = no' --data "$work/none" --set sandbox=no
 doctor 0 'warn +machine .*more memory than there is' --data "$work/none" --set worker_memory_mib=16777216
-doctor 0 'warn +data .*chmod o=' --data "$work/others" --set min_free_mib=1
+doctor 0 'warn +data .*chmod go=' --data "$work/others" --set min_free_mib=1
 doctor 1 'FAIL +disk' --data "$work/others" --set min_free_mib=16777216
 doctor 1 'FAIL +database .*damaged' --data "$work/damaged" --set min_free_mib=1
 doctor 0 'ok +libraries .*sqlite [0-9]' --data "$work/none"

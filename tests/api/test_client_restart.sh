@@ -79,6 +79,7 @@ run 0 cancel last
 # The daemon goes away for good in the middle: the client says so and ends, and what is there stays.
 make_room "$work/third" 4
 head -c 3000000 /dev/urandom >"$work/third/notes.bin"
+equal "$(find "$data" ! -type l -perm /077 | head)" "" "of scenes and jobs, open to other users"
 daemon_end TERM || fail "the daemon did not end with 0"
 run 5 submit "$work/third" $long --retry 1
 finish

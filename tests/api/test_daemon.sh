@@ -100,4 +100,14 @@ equal "$(ls -A "$data/uploads")" "" "left in uploads/ after SIGKILL"
 [ ! -e "$data/scenes/0000" ] || fail "a scene's folder without a row is kept"
 [ -e "$data/scenes/$scene/archive" ] || fail "the scene's archive is gone"
 kill -INT "$daemon_pid"; wait "$daemon_pid"; equal $? 0 "exit status after SIGINT"; daemon_pid=
+
+# --- for its user alone: what is made, and what an earlier version has left open ---
+equal "$(find "$data" ! -type l -perm /077)" "" "open to others"
+chmod 755 "$data" "$data/jobs"; chmod 644 "$data/state.db" "$data/lock"
+echo public >"$work/public"; chmod 644 "$work/public"; ln -s "$work/public" "$data/link"
+start_daemon
+equal "$(find "$data" ! -type l -perm /077)" "" "open to others after an upgrade"
+equal "$(stat -c %a "$work/public")" 644 "what a link names"
+grep -q "data folder $data: 4 of its files and folders were open to other users and are closed now" "$work/log" || fail "$(tail "$work/log")"
+stop_daemon
 finish
