@@ -27,7 +27,7 @@ struct detail {
     const struct views *views;
     const uint16_t (*white)[3];      /* [height][width] what a white texel would send out; 0: not known */
     struct measured *measured;       /* [height][width] value and noise are written */
-    /* Of each photograph, [train_count][pixels]; owned. */
+    /* Of each photograph, [train_count][pixels], 14 bytes a pixel of all of them together; owned. */
     uint32_t **triangle;             /* that is shown; UINT32_MAX: the pixel is not asked */
     float **worth;                   /* inverse variance by noise, up to a factor; at most 1 */
     uint16_t (**off)[3];             /* base colour that it shows beyond what the texture told at first */

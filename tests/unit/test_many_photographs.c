@@ -65,6 +65,25 @@ static void test_bounds(void) {
     plane_rig_release(&rig);
 }
 
+/* How bright a texel is, by which noise is told, the photographs say by the light they had: five of a 64th of the exposure
+ * are wrong, and have half of what they show as noise at what the four others show, but none at what they show themselves. */
+static void test_exposure(void) {
+    struct plane_rig rig;
+    rgb right = {1.0f, 1.0f, 1.0f}, wrong = {3.0f / 64.0f, 3.0f / 64.0f, 3.0f / 64.0f};
+    plane_rig_init(&rig, 9, 1);
+    for (int i = 0; i < 9; i++) {
+        struct photograph *photo = plane_rig_add(&rig, (vec3){0.01f * (float)i, 0.0f, 2.0f}, (vec3){0.1f, 0.1f, 0.0f}, 0.2f,
+                                                 plane_paint_one, i < 4 ? &right : &wrong);
+        photo->exposure = i < 4 ? 1.0f : 1.0f / 64.0f;
+    }
+    plane_rig_look(&rig, 0.01f);
+    rig.r.noise.share[19] = 0.5f; /* stored values from 1/64 to 2/64 */
+    fused_release(&rig.r.fused);
+    fuse(&rig.r.fused, &rig.views, &rig.r.noise, &rig.r.atlas, &rig.r.inverse, rig.pool);
+    CHECK_NEAR(fused_radiance(&rig.r.fused, PLANE_MIDDLE).r, 1.0f, 0.01f);
+    plane_rig_release(&rig);
+}
+
 /* Under light from above of pi irradiance: base colour is what is shown. */
 static void test_divide(uint32_t count) {
     struct plane_rig rig;
@@ -107,6 +126,7 @@ int main(void) {
     test_fuse(300, 3);
     test_fuse(2100, 1);
     test_bounds();
+    test_exposure();
     test_divide(100);
     test_emission_pattern(100);
     return check_result();
