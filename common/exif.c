@@ -9,6 +9,7 @@
 enum {
     TAG_ORIENTATION = 0x0112,
     TAG_EXIF_IFD = 0x8769,
+    TAG_COLOR_SPACE = 0xa001, /* 1: sRGB, 65535: uncalibrated; some cameras have 2 for Adobe RGB */
     TAG_INTEROPERABILITY_IFD = 0xa005,
     TAG_INTEROPERABILITY_INDEX = 0x0001,
     TAG_EXPOSURE_TIME = 0x829a,
@@ -96,6 +97,10 @@ static struct next read_directory(const struct block *b, size_t offset, struct i
             break;
         case TAG_EXIF_IFD: next.exif = (size_t)value; break;
         case TAG_INTEROPERABILITY_IFD: next.interoperability = (size_t)value; break;
+        case TAG_COLOR_SPACE:
+            info->is_uncalibrated = value == 65535;
+            info->is_adobe_rgb = value == 2;
+            break;
         case TAG_EXPOSURE_TIME: info->exposure_time_sec = value; break;
         case TAG_F_NUMBER: info->f_number = value; break;
         case TAG_SENSITIVITY: iso->photographic = value < 65535 ? value : 0; break;
@@ -120,7 +125,7 @@ void image_parse_exif(const uint8_t *data, size_t size, struct image_info *info)
     if (first.exif != 0)
         second = read_directory(&b, first.exif, info, &iso);
     if (second.interoperability != 0)
-        info->is_adobe_rgb = says_adobe_rgb(&b, second.interoperability);
+        info->is_adobe_rgb = info->is_adobe_rgb || says_adobe_rgb(&b, second.interoperability);
     info->iso = iso.photographic > 0 ? iso.photographic
                 : iso.iso_speed > 0  ? iso.iso_speed
                 : iso.standard > 0   ? iso.standard

@@ -48,6 +48,7 @@ struct image_info {
     double exposure_time_sec, iso, f_number;
     int orientation;       /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
     bool is_adobe_rgb;     /* EXIF says so, as cameras do that write no profile */
+    bool is_uncalibrated;  /* EXIF says that the colours are not those of sRGB, and not what they are */
     /* Of pictures that were read, not only probed: */
     char color_space[64];    /* that pixels were converted from to Rec. 709, for people: "Display P3"; "" where they were not */
     char color_warning[160]; /* what the file says of its colours and cannot be used, so that they pass for sRGB; or "" */

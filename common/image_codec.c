@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -46,6 +47,14 @@ static void find_clipped(struct image *image) {
         image->clipped[i] = (uint8_t)((pixel[0] >= IMAGE_CLIP_SHARE) | (pixel[1] >= IMAGE_CLIP_SHARE) << 1 |
                                       (pixel[2] >= IMAGE_CLIP_SHARE) << 2);
     }
+}
+
+void image_color_by_exif(const struct image_info *info, struct color *color) {
+    if (info->is_adobe_rgb)
+        color_set_adobe_rgb(color, info->bits);
+    else if (info->is_uncalibrated && color->warning[0] == '\0')
+        snprintf(color->warning, sizeof color->warning,
+                 "its EXIF says that its colours are not those of sRGB, and no profile says what they are");
 }
 
 void image_convert(struct image *image, struct image_info *info, struct color *color) {

@@ -30,6 +30,9 @@ size_t image_source_read(struct image_source *source, uint64_t offset, void *buf
 /* Converts a picture that was read, of values from 0 to 1, as *color says, and tells it in *info; releases *color. */
 void image_convert(struct image *image, struct image_info *info, struct color *color);
 
+/* By EXIF, where the file has nothing better. */
+void image_color_by_exif(const struct image_info *info, struct color *color);
+
 /* The names of a colour picture's channels, for image_header. */
 extern const char *const image_rgba[4];
 

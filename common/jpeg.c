@@ -166,8 +166,8 @@ static void read_color(struct reader *r) {
         color_set_profile(&r->color, r->profile, length, r->jpeg.num_components == 1, 8);
     else if (r->is_profile_damaged)
         snprintf(r->color.warning, sizeof r->color.warning, "the segments of its ICC profile do not fit together");
-    else if (r->info->is_adobe_rgb)
-        color_set_adobe_rgb(&r->color, 8);
+    else
+        image_color_by_exif(r->info, &r->color);
 }
 
 static void read_pixels(struct reader *r) {

@@ -149,8 +149,8 @@ static void read_pixels(struct reader *r) {
 }
 
 static void convert(struct reader *r) {
-    if (!png_color_read(r->source, r->is_grey, r->info->bits, &r->color) && r->info->is_adobe_rgb)
-        color_set_adobe_rgb(&r->color, r->info->bits);
+    if (!png_color_read(r->source, r->is_grey, r->info->bits, &r->color))
+        image_color_by_exif(r->info, &r->color);
     image_convert(r->image, r->info, &r->color);
 }
 

@@ -26,6 +26,7 @@
 #include "common/sha256.h"
 #include "server/export/outputs.h"
 #include "server/ingest/bundle.h"
+#include "server/ingest/photo_color.h"
 #include "server/reconstruct/reconstruct.h"
 #include "server/worker/checkpoint.h"
 #include "server/worker/read_back.h"
@@ -273,6 +274,13 @@ static enum status load_scene(struct run *run, const struct settings *settings,
     cJSON_Delete(problems);
     for (size_t i = 0; status == STATUS_OK && i < scene->warning_count; i++)
         progress_log(run->progress, "warning", scene->warning[i]);
+    char *color = status == STATUS_OK ? photo_color_fact(scene) : NULL;
+    if (color) {
+        char *text = mem_printf("photographs: %s", color);
+        progress_log(run->progress, "info", text);
+        mem_free(text);
+    }
+    mem_free(color);
     return status;
 }
 

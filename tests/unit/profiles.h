@@ -3,6 +3,7 @@
 #define UNBAKE_TESTS_PROFILES_H
 
 #include <lcms2.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <zlib.h>
 

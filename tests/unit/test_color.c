@@ -378,6 +378,15 @@ static void adobe_rgb(void) {
         image_release(&image);
     }
     buf_release(&file);
+    char other[sizeof exif];
+    memcpy(other, exif, sizeof exif);
+    other[sizeof exif - 1 - 4 - 2] = '8'; /* R98: sRGB by DCF, and yet uncalibrated */
+    jpeg_make(&file, (const uint8_t[]){100, 100, 100}, 3, NULL, other, sizeof exif - 1);
+    if (read_bytes(&file, &image, &info)) {
+        CHECK(info.encoding == IMAGE_SRGB && strstr(info.color_warning, "its EXIF says"));
+        image_release(&image);
+    }
+    buf_release(&file);
     profile_display_p3(&profile); /* which wins */
     jpeg_make(&file, (const uint8_t[]){100, 100, 100}, 3, &profile, exif, sizeof exif - 1);
     if (read_bytes(&file, &image, &info)) {
