@@ -27,6 +27,19 @@ wait_for 60 scene_state "$one" rejected
 [ "$(field '.problems | length')" -ge 1 ] && [ -n "$(field '.problems[0].reason')" ] || fail "no reason: $(cat "$work/body")"
 call POST /v1/jobs -H 'Content-Type: application/json' -d "{\"scene\":\"$one\"}"; expect 422 "a job on a rejected scene"
 equal "$(field '.invalid_params[0].name')" scene
+
+# --- photographs of another colour space: their profile is read inside the sandbox, and what was done is said ---
+p3=${UNBAKE_TEST_DATA:-../shared/data}/captures/icc_p3
+if [ -d "$p3" ]; then
+    (cd "$p3" && zip -q -r "$work/p3.zip" .)
+    call POST /v1/scenes -T "$work/p3.zip"; expect 201 "photographs of Display P3"
+    id=$(field .id)
+    wait_for 60 scene_state "$id" ready
+    equal "$(field .facts.photographs)" "Display P3, converted to Rec. 709 (6 of 6)" "what was converted"
+    call DELETE "/v1/scenes/$id"; expect 204 "deletion of these"
+else
+    echo "test data captures/icc_p3 is not here"
+fi
 etag=$(call GET "/v1/scenes/$one"; header etag)
 call GET "/v1/scenes/$one" -H "If-None-Match: $etag"; expect 304
 
