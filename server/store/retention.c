@@ -10,7 +10,7 @@
 
 enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
                        struct error *err) {
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err); /* without it no daemon starts to free anything */
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err,

@@ -142,7 +142,7 @@ enum status store_scene_postpone(struct store *store, const char *id, const char
 }
 
 enum status store_scene_check_again(struct store *store, struct error *err) {
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err); /* a start on a full disk needs it */
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err,

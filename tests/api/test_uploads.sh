@@ -183,7 +183,7 @@ fi
 start_daemon --set min_free_mib=16777216
 call POST /v1/uploads -H "$tus" -H 'Upload-Length: 5'; expect 507 "below the low-water mark"
 stop_daemon
-if [ "$(id -u)" -eq 0 ] && mkdir "$work/small-disk" && mount -t tmpfs -o size=7m none "$work/small-disk" 2>/dev/null; then
+if [ "$(id -u)" -eq 0 ] && mkdir "$work/small-disk" && mount -t tmpfs -o size=14m none "$work/small-disk" 2>/dev/null; then
     mounted=$work/small-disk
     data=$work/small-disk/data
     start_daemon --set min_free_mib=0 --set max_upload_mib=100
