@@ -57,7 +57,7 @@ forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(de
     'only main.c sees the tools'
 
 own 'embree[34]/' server/render/accel.c
-own 'microhttpd\.h' server/http/listener.c
+own 'microhttpd\.h' server/http/exchange.h
 own 'gnutls/' server/http/tls.c server/worker/deliver.c
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
 own 'curl/' client/request.c

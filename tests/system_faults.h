@@ -69,7 +69,9 @@ static inline bool is_among(const char *name, const char *names) {
 
 static inline bool system_fails(const char *name) {
     const char *only = system_faults_only;
-    if (faults_are_off || (only && !is_among(name, only)) ||
+    if (faults_watch)
+        faults_watch(name);
+    if (faults_pass_by() || (only && !is_among(name, only)) ||
         !faults_strike(&system_faults_left, system_faults_stay))
         return false;
     system_failed = name;

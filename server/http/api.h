@@ -52,6 +52,8 @@ struct partials; /* partial.h */
 struct listener; /* listener.h */
 struct tally;    /* tally.h */
 struct brake;    /* brake.h */
+struct trash;    /* data/trash.h */
+struct readiness; /* readiness.h */
 
 struct api {
     struct api_config config; /* pointers in it are borrowed */
@@ -60,6 +62,8 @@ struct api {
     struct hub *hub;
     struct digests *digests;
     struct partials *partials;
+    struct trash *trash;
+    struct readiness *readiness;
     struct listener *listener; /* NULL before it listens; for figures */
     /* Held while a scene's row and its file appear or disappear together. */
     pthread_mutex_t scene_mutex;

@@ -1,4 +1,5 @@
 /* collector.c -- see collector.h. */
+#include "server/data/trash.h"
 #include "server/http/collector.h"
 
 #include <pthread.h>
@@ -41,7 +42,7 @@ static enum status remove_expired(struct api *api, const struct expired *e, cons
     enum status status = store_expired_delete(api->store, e, now, err);
     if (status == STATUS_OK)
         status = e->kind == EXPIRED_UPLOAD ? partial_forget(api->partials, e->id, err)
-                                           : space_discard(api, path, err);
+                                           : trash_take(api->trash, path, err);
     if (e->kind == EXPIRED_SCENE)
         pthread_mutex_unlock(&api->scene_mutex);
     return status;

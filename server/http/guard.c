@@ -22,6 +22,7 @@ struct guarded {
     uint64_t window_bytes;  /* arrived in the window; in GUARD_REPLY: taken before it */
     bool has_backlog;       /* GUARD_REPLY: there is a window */
     bool is_shut;
+    double held_sec;        /* since when it is held; 0: it is not */
     struct guarded *next, *previous;
 };
 
@@ -92,7 +93,7 @@ void guard_forsake(struct guarded *c) {
 void guard_look(struct guard *g, double now_sec) {
     pthread_mutex_lock(&g->mutex);
     for (struct guarded *c = g->first; c; c = c->next) {
-        if (c->is_shut || !is_late(g, c, now_sec))
+        if (c->is_shut || c->held_sec > 0.0 || !is_late(g, c, now_sec))
             continue;
         if (c->phase == GUARD_REPLY)
             guard_forsake(c);
@@ -197,6 +198,18 @@ void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase) {
     c->phase_sec = c->since_sec = clock_sec();
     c->window_bytes = 0;
     c->has_backlog = false;
+    c->held_sec = 0.0;
+    pthread_mutex_unlock(&g->mutex);
+}
+
+void guard_hold(struct guard *g, struct guarded *c, bool is_held) {
+    double now = clock_sec();
+    pthread_mutex_lock(&g->mutex);
+    if (!is_held && c->held_sec > 0.0) {
+        c->phase_sec += now - c->held_sec;
+        c->since_sec += now - c->held_sec;
+    }
+    c->held_sec = is_held ? now : 0.0;
     pthread_mutex_unlock(&g->mutex);
 }
 

@@ -14,6 +14,7 @@
 #ifndef UNBAKE_HTTP_GUARD_H
 #define UNBAKE_HTTP_GUARD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -39,6 +40,9 @@ void guard_free(struct guard *g);
 struct guarded *guard_add(struct guard *g, int fd);
 void guard_remove(struct guard *g, struct guarded *c);
 void guard_enter(struct guard *g, struct guarded *c, enum guard_phase phase);
+/* While it is held, what the other side does not do is not its fault: its phase goes on afterwards as if no time had
+ * passed. guard_enter ends it, too. */
+void guard_hold(struct guard *g, struct guarded *c, bool is_held);
 void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* arrived just now */
 
 /* What the other side has not taken of a reply is not kept in the kernel for minutes after the

@@ -346,21 +346,25 @@ static void refill(struct subscriber *s) {
         buf_puts(&s->text, s->what.is_ndjson ? "\n" : ": keepalive\n\n");
 }
 
-static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
+static bool subscriber_fill(struct stream *base) {
     struct subscriber *s = (struct subscriber *)base;
-    struct hub *hub = s->api->hub;
     if (!s->is_listed)
         enlist(s);
     if (is_revoked(s))
-        return -1;
-    if (s->text_read == s->text.length) {
+        s->has_ended = true;
+    else
         refill(s);
-        if (s->text.length == 0)
-            return s->has_ended ? -1 : 0;
-        if (s->text.overflowed)
-            return -1; /* a single batch of a megabyte: nothing of ours */
-    }
+    return s->text.length > s->text_read || s->has_ended;
+}
+
+static ssize_t subscriber_read(struct stream *base, char *to, size_t size) {
+    struct subscriber *s = (struct subscriber *)base;
+    struct hub *hub = s->api->hub;
     size_t count = s->text.length - s->text_read;
+    if (count == 0)
+        return s->has_ended ? -1 : 0;
+    if (s->text.overflowed)
+        return -1; /* a single batch of a megabyte: nothing of ours */
     count = count < size ? count : size;
     memcpy(to, s->text.data + s->text_read, count);
     s->text_read += count;
@@ -382,6 +386,7 @@ static void subscriber_close(struct stream *base) {
 struct stream *hub_subscribe(struct api *api, const struct caller *caller, const struct subscription *what) {
     struct subscriber *s = mem_calloc(1, sizeof *s);
     s->base.read = subscriber_read;
+    s->base.fill = subscriber_fill;
     s->base.close = subscriber_close;
     s->base.must_say = what->revision != 0;
     s->api = api;

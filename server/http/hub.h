@@ -5,7 +5,7 @@
  *    a slow reader costs neither memory nor anybody else's time, and what it lags behind it
  *    reads from the database (where an overtaken progress event is no longer). Where what it has
  *    not read is gone altogether it gets a `resync`.
- * 2. hub_changed only marks and wakes; the text is made on the stream's own thread.
+ * 2. hub_changed only marks and wakes; the text is made by the stream's fill, on a thread that may wait.
  * 3. Lock order: hub, then listener, then libmicrohttpd. The store is never called with any. */
 #ifndef UNBAKE_HTTP_HUB_H
 #define UNBAKE_HTTP_HUB_H

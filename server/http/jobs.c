@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
+#include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
@@ -287,7 +288,7 @@ struct response *jobs_delete(struct api *api, struct request *r) {
     if (status == STATUS_OK) {
         char path[40];
         snprintf(path, sizeof path, "jobs/%lld", (long long)id);
-        status = space_discard(api, path, &err);
+        status = trash_take(api->trash, path, &err);
     }
     return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
 }

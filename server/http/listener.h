@@ -1,13 +1,15 @@
 /* listener.h -- the daemon's HTTP side: sockets, threads and libmicrohttpd, of which nothing shows.
  *
- *   head ──> head_check, routes_begin ──> body: routes_data ... ──> routes_finish ──> reply
- *                    │ refused                     │ refused
- *                    └──> reply                    └──> reply written past the library, then drain
+ *   head ──> head_check, routes_find, routes_begin ──> body: routes_data ... ──> routes_finish ──> reply
+ *                    │ refused                              │ refused
+ *                    └──> reply                             └──> reply written past the library, then drain
  *
- * 1. A handler that may wait for a disk runs on a clerk thread while its connection is suspended;
- *    libmicrohttpd's own few threads never wait.
+ * 1. libmicrohttpd's own few threads never wait for a disk, nor for a mutex that somebody holds who does. They see to
+ *    sockets, heads and what is in memory; the connection is suspended while a thread of a pool does the rest: `quick`
+ *    what asks the store or opens a file, `slow` what syncs, or moves bodies from and to the disk (route.h,
+ *    exchange.h). So /healthz is answered whatever the disk does. tests/api/test_http_threads.c holds it.
  * 2. A stream with nothing to say is suspended, never asked again until it is woken.
- * 3. Stopping: accept nothing more, end the streams, resume all, then stop the library, which
+ * 3. Stopping: accept nothing more, end the streams, let the pools finish, resume all, then stop the library, which
  *    aborts the process when it finds a suspended connection. */
 #ifndef UNBAKE_HTTP_LISTENER_H
 #define UNBAKE_HTTP_LISTENER_H

@@ -52,7 +52,6 @@ struct request {
     struct buf body;           /* what was collected of it, for routes that take JSON */
     struct upload *upload;     /* a body that goes to disk; owned */
     struct patch *patch;       /* a body that goes on with an upload in parts; owned */
-    bool wants_rest;           /* routes_rest must run before more of the body is taken */
 };
 
 /* After routes_drop_body, which knows what upload and patch are. */
@@ -60,14 +59,16 @@ void request_release(struct request *r);
 /* The value of the first field of that name (case does not matter), NULL where absent; borrowed. */
 const char *request_field(const struct request *r, const char *name);
 
-/* A body without a known end. The listener calls read on one of its threads, one call at a time,
- * and close exactly once after the last read. */
+/* A body that is made while it is sent. The listener makes one call at a time, and close exactly once, the last. */
 struct stream {
-    /* Bytes put into to[size]; 0: nothing now, call again after stream_wake; -1: the end. */
+    /* Bytes that are there already, put into to[size]; 0: fill must be called; -1: the end. Never waits. */
     ssize_t (*read)(struct stream *s, char *to, size_t size);
-    void (*close)(struct stream *s); /* frees s */
+    /* Gets more, on a thread that may wait for a disk; false: there is nothing now, call again after `wake`. */
+    bool (*fill)(struct stream *s);
+    void (*close)(struct stream *s); /* frees s; as fill */
+    bool is_sized; /* of as many bytes as the response says; else the connection is cut. It is never woken */
     bool must_say; /* without a byte it must not look whole: its connection is cut */
-    /* Set by the listener before the first read; thread-safe; may be called until close, also
+    /* Set by the listener before the first call; thread-safe; may be called until close, also
      * when the stream is not waiting. */
     void (*wake)(void *waker);
     void *waker;

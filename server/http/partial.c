@@ -12,8 +12,8 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/trash.h"
 #include "server/http/intake.h"
-#include "server/http/space.h"
 #include "server/http/upload.h"
 
 #define UNFINISHED_MAX 10000 /* uploads, of all users */
@@ -195,13 +195,10 @@ enum status partial_look(struct partials *p, const char *id, struct upload_row *
 }
 
 enum status partial_forget(struct partials *p, const char *id, struct error *err) {
-    enum status status = STATUS_OK;
+    char path[sizeof "uploads/" + UPLOAD_ID_SIZE];
     intake_mark_gone(p, id);
-    char *path = intake_path(p, id);
-    if (unlink(path) != 0 && errno != ENOENT)
-        status = error_set_errno(err, errno, "cannot remove %s", path);
-    mem_free(path);
-    return status;
+    snprintf(path, sizeof path, "uploads/%s", id);
+    return trash_take(p->api->trash, path, err);
 }
 
 enum status partial_remove(struct partials *p, const char *id, struct error *err) {

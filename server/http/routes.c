@@ -13,46 +13,46 @@
 #include "server/http/uploads.h"
 
 static const struct route table[] = {
-    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, false, ""},
-    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, false, ""},
-    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, false, ""},
-    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, false, ""},
-    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, true, ""},
-    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, false, ""},
-    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, false, ""},
-    {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, false, ""},
-    {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, false, ""},
-    {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, false, ""},
-    {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, false, ""},
-    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, false, ""},
-    {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, false, "limit cursor"},
-    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, true, "name"},
-    {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, false, ""},
-    {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, true, ""},
-    {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, true, "dry_run"},
-    {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, false, ""},
-    {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, false, "sha256 limit cursor"},
-    {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, true, ""},
-    {METHOD_OPTIONS, "/v1/uploads/{upload}", ROUTE_PUBLIC, uploads_options, 0, false, ""},
-    {METHOD_GET, "/v1/uploads/{upload}", ROUTE_VIEWER, uploads_get, 0, true, ""},
-    {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, true, ""},
-    {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, true, "dry_run"},
-    {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, true, "dry_run"},
-    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, false, "state limit cursor"},
-    {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, true, "dry_run"},
-    {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, false, "wait"},
-    {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, true, ""},
-    {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, true, "dry_run"},
-    {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, jobs_cancel, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, jobs_pause, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, jobs_resume, 0, true, ""},
-    {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, jobs_retry, 0, true, "from"},
-    {METHOD_POST, "/v1/jobs/{job}/extend", ROUTE_USER, jobs_extend, ROUTE_BODY_JSON, true, ""},
-    {METHOD_GET, "/v1/events", ROUTE_VIEWER, events_all, 0, false, "after follow wait"},
-    {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, false, "after follow wait"},
-    {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, false, "bytes"},
-    {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, false, ""},
-    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, true, ""},
+    {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/page.css", ROUTE_PUBLIC, system_page_css, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/page.js", ROUTE_PUBLIC, system_page_js, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/healthz", ROUTE_PUBLIC, system_healthz, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/readyz", ROUTE_PUBLIC, system_readyz, 0, ROUTE_SLOW, ""},
+    {METHOD_GET, "/metrics", ROUTE_VIEWER, system_metrics, 0, ROUTE_QUICK, ""},
+    {METHOD_GET, "/openapi.json", ROUTE_PUBLIC, system_openapi, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/version", ROUTE_VIEWER, system_version, 0, ROUTE_QUICK, ""},
+    {METHOD_GET, "/v1/session", ROUTE_VIEWER, session_get, 0, ROUTE_QUICK, ""},
+    {METHOD_POST, "/v1/session", ROUTE_PUBLIC, session_add, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
+    {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, ROUTE_QUICK, ""},
+    {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, ROUTE_QUICK, "limit cursor"},
+    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, ROUTE_SLOW, "name"},
+    {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, ROUTE_QUICK, ""},
+    {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
+    {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, ROUTE_SLOW, "dry_run"},
+    {METHOD_OPTIONS, "/v1/uploads", ROUTE_PUBLIC, uploads_options, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/uploads", ROUTE_VIEWER, uploads_list, 0, ROUTE_QUICK, "sha256 limit cursor"},
+    {METHOD_POST, "/v1/uploads", ROUTE_USER, uploads_add, 0, ROUTE_SLOW, ""},
+    {METHOD_OPTIONS, "/v1/uploads/{upload}", ROUTE_PUBLIC, uploads_options, 0, ROUTE_AT_ONCE, ""},
+    {METHOD_GET, "/v1/uploads/{upload}", ROUTE_VIEWER, uploads_get, 0, ROUTE_SLOW, ""},
+    {METHOD_PATCH, "/v1/uploads/{upload}", ROUTE_USER, uploads_patch, ROUTE_BODY_PATCH, ROUTE_SLOW, ""},
+    {METHOD_DELETE, "/v1/uploads/{upload}", ROUTE_USER, uploads_delete, 0, ROUTE_SLOW, "dry_run"},
+    {METHOD_POST, "/v1/collect", ROUTE_ADMIN, collect_now, 0, ROUTE_SLOW, "dry_run"},
+    {METHOD_GET, "/v1/jobs", ROUTE_VIEWER, jobs_list, 0, ROUTE_QUICK, "state limit cursor"},
+    {METHOD_POST, "/v1/jobs", ROUTE_USER, jobs_add, ROUTE_BODY_JSON, ROUTE_QUICK, "dry_run"},
+    {METHOD_GET, "/v1/jobs/{job}", ROUTE_VIEWER, jobs_get, 0, ROUTE_QUICK, "wait"},
+    {METHOD_PATCH, "/v1/jobs/{job}", ROUTE_USER, jobs_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
+    {METHOD_DELETE, "/v1/jobs/{job}", ROUTE_USER, jobs_delete, 0, ROUTE_SLOW, "dry_run"},
+    {METHOD_POST, "/v1/jobs/{job}/cancel", ROUTE_USER, jobs_cancel, 0, ROUTE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/pause", ROUTE_USER, jobs_pause, 0, ROUTE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, jobs_resume, 0, ROUTE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, jobs_retry, 0, ROUTE_QUICK, "from"},
+    {METHOD_POST, "/v1/jobs/{job}/extend", ROUTE_USER, jobs_extend, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
+    {METHOD_GET, "/v1/events", ROUTE_VIEWER, events_all, 0, ROUTE_QUICK, "after follow wait"},
+    {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, ROUTE_QUICK, "after follow wait"},
+    {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, ROUTE_QUICK, "bytes"},
+    {METHOD_GET, "/v1/jobs/{job}/outputs", ROUTE_VIEWER, outputs_list, 0, ROUTE_QUICK, ""},
+    {METHOD_GET, "/v1/jobs/{job}/outputs/{name...}", ROUTE_VIEWER, outputs_get, 0, ROUTE_QUICK, ""},
 };
 
 const struct route *routes_table(size_t *count) {
@@ -179,13 +179,20 @@ static struct response *too_large(const struct request *r, uint64_t limit) {
     return problem_full(r, 413, detail, "", members);
 }
 
-static struct response *begin(struct api *api, struct request *r) {
+struct response *routes_find(struct request *r) {
     override_method(r);
     for (size_t i = 0; i < sizeof table / sizeof *table && !r->route; i++)
         if ((int)table[i].method == r->method && matches(table[i].pattern, &r->target))
             r->route = &table[i];
-    if (!r->route)
-        return no_route(r);
+    return r->route ? NULL : answer(r, no_route(r));
+}
+
+bool routes_body_is_stored(const struct request *r) {
+    enum route_body body = body_of(r);
+    return body == ROUTE_BODY_UPLOAD || body == ROUTE_BODY_PATCH;
+}
+
+static struct response *begin(struct api *api, struct request *r) {
     struct response *refusal = auth_check(api, r);
     if (!refusal)
         refusal = check_query(r);
@@ -204,24 +211,28 @@ static struct response *begin(struct api *api, struct request *r) {
 }
 
 struct response *routes_begin(struct api *api, struct request *r) {
-    return answer(r, begin(api, r));
+    struct response *refusal = begin(api, r);
+    if (refusal)
+        routes_drop_body(r);
+    return answer(r, refusal);
 }
 
-struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length) {
+static struct response *take(struct api *api, struct request *r, const void *data, size_t length) {
     if (r->upload) {
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
             return too_large(r, api->config.max_upload_bytes);
         return upload_data(api, r, data, length);
     }
     if (r->patch)
-        return answer(r, uploads_data(api, r, data, length));
-    return buf_append(&r->body, data, length) ? NULL : answer(r, too_large(r, ROUTES_BODY_MAX));
+        return uploads_data(api, r, data, length);
+    return buf_append(&r->body, data, length) ? NULL : too_large(r, ROUTES_BODY_MAX);
 }
 
-struct response *routes_rest(struct api *api, struct request *r) {
-    (void)api;
-    r->wants_rest = false;
-    return answer(r, uploads_rest(r));
+struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length) {
+    struct response *refusal = take(api, r, data, length);
+    if (refusal)
+        routes_drop_body(r);
+    return answer(r, refusal);
 }
 
 struct response *routes_finish(struct api *api, struct request *r) {

@@ -1,9 +1,10 @@
 /* routes.h -- the table of routes, and the way of a request through it.
  *
- *   routes_begin ──> (routes_data ... routes_rest ...) ──> routes_finish
+ *   routes_find ──> routes_begin ──> (routes_data ...) ──> routes_finish
  *
- * Each of the first three may end the request with a reply; routes_finish always does. They never
- * run at the same time for one request. */
+ * Each but the last may end the request with a reply; routes_finish always does. They never run at the
+ * same time for one request. All but routes_find may wait for a disk, and routes_drop_body too; not so those of a
+ * route that is ROUTE_AT_ONCE, nor routes_data of a body that is not stored. */
 #ifndef UNBAKE_HTTP_ROUTES_H
 #define UNBAKE_HTTP_ROUTES_H
 
@@ -15,10 +16,11 @@ const struct route *routes_table(size_t *count);
 
 #define ROUTES_BODY_MAX ((size_t)1 << 20) /* bytes of a body that is not an upload */
 
+struct response *routes_find(struct request *r);
+/* Whether its body goes to disk as it comes. */
+bool routes_body_is_stored(const struct request *r);
 struct response *routes_begin(struct api *api, struct request *r);
 struct response *routes_data(struct api *api, struct request *r, const void *data, size_t length);
-/* Wanted by request.wants_rest, which it clears; waits for a disk. */
-struct response *routes_rest(struct api *api, struct request *r);
 struct response *routes_finish(struct api *api, struct request *r);
 /* Forgets what came of the body, on disk too: the request is refused, or over. */
 void routes_drop_body(struct request *r);

@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "common/sha256.h"
 #include "common/utf8.h"
+#include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/body.h"
 #include "server/http/field.h"
@@ -168,7 +169,7 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
-        status = space_discard(api, path, &err);
+        status = trash_take(api->trash, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
         reply = keeping_would_free(api, r, is_gone ? path : "scenes/none");

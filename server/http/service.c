@@ -7,18 +7,18 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/brake.h"
+#include "server/data/trash.h"
 #include "server/http/digests.h"
 #include "server/http/hub.h"
 #include "server/http/partial.h"
-#include "server/http/space.h"
+#include "server/http/readiness.h"
 #include "server/http/tally.h"
 
 static const char *const folders[] = {
     [STORE_FILES_SCENE] = "scenes", [STORE_FILES_JOB] = "jobs", [STORE_FILES_UPLOAD] = "uploads"};
 
-/* Removes what is in DATA/folder: all of it, or (kind not NULL) what the store has no row for. */
-static enum status sweep(const struct api *api, const char *folder, const enum store_files *kind,
-                         struct error *err) {
+/* Removes what is in DATA/folder and the store has no row for. */
+static enum status sweep(const struct api *api, const char *folder, enum store_files kind, struct error *err) {
     char *path = file_join(api->config.data_dir, folder);
     enum status status = file_make_dirs(path, err);
     char **names = NULL;
@@ -26,16 +26,27 @@ static enum status sweep(const struct api *api, const char *folder, const enum s
     if (status == STATUS_OK)
         status = file_list(path, &names, &count, err);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        if (kind && store_has_files(api->store, *kind, names[i]))
+        if (store_has_files(api->store, kind, names[i]))
             continue;
-        char *inner = file_join(path, names[i]);
+        char *inner = file_join(folder, names[i]);
         log_info("removing %s, left over from an earlier run", inner);
-        status = file_remove_tree(inner, err);
+        status = trash_take(api->trash, inner, err);
         mem_free(inner);
     }
     file_free_names(names, count);
     mem_free(path);
     return status;
+}
+
+static void renew_reserve(void *store) {
+    store_reserve_renew(store);
+}
+
+static enum status open_trash(struct api *api, struct error *err) {
+    char *path = file_join(api->config.data_dir, "trash");
+    enum status status = file_make_dirs(path, err);
+    mem_free(path);
+    return status == STATUS_OK ? trash_new(&api->trash, api->config.data_dir, renew_reserve, api->store, err) : status;
 }
 
 enum status service_new(struct api **out, const struct api_config *config, struct store *store,
@@ -57,14 +68,14 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     if (status == STATUS_OK)
         status = store_keep_empty(store, api->config.empty_upload_ms, err);
     if (status == STATUS_OK)
-        status = partials_recover(api->partials, err);
+        status = open_trash(api, err);
     if (status == STATUS_OK)
-        status = sweep(api, "trash", NULL, err);
-    for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++) {
-        enum store_files kind = (enum store_files)i;
-        status = sweep(api, folders[i], &kind, err);
-    }
+        status = partials_recover(api->partials, err);
+    for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++)
+        status = sweep(api, folders[i], (enum store_files)i, err);
     store_reserve_renew(store);
+    if (status == STATUS_OK)
+        status = readiness_new(&api->readiness, store, config->data_dir, err);
     if (status == STATUS_OK)
         status = digests_new(&api->digests, store, config->data_dir, err);
     if (status == STATUS_OK) {
@@ -87,6 +98,8 @@ void service_free(struct api *api) {
     tally_free(api->tally);
     brake_free(api->brake);
     digests_free(api->digests);
+    readiness_free(api->readiness);
+    trash_free(api->trash);
     pthread_mutex_destroy(&api->scene_mutex);
     mem_free(api);
 }

@@ -8,9 +8,6 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
-/* Moves DATA/`path` out of the way at once and removes it after; absent is no error. */
-enum status space_discard(struct api *api, const char *path, struct error *err);
-
 /* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
 struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);
 /* The same when the caller keeps so much, but for the scene `but_scene` (NULL: all), that `bytes` more pass

@@ -11,9 +11,10 @@
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
+#include "server/http/limits.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
-#include "server/http/space.h"
+#include "server/http/readiness.h"
 
 /* --- the web page -------------------------------------------------------------------------- */
 
@@ -76,32 +77,15 @@ struct response *system_healthz(struct api *api, struct request *r) {
     return status_reply("ok");
 }
 
-/* Whether the disk of the data folder takes what it is given: a file goes there and comes back. */
-static enum status probe_disk(const struct api *api, const struct request *r, struct error *err) {
-    static const char text[] = "can this be read back?\n";
-    struct buf found;
-    char *path = mem_printf("%s/trash/probe-%s", api->config.data_dir, r->id); /* swept at the next start */
-    buf_init(&found, 4096);
-    enum status status = file_replace(path, text, sizeof text - 1, err);
-    if (status == STATUS_OK)
-        status = file_read(path, &found, err);
-    if (status == STATUS_OK && strcmp(buf_text(&found), text) != 0)
-        status = error_set(err, STATUS_CORRUPT, "%s: what is read back differs", path);
-    unlink(path);
-    buf_release(&found);
-    mem_free(path);
-    return status;
-}
-
 struct response *system_readyz(struct api *api, struct request *r) {
     struct error err;
-    if (store_probe(api->store, &err) != STATUS_OK || probe_disk(api, r, &err) != STATUS_OK)
+    uint64_t room;
+    if (readiness_ask(api->readiness, &room, &err) != STATUS_OK)
         return problem_full(r, 503, err.message, err.hint, NULL);
-    struct response *full = space_check_room(api, r, 0);
     bool waits = scheduler_waits_for_disk(api->scheduler);
-    if (!full && !waits)
+    uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);
+    if (room >= keep && !waits)
         return status_reply("ready");
-    response_free(full);
     return problem_full(r, 503, waits ? "the disk of the data folder is nearly full: jobs wait"
                                       : "the disk of the data folder is nearly full",
                         "delete jobs or scenes that nobody needs", NULL);

@@ -310,14 +310,9 @@ struct response *uploads_data(struct api *api, struct request *r, const void *da
         sha1_update(&p->sha1, data, length);
     else if (p->checksum == CHECKSUM_SHA256)
         sha256_update(&p->sha256, data, length);
-    /* The library does not bear a pause between the chunks of one piece that it has read. */
-    r->wants_rest = r->content_length > 0 && claim_is_due(p->claim);
+    if (claim_is_due(p->claim) && claim_commit(p->claim, &err) != STATUS_OK)
+        return refuse(r, &err);
     return NULL;
-}
-
-struct response *uploads_rest(struct request *r) {
-    struct error err;
-    return claim_commit(r->patch->claim, &err) == STATUS_OK ? NULL : refuse(r, &err);
 }
 
 void uploads_drop(struct patch *p) {

@@ -9,10 +9,8 @@ struct patch; /* opaque */
 
 /* Start of request r's body: sets r->patch, or refuses with a reply. */
 struct response *uploads_begin(struct api *api, struct request *r);
-/* The next bytes; NULL, or the reply that ends it. Sets r->wants_rest now and then. */
+/* The next bytes; NULL, or the reply that ends it. */
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length);
-/* Counts what has come so far. */
-struct response *uploads_rest(struct request *r);
 void uploads_drop(struct patch *p); /* NULL is fine; what has come stays with the upload */
 
 #endif

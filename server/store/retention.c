@@ -20,7 +20,7 @@ enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, in
 }
 
 enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err) {
-    enum status status = store_begin(store, err);
+    enum status status = store_begin_freeing(store, err);
     if (status != STATUS_OK)
         return status;
     status = sql_run(&store->sql, err, "UPDATE retention SET empty_upload_ms = ?", "i", upload_ms);

@@ -1,5 +1,6 @@
 /* test_http_disk.c -- a disk that fails, or lies, while the daemon serves: what it says, what it holds on to, and that it
  * goes on once the disk is well. */
+#include "server/data/trash.h"
 #include "server/http/collector.h"
 #include "server/http/space.h"
 #include "tests/api/rig.h"
@@ -47,6 +48,7 @@ static void check_probe(void) {
 
 /* Where it is not known how much room there is, the reserve is not made, and nothing is said to fail for that. */
 static void check_reserve(void) {
+    faults_behind = true;
     system_break(" statvfs ", EIO);
     for (int is_well = 0; is_well < 2; is_well++) {
         int64_t job = rig_job(&rig);
@@ -54,6 +56,7 @@ static void check_reserve(void) {
         rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
         unlink(reserve);
         check_answer("DELETE", path, "", 204, "");
+        trash_wait(rig.api->trash);
         CHECK((access(reserve, F_OK) == 0) == is_well);
         system_mend();
         mem_free(path);

@@ -160,16 +160,13 @@ static struct response *send_body(struct request *r, const char *body, size_t le
     size_t half = length / 2;
     const char *piece[2] = {body, body + half};
     const size_t size[2] = {half, length - half};
-    for (int i = 0; i < 2 && !reply; i++) {
+    for (int i = 0; i < 2 && !reply; i++)
         if (size[i] > 0)
             reply = routes_data(lab.api, r, piece[i], size[i]);
-        if (!reply && r->wants_rest)
-            reply = routes_rest(lab.api, r);
-    }
     return reply;
 }
 
-/* What listener.c does with a request. */
+/* What exchange.c does with a request. */
 static struct response *serve(struct request *r, char *text, const char *end) {
     struct error err;
     char number[24];
@@ -188,9 +185,9 @@ static struct response *serve(struct request *r, char *text, const char *end) {
         return NULL;
     }
     if (!reply)
+        reply = routes_find(r);
+    if (!reply)
         reply = routes_begin(lab.api, r);
-    if (reply)
-        routes_drop_body(r);
     if (!reply && r->has_body)
         reply = send_body(r, text ? text : "", length);
     return reply ? reply : routes_finish(lab.api, r);
@@ -226,6 +223,8 @@ static void read_stream(struct stream *stream) {
     for (int i = 0; i < READS_MAX && got > 0; i++) {
         got = stream->read(stream, chunk, sizeof chunk);
         MUST(got >= -1 && got <= (ssize_t)sizeof chunk);
+        if (got == 0 && stream->fill(stream))
+            got = 1;
     }
 }
 

@@ -1,0 +1,168 @@
+/* trash.c -- see trash.h. What is to go is called trash/gone-TIME-NUMBER; others keep what they make for a moment in
+ * trash/, too, under other names. */
+#include "server/data/trash.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "common/file.h"
+#include "common/log.h"
+#include "common/mem.h"
+
+#define PREFIX "gone-"
+
+struct trash {
+    const char *data_dir;
+    void (*emptied)(void *user);
+    void *user;
+    long long started_ns;
+    atomic_ullong number;
+    pthread_t thread;
+    pthread_mutex_t mutex; /* guards what follows; never held while the disk works */
+    pthread_cond_t changed;
+    bool has_work, is_working, stopping;
+};
+
+static bool is_stopping(struct trash *t) {
+    pthread_mutex_lock(&t->mutex);
+    bool stopping = t->stopping;
+    pthread_mutex_unlock(&t->mutex);
+    return stopping;
+}
+
+static void empty(struct trash *t) {
+    struct error err;
+    char **names;
+    size_t count;
+    char *folder = file_join(t->data_dir, "trash");
+    if (file_list(folder, &names, &count, &err) != STATUS_OK)
+        log_warning("what is to be removed cannot be found: %s", err.message);
+    for (size_t i = 0; i < count && !is_stopping(t); i++) {
+        char *path = file_join(folder, names[i]);
+        if (strncmp(names[i], PREFIX, sizeof PREFIX - 1) == 0 && file_remove_tree(path, &err) != STATUS_OK)
+            log_warning("%s is left until the next start: %s", path, err.message);
+        mem_free(path);
+    }
+    file_free_names(names, count);
+    mem_free(folder);
+    if (t->emptied)
+        t->emptied(t->user);
+}
+
+/* What others made for a moment, in an earlier life: little. */
+static enum status drop_scraps(const char *data_dir, struct error *err) {
+    char **names;
+    size_t count;
+    char *folder = file_join(data_dir, "trash");
+    enum status status = file_list(folder, &names, &count, err);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        char *path = file_join(folder, names[i]);
+        if (strncmp(names[i], PREFIX, sizeof PREFIX - 1) != 0)
+            status = file_remove_tree(path, err);
+        mem_free(path);
+    }
+    file_free_names(names, count);
+    mem_free(folder);
+    return status;
+}
+
+static void *run(void *user) {
+    struct trash *t = user;
+    pthread_setname_np(pthread_self(), "trash");
+    pthread_mutex_lock(&t->mutex);
+    while (!t->stopping) {
+        if (!t->has_work) {
+            t->is_working = false;
+            pthread_cond_broadcast(&t->changed);
+            pthread_cond_wait(&t->changed, &t->mutex);
+            continue;
+        }
+        t->has_work = false;
+        t->is_working = true;
+        pthread_mutex_unlock(&t->mutex);
+        empty(t);
+        pthread_mutex_lock(&t->mutex);
+    }
+    pthread_mutex_unlock(&t->mutex);
+    return NULL;
+}
+
+enum status trash_new(struct trash **out, const char *data_dir, void (*emptied)(void *user), void *user,
+                      struct error *err) {
+    struct timespec now;
+    *out = NULL;
+    enum status status = drop_scraps(data_dir, err);
+    if (status != STATUS_OK)
+        return status;
+    clock_gettime(CLOCK_REALTIME, &now);
+    struct trash *t = mem_calloc(1, sizeof *t);
+    t->data_dir = data_dir;
+    t->emptied = emptied;
+    t->user = user;
+    t->started_ns = (long long)now.tv_sec * 1000000000 + now.tv_nsec;
+    t->has_work = true;
+    pthread_mutex_init(&t->mutex, NULL);
+    pthread_cond_init(&t->changed, NULL);
+    int failed = pthread_create(&t->thread, NULL, run, t);
+    *out = failed ? NULL : t;
+    if (failed) {
+        pthread_cond_destroy(&t->changed);
+        pthread_mutex_destroy(&t->mutex);
+        mem_free(t);
+        return error_set_errno(err, failed, "cannot start the thread that removes files");
+    }
+    return STATUS_OK;
+}
+
+void trash_free(struct trash *t) {
+    if (!t)
+        return;
+    pthread_mutex_lock(&t->mutex);
+    t->stopping = true;
+    pthread_cond_broadcast(&t->changed);
+    pthread_mutex_unlock(&t->mutex);
+    pthread_join(t->thread, NULL);
+    pthread_cond_destroy(&t->changed);
+    pthread_mutex_destroy(&t->mutex);
+    mem_free(t);
+}
+
+static void wake(struct trash *t) {
+    pthread_mutex_lock(&t->mutex);
+    t->has_work = true;
+    pthread_cond_broadcast(&t->changed);
+    pthread_mutex_unlock(&t->mutex);
+}
+
+enum status trash_take(struct trash *t, const char *path, struct error *err) {
+    char *from = file_join(t->data_dir, path);
+    char *to = mem_printf("%s/trash/" PREFIX "%lld-%llu", t->data_dir, t->started_ns, atomic_fetch_add(&t->number, 1));
+    enum status status = STATUS_OK;
+    bool is_moved = rename(from, to) == 0;
+    if (!is_moved && (errno == ENOSPC || errno == EDQUOT))
+        status = file_remove_tree(from, err);
+    else if (!is_moved && errno != ENOENT)
+        status = error_set_errno(err, errno, "cannot move %s away", from);
+    wake(t);
+    mem_free(from);
+    mem_free(to);
+    return status;
+}
+
+bool trash_is_busy(struct trash *t) {
+    pthread_mutex_lock(&t->mutex);
+    bool is_busy = t->has_work || t->is_working;
+    pthread_mutex_unlock(&t->mutex);
+    return is_busy;
+}
+
+void trash_wait(struct trash *t) {
+    pthread_mutex_lock(&t->mutex);
+    while (t->has_work || t->is_working)
+        pthread_cond_wait(&t->changed, &t->mutex);
+    pthread_mutex_unlock(&t->mutex);
+}

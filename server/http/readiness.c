@@ -1,0 +1,129 @@
+/* readiness.c -- see readiness.h. */
+#include "server/http/readiness.h"
+
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/clock.h"
+#include "common/file.h"
+#include "common/mem.h"
+
+struct readiness {
+    struct store *store;
+    const char *data_dir;
+    pthread_t thread;
+    pthread_mutex_t mutex; /* guards what follows; not held while the disk is asked */
+    pthread_cond_t changed;
+    bool is_wanted, is_asking, stopping;
+    double asked_sec; /* when the one began that goes on */
+    unsigned long answered; /* how often */
+    struct error answer;    /* the last; its status STATUS_OK: all is well */
+    uint64_t free_bytes;
+};
+
+/* A file goes to the disk and comes back. */
+static enum status probe_disk(const struct readiness *r, struct error *err) {
+    static const char text[] = "can this be read back?\n";
+    struct buf found;
+    char *path = file_join(r->data_dir, "trash/probe"); /* swept at the next start */
+    buf_init(&found, 4096);
+    enum status status = file_replace(path, text, sizeof text - 1, err);
+    if (status == STATUS_OK)
+        status = file_read(path, &found, err);
+    if (status == STATUS_OK && strcmp(buf_text(&found), text) != 0)
+        status = error_set(err, STATUS_CORRUPT, "%s: what is read back differs", path);
+    unlink(path);
+    buf_release(&found);
+    mem_free(path);
+    return status;
+}
+
+static void *run(void *user) {
+    struct readiness *r = user;
+    pthread_setname_np(pthread_self(), "readiness");
+    pthread_mutex_lock(&r->mutex);
+    while (!r->stopping) {
+        struct error err = {0};
+        uint64_t room = 0;
+        if (!r->is_wanted) {
+            pthread_cond_wait(&r->changed, &r->mutex);
+            continue;
+        }
+        r->is_wanted = false;
+        r->is_asking = true;
+        r->asked_sec = clock_sec();
+        pthread_mutex_unlock(&r->mutex);
+        enum status status = store_probe(r->store, &err);
+        if (status == STATUS_OK)
+            status = probe_disk(r, &err);
+        if (status == STATUS_OK)
+            status = file_free_bytes(r->data_dir, &room, &err);
+        pthread_mutex_lock(&r->mutex);
+        err.status = status;
+        r->answer = err;
+        r->free_bytes = room;
+        r->answered++;
+        r->is_asking = false;
+        pthread_cond_broadcast(&r->changed);
+    }
+    pthread_mutex_unlock(&r->mutex);
+    return NULL;
+}
+
+enum status readiness_new(struct readiness **out, struct store *store, const char *data_dir, struct error *err) {
+    struct readiness *r = mem_calloc(1, sizeof *r);
+    r->store = store;
+    r->data_dir = data_dir;
+    pthread_mutex_init(&r->mutex, NULL);
+    pthread_cond_init(&r->changed, NULL);
+    int failed = pthread_create(&r->thread, NULL, run, r);
+    *out = failed ? NULL : r;
+    if (failed) {
+        pthread_cond_destroy(&r->changed);
+        pthread_mutex_destroy(&r->mutex);
+        mem_free(r);
+        return error_set_errno(err, failed, "cannot start the thread that asks the disk");
+    }
+    return STATUS_OK;
+}
+
+void readiness_free(struct readiness *r) {
+    if (!r)
+        return;
+    pthread_mutex_lock(&r->mutex);
+    r->stopping = true;
+    pthread_cond_broadcast(&r->changed);
+    pthread_mutex_unlock(&r->mutex);
+    pthread_join(r->thread, NULL);
+    pthread_cond_destroy(&r->changed);
+    pthread_mutex_destroy(&r->mutex);
+    mem_free(r);
+}
+
+enum status readiness_ask(struct readiness *r, uint64_t *free_bytes, struct error *err) {
+    struct timespec until;
+    clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_sec += READINESS_WAIT_SEC;
+    pthread_mutex_lock(&r->mutex);
+    bool is_late = r->is_asking && clock_sec() - r->asked_sec >= READINESS_WAIT_SEC;
+    unsigned long before = r->answered;
+    if (!r->is_asking && !r->is_wanted) {
+        r->is_wanted = true;
+        pthread_cond_broadcast(&r->changed);
+    }
+    while (!is_late && r->answered == before && !r->stopping)
+        is_late = pthread_cond_clockwait(&r->changed, &r->mutex, CLOCK_MONOTONIC, &until) != 0;
+    enum status status = r->answer.status;
+    if (is_late || r->answered == before)
+        status = error_set(err, STATUS_UNAVAILABLE, "the disk of the data folder has not answered within %d s",
+                           READINESS_WAIT_SEC);
+    else if (status != STATUS_OK)
+        *err = r->answer;
+    *free_bytes = r->free_bytes;
+    pthread_mutex_unlock(&r->mutex);
+    return status;
+}
