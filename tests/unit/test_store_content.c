@@ -1,4 +1,5 @@
 /* test_store_content.c -- what state.db holds besides jobs: scenes, events, outputs. */
+#include <limits.h>
 #include <math.h>
 #include <sqlite3.h>
 
@@ -258,11 +259,143 @@ static void test_outbox(void) {
     drop_dir(dir);
 }
 
+/* The events of a job that has ended long ago go, but for the last; and again, when it has lived anew. */
+static void test_pruned_twice(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    int64_t id = add_job(store, SCENE_A, 0);
+    for (int life = 0; life < 3; life++) {
+        int attempt;
+        bool more = true;
+        OK(store_job_start(store, id, &attempt, &err));
+        for (int i = 0; i < 5; i++)
+            OK(store_event_add(store, id, attempt, EVENT_LOG, "{}", &err));
+        OK(store_job_fail(store, id, attempt, "x", "", &err));
+        CHECK(events_of(store, id) > 5);
+        for (int jobs = 0; more; jobs++) {
+            OK(store_event_prune(store, INT64_MAX, &more, &err));
+            CHECK_THAT(more == (jobs == 0), "life %d: %d jobs had events", life, jobs);
+        }
+        CHECK(events_of(store, id) == 1);
+        CHECK(strstr(last_event, "failed"));
+        OK(store_job_retry(store, id, 1, NULL, NULL, &err));
+    }
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* What an upload has on disk never becomes less, whoever counts late; and its hash is of so many bytes. */
+static void test_upload_offset(void) {
+    static const char id[] = "00112233445566778899aabbccddeeff";
+    const struct { uint64_t counted, received; const char *hash, *kept; } steps[] = {
+        {100, 100, "AAAA", "AAAA"}, {300, 300, "BBBB", "BBBB"}, {200, 300, "CCCC", "BBBB"}, {300, 300, "DDDD", "BBBB"}};
+    struct upload_row row = {.name = (char[]){"u"}, .metadata = (char[]){""}, .length = 500};
+    char *dir = fresh_dir(), hash[4];
+    struct store *store;
+    OK(store_open(&store, dir, &err));
+    snprintf(row.id, sizeof row.id, "%s", id);
+    OK(store_upload_add(store, &row, "0000", 4, &(struct count_limits){9, 9}, &err));
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        OK(store_upload_advance(store, id, steps[i].counted, steps[i].hash, 4, &err));
+        OK(store_upload_get(store, id, &row, hash, sizeof hash, &err));
+        CHECK_THAT(row.received == steps[i].received && memcmp(hash, steps[i].kept, 4) == 0, "step %zu: %llu", i,
+                   (unsigned long long)row.received);
+        upload_row_release(&row);
+    }
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* What was listed as expired and is not any more when it is to be removed stays. */
+static void test_expired_no_more(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    struct expired *list;
+    size_t count;
+    const int64_t later = INT64_MAX / 2;
+    OK(store_open(&store, dir, &err));
+    OK(store_keep(store, 1000, 1000, 1000, &err));
+    OK(store_keep_empty(store, 1000, &err));
+    add_ready_scene(store, SCENE_A);
+    int64_t id = add_job(store, SCENE_A, 0), used;
+    bool existed;
+    OK(store_job_cancel(store, id, &err));
+    OK(store_scene_add(store, SCENE_B, "b", 10, 0, &existed, &err));
+    OK(store_scene_ready(store, SCENE_B, "{}", &err));
+    struct upload_row row = {.id = "00112233445566778899aabbccddeeff", .name = (char[]){"u"}, .metadata = (char[]){""}, .length = 9};
+    OK(store_upload_add(store, &row, "0000", 4, &(struct count_limits){9, 9}, &err));
+    OK(store_expired_list(store, later, 9, &list, &count, &err));
+    CHECK_THAT(count == 4, "%zu", count);
+    const struct keeping pinned = {.pin = KEEP_PIN_ON};
+    const struct job_patch patch = {.priority = INT_MIN, .shared = -1, .keeping = pinned};
+    OK(store_job_patch(store, id, -1, &patch, &err));
+    OK(store_upload_keep(store, row.id, &pinned, &err));
+    OK(store_scene_patch(store, NULL, SCENE_A, NULL, &pinned, &err));
+    used = add_job(store, SCENE_B, 0);
+    for (size_t i = 0; i < count; i++) {
+        IS(store_expired_delete(store, &list[i], later, &err), STATUS_CONFLICT);
+        mem_free(list[i].name);
+    }
+    mem_free(list);
+    CHECK(store_has_files(store, STORE_FILES_SCENE, SCENE_A) && store_has_files(store, STORE_FILES_SCENE, SCENE_B));
+    CHECK(store_has_files(store, STORE_FILES_UPLOAD, row.id));
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    job_release(&job);
+    OK(store_job_get(store, used, &job, &err));
+    job_release(&job);
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* A digest is kept for the announcement that it was computed for, and no other. */
+static void test_output_digest(void) {
+    const struct file_version version = {.inode = 7, .bytes = 3, .modified_ns = 5, .changed_ns = 6};
+    char *dir = fresh_dir();
+    struct store *store;
+    struct output_row first, row;
+    int64_t of = 0;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    add_ready_scene(store, SCENE_A);
+    int64_t id = add_job(store, SCENE_A, 0);
+    OK(store_job_start(store, id, &attempt, &err));
+    IS(store_output_next_digest(store, &of, &row, &err), STATUS_NOT_FOUND);
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 3, SCENE_A, "x/y", &err));
+    OK(store_output_next_digest(store, &of, &first, &err));
+    CHECK(of == id && strcmp(first.name, "a") == 0 && !*first.digest);
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 3, SCENE_B, "x/y", &err)); /* anew, meanwhile */
+    OK(store_output_enter_digest(store, id, &first, &version, SCENE_A, &err));
+    output_row_release(&first);
+    OK(store_output_next_digest(store, &of, &row, &err));
+    CHECK_THAT(!*row.digest, "%s", row.digest);
+    OK(store_output_enter_digest(store, id, &row, &version, SCENE_C, &err));
+    output_row_release(&row);
+    IS(store_output_next_digest(store, &of, &row, &err), STATUS_NOT_FOUND);
+    OK(store_output_get(store, id, "a", &row, &err));
+    CHECK_STRING(row.digest, SCENE_C);
+    CHECK(memcmp(&row.version, &version, sizeof version) == 0);
+    output_row_release(&row);
+    OK(store_output_want_digest(store, id, "a", &err));
+    OK(store_output_next_digest(store, &of, &row, &err));
+    OK(store_output_enter_digest(store, id, &row, NULL, NULL, &err)); /* there is none to be had */
+    output_row_release(&row);
+    IS(store_output_next_digest(store, &of, &row, &err), STATUS_NOT_FOUND);
+    store_close(store);
+    drop_dir(dir);
+}
+
 int main(void) {
     test_scenes();
     test_share();
     test_sent_again();
     test_events();
     test_outbox();
+    test_pruned_twice();
+    test_upload_offset();
+    test_expired_no_more();
+    test_output_digest();
     return check_result();
 }
