@@ -30,9 +30,17 @@ static const struct server_command table[] = {
      "  unbaked doctor --config /etc/unbaked.conf\n", doctor_flags, doctor_command},
     {"backup", "FILE", "write a consistent copy of the database, also while the daemon works",
      "FILE is a whole state.db: users, scenes, jobs, events. The files of scenes never change once they\n"
-     "are there, those of a job only while it runs: copy those folders after it, with rsync, say.\n",
-     "  unbaked backup /backup/state.db && rsync -a /var/lib/unbaked/scenes /var/lib/unbaked/jobs /backup/\n",
+     "are there, those of a job only while it runs: copy those folders after it, with rsync, say. With\n"
+     "--with-outputs FILE is a folder with the files of scenes and jobs too, which share their blocks with\n"
+     "the data folder where both are on one file system, and a SHA256SUMS of all. A job that runs begins\n"
+     "anew when it is restored. What is there already is not overwritten.\n",
+     "  unbaked backup /backup/state.db && rsync -a /var/lib/unbaked/scenes /var/lib/unbaked/jobs /backup/\n"
+     "  unbaked backup --with-outputs /backup/$(date +%F)\n",
      backup_flags, backup_command},
+    {"restore", "BACKUP DIR", "make a data folder out of a backup with outputs",
+     "DIR is made, or must be empty. Every file is held against its digest in the backup; where one is\n"
+     "damaged, nothing is restored, or with --skip-damaged all others. Root gives the files to DIR's owner.\n",
+     "  unbaked restore /backup/2026-01-31 /var/lib/unbaked\n", restore_flags, restore_command},
     {"demo-room", "DIR", "make a room whose materials and lights are known", "",
      "  unbaked demo-room /tmp/room\n", NULL, demo_command},
     {"evaluate", "ROOM OUTPUTS", "compare a job's outputs with a known room", "",

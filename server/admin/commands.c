@@ -16,28 +16,24 @@
 #include "common/mem.h"
 #include "server/admin/admin.h"
 
-#define HELP_FLAG {"--help", NULL, "print this help"}
-
 const struct flag token_flags[] = {
     {"--role", "ROLE", "of a new token: viewer, user (the default) or admin"},
     {"--json", NULL, "print JSON"},
     INVOCATION_FLAGS,
-    HELP_FLAG,
+    COMMAND_HELP_FLAG,
     {0},
 };
-const struct flag backup_flags[] = {INVOCATION_FLAGS, HELP_FLAG, {0}};
-const struct flag check_config_flags[] = {INVOCATION_FLAGS, HELP_FLAG, {0}};
+const struct flag check_config_flags[] = {INVOCATION_FLAGS, COMMAND_HELP_FLAG, {0}};
 
-static int fail(const struct error *err) {
+int command_failed(const struct error *err) {
     fprintf(stderr, "unbaked: %s\n", err->message);
     if (*err->hint)
         fprintf(stderr, "  hint: %s\n", err->hint);
     return err->status == STATUS_INPUT ? EXIT_USAGE : EXIT_FAILURE;
 }
 
-/* -1 to go on, or what the command returns. `file` as for invocation_read. */
-static int begin_with(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
-                      size_t words_min, size_t words_max) {
+int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
+                  size_t words_min, size_t words_max) {
     int code = invocation_read(in, argc, argv, flags, file);
     if (code < 0 && invocation_has(in, "--help"))
         return COMMAND_HELP;
@@ -45,11 +41,6 @@ static int begin_with(const char *file, struct invocation *in, int argc, char **
         return COMMAND_MISUSED;
     log_set_level(LOG_WARNING);
     return code;
-}
-
-static int begin(struct invocation *in, int argc, char **argv, const struct flag *flags, size_t words_min,
-                 size_t words_max) {
-    return begin_with(CONFIG_FILE_DEFAULT, in, argc, argv, flags, words_min, words_max);
 }
 
 /* --- token --------------------------------------------------------------------------------- */
@@ -86,7 +77,7 @@ int token_command(int argc, char **argv) {
     struct invocation in;
     struct error err;
     cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd, code = begin(&in, argc, argv, token_flags, 1, 2);
+    int fd, code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, token_flags, 1, 2);
     const char *action = code < 0 ? in.words[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
@@ -107,7 +98,7 @@ int token_command(int argc, char **argv) {
             json_add_string(request, "which", in.words[1]);
         json_add_string(request, "role", invocation_value(&in, "--role", "user"));
         if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
-            code = fail(&err);
+            code = command_failed(&err);
         } else if (invocation_has(&in, "--json")) {
             char *text = json_text(reply);
             printf("%s\n", text);
@@ -122,84 +113,17 @@ int token_command(int argc, char **argv) {
     return code < 0 ? EXIT_SUCCESS : code;
 }
 
-/* --- backup -------------------------------------------------------------------------------- */
-
-/* Copies what fd holds to `path`, which appears only when it is whole and on the disk, and where nothing is yet: an
- * earlier backup may be all that is left. */
-static enum status keep(int fd, const char *path, uint64_t *bytes, struct error *err) {
-    char *part = mem_printf("%s.part-XXXXXX", path), chunk[65536];
-    enum status status = STATUS_OK;
-    ssize_t got = 0;
-    *bytes = 0;
-    int out = mkostemp(part, O_CLOEXEC); /* 0600 */
-    bool is_made = out >= 0;
-    if (!is_made)
-        status = error_set_errno(err, errno, "cannot create %s", part);
-    while (status == STATUS_OK && (got = read(fd, chunk, sizeof chunk)) > 0) {
-        status = file_write_all(out, chunk, (size_t)got, part, err);
-        *bytes += (uint64_t)got;
-    }
-    if (status == STATUS_OK && (got < 0 || fsync(out) != 0))
-        status = error_set_errno(err, errno, "cannot write %s", part);
-    if (status == STATUS_OK)
-        status = file_rename_new(part, path, err);
-    if (status == STATUS_OK)
-        status = file_sync_parent(path, err);
-    else if (is_made)
-        unlink(part);
-    if (is_made)
-        close(out);
-    mem_free(part);
-    return status;
-}
-
-static enum status check_new(const char *path, struct error *err) {
-    struct stat info;
-    if (lstat(path, &info) != 0)
-        return STATUS_OK; /* a path that leads nowhere is told when it is opened */
-    error_set(err, STATUS_CONFLICT, "%s is there already, and a backup overwrites nothing", path);
-    return error_hint(err, "name another, as %s-$(date +%%F)", path);
-}
-
-int backup_command(int argc, char **argv) {
-    struct invocation in;
-    struct error err;
-    uint64_t bytes = 0;
-    cJSON *request = cJSON_CreateObject(), *reply = NULL;
-    int fd = -1, code = begin(&in, argc, argv, backup_flags, 1, 1);
-    json_add_string(request, "command", "backup");
-    if (code < 0) {
-        enum status status = check_new(in.words[0], &err);
-        if (status == STATUS_OK)
-            status = admin_call(in.config.data_dir, request, &reply, &fd, &err);
-        if (status == STATUS_OK && fd < 0)
-            status = error_set(&err, STATUS_INTERNAL, "the daemon sent no copy");
-        if (status == STATUS_OK)
-            status = keep(fd, in.words[0], &bytes, &err);
-        if (status != STATUS_OK)
-            code = fail(&err);
-        else
-            printf("%s: %llu bytes\n", in.words[0], (unsigned long long)bytes);
-    }
-    if (fd >= 0)
-        close(fd);
-    cJSON_Delete(request);
-    cJSON_Delete(reply);
-    invocation_release(&in);
-    return code < 0 ? EXIT_SUCCESS : code;
-}
-
 /* --- check-config -------------------------------------------------------------------------- */
 
 int check_config_command(int argc, char **argv) {
     struct invocation in;
     struct buf problems;
     struct error err;
-    int code = begin_with(NULL, &in, argc, argv, check_config_flags, 0, 1);
+    int code = command_begin(NULL, &in, argc, argv, check_config_flags, 0, 1);
     bool has_file = in.word_count == 1;
     if (code < 0 && !has_file) {
         invocation_release(&in);
-        code = begin(&in, argc, argv, check_config_flags, 0, 1);
+        code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, check_config_flags, 0, 1);
     }
     buf_init(&problems, (size_t)1 << 20);
     if (code < 0 && has_file && config_read(&in.config, in.words[0], &problems, &err) != STATUS_OK)
