@@ -60,7 +60,7 @@ static struct response *check_framing(const struct request *r) {
         return refuse(r, 400, "Content-Length is not a number");
     if (coding && (field_occurrences(r, "Transfer-Encoding") > 1 || strcasecmp(coding, "chunked") != 0))
         return refuse(r, 400, "Transfer-Encoding must be \"chunked\" or absent");
-    if (expect && strcasecmp(expect, "100-continue") != 0)
+    if (expect && *expect && strcasecmp(expect, "100-continue") != 0) /* it is a list, which may be empty */
         return refuse(r, 417, "the only expectation known here is 100-continue");
     return NULL;
 }

@@ -1,5 +1,6 @@
 /* jobs.c -- /v1/jobs: submit, look, change, act. */
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -388,8 +389,10 @@ static char *longer_settings(const struct request *r, const struct job *job, str
         double more = cJSON_IsNumber(body->child) ? body->child->valuedouble : -1.0;
         if (strcmp(body->child->string, limit) != 0)
             problem_param(params, body->child->string, NULL, "is not what limits this job: %s is", limit);
-        else if (!(more > 0.0))
-            problem_param(params, limit, NULL, "must be a number above 0");
+        else if (!(more > 0.0) || settings_number(&full, limit) + more <= settings_number(&full, limit))
+            problem_param(params, limit, NULL, "must be a number above 0"); /* one that counts, too */
+        else if (strcmp(limit, "iterations") == 0 && more != floor(more))
+            problem_param(params, limit, NULL, "must be a whole number");
         double sum = settings_number(&full, limit) + more;
         cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
         json_add_number(settings, limit, sum);

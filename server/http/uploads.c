@@ -58,6 +58,10 @@ static struct response *refuse(const struct request *r, const struct error *err)
     return problem_from(r, err);
 }
 
+static bool is_upload_id(const char *id) {
+    return strlen(id) == UPLOAD_ID_SIZE - 1 && strspn(id, "0123456789abcdef") == UPLOAD_ID_SIZE - 1;
+}
+
 /* The id in the path, where there is such an upload and it is the caller's; or *refusal. Others'
  * uploads do not exist for a caller. */
 static const char *find_upload(struct api *api, const struct request *r, struct response **refusal) {
@@ -65,7 +69,7 @@ static const char *find_upload(struct api *api, const struct request *r, struct 
     struct upload_row row = {0};
     struct error err;
     enum status status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
-    if (strlen(id) == UPLOAD_ID_SIZE - 1 && strspn(id, "0123456789abcdef") == UPLOAD_ID_SIZE - 1)
+    if (is_upload_id(id))
         status = store_upload_get(api->store, id, &row, NULL, 0, &err);
     if (status == STATUS_OK && row.owner_id != r->caller.user_id && r->caller.role != ROLE_ADMIN)
         status = error_set(&err, STATUS_NOT_FOUND, "there is no upload %.80s", id);
@@ -97,7 +101,8 @@ static void add_place(struct response *reply, const struct upload_row *row) {
 }
 
 struct response *uploads_options(struct api *api, struct request *r) {
-    (void)r;
+    if (r->target.segment_count > 2 && !is_upload_id(r->target.segments[2]))
+        return problem(r, 404, "\"%.80s\" is no upload's id", r->target.segments[2]);
     struct response *reply = response_new(204);
     response_field(reply, "Tus-Version", TUS_VERSION);
     response_field(reply, "Tus-Extension", "creation,termination,expiration,checksum");
@@ -345,8 +350,10 @@ static struct response *change(struct api *api, const struct request *r) {
     struct keeping keeping = {0};
     struct upload_row row;
     struct error err;
-    struct response *reply = NULL;
-    const char *id = find_upload(api, r, &reply);
+    struct response *reply = check_version(r, false);
+    if (!reply && (request_field(r, "Upload-Offset") || request_field(r, "Upload-Checksum")))
+        reply = problem(r, 400, "Upload-Offset and Upload-Checksum belong to bytes (" MIME_TUS "), not to JSON");
+    const char *id = reply ? NULL : find_upload(api, r, &reply);
     cJSON *body = reply ? NULL : body_object(r, &reply);
     if (reply)
         return reply;

@@ -50,6 +50,14 @@ jq -r '.paths | to_entries[] | .key as $p | .value | keys[] | select(. != "param
     "$work/openapi" | sort >"$work/described"
 sed -n 's/^ *{METHOD_\([A-Z]*\), "\([^"]*\)".*/\1 \2/p' server/http/routes.c | sed 's/\.\.\.}/}/' | sort >"$work/table"
 diff "$work/described" "$work/table" || fail "openapi.json and the route table differ"
+# Who may use it without a token is said, and what any request may get.
+sed -n 's/^ *{METHOD_\([A-Z]*\), "\([^"]*\)", ROUTE_PUBLIC,.*/\1 \2/p' server/http/routes.c | sort >"$work/public"
+jq -r '.paths | to_entries[] | .key as $p | .value | to_entries[] | select(.value.security? == []) | "\(.key | ascii_upcase) \($p)"' \
+    "$work/openapi" | sort | diff - "$work/public" || fail "openapi.json and the route table differ in what is public"
+for code in 400 403 415 417 500; do
+    equal "$(jq -r --arg c $code '[.paths[] | to_entries[] | select(.key != "parameters") | .value
+        | select(.responses[$c] == null) | .operationId] | join(" ")' "$work/openapi")" "" "operations without $code"
+done
 while read -r method path; do
     concrete=$(sed 's/{scene}/0123456789abcdef/; s/{job}/4242/; s/{upload}/0123456789abcdef/; s/{name}/none.exr/; s|^/v1/events|&?wait=1|' <<<"$path")
     case $method in POST | PATCH) extra=(-H 'Content-Type: application/json' -H 'If-Match: *' --data-binary '{}') ;; *) extra=() ;; esac

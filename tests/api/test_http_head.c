@@ -64,6 +64,12 @@ static const struct {
      "Idempotency-Key: a\r\nIdempotency-Key: b\r\nContent-Length: 0\r\n\r\n", 400},
     {"two Ranges", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "Range: bytes=0-1\r\nRange: bytes=1-2\r\n\r\n", 400},
     {"an unknown expectation", "POST /v1/jobs HTTP/1.1\r\n" HOST CLOSE "Expect: tea\r\nContent-Length: 1\r\n\r\n", 417},
+    {"no expectation", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "Expect:\r\n\r\n", 200},
+    {"OPTIONS of what is no upload's id", "OPTIONS /v1/uploads/x HTTP/1.1\r\n" HOST CLOSE "\r\n", 404},
+    {"a change by JSON in another version of tus", "PATCH " NO_UPLOAD " HTTP/1.1\r\n" HOST CLOSE
+     "Content-Type: application/json\r\nTus-Resumable: 2.0.0\r\nContent-Length: 2\r\n\r\n{}", 412},
+    {"a change by JSON with an offset", "PATCH " NO_UPLOAD " HTTP/1.1\r\n" HOST CLOSE
+     "Content-Type: application/json\r\nUpload-Offset: 0\r\nContent-Length: 2\r\n\r\n{}", 400},
     {"HTTP/1.7", "GET /healthz HTTP/1.7\r\n" HOST CLOSE "\r\n", 400},
     {"HTTP/2.0", "GET /healthz HTTP/2.0\r\n" HOST CLOSE "\r\n", 505},
     {"no version", "GET /healthz\r\n\r\n", 400},

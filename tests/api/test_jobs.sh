@@ -144,7 +144,7 @@ move start "$job"; move succeed "$job" 5
 post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend without a checkpoint"
 mkdir -p "$idle_dir/jobs/$job"; head -c 20000 /dev/zero >"$idle_dir/jobs/$job/checkpoint.db"
 for bad in '{}' '[]' '{"time_limit_sec":1,"iterations":1}'; do post "/v1/jobs/$job/extend" "$bad"; expect 400 "extend by $bad"; done
-for bad in '{"time_limit_sec":0}' '{"time_limit_sec":"x"}' '{"time_limit_sec":1e9}' '{"iterations":5}'; do
+for bad in '{"time_limit_sec":0}' '{"time_limit_sec":"x"}' '{"time_limit_sec":1e9}' '{"time_limit_sec":1e-300}' '{"iterations":5}'; do
     post "/v1/jobs/$job/extend" "$bad"; expect 422 "extend by $bad"
 done
 post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 202; equal "$(field .settings.time_limit_sec)" 660; equal "$(field .settings.refine_looks)" 0
