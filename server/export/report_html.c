@@ -21,7 +21,7 @@ static const char style[] =
     "p{margin:.3rem 0 .8rem}.soft,figcaption span,th{color:var(--soft)}"
     ".grid{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(20rem,1fr))}"
     ".card,figure{margin:0;background:var(--card);border:1px solid var(--line);"
-    "border-radius:8px;padding:.8rem;overflow-x:auto}"
+    "border-radius:8px;padding:.8rem}.card{overflow-x:auto}.card:focus-visible{outline:2px solid var(--accent)}"
     "img{display:block;width:100%;height:auto;border-radius:4px;background:#16181b}"
     "figcaption{margin-top:.5rem;font-size:.9rem}figcaption span{display:block;font-size:.82rem}"
     ".wide figure{margin-bottom:1rem}.heads{display:grid;grid-template-columns:repeat(3,1fr);"
@@ -116,7 +116,10 @@ static void put_curve(struct buf *out, const char *name, const cJSON *series) {
     curve_init(&c, series);
     buf_puts(out, "<figure>");
     if (c.count >= 2 && c.steps > 0.0) {
-        buf_printf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\">", WIDTH, HEIGHT);
+        buf_printf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"", WIDTH, HEIGHT);
+        html_key(out, name);
+        buf_printf(out, ", from %.3g at step %.4g to %.3g at step %.4g\">", c.point[0].value, c.point[0].step,
+                   c.point[c.count - 1].value, c.point[c.count - 1].step);
         put_axes(out, &c);
         put_path(out, &c);
         buf_puts(out, "</svg>");
@@ -133,6 +136,13 @@ static void put_curve(struct buf *out, const char *name, const cJSON *series) {
     }
     buf_puts(out, "</span></figcaption></figure>");
     mem_free(c.point);
+}
+
+/* A card scrolls where its table is too wide: by keyboard too, and so it has a name. */
+static void begin_card(struct buf *out, const char *classes, const char *name) {
+    buf_printf(out, "<div class=\"card%s\" tabindex=0 role=region aria-label=\"", classes);
+    html_key(out, name);
+    buf_puts(out, "\">");
 }
 
 /* --- sections ----------------------------------------------------------------------------- */
@@ -209,8 +219,9 @@ static void put_stages(struct buf *out, const cJSON *stages) {
         longest = fmax(longest, isfinite(seconds) ? seconds : 0.0);
         total += isfinite(seconds) ? seconds : 0.0;
     }
-    buf_printf(out, "<h2>Time by stage</h2><div class=card><p class=soft>%.1f s in all</p><table>",
-               total);
+    buf_puts(out, "<h2>Time by stage</h2>");
+    begin_card(out, "", "time by stage");
+    buf_printf(out, "<p class=soft>%.1f s in all</p><table>", total);
     for (const cJSON *stage = stages->child; stage; stage = stage->next) {
         const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(stage, "name"));
         double seconds = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(stage, "seconds"));
@@ -268,7 +279,9 @@ static void put_segments(struct buf *out, const cJSON *segments) {
     int count = cJSON_GetArraySize(segments), emitters = 0, rows = 0;
     for (const cJSON *s = segments->child; s; s = s->next)
         emitters += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter"));
-    buf_printf(out, "<h2>Segments</h2><div class=card><p class=soft>%d segments, %d of them "
+    buf_puts(out, "<h2>Segments</h2>");
+    begin_card(out, "", "segments");
+    buf_printf(out, "<p class=soft>%d segments, %d of them "
                "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=n>texels"
                "</th><th class=n>roughness</th><th class=n>specular</th><th>mean base colour</th>"
                "<th>emission, radiance</th></tr>", count, emitters);
@@ -302,7 +315,8 @@ static void put_others(struct buf *out, const cJSON *report, bool plain) {
             html_value(out, member);
             buf_puts(out, "</td></tr>");
         } else {
-            buf_puts(out, "<div class=card><b>");
+            begin_card(out, "", member->string);
+            buf_puts(out, "<b>");
             html_key(out, member->string);
             buf_puts(out, "</b>");
             html_value(out, member);
@@ -314,7 +328,9 @@ static void put_others(struct buf *out, const cJSON *report, bool plain) {
 static void put_files(struct buf *out, const cJSON *files) {
     if (!cJSON_IsArray(files))
         return;
-    buf_puts(out, "<h2>Files</h2><div class=\"card files\"><table>");
+    buf_puts(out, "<h2>Files</h2>");
+    begin_card(out, " files", "files");
+    buf_puts(out, "<table>");
     for (const cJSON *file = files->child; file; file = file->next) {
         const cJSON *name = cJSON_GetObjectItemCaseSensitive(file, "name");
         buf_puts(out, "<tr><th><a href=\"");
@@ -335,11 +351,13 @@ enum status report_html(const struct report_page *page, struct buf *out, struct 
     html_text(out, page->title);
     buf_puts(out, " – unbake</title><style>");
     buf_puts(out, style);
-    buf_puts(out, "</style><h1>");
+    buf_puts(out, "</style><main><h1>");
     html_text(out, page->title);
     buf_puts(out, "</h1><p class=soft>Materials and lights recovered by unbake. Colours are linear "
                   "Rec. 709; radiance is in units in which a frame of exposure 1 maps radiance 1 "
-                  "to pixel value 1.</p><div class=card><table>");
+                  "to pixel value 1.</p>");
+    begin_card(out, "", "summary");
+    buf_puts(out, "<table>");
     put_others(out, report, true);
     buf_puts(out, "</table></div>");
     enum status status = put_textures(out, page, err);
@@ -354,7 +372,7 @@ enum status report_html(const struct report_page *page, struct buf *out, struct 
     put_others(out, report, false);
     buf_puts(out, "</div>");
     put_files(out, cJSON_GetObjectItemCaseSensitive(report, "files"));
-    buf_puts(out, "</html>\n");
+    buf_puts(out, "</main></html>\n");
     if (out->overflowed)
         return error_set(err, STATUS_LIMIT, "report.html would be larger than %zu bytes", out->limit);
     return STATUS_OK;

@@ -85,14 +85,17 @@ function showJobs() {
   const rows = [...jobs.values()].sort((a, b) => b.id - a.id).map((job) => {
     const row = element("tr", null, { className: job.id === chosen ? "chosen" : "" });
     const link = element("button", job.id, { onclick: () => choose(job.id) });
+    link.dataset.job = job.id;
     const number = element("td", null);
     number.append(link);
     const bar = element("td", null);
-    if (job.state === "running") bar.append(element("progress", null, { max: 1, value: job.progress }));
+    if (job.state === "running") bar.append(element("progress", null, { max: 1, value: job.progress, ariaLabel: `progress of job ${job.id}` }));
     row.append(number, element("td", job.state), bar, element("td", job.name), element("td", job.owner ?? ""));
     return row;
   });
+  const focused = document.activeElement?.dataset.job; // rows are made anew at each event: whoever is on one stays there
   $("jobs").replaceChildren(...rows);
+  if (focused) $("jobs").querySelector(`[data-job="${focused}"]`)?.focus();
   $("no-jobs").hidden = rows.length > 0;
 }
 
