@@ -17,7 +17,10 @@ bool exr_unzip(const uint8_t *data, size_t size, uint8_t *out) {
     uint8_t *split = mem_alloc(size);
     uLongf length = size;
     uLong used = size;
-    bool is_stream = uncompress2(split, &length, data, &used) == Z_OK && length == size && used == size;
+    int result = uncompress2(split, &length, data, &used);
+    if (result == Z_MEM_ERROR)
+        mem_exhausted("zlib");
+    bool is_stream = result == Z_OK && length == size && used == size;
     for (size_t i = 1; is_stream && i < size; i++)
         split[i] = (uint8_t)(split[i - 1] + split[i] - 128);
     for (size_t i = 0; is_stream && i < size; i++)

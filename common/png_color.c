@@ -119,8 +119,10 @@ static bool use_iccp(const struct chunk *chunk, bool is_grey, int bits, struct c
     size_t room = (chunk->length - at) * 32 < PROFILE_MAX ? (chunk->length - at) * 32 + 4096 : PROFILE_MAX;
     uint8_t *profile = mem_alloc(room);
     uLongf length = room;
-    bool is_whole = uncompress(profile, &length, chunk->data + at, chunk->length - at) == Z_OK;
-    if (is_whole)
+    int result = uncompress(profile, &length, chunk->data + at, chunk->length - at);
+    if (result == Z_MEM_ERROR)
+        mem_exhausted("zlib");
+    if (result == Z_OK)
         color_set_profile(color, profile, length, is_grey, bits);
     else
         warn(color, "iCCP", "is damaged");
