@@ -63,6 +63,9 @@ static const struct command table[] = {
      "They go on from their checkpoints. With --from, also those that succeeded: that stage and all\n"
      "after it are done anew. Stages are load, prepare, fuse, solve, refine, report and export.\n",
      "  unbake retry 17\n  unbake retry 17 --from report\n", 1, ANY_NUMBER, retry_options, retry_run},
+    {"redeliver", "JOB...", "send the messages of jobs' webhooks again",
+     "Those that wait are sent now; where none does, one of the present state. `unbake show` tells what became of them.\n",
+     "  unbake redeliver 17\n", 1, ANY_NUMBER, no_options, redeliver_run},
     {"extend", "JOB", "let a job that has ended go on for longer",
      "It goes on from its checkpoint, which the server keeps for a while.\n",
      "  unbake extend 17 --time 3600\n  unbake extend last --iterations 500\n", 1, 1, extend_options,

@@ -23,6 +23,7 @@ int list_run(struct client *c, const struct options *o);
 int show_run(struct client *c, const struct options *o);
 int cancel_run(struct client *c, const struct options *o);
 int pause_run(struct client *c, const struct options *o);
+int redeliver_run(struct client *c, const struct options *o);
 int resume_run(struct client *c, const struct options *o);
 int retry_run(struct client *c, const struct options *o);
 int rm_run(struct client *c, const struct options *o);

@@ -146,6 +146,22 @@ static void print_outputs(struct client *c, const cJSON *outputs) {
     table_release(&t);
 }
 
+/* Where the job's states are told, and what became of that. */
+static void print_webhook(struct client *c, const cJSON *job) {
+    const cJSON *d = cJSON_GetObjectItemCaseSensitive(job, "webhook_delivery");
+    double status = member_number(d, "last_status", 0.0);
+    char text[400], answered[32] = "";
+    if (!cJSON_IsObject(d))
+        return;
+    field_print(c, "webhook", member_text(job, "webhook"));
+    if (status > 0.0)
+        snprintf(answered, sizeof answered, ", answered %.0f", status);
+    snprintf(text, sizeof text, "%s, %.0f to be sent, %.0f attempts%s%s%.200s", member_text(d, "state"),
+             member_number(d, "pending", 0.0), member_number(d, "attempts", 0.0), answered,
+             *member_text(d, "last_error") ? ": " : "", member_text(d, "last_error"));
+    field_print(c, "delivery", text);
+}
+
 static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) {
     char text[96], left[16];
     const char *wanted = member_text(job, "wanted");
@@ -164,6 +180,7 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
         field_print(c, "stage", text);
     }
     field_print(c, "owner", member_text(job, "owner"));
+    print_webhook(c, job);
     field_print(c, "shared", cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(job, "shared")) ? "yes" : "");
     field_print(c, "scene", member_text(job, "scene"));
     snprintf(text, sizeof text, "%.0f", member_number(job, "priority", 0.0));
@@ -293,6 +310,10 @@ int cancel_run(struct client *c, const struct options *o) {
 
 int pause_run(struct client *c, const struct options *o) {
     return act_on_all(c, o, "pause");
+}
+
+int redeliver_run(struct client *c, const struct options *o) {
+    return act_on_all(c, o, "webhook/redeliver");
 }
 
 int resume_run(struct client *c, const struct options *o) {

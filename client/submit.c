@@ -27,7 +27,7 @@ const struct option submit_options[] = {
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
     {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"},
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
-    {"webhook", 0, OPTION_TEXT, "URL", "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET"},
+    {"webhook", 0, OPTION_TEXT, "URL", "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET (whsec_ and base64)"},
     {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
     {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room; send and queue nothing"},
     {0},

@@ -8,6 +8,12 @@
 #define UNBAKE_VERSION "0.1.0"
 
 /* Event types of GET /v1/jobs/{id}/events. */
+/* A webhook's secret as standardwebhooks.com writes it: this and the base64 of a key of so many bytes. The text of any
+ * other secret is the key itself. */
+#define WEBHOOK_SECRET_PREFIX "whsec_"
+#define WEBHOOK_KEY_LEAST 24
+#define WEBHOOK_KEY_MOST 64
+
 #define EVENT_STATE "state"
 #define EVENT_PROGRESS "progress"
 #define EVENT_METRIC "metric"

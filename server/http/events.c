@@ -85,7 +85,7 @@ struct response *events_get(struct api *api, struct request *r) {
     if (!reply)
         reply = limits_check_stream(api, r);
     if (!reply) {
-        what.snapshot = view_job(&job);
+        what.snapshot = view_job(&job, &r->caller);
         reply = stream_reply(api, r, what.is_ndjson ? MIME_NDJSON : MIME_SSE, &what);
     }
     job_release(&job);

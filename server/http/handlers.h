@@ -47,6 +47,7 @@ struct response *jobs_patch(struct api *api, struct request *r);
 struct response *jobs_delete(struct api *api, struct request *r);
 struct response *jobs_cancel(struct api *api, struct request *r);
 struct response *jobs_pause(struct api *api, struct request *r);
+struct response *jobs_redeliver(struct api *api, struct request *r);
 struct response *jobs_resume(struct api *api, struct request *r);
 struct response *jobs_retry(struct api *api, struct request *r);
 struct response *jobs_extend(struct api *api, struct request *r);

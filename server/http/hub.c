@@ -276,7 +276,7 @@ static void fetch_job(struct subscriber *s, bool is_over) {
     bool may_read = caller_access_job(&s->caller, &job) >= ACCESS_READ;
     bool has_come = s->what.revision > 0 ? job.revision != s->what.revision : job_is_terminal(job.state);
     if (may_read && (has_come || is_over)) {
-        cJSON *view = view_job(&job);
+        cJSON *view = view_job(&job, &s->caller);
         char *text = json_text(view);
         buf_puts(&s->text, text);
         mem_free(text);

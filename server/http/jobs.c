@@ -24,9 +24,9 @@ static struct response *show_job(const struct request *r, struct job *job, int s
     snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job->revision);
     struct response *reply;
     if (status == 200 && r->method == METHOD_GET) {
-        reply = view_tagged(r, view_job(job), etag);
+        reply = view_tagged(r, view_job(job, &r->caller), etag);
     } else {
-        reply = response_json(status, view_job(job));
+        reply = response_json(status, view_job(job, &r->caller));
         response_field(reply, "ETag", "%s", etag);
     }
     job_release(job);
@@ -79,7 +79,7 @@ struct response *jobs_list(struct api *api, struct request *r) {
     char next[32] = "";
     for (size_t i = 0; i < count; i++) {
         if (i < limit)
-            cJSON_AddItemToArray(items, view_job(&jobs[i]));
+            cJSON_AddItemToArray(items, view_job(&jobs[i], &r->caller));
         if (i == limit)
             snprintf(next, sizeof next, "%lld", (long long)jobs[limit - 1].id);
     }
@@ -322,6 +322,14 @@ static struct count_limits limits_of(const struct api *api) {
 static enum status do_resume(struct api *api, int64_t id, struct error *err) {
     struct count_limits limits = limits_of(api);
     return store_job_resume(api->store, id, &limits, err);
+}
+
+static enum status do_redeliver(struct api *api, int64_t id, struct error *err) {
+    return store_webhook_again(api->store, id, err);
+}
+
+struct response *jobs_redeliver(struct api *api, struct request *r) {
+    return act(api, r, do_redeliver);
 }
 
 struct response *jobs_cancel(struct api *api, struct request *r) {

@@ -48,6 +48,7 @@ static const struct route table[] = {
     {METHOD_POST, "/v1/jobs/{job}/resume", ROUTE_USER, jobs_resume, 0, ROUTE_QUICK, ""},
     {METHOD_POST, "/v1/jobs/{job}/retry", ROUTE_USER, jobs_retry, 0, ROUTE_QUICK, "from"},
     {METHOD_POST, "/v1/jobs/{job}/extend", ROUTE_USER, jobs_extend, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
+    {METHOD_POST, "/v1/jobs/{job}/webhook/redeliver", ROUTE_USER, jobs_redeliver, 0, ROUTE_QUICK, ""},
     {METHOD_GET, "/v1/events", ROUTE_VIEWER, events_all, 0, ROUTE_QUICK, "after follow wait"},
     {METHOD_GET, "/v1/jobs/{job}/events", ROUTE_VIEWER, events_get, 0, ROUTE_QUICK, "after follow wait"},
     {METHOD_GET, "/v1/jobs/{job}/log", ROUTE_VIEWER, jobs_log, 0, ROUTE_QUICK, "bytes"},

@@ -43,7 +43,27 @@ static void add_disk_bytes(cJSON *object, int64_t bytes) {
         json_add(object, "disk_bytes", cJSON_CreateNull());
 }
 
-cJSON *view_job(const struct job *job) {
+/* Where its states are told, and what became of the messages. */
+static void add_webhook(cJSON *v, const struct job *job, const struct caller *who) {
+    bool is_his = who->role == ROLE_ADMIN || who->user_id == job->owner_id;
+    json_add_string(v, "webhook", is_his ? or_null(job->webhook) : NULL);
+    json_add_bool(v, "has_webhook", *job->webhook != '\0');
+    cJSON *known = is_his && *job->delivery ? cJSON_Parse(job->delivery) : NULL;
+    if (!known) {
+        json_add(v, "webhook_delivery", cJSON_CreateNull());
+        return;
+    }
+    const cJSON *next = cJSON_GetObjectItemCaseSensitive(known, "next_ms");
+    int64_t next_ms = cJSON_IsNumber(next) ? (int64_t)next->valuedouble : 0;
+    int64_t at_ms = (int64_t)cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(known, "at_ms"));
+    cJSON_DeleteItemFromObjectCaseSensitive(known, "next_ms");
+    cJSON_DeleteItemFromObjectCaseSensitive(known, "at_ms");
+    add_time(known, "last_at", at_ms);
+    add_time(known, "next_try_at", next_ms);
+    json_add(v, "webhook_delivery", known);
+}
+
+cJSON *view_job(const struct job *job, const struct caller *who) {
     cJSON *v = cJSON_CreateObject();
     json_add_int(v, "id", job->id);
     json_add_int(v, "revision", job->revision);
@@ -74,7 +94,7 @@ cJSON *view_job(const struct job *job) {
     add_disk_bytes(v, job->disk_bytes);
     json_add_string(v, "reason", or_null(job->reason));
     json_add_string(v, "hint", or_null(job->hint));
-    json_add_string(v, "webhook", or_null(job->webhook));
+    add_webhook(v, job, who);
     static const char *const parts[] = {"events", "outputs", "log"};
     cJSON *links = cJSON_AddObjectToObject(v, "links");
     char path[128];

@@ -6,7 +6,8 @@
 #include "server/http/message.h"
 #include "server/store/store.h"
 
-cJSON *view_job(const struct job *job);
+/* For `who`: the URL of its webhook is a secret between its owner and the receiver. */
+cJSON *view_job(const struct job *job, const struct caller *who);
 cJSON *view_scene(const struct scene_row *row);
 cJSON *view_upload(const struct upload_row *row);
 cJSON *view_output(int64_t job_id, const struct output_row *row);

@@ -5,7 +5,9 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/base64.h"
 #include "common/mem.h"
+#include "common/protocol.h"
 #include "common/url.h"
 #include "common/utf8.h"
 #include "server/http/api.h"
@@ -55,6 +57,12 @@ static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
                       PRIORITY_MAX);
 }
 
+static bool is_key(const char *base64) {
+    unsigned char key[WEBHOOK_KEY_MOST];
+    size_t size;
+    return base64_decode(base64, strlen(base64), key, sizeof key, &size) && size >= WEBHOOK_KEY_LEAST;
+}
+
 /* {"url", "secret"}: both, and nothing else. */
 static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
     const char *url = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "url"));
@@ -68,6 +76,11 @@ static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
     else if (length < WEBHOOK_SECRET_LEAST || length > WEBHOOK_SECRET_MOST)
         problem_param(params, "webhook", NULL, "must have a secret of %d to %d bytes", WEBHOOK_SECRET_LEAST,
                       WEBHOOK_SECRET_MOST);
+    else if (strncmp(secret, WEBHOOK_SECRET_PREFIX, strlen(WEBHOOK_SECRET_PREFIX)) == 0 &&
+             !is_key(secret + strlen(WEBHOOK_SECRET_PREFIX)))
+        problem_param(params, "webhook", "printf 'whsec_%s' \"$(head -c 32 /dev/urandom | base64)\" makes one",
+                      "has a secret that begins with " WEBHOOK_SECRET_PREFIX
+                      ", but what follows is not the base64 of %d to %d bytes", WEBHOOK_KEY_LEAST, WEBHOOK_KEY_MOST);
     else if (url_parse(url, &parts, &err) != STATUS_OK)
         problem_param(params, "webhook", NULL, "%s", err.message);
     w->webhook_url = url;

@@ -14,7 +14,9 @@
 #include "common/mem.h"
 #include "server/worker/progress.h"
 
-#define LIMIT_SEC 60.0
+/* Who did not answer in time has less of it the next time: others wait for their turns. */
+#define LIMIT_SEC 20.0
+#define LIMIT_AGAIN_SEC 10.0
 
 /* Its process is gone, and so is what it was given. */
 static void clear_away(struct delivery *d) {
@@ -33,8 +35,8 @@ static void forget(struct delivery *d) {
 enum status delivery_start(struct delivery *d, const struct scheduler_config *config,
                            const struct outbox_row *row, struct error *err) {
     char number[32];
-    *d = (struct delivery){.id = row->id, .job_id = row->job_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
-                           .kill_at_sec = clock_sec() + LIMIT_SEC,
+    *d = (struct delivery){.id = row->id, .job_id = row->job_id, .owner_id = row->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
+                           .kill_at_sec = clock_sec() + (row->tries > 0 ? LIMIT_AGAIN_SEC : LIMIT_SEC),
                            .dir = mem_printf("%s/trash/message-%lld", config->data_dir, (long long)row->id)};
     cJSON *order = cJSON_CreateObject();
     json_add_string(order, "kind", "deliver");
@@ -61,16 +63,22 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     return status;
 }
 
-/* The line that says how it ended. */
+/* The lines that say what was answered, and how it ended. */
 static void hear(void *user, const char *text, size_t length) {
     struct delivery *d = user;
-    const char *type, *message;
+    const char *type, *message, *word;
+    double code;
     cJSON *line;
     if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK)
         return;
     if (json_string(line, "type", "line", "", &type, NULL) == STATUS_OK && strcmp(type, "end") == 0 &&
         json_string(line, "message", "line", "", &message, NULL) == STATUS_OK)
         snprintf(d->reason, sizeof d->reason, "%s", message);
+    if (json_string(line, "status", "line", "", &word, NULL) == STATUS_OK)
+        d->is_final = d->is_final || strcmp(word, status_name(STATUS_INPUT)) == 0;
+    if (json_string(line, "series", "line", "", &word, NULL) == STATUS_OK && strcmp(word, "status") == 0 &&
+        json_number(line, "value", "line", 0, &code, NULL) == STATUS_OK && code >= 100 && code <= 999)
+        d->status = (int)code;
     cJSON_Delete(line);
 }
 
@@ -78,7 +86,9 @@ static void hear(void *user, const char *text, size_t length) {
 static bool settle(struct delivery *d, struct store *store) {
     struct error err;
     bool gave_up;
-    if (store_outbox_settle(store, d->id, d->delivered, &gave_up, &err) != STATUS_OK) {
+    const struct outbox_outcome outcome = {.delivered = d->delivered, .is_final = d->is_final, .status = d->status,
+                                           .reason = d->delivered ? NULL : d->reason[0] ? d->reason : "its time was up"};
+    if (store_outbox_settle(store, d->id, &outcome, &gave_up, &err) != STATUS_OK) {
         if (!d->complained)
             log_warning("a webhook's outcome cannot be recorded: %s", err.message);
         d->complained = true;

@@ -19,6 +19,9 @@ struct delivery {
     struct worker worker;
     char *dir;
     char reason[256]; /* why it failed, by its own words */
+    int64_t owner_id;   /* of the job */
+    int status;         /* that was answered; 0: none */
+    bool is_final;      /* it said that another try would end like this one */
     bool has_ended, delivered; /* its process; the message, then */
     bool complained;           /* that could not be entered, and the log says so */
 };

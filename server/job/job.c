@@ -93,6 +93,7 @@ void job_release(struct job *job) {
     mem_free(job->stage);
     mem_free(job->restart_from);
     mem_free(job->webhook);
+    mem_free(job->delivery);
     mem_free(job->reason);
     mem_free(job->hint);
     *job = (struct job){.eta_sec = -1.0};

@@ -74,6 +74,7 @@ struct job {
     int64_t disk_bytes;        /* that its folder takes, as of the end of its last attempt; -1: not known */
     double progress;           /* 0..1, of the stage */
     double eta_sec;            /* negative: unknown */
+    char *delivery;            /* what became of its messages: JSON object text; "": it has no webhook */
     char *webhook;             /* the URL that is told of its states; "": none */
     char *reason;              /* why it failed or is paused, in plain words; "" if not */
     char *hint;                /* what to do about it; "" if nothing is known */

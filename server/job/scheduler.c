@@ -31,7 +31,8 @@
 #include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
-#define DELIVERIES 4      /* webhooks that are called at the same time */
+#define DELIVERIES 8      /* webhooks that are called at the same time */
+#define USER_DELIVERIES 2 /* of them, of one user: a receiver that hangs holds up no other user's */
 #define RETRY_SEC 5.0         /* after the store or a start failed */
 #define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
 
@@ -358,10 +359,24 @@ static void listen_and_settle(struct scheduler *s) {
     atomic_store(&s->running, running);
 }
 
+/* Users with as many deliveries under way as one may have; their number. */
+static size_t busy_users(const struct scheduler *s, int64_t users[DELIVERIES]) {
+    size_t count = 0;
+    for (size_t i = 0; i < DELIVERIES; i++) {
+        size_t same = 0;
+        for (size_t k = 0; k <= i; k++)
+            same += s->delivery[i].id != 0 && s->delivery[k].id != 0 && s->delivery[k].owner_id == s->delivery[i].owner_id;
+        if (same == USER_DELIVERIES)
+            users[count++] = s->delivery[i].owner_id;
+    }
+    return count;
+}
+
 /* Sends what the outbox has, as far as there are hands for it. */
 static void deliver(struct scheduler *s) {
     struct error err;
-    int64_t after = 0;
+    int64_t after = 0, skip[DELIVERIES];
+    size_t skip_count;
     double wait = (double)INFINITY;
     bool is_free = false;
     for (size_t i = 0; i < DELIVERIES; i++)
@@ -373,7 +388,8 @@ static void deliver(struct scheduler *s) {
         struct outbox_row row;
         enum status status = STATUS_OK;
         while (s->delivery[i].id == 0 && status == STATUS_OK) {
-            status = store_outbox_next(s->store, after, &row, &err);
+            skip_count = busy_users(s, skip);
+            status = store_outbox_next(s->store, after, skip, skip_count, &row, &err);
             if (status != STATUS_OK)
                 break;
             after = row.id;

@@ -12,7 +12,12 @@
     " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
     " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
     " restart_from, memory_step, pinned, " JOB_EXPIRES ","                                  \
-    " (SELECT url FROM webhooks WHERE job_id = jobs.id), disk_bytes"
+    " (SELECT url FROM webhooks WHERE job_id = jobs.id), disk_bytes,"                          \
+    " (SELECT json_object('state', CASE WHEN w.waiting > 0 THEN 'pending' WHEN result = '' THEN 'idle'"     \
+    "  WHEN result = 'delivered' THEN result ELSE 'failed' END, 'pending', w.waiting, 'attempts', attempts," \
+    "  'last_status', nullif(status, 0), 'last_error', nullif(error, ''), 'next_ms', w.next_ms, 'at_ms', at_ms)"  \
+    "  FROM webhooks, (SELECT count(*) AS waiting, min(next_ms) AS next_ms FROM outbox WHERE job_id = jobs.id) AS w" \
+    "  WHERE webhooks.job_id = jobs.id)"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
     *job = (struct job){
@@ -44,6 +49,7 @@ static void fill(struct job *job, sqlite3_stmt *stmt) {
         .expires_ms = sqlite3_column_int64(stmt, 26),
         .webhook = sql_dup(stmt, 27),
         .disk_bytes = sqlite3_column_int64(stmt, 28),
+        .delivery = sql_dup(stmt, 29),
     };
     strncpy(job->scene_id, sql_text(stmt, 2), sizeof job->scene_id - 1);
 }

@@ -207,7 +207,16 @@ static const char step_13[] =
 static const char step_14[] =
     "ALTER TABLE retention ADD COLUMN empty_upload_ms INTEGER NOT NULL DEFAULT 600000;";
 
+/* What became of a job's webhook. */
+static const char step_15[] =
+    "ALTER TABLE webhooks ADD COLUMN result TEXT NOT NULL DEFAULT '';" /* of the last call: delivered, failed or gave_up */
+    "ALTER TABLE webhooks ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;" /* of its message */
+    "ALTER TABLE webhooks ADD COLUMN status INTEGER NOT NULL DEFAULT 0;" /* that was answered; 0: none */
+    "ALTER TABLE webhooks ADD COLUMN error TEXT NOT NULL DEFAULT '';"
+    "ALTER TABLE webhooks ADD COLUMN at_ms INTEGER NOT NULL DEFAULT 0;"
+    "CREATE INDEX outbox_by_job ON outbox (job_id);";
+
 const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
                                     step_6, step_7, step_8, step_9, step_10,
-                                    step_11, step_12, step_13, step_14};
+                                    step_11, step_12, step_13, step_14, step_15};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -298,18 +298,30 @@ enum status store_event_newest(struct store *store, int64_t *id, struct error *e
 /* A message for a webhook, made by every change of its job's state. */
 struct outbox_row {
     int64_t id, job_id;
+    int64_t owner_id;          /* whose job it is; 0: nobody's */
     char *url, *secret, *body; /* owned */
     int tries;
 };
 void outbox_row_release(struct outbox_row *row);
-/* The first message with id > after whose time has come; STATUS_NOT_FOUND when there is none. */
-enum status store_outbox_next(struct store *store, int64_t after, struct outbox_row *row, struct error *err);
+/* The first message with id > after whose time has come, of users that are none of skip[skip_count]; STATUS_NOT_FOUND
+ * when there is none. */
+enum status store_outbox_next(struct store *store, int64_t after, const int64_t *skip, size_t skip_count,
+                              struct outbox_row *row, struct error *err);
 /* How long until the next message's time comes, of those whose time has not come yet; infinite when
  * there is none. */
 enum status store_outbox_wait(struct store *store, double *seconds, struct error *err);
-/* Removes a message that was delivered, or puts it off: longer each time, and in the end for ever. */
-enum status store_outbox_settle(struct store *store, int64_t id, bool delivered, bool *gave_up,
+struct outbox_outcome {
+    bool delivered;
+    bool is_final;      /* another try would end like this one */
+    int status;         /* that was answered; 0: none */
+    const char *reason; /* why it was not delivered; NULL: it was */
+};
+/* Removes a message that was delivered, or puts it off: longer each time, and in the end for ever. The job shows it. */
+enum status store_outbox_settle(struct store *store, int64_t id, const struct outbox_outcome *outcome, bool *gave_up,
                                 struct error *err);
+/* The job's messages that wait are sent now, with all their tries before them; where there are none, one of its present
+ * state. STATUS_CONFLICT: the job has no webhook. */
+enum status store_webhook_again(struct store *store, int64_t job_id, struct error *err);
 
 /* What tells one version of a file from another, as stat has it. */
 struct file_version {

@@ -12,6 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/base64.h"
 #include "common/buf.h"
 #include "common/clock.h"
 #include "common/log.h"
@@ -19,6 +20,7 @@
 #include "common/protocol.h"
 #include "common/url.h"
 #include "server/worker/sandbox.h"
+#include "server/worker/progress.h"
 #include "server/worker/tasks.h"
 
 #define PATIENCE_SEC 10 /* for each step; the daemon's is for all */
@@ -56,12 +58,27 @@ bool deliver_is_public(const struct sockaddr *address) {
     return false;
 }
 
+/* The key of a secret: its bytes, which are `key`'s or the secret's own. */
+static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MOST], const void **bytes) {
+    size_t prefix = strlen(WEBHOOK_SECRET_PREFIX), size;
+    const char *base64 = secret + prefix;
+    *bytes = key;
+    if (strncmp(secret, WEBHOOK_SECRET_PREFIX, prefix) == 0 &&
+        base64_decode(base64, strlen(base64), key, WEBHOOK_KEY_MOST, &size) && size >= WEBHOOK_KEY_LEAST)
+        return size;
+    *bytes = secret;
+    return strlen(secret);
+}
+
 void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body,
                   char signature[64]) {
     unsigned char mac[32];
     gnutls_datum_t raw = {.data = mac, .size = sizeof mac}, text = {0};
+    unsigned char decoded[WEBHOOK_KEY_MOST];
+    const void *key;
+    size_t key_size = key_of(secret, decoded, &key);
     char *signed_text = mem_printf("%s.%lld.%s", id, timestamp, body);
-    gnutls_hmac_fast(GNUTLS_MAC_SHA256, secret, strlen(secret), signed_text, strlen(signed_text), mac);
+    gnutls_hmac_fast(GNUTLS_MAC_SHA256, key, key_size, signed_text, strlen(signed_text), mac);
     gnutls_base64_encode2(&raw, &text);
     snprintf(signature, 64, "v1,%.*s", (int)text.size, (const char *)text.data);
     gnutls_free(text.data);
@@ -182,7 +199,6 @@ static enum status talk_tls(int fd, const char *host, const struct buf *request,
 }
 
 enum status task_deliver(const struct order *order, struct progress *progress, struct error *err) {
-    (void)progress;
     struct url url;
     struct buf request;
     char signature[64];
@@ -196,7 +212,7 @@ enum status task_deliver(const struct order *order, struct progress *progress, s
     buf_init(&request, 1 << 20);
     buf_printf(&request, "POST %s%s HTTP/1.1\r\nHost: %s%s%s:%s\r\nUser-Agent: unbaked/" UNBAKE_VERSION "\r\n"
                "Connection: close\r\nContent-Type: " MIME_JSON "\r\nContent-Length: %zu\r\n"
-               "Webhook-Id: %s\r\nWebhook-Timestamp: %lld\r\nWebhook-Signature: %s\r\n\r\n%s",
+               "webhook-id: %s\r\nwebhook-timestamp: %lld\r\nwebhook-signature: %s\r\n\r\n%s",
                *url.target == '/' ? "" : "/", url.target, is_v6 ? "[" : "", url.host, is_v6 ? "]" : "", url.port,
                strlen(order->body), order->message_id, now, signature, order->body);
     int fd = call(&url, order->allow_private, err);
@@ -206,6 +222,8 @@ enum status task_deliver(const struct order *order, struct progress *progress, s
         status = err->status;
     else
         status = url.is_tls ? talk_tls(fd, url.host, &request, &code, err) : talk(fd, NULL, &request, &code, err);
+    if (code > 0)
+        progress_metric(progress, "status", 0, code); /* for the daemon, which does not speak to strangers */
     if (status == STATUS_OK && (code < 200 || code > 299))
         status = error_set(err, STATUS_UNAVAILABLE, "%s answered %d", url.host, code);
     if (fd >= 0)

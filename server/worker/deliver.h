@@ -5,7 +5,9 @@
  *    is called: a name that changes in between gains nothing. Private addresses are refused
  *    unless the daemon's configuration lets them be.
  * 2. Redirects are not followed. What comes back is read up to its status, which must be 2xx.
- * 3. A message is signed as standardwebhooks.com has it: HMAC-SHA256 over "ID.TIMESTAMP.BODY". */
+ * 3. A message is signed as standardwebhooks.com has it: HMAC-SHA256 over "ID.TIMESTAMP.BODY". The key is what is base64
+ *    behind whsec_ in the secret. A secret of another form is the key as it stands: the library verifies such messages
+ *    with whsec_ and the base64 of that text. */
 #ifndef UNBAKE_WORKER_DELIVER_H
 #define UNBAKE_WORKER_DELIVER_H
 

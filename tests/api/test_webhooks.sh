@@ -50,6 +50,12 @@ for host in 127.0.0.1 localhost '[::1]' 0.0.0.0; do
     UNBAKE_WEBHOOK_SECRET=$secret run 0 submit "$work/room" $quick --set method=listing1 --webhook "http://$host:${hook##*:}/" --watch -q
 done
 wait_for 60 sh -c "[ \$(grep -c 'an address of a private network' '$work/log') -ge 4 ]"
+# Another try would end the same: none is made, and the job says so.
+grep -q 'cannot be called: .*private network' "$work/log" && fail "a private address is to be called again"
+wait_for 60 sh -c "'$build/unbake' show last --json | jq -e '.webhook_delivery | .state == \"failed\" and .pending == 0 and .attempts == 1'"
+run 0 show last; has "$out" "private network"
+run 0 redeliver last
+wait_for 60 sh -c "'$build/unbake' show last --json | jq -e '.webhook_delivery.pending == 0'"
 equal "$(told | wc -l)" 0 "messages to private addresses"
 
 # Faults of a submission.

@@ -86,7 +86,7 @@ static void check_job(int64_t id) {
     struct job job;
     MUST(store_event_list(store, id, 0, 1000, check_event, NULL, NULL) == STATUS_OK);
     MUST(store_job_get(store, id, &job, NULL) == STATUS_OK);
-    cJSON *view = view_job(&job);
+    cJSON *view = view_job(&job, &(struct caller){.role = ROLE_ADMIN});
     char *text = json_text(view);
     check_json(text);
     mem_free(text);

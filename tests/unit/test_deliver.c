@@ -59,5 +59,15 @@ int main(void) {
     char signature[64];
     deliver_sign("a-secret-of-mine", "msg_1", 1700000000, "{}", signature);
     CHECK_STRING(signature, "v1,Xd/6c2MVkryC92SeVVR7LM8BbjruK54ef+m7qacFtVY=");
+    /* The reference library's own: standardwebhooks, libraries/python/tests/test_webhooks.py, test_sign_function. */
+    deliver_sign("whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw", "msg_p5jXN8AQM9LWM0D4loKWxJek", 1614265330,
+                 "{\"test\": 2432232314}", signature);
+    CHECK_STRING(signature, "v1,g0hM9SsE+OTPJTGt/tmIKtSyZlE3uFJELVlNIOLJ1OE=");
+    /* What is no base64, or of too few bytes, is the key as it stands:
+     * printf %s 'msg_1.1700000000.{}' | openssl dgst -sha256 -hmac 'whsec_not base64' -binary | base64 */
+    deliver_sign("whsec_not base64", "msg_1", 1700000000, "{}", signature);
+    CHECK_STRING(signature, "v1,koCIHAY4tYn2iV1PPmIh7AOgu8PKTu6e3Xbx4gtT1/U=");
+    deliver_sign("whsec_c2hvcnQ=", "msg_1", 1700000000, "{}", signature);
+    CHECK_STRING(signature, "v1,bFx7oQp2f0M93cVABJzGWZmxzNeel7tgrb2RxeE+jmo=");
     return check_result();
 }

@@ -71,7 +71,7 @@ static enum status start(struct delivery *d, struct error *why) {
     struct outbox_row row;
     bool was_off = faults_are_off;
     faults_are_off = true;
-    OK(store_outbox_next(store, 0, &row, &err));
+    OK(store_outbox_next(store, 0, NULL, 0, &row, &err));
     faults_are_off = was_off;
     enum status status = delivery_start(d, &config, &row, why);
     outbox_row_release(&row);
@@ -134,7 +134,7 @@ static void check_refused(const char *url, const char *why) {
     int tries = 0;
     add_message(url);
     log_forget();
-    OK(store_outbox_next(store, 0, &row, &err)); /* the first time; later ones do not wait for theirs */
+    OK(store_outbox_next(store, 0, NULL, 0, &row, &err)); /* the first time; later ones do not wait for theirs */
     for (; count_outbox() == 1 && tries < 1000; tries++) {
         CHECK_THAT(log_count("will not be again") == 0 && log_count(why) == tries, "try %d", tries);
         OK(delivery_start(&d, &config, &row, &err));

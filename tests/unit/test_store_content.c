@@ -216,6 +216,44 @@ static void test_events(void) {
 
 /* --- messages ------------------------------------------------------------------------------------ */
 
+static void check_delivery(struct store *store, int64_t id, const char *part) {
+    struct job job;
+    OK(store_job_get(store, id, &job, &err));
+    CHECK_THAT(strstr(job.delivery, part), "%s", job.delivery);
+    job_release(&job);
+}
+
+/* The job tells what became of its messages, and they can be sent again: those that wait, or one of its present state. */
+static void check_again(struct store *store, int64_t id) {
+    struct outbox_row row;
+    bool gave_up;
+    double wait;
+    const int64_t nobody = 0;
+    check_delivery(store, id, "\"state\":\"failed\",\"pending\":0,\"attempts\":30,\"last_status\":null,\"last_error\":\"no\"");
+    OK(store_webhook_again(store, id, &err));
+    check_delivery(store, id, "\"state\":\"pending\",\"pending\":1");
+    IS(store_outbox_next(store, 0, &nobody, 1, &row, &err), STATUS_NOT_FOUND); /* whose turn it is not */
+    OK(store_outbox_next(store, 0, NULL, 0, &row, &err));
+    CHECK(strstr(row.body, "succeeded") && row.tries == 0 && row.owner_id == 0);
+    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.status = 500, .reason = "answered 500"}, &gave_up, &err));
+    OK(store_outbox_wait(store, &wait, &err));
+    CHECK(!gave_up && wait > 0.1);
+    check_delivery(store, id, "\"attempts\":1,\"last_status\":500,\"last_error\":\"answered 500\"");
+    OK(store_webhook_again(store, id, &err)); /* the one that waits, now */
+    check_delivery(store, id, "\"pending\":1");
+    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.delivered = true, .status = 204}, &gave_up, &err));
+    check_delivery(store, id, "\"state\":\"delivered\",\"pending\":0,\"attempts\":1,\"last_status\":204,\"last_error\":null");
+    /* What cannot be otherwise is not tried again. */
+    outbox_row_release(&row);
+    OK(store_webhook_again(store, id, &err));
+    OK(store_outbox_next(store, 0, NULL, 0, &row, &err));
+    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.is_final = true, .reason = "private"}, &gave_up, &err));
+    CHECK(gave_up);
+    check_delivery(store, id, "\"state\":\"failed\"");
+    outbox_row_release(&row);
+    IS(store_webhook_again(store, 999, &err), STATUS_CONFLICT);
+}
+
 /* A message that is put off has its time, whatever else is due: the one who is called may hang. */
 static void test_outbox(void) {
     char *dir = fresh_dir();
@@ -234,25 +272,26 @@ static void test_outbox(void) {
     OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
     OK(store_job_start(store, id, &attempt, &err));
     OK(store_job_succeed(store, id, attempt, &err));
-    OK(store_outbox_next(store, 0, &first, &err));
-    OK(store_outbox_next(store, first.id, &second, &err));
+    OK(store_outbox_next(store, 0, NULL, 0, &first, &err));
+    OK(store_outbox_next(store, first.id, NULL, 0, &second, &err));
     CHECK(strstr(first.body, "running") && strstr(second.body, "succeeded"));
-    OK(store_outbox_settle(store, first.id, false, &gave_up, &err));
+    OK(store_outbox_settle(store, first.id, &(struct outbox_outcome){.reason = "no"}, &gave_up, &err));
     CHECK(!gave_up);
     OK(store_outbox_wait(store, &wait, &err));
     CHECK_THAT(wait > 0.1 && wait <= 2.0, "%g s until the next time", wait);
-    OK(store_outbox_settle(store, first.id, true, &gave_up, &err));
+    OK(store_outbox_settle(store, first.id, &(struct outbox_outcome){.delivered = true, .status = 200}, &gave_up, &err));
     OK(store_outbox_wait(store, &wait, &err));
     CHECK(isinf(wait));
 
     /* Who never answers is given up one day, and not before. */
     int tries = 0;
     for (gave_up = false; !gave_up && tries < 100; tries++) {
-        OK(store_outbox_settle(store, second.id, false, &gave_up, &err));
+        OK(store_outbox_settle(store, second.id, &(struct outbox_outcome){.reason = "no"}, &gave_up, &err));
         OK(store_outbox_wait(store, &wait, &err));
         CHECK(isinf(wait) == gave_up);
     }
     CHECK_THAT(tries == 30, "%d tries", tries);
+    check_again(store, id);
     outbox_row_release(&first);
     outbox_row_release(&second);
     store_close(store);

@@ -289,13 +289,13 @@ static enum status list_outputs(void) {
 
 static enum status next_message(void) {
     struct outbox_row row;
-    enum status status = store_outbox_next(store, 0, &row, &err);
+    enum status status = store_outbox_next(store, 0, NULL, 0, &row, &err);
     outbox_row_release(&row);
     return status;
 }
 static enum status settle(bool delivered) {
     bool gave_up;
-    return store_outbox_settle(store, 1, delivered, &gave_up, &err);
+    return store_outbox_settle(store, 1, &(struct outbox_outcome){.delivered = delivered, .reason = delivered ? NULL : "no"}, &gave_up, &err);
 }
 static enum status put_off(void) { return settle(false); }
 static enum status delivered(void) { return settle(true); }
