@@ -6,7 +6,7 @@
 . tests/api/client.sh "$@"
 
 version=4.32.5
-tool=$build/schemathesis/bin/schemathesis
+tool=$build/schemathesis/bin/schemathesis # $build is absolute
 if [ ! -x "$tool" ]; then
     [ -n "${UNBAKE_LONG:-}" ] || { echo "there is no schemathesis (make soak installs it)"; exit 77; }
     python3 -m venv "$build/schemathesis" && "$build/schemathesis/bin/pip" install -q "schemathesis==$version" ||
@@ -39,10 +39,12 @@ include-method = "OPTIONS"
 enabled = false # what an OPTIONS tells is of the protocol, not of an upload
 TOML
 long=${UNBAKE_LONG:-}
+cd "$work" || exit 1 # where it leaves what it has learnt
 "$tool" --config-file "$work/config.toml" run "$UNBAKE_SERVER/openapi.json" -H "Authorization: Bearer $token" \
     --exclude-path-regex '/events$' --max-examples "$([ -n "$long" ] && echo 60 || echo 5)" --seed 1 --continue-on-failure \
     --suppress-health-check all --request-timeout 30 --no-color --warnings off >"$work/out" 2>&1
 code=$?
+cd - >/dev/null || exit 1
 [ $code -eq 0 ] || { fail "schemathesis ends with $code"; sed -n '/= FAILURES =/,$p;/= ERRORS =/,$p' "$work/out"; tail -n 30 "$work/out"; }
 cases=$(sed -n 's/^ *\([0-9]*\) generated.*/\1/p' "$work/out" | head -n 1)
 printf 'cases against openapi.json, with 0 findings\t%s\t1000\thigher\n' "${cases:-0}"
