@@ -21,7 +21,7 @@ chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill"
 slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults unit/test_outputs_read_back
 gradient/test_path render/test_calibrate_light render/test_changing_light render/test_detail
 render/test_emitters render/test_hidden_lamp render/test_sky_doubt unit/test_evaluate api/test_metrics
-api/test_http_faults api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
+api/test_http_faults api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 

@@ -80,12 +80,15 @@ static enum status is_in_check(struct store *store, const char *id, int64_t *is_
 
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err) {
-    int64_t state = -1;
+    int64_t state = -1, is_mine = 0;
     *existed = false;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
     status = state_of(store, id, &state, err);
+    if (status == STATUS_OK)
+        status = sql_int(&store->sql, 0, &is_mine, err,
+                         "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id, owner_id);
     if (status == STATUS_OK && state < 0)
         status = sql_run(&store->sql, err,
                          "INSERT INTO scenes (id, state, bytes, created_ms)"
@@ -101,7 +104,7 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
                          " VALUES (?, ?, ?, ?) ON CONFLICT DO NOTHING",
                          "tiit", id, owner_id, store_now_ms(), name);
     status = store_end(store, status, 0, err);
-    *existed = status == STATUS_OK && state >= 0;
+    *existed = status == STATUS_OK && is_mine;
     return status;
 }
 

@@ -77,8 +77,8 @@ struct scene_row {
 void scene_row_release(struct scene_row *row);
 
 /* A complete, durable upload by user owner_id: the row starts in `checking`. Content that is there
- * already is no error: *existed is set, the user owns it too, by that name (one who did keeps his), and nothing
- * else changes, but one that was rejected or waits for room is checked again. */
+ * already is no error: the user owns it too, by that name (one who did keeps his, and *existed is set: that others do is
+ * not his to know), and nothing else changes, but one that was rejected or waits for room is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
                             int64_t owner_id, bool *existed, struct error *err);
 /* What it takes of the disk was entered before. */

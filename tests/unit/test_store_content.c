@@ -124,7 +124,7 @@ static void test_sent_again(void) {
     scene_row_release(&row);
     OK(store_scene_add(store, SCENE_A, "two", 10, 2, &existed, &err));
     OK(store_scene_get(store, SCENE_A, &row, &err));
-    CHECK(existed && row.created_ms == 5000 && row.expires_ms > 1600000000000);
+    CHECK(!existed && row.created_ms == 5000 && row.expires_ms > 1600000000000);
     scene_row_release(&row);
     store_close(store);
     mem_free(path);

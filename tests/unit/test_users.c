@@ -284,7 +284,7 @@ static void test_lists(void) {
 
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
-    CHECK(existed && scenes_seen(store, &bob) == 2);
+    CHECK(!existed && scenes_seen(store, &bob) == 2);
     const struct keeping past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
     OK(store_scene_patch(store, &alice, SCENE_A, "mine", &pin, &err));
     IS(store_scene_patch(store, &bob, SCENE_A, NULL, &loose, &err), STATUS_CONFLICT);
