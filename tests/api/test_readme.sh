@@ -138,7 +138,6 @@ systemctl() {
 }
 chown() { :; }
 install() { mkdir -p "\${@: -1}"; }
-command -v rsync >/dev/null || rsync() { cp "\$@"; }
 PREAMBLE
     { printf '#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n'; printf '\x80\x80\x80\x80%.0s' $(seq 32); } >"$place/sky.hdr"
 }
