@@ -18,7 +18,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/admin/folder.h"
+#include "server/data/folder.h"
 
 #define LINE_MAX_BYTES ((size_t)1 << 20)
 #define PATIENCE_SEC 5 /* of the daemon, for a request; a reply may take as long as it takes */

@@ -13,7 +13,7 @@
 #include "common/sha256.h"
 #include "server/admin/commands.h"
 #include "server/admin/copy.h"
-#include "server/admin/folder.h"
+#include "server/data/folder.h"
 #include "server/store/contents.h"
 
 #define SUMS_MAX_BYTES ((size_t)1 << 30)

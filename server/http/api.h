@@ -48,7 +48,7 @@ struct api_config {
 
 struct hub;      /* hub.h */
 struct digests;  /* digests.h */
-struct partials; /* partial.h */
+struct resumables; /* resumable.h */
 struct listener; /* listener.h */
 struct tally;    /* tally.h */
 struct brake;    /* brake.h */
@@ -61,7 +61,7 @@ struct api {
     struct scheduler *scheduler; /* borrowed */
     struct hub *hub;
     struct digests *digests;
-    struct partials *partials;
+    struct resumables *resumables;
     struct trash *trash;
     struct readiness *readiness;
     struct listener *listener; /* NULL before it listens; for figures */

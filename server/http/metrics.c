@@ -6,7 +6,7 @@
 
 #include "common/file.h"
 #include "common/protocol.h"
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
 #include "server/http/listener.h"

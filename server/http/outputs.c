@@ -13,10 +13,10 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/http/auth.h"
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/http/job_file.h"
+#include "server/data/job_file.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 

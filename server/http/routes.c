@@ -9,7 +9,7 @@
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
-#include "server/http/upload.h"
+#include "server/uploads/upload.h"
 #include "server/http/uploads.h"
 
 static const struct route table[] = {

@@ -13,7 +13,7 @@
 #include "server/http/keeping.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
-#include "server/http/upload.h"
+#include "server/uploads/upload.h"
 #include "server/http/views.h"
 
 /* A scene has no revision: what is shown of it is its tag. */

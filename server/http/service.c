@@ -8,9 +8,9 @@
 #include "common/mem.h"
 #include "server/http/brake.h"
 #include "server/data/trash.h"
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 #include "server/http/hub.h"
-#include "server/http/partial.h"
+#include "server/uploads/resumable.h"
 #include "server/http/readiness.h"
 #include "server/http/tally.h"
 
@@ -61,7 +61,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     api->tally = tally_new();
     api->brake = brake_new();
     api->hub = hub_new(config->keepalive_sec);
-    api->partials = partials_new(api);
+    api->resumables = resumables_new(api);
     *out = api;
     enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
                                     config->upload_keep_ms, err);
@@ -70,7 +70,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     if (status == STATUS_OK)
         status = open_trash(api, err);
     if (status == STATUS_OK)
-        status = partials_recover(api->partials, err);
+        status = resumables_recover(api->resumables, err);
     for (size_t i = 0; i < sizeof folders / sizeof *folders && status == STATUS_OK; i++)
         status = sweep(api, folders[i], (enum store_files)i, err);
     store_reserve_renew(store);
@@ -93,7 +93,7 @@ void service_free(struct api *api) {
         return;
     store_on_change(api->store, NULL, NULL);
     store_on_digest_wanted(api->store, NULL, NULL);
-    partials_free(api->partials);
+    resumables_free(api->resumables);
     hub_free(api->hub);
     tally_free(api->tally);
     brake_free(api->brake);

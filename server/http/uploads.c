@@ -1,5 +1,5 @@
 /* uploads.c -- /v1/uploads: bundles in parts, by the tus protocol 1.0.0 (tus.io) with its
- * extensions creation, termination, expiration and checksum. What is on disk is partial.c's. A PATCH
+ * extensions creation, termination, expiration and checksum. What is on disk is resumable.c's. A PATCH
  * whose body is JSON is not of the protocol: it changes how long the upload is kept. */
 #include "server/http/uploads.h"
 
@@ -16,12 +16,12 @@
 #include "common/sha256.h"
 #include "common/utf8.h"
 #include "server/http/body.h"
-#include "server/http/claim.h"
+#include "server/uploads/upload_writer.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
 #include "server/http/limits.h"
-#include "server/http/partial.h"
+#include "server/uploads/resumable.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
@@ -31,7 +31,7 @@
 enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
 
 struct patch {
-    struct claim *claim;
+    struct upload_writer *writer;
     enum checksum checksum;
     uint8_t wanted[32];
     struct sha1 sha1;
@@ -190,7 +190,7 @@ static struct response *create(struct api *api, const struct request *r, struct 
         refusal = space_check_room(api, r, row->length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, row->length);
-    if (!refusal && partial_create(api->partials, row, &err) != STATUS_OK)
+    if (!refusal && resumable_create(api->resumables, row, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     return refusal;
@@ -223,7 +223,7 @@ struct response *uploads_get(struct api *api, struct request *r) {
     const char *id = reply ? NULL : find_upload(api, r, &reply);
     if (reply)
         return reply;
-    if (partial_look(api->partials, id, &row, &err) != STATUS_OK)
+    if (resumable_look(api->resumables, id, &row, &err) != STATUS_OK)
         return refuse(r, &err);
     reply = response_json(200, view_upload(&row));
     response_field(reply, "Cache-Control", "no-store");
@@ -295,27 +295,27 @@ struct response *uploads_begin(struct api *api, struct request *r) {
     refusal = read_checksum(r, p);
     if (refusal)
         return refusal;
-    if (claim_take(api->partials, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->claim, &err) !=
+    if (upload_writer_take(api->resumables, id, (uint64_t)offset, p->checksum != CHECKSUM_NONE, &p->writer, &err) !=
         STATUS_OK)
         return refuse(r, &err);
-    if (r->content_length > 0 && (uint64_t)r->content_length > claim_room(p->claim))
-        return problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld", claim_room(p->claim),
+    if (r->content_length > 0 && (uint64_t)r->content_length > upload_writer_room(p->writer))
+        return problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld", upload_writer_room(p->writer),
                        (long long)r->content_length);
-    uint64_t unreserved = claim_unreserved(p->claim);
+    uint64_t unreserved = upload_writer_unreserved(p->writer);
     return unreserved ? space_check_room(api, r, unreserved) : NULL;
 }
 
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
     struct patch *p = r->patch;
     struct error err;
-    if (claim_write(p->claim, data, length, &err) != STATUS_OK)
+    if (upload_writer_write(p->writer, data, length, &err) != STATUS_OK)
         return refuse(r, &err);
     atomic_fetch_add(&api->uploaded_bytes, length);
     if (p->checksum == CHECKSUM_SHA1)
         sha1_update(&p->sha1, data, length);
     else if (p->checksum == CHECKSUM_SHA256)
         sha256_update(&p->sha256, data, length);
-    if (claim_is_due(p->claim) && claim_commit(p->claim, &err) != STATUS_OK)
+    if (upload_writer_is_due(p->writer) && upload_writer_commit(p->writer, &err) != STATUS_OK)
         return refuse(r, &err);
     return NULL;
 }
@@ -323,7 +323,7 @@ struct response *uploads_data(struct api *api, struct request *r, const void *da
 void uploads_drop(struct patch *p) {
     if (!p)
         return;
-    claim_release(p->claim);
+    upload_writer_release(p->writer);
     mem_free(p);
 }
 
@@ -383,9 +383,9 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     if (!is_as_sent(p))
         return problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten");
     if (p->checksum != CHECKSUM_NONE)
-        status = claim_accept(p->claim, &err);
+        status = upload_writer_accept(p->writer, &err);
     if (status == STATUS_OK)
-        status = claim_finish(p->claim, &row, &err);
+        status = upload_writer_finish(p->writer, &row, &err);
     if (status != STATUS_OK)
         return refuse(r, &err);
     struct response *reply = response_new(204);
@@ -409,7 +409,7 @@ struct response *uploads_delete(struct api *api, struct request *r) {
         mem_free(path);
         return reply;
     }
-    if (partial_remove(api->partials, id, &err) != STATUS_OK)
+    if (resumable_remove(api->resumables, id, &err) != STATUS_OK)
         return refuse(r, &err);
     return response_new(204);
 }

@@ -6,7 +6,7 @@
 #include <pthread.h>
 #include <sys/stat.h>
 
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 #include "tests/api/outputs.h"
 
 #define BIG (DIGESTS_AT_ONCE + 1)

@@ -2,8 +2,8 @@
 #include <pthread.h>
 #include <sys/resource.h>
 
-#include "server/http/intake.h"
-#include "server/http/partial.h"
+#include "server/uploads/upload_session.h"
+#include "server/uploads/resumable.h"
 #include "tests/api/rig.h"
 
 #define BYTES 1000
@@ -129,7 +129,7 @@ static void check_stop_when_busy(void) {
 
 static void create(char id[UPLOAD_ID_SIZE]) {
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
-    rig_must(partial_create(rig.api->partials, &row, &err), &err, "partial_create");
+    rig_must(resumable_create(rig.api->resumables, &row, &err), &err, "resumable_create");
     memcpy(id, row.id, UPLOAD_ID_SIZE);
     upload_row_release(&row);
 }
@@ -169,7 +169,7 @@ static void *stop(void *user) {
  * told to come back, and what of it was received is there. */
 static void check_stop(void) {
     char first[UPLOAD_ID_SIZE], second[UPLOAD_ID_SIZE], bytes[HALF], path[128];
-    struct partials *p = rig.api->partials;
+    struct resumables *p = rig.api->resumables;
     struct buf reply;
     pthread_t thread;
     snprintf(path, sizeof path, "GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\n\r\n", (long long)rig_job(&rig));

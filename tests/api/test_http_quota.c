@@ -1,6 +1,6 @@
 /* test_http_quota.c -- what one user may take of what all share, each with its own status, the option's name and who can
  * raise it; admins are not bound. Uploads that never begin give their space back soon. */
-#include "server/http/collector.h"
+#include "server/data/collector.h"
 #include "tests/api/rig.h"
 
 static struct rig rig;

@@ -4,8 +4,8 @@
 #include <pthread.h>
 
 #include "server/data/trash.h"
-#include "server/http/collector.h"
-#include "server/http/digests.h"
+#include "server/data/collector.h"
+#include "server/uploads/digests.h"
 #include "server/http/readiness.h"
 #include "tests/api/outputs.h"
 #include "tests/system_faults.h"

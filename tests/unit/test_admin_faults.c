@@ -10,7 +10,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/admin/commands.h"
-#include "server/admin/folder.h"
+#include "server/data/folder.h"
 #include "tests/check.h"
 #include "tests/system_faults.h"
 

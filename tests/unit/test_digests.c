@@ -1,5 +1,5 @@
 /* test_digests.c -- the hash of an output that is written, cut or unreadable while it is read: it is told. */
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 
 #include <dlfcn.h>
 #include <errno.h>

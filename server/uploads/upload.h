@@ -3,8 +3,8 @@
  * 1. It lives in DATA/uploads/ under a name of no meaning until it is whole and synced; only then
  *    is it renamed to DATA/scenes/ID/archive. What is freed before that leaves nothing behind.
  * 2. Space is reserved at the start where the length is known; min_free_bytes stay free always. */
-#ifndef UNBAKE_HTTP_UPLOAD_H
-#define UNBAKE_HTTP_UPLOAD_H
+#ifndef UNBAKE_UPLOADS_UPLOAD_H
+#define UNBAKE_UPLOADS_UPLOAD_H
 
 #include <stdint.h>
 

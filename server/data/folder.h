@@ -1,6 +1,6 @@
 /* folder.h -- the data folder: one process at a time, whoever it is, and for its user alone. */
-#ifndef UNBAKE_ADMIN_FOLDER_H
-#define UNBAKE_ADMIN_FOLDER_H
+#ifndef UNBAKE_DATA_FOLDER_H
+#define UNBAKE_DATA_FOLDER_H
 
 #include "common/error.h"
 

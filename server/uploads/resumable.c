@@ -1,5 +1,5 @@
-/* partial.c -- see partial.h. What is in use, and its locks, are intake.h's. */
-#include "server/http/partial.h"
+/* resumable.c -- see resumable.h. What is in use, and its locks, are upload_session.h's. */
+#include "server/uploads/resumable.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -13,18 +13,18 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/trash.h"
-#include "server/http/intake.h"
-#include "server/http/upload.h"
+#include "server/uploads/upload_session.h"
+#include "server/uploads/upload.h"
 
 #define UNFINISHED_MAX 10000 /* uploads, of all users */
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
 /* The file is, or was about to be, at its place among the scenes. */
-static enum status place(struct partials *p, const struct upload_row *row, const char *scene_id,
+static enum status place(struct resumables *p, const struct upload_row *row, const char *scene_id,
                          struct error *err) {
     struct api *api = p->api;
-    char *path = intake_path(p, row->id);
+    char *path = upload_session_path(p, row->id);
     bool existed;
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = STATUS_OK;
@@ -41,8 +41,8 @@ static enum status place(struct partials *p, const struct upload_row *row, const
 }
 
 /* It is not what was announced. */
-static enum status reject(struct partials *p, const struct upload_row *row, const char *scene_id, struct error *err) {
-    enum status status = partial_remove(p, row->id, err);
+static enum status reject(struct resumables *p, const struct upload_row *row, const char *scene_id, struct error *err) {
+    enum status status = resumable_remove(p, row->id, err);
     if (status != STATUS_OK)
         return status;
     error_set(err, STATUS_INPUT, "the upload's SHA-256 is %s, and its metadata says %s", scene_id, row->sha256);
@@ -50,7 +50,7 @@ static enum status reject(struct partials *p, const struct upload_row *row, cons
 }
 
 /* The upload `id` is whole and counted: makes its scene, once. */
-static enum status finish(struct partials *p, const char *id, struct error *err) {
+static enum status finish(struct resumables *p, const char *id, struct error *err) {
     struct upload_row row;
     struct sha256 hash;
     char scene_id[SHA256_HEX_SIZE];
@@ -69,20 +69,20 @@ static enum status finish(struct partials *p, const char *id, struct error *err)
 }
 
 /* Commits; finishes what is whole. */
-static enum status settle(struct intake *e, struct error *err) {
-    enum status status = intake_commit(e, err);
-    if (status != STATUS_OK || !intake_is_whole(e))
+static enum status settle(struct upload_session *e, struct error *err) {
+    enum status status = upload_session_commit(e, err);
+    if (status != STATUS_OK || !upload_session_is_whole(e))
         return status;
-    status = finish(e->partials, e->id, err);
+    status = finish(e->resumables, e->id, err);
     if (status == STATUS_OK)
-        intake_close(e);
+        upload_session_close(e);
     return status;
 }
 
 /* --- all of them ------------------------------------------------------------------------- */
 
-struct partials *partials_new(struct api *api) {
-    struct partials *p = mem_calloc(1, sizeof *p);
+struct resumables *resumables_new(struct api *api) {
+    struct resumables *p = mem_calloc(1, sizeof *p);
     p->api = api;
     pthread_mutex_init(&p->mutex, NULL);
     pthread_mutex_init(&p->finishing, NULL);
@@ -93,31 +93,31 @@ struct partials *partials_new(struct api *api) {
     return p;
 }
 
-void partials_tend(struct partials *p) {
-    struct intake *e;
+void resumables_tend(struct resumables *p) {
+    struct upload_session *e;
     pthread_mutex_lock(&p->mutex);
     unsigned long round = ++p->round;
     pthread_mutex_unlock(&p->mutex);
-    while ((e = intake_next(p, round)) != NULL) { /* nobody uses it: it is there because it is dirty */
+    while ((e = upload_session_next(p, round)) != NULL) { /* nobody uses it: it is there because it is dirty */
         struct error err;
         if (settle(e, &err) != STATUS_OK)
             log_warning("upload %s: %s", e->id, err.message);
-        intake_put(e);
+        upload_session_put(e);
     }
 }
 
-void partials_free(struct partials *p) {
+void resumables_free(struct resumables *p) {
     if (!p)
         return;
-    partials_tend(p);
+    resumables_tend(p);
     while (p->first)
-        intake_drop(p->first);
+        upload_session_drop(p->first);
     pthread_mutex_destroy(&p->finishing);
     pthread_mutex_destroy(&p->mutex);
     mem_free(p);
 }
 
-enum status partials_recover(struct partials *p, struct error *err) {
+enum status resumables_recover(struct resumables *p, struct error *err) {
     char cursor[128] = "";
     enum status status;
     do {
@@ -148,7 +148,7 @@ static enum status new_id(char id[UPLOAD_ID_SIZE], struct error *err) {
     return STATUS_OK;
 }
 
-enum status partial_create(struct partials *p, struct upload_row *row, struct error *err) {
+enum status resumable_create(struct resumables *p, struct upload_row *row, struct error *err) {
     struct sha256 hash;
     memset(&hash, 0, sizeof hash); /* all of it is stored */
     sha256_init(&hash);
@@ -156,7 +156,7 @@ enum status partial_create(struct partials *p, struct upload_row *row, struct er
     if (status != STATUS_OK)
         return status;
     snprintf(row->boot, sizeof row->boot, "%s", p->boot);
-    char *path = intake_path(p, row->id);
+    char *path = upload_session_path(p, row->id);
     int fd = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0)
         status = error_set_errno(err, errno, "cannot create %s", path);
@@ -178,30 +178,30 @@ enum status partial_create(struct partials *p, struct upload_row *row, struct er
     return status;
 }
 
-enum status partial_look(struct partials *p, const char *id, struct upload_row *row, struct error *err) {
-    struct intake *e;
+enum status resumable_look(struct resumables *p, const char *id, struct upload_row *row, struct error *err) {
+    struct upload_session *e;
     enum status status = store_upload_get(p->api->store, id, row, NULL, 0, err);
     if (status != STATUS_OK || *row->scene_id)
         return status;
     upload_row_release(row);
-    status = intake_get(p, id, &e, err);
+    status = upload_session_get(p, id, &e, err);
     if (status == STATUS_OK) {
         status = settle(e, err);
-        intake_put(e);
+        upload_session_put(e);
     } else if (status == STATUS_CONFLICT) {
         status = STATUS_OK; /* finished just now */
     }
     return status == STATUS_OK ? store_upload_get(p->api->store, id, row, NULL, 0, err) : status;
 }
 
-enum status partial_forget(struct partials *p, const char *id, struct error *err) {
+enum status resumable_forget(struct resumables *p, const char *id, struct error *err) {
     char path[sizeof "uploads/" + UPLOAD_ID_SIZE];
-    intake_mark_gone(p, id);
+    upload_session_mark_gone(p, id);
     snprintf(path, sizeof path, "uploads/%s", id);
     return trash_take(p->api->trash, path, err);
 }
 
-enum status partial_remove(struct partials *p, const char *id, struct error *err) {
+enum status resumable_remove(struct resumables *p, const char *id, struct error *err) {
     enum status status = store_upload_delete(p->api->store, id, err);
-    return status == STATUS_OK ? partial_forget(p, id, err) : status;
+    return status == STATUS_OK ? resumable_forget(p, id, err) : status;
 }

@@ -1,5 +1,5 @@
 /* upload.c -- see upload.h. */
-#include "server/http/upload.h"
+#include "server/uploads/upload.h"
 
 #include <errno.h>
 #include <fcntl.h>

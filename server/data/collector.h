@@ -1,7 +1,7 @@
 /* collector.h -- removes what has expired (store/retention.h), and sees to what is left to be done
  * about uploads, once in a while. */
-#ifndef UNBAKE_HTTP_COLLECTOR_H
-#define UNBAKE_HTTP_COLLECTOR_H
+#ifndef UNBAKE_DATA_COLLECTOR_H
+#define UNBAKE_DATA_COLLECTOR_H
 
 #include "common/error.h"
 #include "common/json.h"

@@ -1,8 +1,8 @@
-/* intake.c -- see intake.h.
+/* upload_session.c -- see upload_session.h.
  *
  * One commit of an upload at a time: of two syncs at once the kernel tells one of a page that it could
  * not write, and the other that all is well. */
-#include "server/http/intake.h"
+#include "server/uploads/upload_session.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -15,19 +15,19 @@
 
 #define CHUNK_BYTES ((size_t)256 << 10)
 
-char *intake_path(const struct partials *p, const char *id) {
+char *upload_session_path(const struct resumables *p, const char *id) {
     return mem_printf("%s/uploads/%s", p->api->config.data_dir, id);
 }
 
 /* --- loading ------------------------------------------------------------------------------- */
 
-static enum status open_file(struct intake *e, struct error *err) {
+static enum status open_file(struct upload_session *e, struct error *err) {
     if (e->fd >= 0)
         return STATUS_OK;
     enum status status = STATUS_OK;
-    char *path = intake_path(e->partials, e->id);
+    char *path = upload_session_path(e->resumables, e->id);
     e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
-    /* Whole, it may be on its way to be a scene: see place in partial.c. */
+    /* Whole, it may be on its way to be a scene: see place in resumable.c. */
     if (e->fd < 0 && (errno != ENOENT || e->received < e->length))
         status = error_set_errno(err, errno, "cannot open %s", path);
     mem_free(path);
@@ -35,7 +35,7 @@ static enum status open_file(struct intake *e, struct error *err) {
 }
 
 /* Hashes what lies in the file from e->received to its end: written, but never counted. */
-static enum status believe_tail(struct intake *e, struct error *err) {
+static enum status believe_tail(struct upload_session *e, struct error *err) {
     char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
     ssize_t got = 1;
@@ -57,17 +57,17 @@ static enum status believe_tail(struct intake *e, struct error *err) {
 
 /* What lies beyond the counted bytes may be anything: the machine was started anew since, or its disk
  * has failed. */
-static enum status cut_tail(struct intake *e, struct error *err) {
+static enum status cut_tail(struct upload_session *e, struct error *err) {
     if (ftruncate(e->fd, (off_t)e->received) != 0)
         return error_set_errno(err, errno, "cannot cut upload %s", e->id);
     if (fallocate(e->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)e->length) != 0 && errno != EOPNOTSUPP)
         return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s",
                                (unsigned long long)e->length, e->id);
-    return store_upload_begin(e->partials->api->store, e->id, e->partials->boot, err);
+    return store_upload_begin(e->resumables->api->store, e->id, e->resumables->boot, err);
 }
 
-static enum status load(struct intake *e, struct error *err) {
-    struct partials *p = e->partials;
+static enum status load(struct upload_session *e, struct error *err) {
+    struct resumables *p = e->resumables;
     struct upload_row row;
     enum status status = store_upload_get(p->api->store, e->id, &row, &e->hash, sizeof e->hash, err);
     if (status != STATUS_OK)
@@ -89,8 +89,8 @@ static enum status load(struct intake *e, struct error *err) {
 
 /* --- while it is in use -------------------------------------------------------------------- */
 
-void intake_drop(struct intake *e) {
-    struct intake **link = &e->partials->first;
+void upload_session_drop(struct upload_session *e) {
+    struct upload_session **link = &e->resumables->first;
     while (*link != e)
         link = &(*link)->next;
     *link = e->next;
@@ -101,32 +101,32 @@ void intake_drop(struct intake *e) {
     mem_free(e);
 }
 
-static bool is_clean(struct intake *e) {
+static bool is_clean(struct upload_session *e) {
     pthread_mutex_lock(&e->mutex);
     bool clean = e->is_gone || (!e->is_spoiled && (!e->is_loaded || e->received == e->counted));
     pthread_mutex_unlock(&e->mutex);
     return clean;
 }
 
-void intake_put(struct intake *e) {
-    struct partials *p = e->partials;
+void upload_session_put(struct upload_session *e) {
+    struct resumables *p = e->resumables;
     pthread_mutex_lock(&p->mutex);
     if (--e->users == 0 && is_clean(e))
-        intake_drop(e);
+        upload_session_drop(e);
     pthread_mutex_unlock(&p->mutex);
 }
 
-static struct intake *find(struct partials *p, const char *id) {
-    struct intake *e = p->first;
+static struct upload_session *find(struct resumables *p, const char *id) {
+    struct upload_session *e = p->first;
     while (e && strcmp(e->id, id) != 0)
         e = e->next;
     return e;
 }
 
-static struct intake *add(struct partials *p, const char *id) {
-    struct intake *e = mem_calloc(1, sizeof *e);
+static struct upload_session *add(struct resumables *p, const char *id) {
+    struct upload_session *e = mem_calloc(1, sizeof *e);
     snprintf(e->id, sizeof e->id, "%s", id);
-    e->partials = p;
+    e->resumables = p;
     e->fd = -1;
     pthread_mutex_init(&e->syncing, NULL);
     pthread_mutex_init(&e->mutex, NULL);
@@ -135,9 +135,9 @@ static struct intake *add(struct partials *p, const char *id) {
     return e;
 }
 
-enum status intake_get(struct partials *p, const char *id, struct intake **out, struct error *err) {
+enum status upload_session_get(struct resumables *p, const char *id, struct upload_session **out, struct error *err) {
     pthread_mutex_lock(&p->mutex);
-    struct intake *e = find(p, id);
+    struct upload_session *e = find(p, id);
     if (!e)
         e = add(p, id);
     e->users++;
@@ -150,14 +150,14 @@ enum status intake_get(struct partials *p, const char *id, struct intake **out, 
         status = load(e, err);
     pthread_mutex_unlock(&e->mutex);
     if (status != STATUS_OK)
-        intake_put(e);
+        upload_session_put(e);
     *out = status == STATUS_OK ? e : NULL;
     return status;
 }
 
-struct intake *intake_next(struct partials *p, unsigned long round) {
+struct upload_session *upload_session_next(struct resumables *p, unsigned long round) {
     pthread_mutex_lock(&p->mutex);
-    struct intake *e = p->first;
+    struct upload_session *e = p->first;
     while (e && (e->users > 0 || e->tended == round))
         e = e->next;
     if (e) {
@@ -168,9 +168,9 @@ struct intake *intake_next(struct partials *p, unsigned long round) {
     return e;
 }
 
-void intake_mark_gone(struct partials *p, const char *id) {
+void upload_session_mark_gone(struct resumables *p, const char *id) {
     pthread_mutex_lock(&p->mutex);
-    struct intake *e = find(p, id);
+    struct upload_session *e = find(p, id);
     if (e)
         e->users++;
     pthread_mutex_unlock(&p->mutex);
@@ -179,17 +179,17 @@ void intake_mark_gone(struct partials *p, const char *id) {
     pthread_mutex_lock(&e->mutex);
     e->is_gone = true;
     pthread_mutex_unlock(&e->mutex);
-    intake_put(e);
+    upload_session_put(e);
 }
 
-bool intake_is_whole(struct intake *e) {
+bool upload_session_is_whole(struct upload_session *e) {
     pthread_mutex_lock(&e->mutex);
     bool is_whole = !e->is_gone && e->counted == e->length;
     pthread_mutex_unlock(&e->mutex);
     return is_whole;
 }
 
-void intake_close(struct intake *e) {
+void upload_session_close(struct upload_session *e) {
     pthread_mutex_lock(&e->mutex);
     e->is_loaded = false; /* the next to come reads its row */
     e->holder = NULL;
@@ -200,21 +200,21 @@ void intake_close(struct intake *e) {
 
 /* What was received since the last commit may be lost: where a sync has failed, the kernel can have
  * dropped it, and the next sync would say that all is well. It is to be sent again. e->syncing is held. */
-static void forget_tail(struct intake *e) {
+static void forget_tail(struct upload_session *e) {
     struct error err;
     pthread_mutex_lock(&e->mutex);
     e->received = e->counted;
     e->is_loaded = false; /* the next to come reads row and hash again */
     e->holder = NULL;
     e->is_spoiled = ftruncate(e->fd, (off_t)e->counted) != 0 &&
-                    store_upload_begin(e->partials->api->store, e->id, "", &err) != STATUS_OK;
+                    store_upload_begin(e->resumables->api->store, e->id, "", &err) != STATUS_OK;
     if (e->is_spoiled)
         log_warning("upload %s: %s", e->id, err.message);
     pthread_mutex_unlock(&e->mutex);
 }
 
 /* e->syncing is held, so nothing else counts or forgets. */
-static enum status commit_alone(struct intake *e, struct error *err) {
+static enum status commit_alone(struct upload_session *e, struct error *err) {
     pthread_mutex_lock(&e->mutex);
     uint64_t received = e->received;
     struct sha256 hash = e->hash;
@@ -230,24 +230,24 @@ static enum status commit_alone(struct intake *e, struct error *err) {
         return failed;
     }
     pthread_mutex_lock(&e->mutex);
-    enum status status = store_upload_advance(e->partials->api->store, e->id, received, &hash, sizeof hash, err);
+    enum status status = store_upload_advance(e->resumables->api->store, e->id, received, &hash, sizeof hash, err);
     if (status == STATUS_OK)
         e->counted = received;
     pthread_mutex_unlock(&e->mutex);
     return status;
 }
 
-enum status intake_commit(struct intake *e, struct error *err) {
+enum status upload_session_commit(struct upload_session *e, struct error *err) {
     pthread_mutex_lock(&e->syncing);
     enum status status = commit_alone(e, err);
     pthread_mutex_unlock(&e->syncing);
     return status;
 }
 
-enum status intake_disbelieve(struct intake *e, struct error *err) {
-    enum status status = intake_commit(e, err);
+enum status upload_session_disbelieve(struct upload_session *e, struct error *err) {
+    enum status status = upload_session_commit(e, err);
     if (status == STATUS_OK)
-        status = store_upload_begin(e->partials->api->store, e->id, "", err);
+        status = store_upload_begin(e->resumables->api->store, e->id, "", err);
     pthread_mutex_lock(&e->mutex);
     if (status == STATUS_OK)
         e->is_believed = false;

@@ -1,6 +1,6 @@
 /* job_file.h -- opens files of DATA/jobs/, which workers write: no part of a path may be a symbolic link. */
-#ifndef UNBAKE_HTTP_JOB_FILE_H
-#define UNBAKE_HTTP_JOB_FILE_H
+#ifndef UNBAKE_DATA_JOB_FILE_H
+#define UNBAKE_DATA_JOB_FILE_H
 
 #include "common/error.h"
 

@@ -1,5 +1,5 @@
 /* digests.c -- see digests.h. */
-#include "server/http/digests.h"
+#include "server/uploads/digests.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -11,7 +11,7 @@
 
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/job_file.h"
+#include "server/data/job_file.h"
 
 #define CHUNK_BYTES ((size_t)256 << 10)
 #define RETRY_SEC 10 /* after the store could not be read, or could not take a digest */

@@ -1,4 +1,4 @@
-/* test_http_partial.c -- two that count what one upload has received, at once, while the disk fails one
+/* test_http_resumable.c -- two that count what one upload has received, at once, while the disk fails one
  * of them: what the kernel may have dropped is counted by neither, and is sent again. And one that takes over. */
 #include <errno.h>
 #include <pthread.h>
@@ -6,7 +6,7 @@
 #include <time.h>
 
 #include "common/sha256.h"
-#include "server/http/claim.h"
+#include "server/uploads/upload_writer.h"
 #include "tests/api/rig.h"
 
 #define BYTES 1000
@@ -51,7 +51,7 @@ int fdatasync(int fd) {
 /* --- two at once ------------------------------------------------------------------------------ */
 
 struct look {
-    struct partials *partials;
+    struct resumables *resumables;
     const char *id;
     enum status status;
 };
@@ -60,17 +60,17 @@ static void *look(void *user) {
     struct look *l = user;
     struct upload_row row = {0};
     struct error err;
-    l->status = partial_look(l->partials, l->id, &row, &err);
+    l->status = resumable_look(l->resumables, l->id, &row, &err);
     upload_row_release(&row);
     return NULL;
 }
 
-static struct claim *send_all(struct partials *p, const char *id, const char *bytes) {
-    struct claim *claim;
+static struct upload_writer *send_all(struct resumables *p, const char *id, const char *bytes) {
+    struct upload_writer *writer;
     struct error err;
-    rig_must(claim_take(p, id, 0, false, &claim, &err), &err, "claim_take");
-    rig_must(claim_write(claim, bytes, BYTES, &err), &err, "claim_write");
-    return claim;
+    rig_must(upload_writer_take(p, id, 0, false, &writer, &err), &err, "upload_writer_take");
+    rig_must(upload_writer_write(writer, bytes, BYTES, &err), &err, "upload_writer_write");
+    return writer;
 }
 
 static void check_received(struct rig *rig, const char *id, uint64_t wanted) {
@@ -86,10 +86,10 @@ static void check_received(struct rig *rig, const char *id, uint64_t wanted) {
 enum rival { RIVAL_LOOK, RIVAL_FINISH, RIVAL_CLAIM };
 
 static void test_two(struct rig *rig, enum rival rival) {
-    struct partials *p = rig->api->partials;
+    struct resumables *p = rig->api->resumables;
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES}, found = {0};
     struct error err;
-    struct claim *late = NULL;
+    struct upload_writer *late = NULL;
     char bytes[BYTES], wanted[SHA256_HEX_SIZE];
     struct sha256 hash;
     pthread_t thread;
@@ -97,10 +97,10 @@ static void test_two(struct rig *rig, enum rival rival) {
     sha256_init(&hash);
     sha256_update(&hash, bytes, sizeof bytes);
     sha256_hex(&hash, wanted);
-    rig_must(partial_create(p, &row, &err), &err, "partial_create");
+    rig_must(resumable_create(p, &row, &err), &err, "resumable_create");
 
-    struct claim *claim = send_all(p, row.id, bytes);
-    struct look first = {.partials = p, .id = row.id};
+    struct upload_writer *writer = send_all(p, row.id, bytes);
+    struct look first = {.resumables = p, .id = row.id};
     atomic_store(&begun, 0);
     atomic_store(&ended, 0);
     atomic_store(&is_asked, false);
@@ -109,9 +109,9 @@ static void test_two(struct rig *rig, enum rival rival) {
     while (atomic_load(&begun) == 0)
         nap();
     atomic_store(&is_asked, true);
-    enum status status = rival == RIVAL_LOOK     ? partial_look(p, row.id, &found, &err)
-                         : rival == RIVAL_FINISH ? claim_finish(claim, &found, &err)
-                                                 : claim_take(p, row.id, 0, true, &late, &err);
+    enum status status = rival == RIVAL_LOOK     ? resumable_look(p, row.id, &found, &err)
+                         : rival == RIVAL_FINISH ? upload_writer_finish(writer, &found, &err)
+                                                 : upload_writer_take(p, row.id, 0, true, &late, &err);
     pthread_join(thread, NULL);
     atomic_store(&is_armed, false);
     CHECK(first.status == STATUS_IO);
@@ -121,13 +121,13 @@ static void test_two(struct rig *rig, enum rival rival) {
     else
         CHECK_THAT(status == STATUS_CONFLICT, "%s", status_name(status));
     upload_row_release(&found);
-    claim_release(late);
-    claim_release(claim);
+    upload_writer_release(late);
+    upload_writer_release(writer);
 
-    claim = send_all(p, row.id, bytes);
-    rig_must(claim_finish(claim, &found, &err), &err, "claim_finish");
+    writer = send_all(p, row.id, bytes);
+    rig_must(upload_writer_finish(writer, &found, &err), &err, "upload_writer_finish");
     CHECK_STRING(found.scene_id, wanted);
-    claim_release(claim);
+    upload_writer_release(writer);
     upload_row_release(&found);
     upload_row_release(&row);
 }
@@ -135,12 +135,12 @@ static void test_two(struct rig *rig, enum rival rival) {
 /* A part that is to be checked has come, but for the end of its request, and another request takes the upload over: what the
  * first has brought does not count. */
 static void test_overtaken(struct rig *rig) {
-    struct partials *p = rig->api->partials;
+    struct resumables *p = rig->api->resumables;
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
     unsigned long long before = atomic_load(&rig->api->uploaded_bytes);
     struct error err;
     struct buf reply;
-    rig_must(partial_create(p, &row, &err), &err, "partial_create");
+    rig_must(resumable_create(p, &row, &err), &err, "resumable_create");
     char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nTus-Resumable: 1.0.0\r\n"
                             "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
                             "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n"
@@ -149,11 +149,11 @@ static void test_overtaken(struct rig *rig) {
     rig_send(fd, head, strlen(head));
     while (atomic_load(&rig->api->uploaded_bytes) < before + 3)
         nap();
-    struct claim *late;
-    rig_must(claim_take(p, row.id, 0, false, &late, &err), &err, "claim_take");
-    rig_must(claim_write(late, "other", 5, &err), &err, "claim_write");
-    rig_must(claim_commit(late, &err), &err, "claim_commit");
-    claim_release(late);
+    struct upload_writer *late;
+    rig_must(upload_writer_take(p, row.id, 0, false, &late, &err), &err, "upload_writer_take");
+    rig_must(upload_writer_write(late, "other", 5, &err), &err, "upload_writer_write");
+    rig_must(upload_writer_commit(late, &err), &err, "upload_writer_commit");
+    upload_writer_release(late);
     buf_init(&reply, 1 << 16);
     rig_send(fd, "0\r\n\r\n", 5);
     rig_receive(fd, &reply, NULL);

@@ -1,5 +1,5 @@
 /* job_file.c -- see job_file.h. */
-#include "server/http/job_file.h"
+#include "server/data/job_file.h"
 
 #include <errno.h>
 #include <fcntl.h>

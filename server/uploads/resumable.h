@@ -1,47 +1,47 @@
-/* partial.h -- uploads in parts, on disk: what is safe, what becomes of them. Who may write: claim.h.
+/* resumable.h -- uploads in parts, on disk: what is safe, what becomes of them. Who may write: upload_writer.h.
  *
- *      created ──claim, write ...──> whole ──finish──> a scene        (or removed, or expired)
+ *      created ──take, write ...──> whole ──finish──> a scene        (or removed, or expired)
  *                  ^         │
  *                  └─────────┘ cut off, daemon restarted: goes on where it was
  *
  * 1. `received` in the store counts bytes that are on disk (fdatasync before the row): what is
  *    acknowledged is never lost. It only grows.
- * 2. One request at a time writes (claim.h).
+ * 2. One request at a time writes (upload_writer.h).
  * 3. A daemon that was killed leaves bytes in the file that no row counts. They are hashed and
  *    counted when the upload is next looked at, provided that the machine has run on since (its
  *    boot id says so): then the kernel has kept them. After a power cut they are cut off.
  * 4. All of the space is reserved when the upload is created.
  * 5. A file that is whole moves to DATA/scenes/ID/archive, then the scene's row is made, then the
- *    upload's row names it. partials_recover goes on from any point in between.
+ *    upload's row names it. resumables_recover goes on from any point in between.
  *
  * All functions are thread-safe. */
-#ifndef UNBAKE_HTTP_PARTIAL_H
-#define UNBAKE_HTTP_PARTIAL_H
+#ifndef UNBAKE_UPLOADS_RESUMABLE_H
+#define UNBAKE_UPLOADS_RESUMABLE_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
 #include "server/http/api.h"
 
-struct partials; /* the uploads that are being written or looked at; opaque */
+struct resumables; /* the uploads that are being written or looked at; opaque */
 
-struct partials *partials_new(struct api *api);
-void partials_free(struct partials *p); /* what is in files but not yet counted is counted */
+struct resumables *resumables_new(struct api *api);
+void resumables_free(struct resumables *p); /* what is in files but not yet counted is counted */
 /* Puts in order what an earlier life left: finishes what is whole. Before the folders are swept. */
-enum status partials_recover(struct partials *p, struct error *err);
+enum status resumables_recover(struct resumables *p, struct error *err);
 /* Counts what was written by requests that were cut off. From time to time. */
-void partials_tend(struct partials *p);
+void resumables_tend(struct resumables *p);
 
 /* Takes owner_id, name, metadata, sha256 and length of *row; fills the rest but for times. Reserves the
  * space: STATUS_NO_SPACE. */
-enum status partial_create(struct partials *p, struct upload_row *row, struct error *err);
+enum status resumable_create(struct resumables *p, struct upload_row *row, struct error *err);
 
 /* The row as it is now, everything received on disk and counted, and finished if it is whole. */
-enum status partial_look(struct partials *p, const char *id, struct upload_row *row, struct error *err);
+enum status resumable_look(struct resumables *p, const char *id, struct upload_row *row, struct error *err);
 
 /* Removes the upload with what it holds, also while somebody writes to it. */
-enum status partial_remove(struct partials *p, const char *id, struct error *err);
+enum status resumable_remove(struct resumables *p, const char *id, struct error *err);
 /* The same for one whose row is gone already. */
-enum status partial_forget(struct partials *p, const char *id, struct error *err);
+enum status resumable_forget(struct resumables *p, const char *id, struct error *err);
 
 #endif

@@ -7,8 +7,8 @@
  *
  * 1. No reply waits for the hash of a file, but for one of at most DIGESTS_AT_ONCE bytes, which it hashes itself.
  * 2. A version that has no digest yet has its tag: a rename, a write or a touch gives it another. */
-#ifndef UNBAKE_HTTP_DIGESTS_H
-#define UNBAKE_HTTP_DIGESTS_H
+#ifndef UNBAKE_UPLOADS_DIGESTS_H
+#define UNBAKE_UPLOADS_DIGESTS_H
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -1,15 +1,15 @@
-/* test_http_partial_faults.c -- uploads in parts where a fault follows another: the clean-up after a failing disk fails,
+/* test_http_resumable_faults.c -- uploads in parts where a fault follows another: the clean-up after a failing disk fails,
  * too, or what is being written is removed. What was counted stays, what was not is sent again, and in the end the scene
  * is what was sent. */
 #include "common/sha256.h"
-#include "server/http/claim.h"
-#include "server/http/intake.h"
+#include "server/uploads/upload_writer.h"
+#include "server/uploads/upload_session.h"
 #include "tests/api/rig.h"
 #include "tests/system_faults.h"
 
 #define BYTES 1000
 #define HALF (BYTES / 2)
-#define MANY 66 /* more than partials_recover reads at once */
+#define MANY 66 /* more than resumables_recover reads at once */
 
 static struct rig rig;
 static struct error err;
@@ -35,27 +35,27 @@ static void create(const char *said_sha256) {
     memcpy(bytes, &(unsigned){++number}, sizeof number);
     sha256_of(bytes, sizeof bytes, sha256);
     snprintf(row.sha256, sizeof row.sha256, "%s", said_sha256);
-    OK(partial_create(rig.api->partials, &row, &err));
+    OK(resumable_create(rig.api->resumables, &row, &err));
     snprintf(id, sizeof id, "%s", row.id);
     upload_row_release(&row);
 }
 
-static struct claim *take(uint64_t offset) {
-    struct claim *claim;
-    OK(claim_take(rig.api->partials, id, offset, false, &claim, &err));
-    return claim;
+static struct upload_writer *take(uint64_t offset) {
+    struct upload_writer *writer;
+    OK(upload_writer_take(rig.api->resumables, id, offset, false, &writer, &err));
+    return writer;
 }
 
 /* Writes what is between, and counts nothing. */
 static void send_part(uint64_t from, uint64_t to) {
-    struct claim *claim = take(from);
-    OK(claim_write(claim, bytes + from, to - from, &err));
-    claim_release(claim);
+    struct upload_writer *writer = take(from);
+    OK(upload_writer_write(writer, bytes + from, to - from, &err));
+    upload_writer_release(writer);
 }
 
 static enum status look(void) {
     struct upload_row row;
-    enum status status = partial_look(rig.api->partials, id, &row, &err);
+    enum status status = resumable_look(rig.api->resumables, id, &row, &err);
     upload_row_release(&row);
     return status;
 }
@@ -70,7 +70,7 @@ static uint64_t counted(void) {
 
 static off_t file_size(void) {
     struct stat info = {0};
-    char *path = intake_path(rig.api->partials, id);
+    char *path = upload_session_path(rig.api->resumables, id);
     CHECK(stat(path, &info) == 0);
     mem_free(path);
     return info.st_size;
@@ -82,12 +82,12 @@ static void check_scene(void) {
     struct buf archive;
     char *path = mem_printf("%s/scenes/%s/archive", rig.dir, sha256);
     buf_init(&archive, BYTES);
-    OK(partial_look(rig.api->partials, id, &row, &err));
+    OK(resumable_look(rig.api->resumables, id, &row, &err));
     CHECK_STRING(row.scene_id, sha256);
     CHECK(row.received == BYTES);
     OK(file_read(path, &archive, &err));
     CHECK(archive.length == BYTES && memcmp(archive.data, bytes, BYTES) == 0);
-    CHECK(rig.api->partials->first == NULL);
+    CHECK(rig.api->resumables->first == NULL);
     buf_release(&archive);
     upload_row_release(&row);
     mem_free(path);
@@ -96,9 +96,9 @@ static void check_scene(void) {
 /* The daemon ends, without a database that would take what is not counted yet, and starts again. */
 static void restart(void) {
     sql_break();
-    partials_free(rig.api->partials);
+    resumables_free(rig.api->resumables);
     sql_mend();
-    rig.api->partials = partials_new(rig.api);
+    rig.api->resumables = resumables_new(rig.api);
 }
 
 /* --- checks ---------------------------------------------------------------------------------------- */
@@ -107,38 +107,38 @@ static void restart(void) {
 static void spoil(void) {
     create("");
     send_part(0, HALF);
-    struct claim *claim = take(HALF);
-    OK(claim_commit(claim, &err));
-    OK(claim_write(claim, bytes + HALF, HALF, &err));
+    struct upload_writer *writer = take(HALF);
+    OK(upload_writer_commit(writer, &err));
+    OK(upload_writer_write(writer, bytes + HALF, HALF, &err));
     system_break(" fdatasync ftruncate ", EIO);
     sql_break();
-    IS(claim_commit(claim, &err), STATUS_IO, "cannot sync");
+    IS(upload_writer_commit(writer, &err), STATUS_IO, "cannot sync");
     sql_mend();
     system_mend();
     CHECK(counted() == HALF && file_size() == BYTES);
-    claim_release(claim);
+    upload_writer_release(writer);
 }
 
 static void check_spoiled(void) {
     spoil(); /* the collector comes first */
     system_break(" ftruncate ", EIO);
     sql_break();
-    partials_tend(rig.api->partials);
+    resumables_tend(rig.api->resumables);
     sql_mend();
     CHECK(counted() == HALF && file_size() == BYTES);
     system_mend();
-    partials_tend(rig.api->partials);
+    resumables_tend(rig.api->resumables);
     CHECK(counted() == HALF && file_size() == HALF);
     send_part(HALF, BYTES);
     check_scene();
 
     spoil(); /* the next part does */
-    struct claim *claim;
+    struct upload_writer *writer;
     system_break(" ftruncate ", EIO);
-    IS(claim_take(rig.api->partials, id, HALF, false, &claim, &err), STATUS_IO, "cannot cut");
-    CHECK(claim == NULL);
+    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_IO, "cannot cut");
+    CHECK(writer == NULL);
     system_break(" fallocate ", ENOSPC);
-    IS(claim_take(rig.api->partials, id, HALF, false, &claim, &err), STATUS_NO_SPACE, "cannot reserve 1000 bytes");
+    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_NO_SPACE, "cannot reserve 1000 bytes");
     system_break(" fallocate ", EOPNOTSUPP); /* some disks cannot reserve */
     send_part(HALF, BYTES);
     system_mend();
@@ -150,10 +150,10 @@ static void check_tending(void) {
     create("");
     send_part(0, BYTES);
     sql_break();
-    partials_tend(rig.api->partials);
+    resumables_tend(rig.api->resumables);
     sql_mend();
     CHECK(counted() == 0);
-    partials_tend(rig.api->partials);
+    resumables_tend(rig.api->resumables);
     CHECK(counted() == BYTES);
     check_scene();
 }
@@ -175,32 +175,32 @@ static void check_tail(void) {
 }
 
 static void check_removed(void) {
-    struct claim *claim, *late;
+    struct upload_writer *writer, *late;
     create("");
-    claim = take(0);
-    OK(claim_write(claim, bytes, HALF, &err));
-    OK(partial_remove(rig.api->partials, id, &err));
-    IS(claim_write(claim, bytes + HALF, HALF, &err), STATUS_NOT_FOUND, "was removed");
-    IS(claim_accept(claim, &err), STATUS_NOT_FOUND, "was removed");
-    IS(claim_take(rig.api->partials, id, HALF, false, &late, &err), STATUS_NOT_FOUND, "there is no upload");
-    OK(claim_commit(claim, &err)); /* there is nothing to count */
-    claim_release(claim);
-    CHECK(rig.api->partials->first == NULL);
+    writer = take(0);
+    OK(upload_writer_write(writer, bytes, HALF, &err));
+    OK(resumable_remove(rig.api->resumables, id, &err));
+    IS(upload_writer_write(writer, bytes + HALF, HALF, &err), STATUS_NOT_FOUND, "was removed");
+    IS(upload_writer_accept(writer, &err), STATUS_NOT_FOUND, "was removed");
+    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &late, &err), STATUS_NOT_FOUND, "there is no upload");
+    OK(upload_writer_commit(writer, &err)); /* there is nothing to count */
+    upload_writer_release(writer);
+    CHECK(rig.api->resumables->first == NULL);
 }
 
 /* Bytes that are to be checked are announced, and the database cannot take note. The request that has the upload keeps it. */
 static void check_disbelief(void) {
-    struct claim *claim, *other;
+    struct upload_writer *writer, *other;
     create("");
-    claim = take(0);
+    writer = take(0);
     for (uint64_t at = 0; at <= HALF; at += HALF) {
         sql_break();
-        IS(claim_take(rig.api->partials, id, at, true, &other, &err), STATUS_IO, "cannot");
+        IS(upload_writer_take(rig.api->resumables, id, at, true, &other, &err), STATUS_IO, "cannot");
         sql_mend();
         CHECK(other == NULL);
-        OK(claim_write(claim, bytes + at, HALF, &err));
+        OK(upload_writer_write(writer, bytes + at, HALF, &err));
     }
-    claim_release(claim);
+    upload_writer_release(writer);
     check_scene();
 }
 
@@ -223,10 +223,10 @@ static void check_rejected(void) {
     CHECK(strstr(err.message, "its metadata says") && *err.hint);
     CHECK(store_upload_get(rig.store, id, &row, NULL, 0, &err) == STATUS_NOT_FOUND);
     upload_row_release(&row);
-    char *path = intake_path(rig.api->partials, id);
+    char *path = upload_session_path(rig.api->resumables, id);
     CHECK(access(path, F_OK) != 0);
     mem_free(path);
-    CHECK(rig.api->partials->first == NULL);
+    CHECK(rig.api->resumables->first == NULL);
 }
 
 /* Its file is moved, and whether that is on disk is not known: it is no scene before it is. */
@@ -256,7 +256,7 @@ static void *look_aside(void *user) {
 static void check_two(void) {
     enum status statuses[2] = {STATUS_IO, STATUS_IO};
     pthread_t threads[2];
-    struct partials *p = rig.api->partials;
+    struct resumables *p = rig.api->resumables;
     unsigned users = 0;
     create("");
     send_part(0, BYTES);
@@ -287,13 +287,13 @@ static void check_recovery(void) {
         strcpy(ids[i], id);
     }
     system_break(" rename ", EIO);
-    partials_free(rig.api->partials); /* counts them */
-    rig.api->partials = partials_new(rig.api);
+    resumables_free(rig.api->resumables); /* counts them */
+    rig.api->resumables = resumables_new(rig.api);
     CHECK(counted() == BYTES);
-    OK(partials_recover(rig.api->partials, &err));
+    OK(resumables_recover(rig.api->resumables, &err));
     system_mend();
     sql_break();
-    IS(partials_recover(rig.api->partials, &err), STATUS_IO, "cannot");
+    IS(resumables_recover(rig.api->resumables, &err), STATUS_IO, "cannot");
     sql_mend();
     for (int is_well = 0; is_well < 2; is_well++) {
         for (size_t i = 0; i < MANY; i++) {
@@ -301,7 +301,7 @@ static void check_recovery(void) {
             CHECK_THAT(!*row.scene_id == !is_well, "upload %zu", i);
             upload_row_release(&row);
         }
-        OK(partials_recover(rig.api->partials, &err));
+        OK(resumables_recover(rig.api->resumables, &err));
     }
     check_scene();
 }

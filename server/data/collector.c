@@ -1,6 +1,6 @@
 /* collector.c -- see collector.h. */
 #include "server/data/trash.h"
-#include "server/http/collector.h"
+#include "server/data/collector.h"
 
 #include <pthread.h>
 #include <time.h>
@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
-#include "server/http/partial.h"
+#include "server/uploads/resumable.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
@@ -41,7 +41,7 @@ static enum status remove_expired(struct api *api, const struct expired *e, cons
         pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_expired_delete(api->store, e, now, err);
     if (status == STATUS_OK)
-        status = e->kind == EXPIRED_UPLOAD ? partial_forget(api->partials, e->id, err)
+        status = e->kind == EXPIRED_UPLOAD ? resumable_forget(api->resumables, e->id, err)
                                            : trash_take(api->trash, path, err);
     if (e->kind == EXPIRED_SCENE)
         pthread_mutex_unlock(&api->scene_mutex);
@@ -104,7 +104,7 @@ static void *run(void *user) {
         struct error err;
         struct timespec until;
         pthread_mutex_unlock(&c->mutex);
-        partials_tend(c->api->partials);
+        resumables_tend(c->api->resumables);
         if (collector_run(c->api, false, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
         store_reserve_renew(c->api->store);

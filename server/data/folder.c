@@ -1,5 +1,5 @@
 /* folder.c -- see folder.h. */
-#include "server/admin/folder.h"
+#include "server/data/folder.h"
 
 #include <errno.h>
 #include <fcntl.h>

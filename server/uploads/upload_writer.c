@@ -1,5 +1,5 @@
-/* claim.c -- see claim.h. */
-#include "server/http/claim.h"
+/* upload_writer.c -- see upload_writer.h. */
+#include "server/uploads/upload_writer.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -7,13 +7,13 @@
 #include <unistd.h>
 
 #include "common/mem.h"
-#include "server/http/intake.h"
+#include "server/uploads/upload_session.h"
 
 #define COMMIT_BYTES ((uint64_t)64 << 20) /* counted at least so often; a kill costs hashing them again */
 #define HINT_BYTES ((uint64_t)8 << 20)    /* writing out begins so often, so that a commit is short */
 
-struct claim {
-    struct intake *intake;
+struct upload_writer {
+    struct upload_session *session;
     bool is_checked;
     uint64_t at;        /* where it writes next */
     struct sha256 hash; /* where is_checked: up to `at` */
@@ -26,8 +26,8 @@ static enum status lost(struct error *err) {
 
 /* --- who writes ---------------------------------------------------------------------------- */
 
-/* The intake's mutex is held. */
-static enum status check_offset(const struct intake *e, uint64_t offset, struct error *err) {
+/* The session's mutex is held. */
+static enum status check_offset(const struct upload_session *e, uint64_t offset, struct error *err) {
     if (!e->is_loaded) /* e->hash is still that of what was forgotten */
         return lost(err);
     if (e->received != offset)
@@ -36,50 +36,50 @@ static enum status check_offset(const struct intake *e, uint64_t offset, struct 
     return STATUS_OK;
 }
 
-enum status claim_take(struct partials *p, const char *id, uint64_t offset, bool is_checked, struct claim **out,
+enum status upload_writer_take(struct resumables *p, const char *id, uint64_t offset, bool is_checked, struct upload_writer **out,
                        struct error *err) {
-    struct intake *e;
+    struct upload_session *e;
     *out = NULL;
-    enum status status = intake_get(p, id, &e, err);
+    enum status status = upload_session_get(p, id, &e, err);
     if (status != STATUS_OK)
         return status;
     pthread_mutex_lock(&e->mutex);
     bool must_disbelieve = is_checked && e->is_believed;
     pthread_mutex_unlock(&e->mutex);
     if (must_disbelieve)
-        status = intake_disbelieve(e, err);
+        status = upload_session_disbelieve(e, err);
     pthread_mutex_lock(&e->mutex);
     if (status == STATUS_OK)
         status = check_offset(e, offset, err);
     if (status == STATUS_OK) {
-        struct claim *c = *out = mem_calloc(1, sizeof *c);
-        *c = (struct claim){e, is_checked, offset, e->hash};
+        struct upload_writer *c = *out = mem_calloc(1, sizeof *c);
+        *c = (struct upload_writer){e, is_checked, offset, e->hash};
         e->holder = c;
     }
     pthread_mutex_unlock(&e->mutex);
     if (status != STATUS_OK)
-        intake_put(e);
+        upload_session_put(e);
     return status;
 }
 
-/* The intake's mutex is held. */
-static enum status check_holder(const struct claim *c, struct error *err) {
-    if (c->intake->is_gone)
+/* The session's mutex is held. */
+static enum status check_holder(const struct upload_writer *c, struct error *err) {
+    if (c->session->is_gone)
         return error_set(err, STATUS_NOT_FOUND, "the upload was removed");
-    if (c->intake->holder != c)
+    if (c->session->holder != c)
         return error_set(err, STATUS_CONFLICT, "another request goes on with this upload");
     return STATUS_OK;
 }
 
-void claim_release(struct claim *c) {
+void upload_writer_release(struct upload_writer *c) {
     if (!c)
         return;
-    struct intake *e = c->intake;
+    struct upload_session *e = c->session;
     pthread_mutex_lock(&e->mutex);
     if (e->holder == c)
         e->holder = NULL;
     pthread_mutex_unlock(&e->mutex);
-    intake_put(e);
+    upload_session_put(e);
     mem_free(c);
 }
 
@@ -100,7 +100,7 @@ static enum status write_at(int fd, const char *data, uint64_t length, uint64_t 
 }
 
 /* Now and then: the kernel begins to write out what has come up to `at`. Only a hint to it. */
-static void hint(struct intake *e, uint64_t at) {
+static void hint(struct upload_session *e, uint64_t at) {
     if (at >= e->hinted && at - e->hinted < HINT_BYTES)
         return;
     if (at > e->hinted)
@@ -108,8 +108,8 @@ static void hint(struct intake *e, uint64_t at) {
     e->hinted = at;
 }
 
-enum status claim_write(struct claim *c, const void *data, uint64_t length, struct error *err) {
-    struct intake *e = c->intake;
+enum status upload_writer_write(struct upload_writer *c, const void *data, uint64_t length, struct error *err) {
+    struct upload_session *e = c->session;
     pthread_mutex_lock(&e->mutex);
     enum status status = check_holder(c, err);
     if (status == STATUS_OK && length > e->length - c->at)
@@ -130,31 +130,31 @@ enum status claim_write(struct claim *c, const void *data, uint64_t length, stru
     return status;
 }
 
-uint64_t claim_room(const struct claim *c) {
-    return c->intake->length - c->at; /* the length never changes */
+uint64_t upload_writer_room(const struct upload_writer *c) {
+    return c->session->length - c->at; /* the length never changes */
 }
 
-uint64_t claim_unreserved(const struct claim *c) {
+uint64_t upload_writer_unreserved(const struct upload_writer *c) {
     struct stat info;
-    uint64_t length = c->intake->length;
-    if (fstat(c->intake->fd, &info) != 0)
-        return claim_room(c);
+    uint64_t length = c->session->length;
+    if (fstat(c->session->fd, &info) != 0)
+        return upload_writer_room(c);
     uint64_t has = (uint64_t)info.st_blocks * 512;
     return has < length ? length - has : 0;
 }
 
 /* --- counting ------------------------------------------------------------------------------ */
 
-bool claim_is_due(const struct claim *c) {
-    struct intake *e = c->intake;
+bool upload_writer_is_due(const struct upload_writer *c) {
+    struct upload_session *e = c->session;
     pthread_mutex_lock(&e->mutex);
     bool due = e->received - e->counted >= COMMIT_BYTES;
     pthread_mutex_unlock(&e->mutex);
     return due;
 }
 
-enum status claim_accept(struct claim *c, struct error *err) {
-    struct intake *e = c->intake;
+enum status upload_writer_accept(struct upload_writer *c, struct error *err) {
+    struct upload_session *e = c->session;
     pthread_mutex_lock(&e->mutex);
     enum status status = check_holder(c, err);
     if (status == STATUS_OK) {
@@ -165,13 +165,13 @@ enum status claim_accept(struct claim *c, struct error *err) {
     return status;
 }
 
-enum status claim_commit(struct claim *c, struct error *err) {
-    return intake_commit(c->intake, err);
+enum status upload_writer_commit(struct upload_writer *c, struct error *err) {
+    return upload_session_commit(c->session, err);
 }
 
-enum status claim_finish(struct claim *c, struct upload_row *row, struct error *err) {
-    struct intake *e = c->intake;
-    enum status status = partial_look(e->partials, e->id, row, err);
+enum status upload_writer_finish(struct upload_writer *c, struct upload_row *row, struct error *err) {
+    struct upload_session *e = c->session;
+    enum status status = resumable_look(e->resumables, e->id, row, err);
     if (status != STATUS_OK || row->received >= c->at)
         return status;
     upload_row_release(row); /* another thread's sync has failed */

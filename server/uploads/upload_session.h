@@ -1,0 +1,64 @@
+/* upload_session.h -- one upload in parts while it is in use: its file, what of it has come in, what of that is
+ * on disk and counted. Made when a request or the collector asks for it, gone when nobody uses it and all
+ * of it is counted. For resumable.c and upload_writer.c; the invariants are resumable.h's.
+ *
+ * Lock order: resumables.finishing, resumables.mutex, upload_session.syncing, upload_session.mutex. A session's mutex may be
+ * held for long while it is loaded, so it is taken under resumables.mutex only when nobody uses it. */
+#ifndef UNBAKE_UPLOADS_UPLOAD_SESSION_H
+#define UNBAKE_UPLOADS_UPLOAD_SESSION_H
+
+#include <pthread.h>
+
+#include "common/sha256.h"
+#include "server/http/api.h"
+
+struct upload_writer; /* upload_writer.h */
+
+struct upload_session {
+    char id[UPLOAD_ID_SIZE];
+    struct resumables *resumables;
+    unsigned users;       /* under resumables->mutex, and so are: */
+    unsigned long tended; /* the round of upload_session_next that last gave it */
+    struct upload_session *next;
+    pthread_mutex_t syncing; /* held by a commit */
+    pthread_mutex_t mutex;   /* guards what follows */
+    bool is_loaded, is_gone;
+    bool is_spoiled; /* what the file has beyond `counted` must be cut off and could not be yet */
+    int fd;          /* -1 before it is loaded; then the same until the session is dropped */
+    uint64_t length;
+    uint64_t received, counted; /* in the file; in the store */
+    uint64_t hinted;            /* writing out has begun up to here */
+    struct sha256 hash;         /* of what was received */
+    bool is_believed;           /* see resumable.h, invariant 3 */
+    const struct upload_writer *holder; /* NULL: nobody writes */
+};
+
+struct resumables {
+    struct api *api;
+    char boot[UPLOAD_BOOT_SIZE]; /* of the machine; "": not known */
+    pthread_mutex_t mutex;       /* guards the list, users and rounds */
+    struct upload_session *first;
+    unsigned long round;
+    pthread_mutex_t finishing; /* one upload becomes a scene at a time */
+};
+
+char *upload_session_path(const struct resumables *p, const char *id); /* of the upload's file; the caller's */
+
+/* The upload's session, loaded, for one more user. STATUS_CONFLICT: it is finished. */
+enum status upload_session_get(struct resumables *p, const char *id, struct upload_session **out, struct error *err);
+/* One that nobody uses and that was not given in this round yet, for one more user; NULL: there is none. */
+struct upload_session *upload_session_next(struct resumables *p, unsigned long round);
+void upload_session_put(struct upload_session *e); /* one user less */
+void upload_session_drop(struct upload_session *e); /* nobody uses it */
+/* The upload is removed: whoever still uses it finds it gone. */
+void upload_session_mark_gone(struct resumables *p, const char *id);
+
+/* What was received is on disk and counted. Where the disk fails, what is not counted is forgotten. */
+enum status upload_session_commit(struct upload_session *e, struct error *err);
+bool upload_session_is_whole(struct upload_session *e); /* and counted */
+/* It has become a scene: the next to come finds it so. */
+void upload_session_close(struct upload_session *e);
+/* From now on the file's tail is not to be believed, since unchecked bytes come. */
+enum status upload_session_disbelieve(struct upload_session *e, struct error *err);
+
+#endif
