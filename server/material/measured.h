@@ -24,7 +24,8 @@ static inline rgb measured_value(const struct measured *m) {
 
 /* What is gathered of one texel: a look a photograph, of no more photographs than this, those of the greatest weights
  * (best.h) among all of the capture. It bounds the time that highlights take, and memory: 3 KiB a thread, however many
- * photographs there are. */
+ * photographs there are. In redkitchen 18 % of the seen triangles have more; the best of them in place of the first are
+ * worth .09 dB of its held-out views. */
 #define MEASURED_LOOKS 48
 struct measured_looks {
     size_t count;
