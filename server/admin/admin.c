@@ -19,6 +19,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/folder.h"
+#include "server/data/layout.h"
 
 #define LINE_MAX_BYTES ((size_t)1 << 20)
 #define PATIENCE_SEC 5 /* of the daemon, for a request; a reply may take as long as it takes */
@@ -88,7 +89,7 @@ static enum status token_revoke(struct store *store, const cJSON *request, cJSON
 
 /* The copy has no name any more when its descriptor is handed over: nothing is left behind. */
 static enum status backup(const char *data_dir, struct store *store, int *fd, struct error *err) {
-    char *dir = file_join(data_dir, "trash"), *path = file_join(dir, "backup-XXXXXX");
+    char *dir = layout_trash(data_dir), *path = layout_trash_file(data_dir, "backup-" LAYOUT_RANDOM);
     enum status status = file_make_dirs(dir, err);
     int made = status == STATUS_OK ? mkostemp(path, O_CLOEXEC) : -1;
     if (status == STATUS_OK && made < 0)
@@ -136,7 +137,7 @@ static int with_address(const char *dir, int fd,
     int dir_fd = open(dir, O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (dir_fd < 0)
         return -1;
-    snprintf(address.sun_path, sizeof address.sun_path, "/proc/self/fd/%d/admin.sock", dir_fd);
+    snprintf(address.sun_path, sizeof address.sun_path, "/proc/self/fd/%d/" LAYOUT_SOCKET, dir_fd);
     int result = call(fd, (struct sockaddr *)&address, sizeof address);
     int number = errno;
     close(dir_fd);
@@ -271,7 +272,7 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
         mem_free(a);
         return failed;
     }
-    char *path = file_join(data_dir, "admin.sock");
+    char *path = layout_socket(data_dir);
     enum status status = STATUS_OK;
     unlink(path); /* of an earlier life: this process holds the folder's lock */
     a->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -302,7 +303,7 @@ void admin_stop(struct admin *a) {
         pthread_join(a->thread, NULL);
     }
     if (a->is_bound) {
-        char *path = file_join(a->data_dir, "admin.sock");
+        char *path = layout_socket(a->data_dir);
         unlink(path);
         mem_free(path);
     }

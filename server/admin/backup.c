@@ -22,6 +22,7 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/admin/copy.h"
+#include "server/data/layout.h"
 #include "server/store/contents.h"
 
 #define ROUNDS_MAX 5
@@ -118,7 +119,7 @@ struct making {
 static enum status copy_database(struct making *m, struct error *err) {
     uint64_t bytes;
     int fd = -1;
-    char *path = file_join(m->folder, "state.db");
+    char *path = layout_state(m->folder);
     enum status status = ask_for_copy(m->data_dir, &fd, err);
     int out = status == STATUS_OK ? open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600) : -1;
     if (status == STATUS_OK && out < 0)
@@ -145,7 +146,8 @@ static void tell_damage(struct making *m, const char *path, const char *what) {
 /* An output of a job that has ended must be as it was announced; of others it may be newer. */
 static enum status copy_output(struct making *m, const struct contents_job *job, const struct contents_output *output,
                                struct error *err) {
-    char *path = mem_printf("jobs/%lld/out/%s", (long long)job->id, output->name), *copy = NULL, hex[SHA256_HEX_SIZE] = "";
+    char *folder = layout_job(NULL, job->id), *path = layout_output(folder, output->name), *copy = NULL;
+    char hex[SHA256_HEX_SIZE] = "";
     bool exists = false;
     enum status status = STATUS_OK;
     if (copy_path_is_plain(path))
@@ -160,27 +162,30 @@ static enum status copy_output(struct making *m, const struct contents_job *job,
     }
     mem_free(copy);
     mem_free(path);
+    mem_free(folder);
     return status;
 }
 
 static enum status copy_job(struct making *m, const struct contents_job *job, struct error *err) {
-    static const char *const others[] = {"worker.log", "checkpoint.db", "checkpoint.db-journal"};
+    char *folder = layout_job(NULL, job->id);
+    char *others[] = {layout_log(folder), layout_checkpoint(folder), layout_checkpoint_journal(folder)};
     enum status status = STATUS_OK;
     bool exists;
     for (size_t i = 0; status == STATUS_OK && i < job->count; i++)
         status = copy_output(m, job, &m->contents.outputs[job->first + i], err);
     m->copy.may_link = false;
-    for (size_t i = 0; status == STATUS_OK && i < sizeof others / sizeof *others && !job->is_running; i++) {
-        char *path = mem_printf("jobs/%lld/%s", (long long)job->id, others[i]);
-        status = copy_file(&m->copy, path, &exists, err);
-        mem_free(path);
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        if (status == STATUS_OK && !job->is_running)
+            status = copy_file(&m->copy, others[i], &exists, err);
+        mem_free(others[i]);
     }
     m->copy.may_link = true;
+    mem_free(folder);
     return status;
 }
 
 static enum status copy_scene(struct making *m, const struct contents_scene *scene, struct error *err) {
-    char *path = mem_printf("scenes/%s", scene->id), *archive = mem_printf("%s/archive", path);
+    char *path = layout_scene(NULL, scene->id), *archive = layout_archive(path);
     enum status status = copy_tree(&m->copy, path, err);
     if (status == STATUS_OK && scene->is_ready && !file_is_in(m->folder, archive))
         tell_damage(m, archive, "is missing");
@@ -214,9 +219,10 @@ static bool is_named(const struct contents *c, bool is_scene, const char *name) 
 static enum status leave_out(const struct making *m, struct error *err) {
     enum status status = STATUS_OK;
     for (int is_scene = 0; is_scene < 2; is_scene++) {
-        char *folder = file_join(m->folder, is_scene ? "scenes" : "jobs"), **names = NULL;
+        char *inner = is_scene ? layout_scenes(NULL) : layout_jobs(NULL);
+        char *folder = file_join(m->folder, inner), **names = NULL;
         size_t count = 0;
-        if (status == STATUS_OK && file_is_in(m->folder, is_scene ? "scenes" : "jobs"))
+        if (status == STATUS_OK && file_is_in(m->folder, inner))
             status = file_list(folder, &names, &count, err);
         for (size_t i = 0; status == STATUS_OK && i < count; i++) {
             char *path = file_join(folder, names[i]);
@@ -226,14 +232,16 @@ static enum status leave_out(const struct making *m, struct error *err) {
         }
         file_free_names(names, count);
         mem_free(folder);
+        mem_free(inner);
     }
     for (size_t i = 0; status == STATUS_OK && i < m->contents.job_count; i++) {
-        char *path = mem_printf("%s/jobs/%lld/checkpoint.db", m->folder, (long long)m->contents.jobs[i].id);
-        char *journal = mem_printf("%s-journal", path);
+        char *folder = layout_job(m->folder, m->contents.jobs[i].id);
+        char *path = layout_checkpoint(folder), *journal = layout_checkpoint_journal(folder);
         if (m->contents.jobs[i].is_running && ((unlink(path) != 0 && errno != ENOENT) || (unlink(journal) != 0 && errno != ENOENT)))
             status = error_set_errno(err, errno, "cannot remove %s", path);
         mem_free(journal);
         mem_free(path);
+        mem_free(folder);
     }
     return status;
 }

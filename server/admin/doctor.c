@@ -23,6 +23,7 @@
 #include "common/protocol.h"
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
+#include "server/data/layout.h"
 #include "server/http/tls.h"
 #include "server/libraries.h"
 #include "server/worker/sandbox.h"
@@ -135,7 +136,7 @@ static bool is_remote(const char *dir) {
 }
 
 static bool check_writable(struct doctor *d, const char *dir) {
-    char *path = file_join(dir, "doctor-XXXXXX");
+    char *path = layout_probe(dir);
     int fd = mkostemp(path, O_CLOEXEC);
     bool good = fd >= 0 && write(fd, "x", 1) == 1 && fsync(fd) == 0;
     int number = errno;
@@ -178,7 +179,7 @@ static void check_disk(struct doctor *d) {
 /* --- the daemon ------------------------------------------------------------------------------ */
 
 static bool daemon_runs(const char *dir) {
-    char *path = file_join(dir, "lock");
+    char *path = layout_lock(dir);
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     bool runs = fd >= 0 && flock(fd, LOCK_SH | LOCK_NB) != 0;
     if (fd >= 0)
@@ -191,7 +192,7 @@ static void check_tokens(struct doctor *d, bool runs) {
     const struct config *c = d->config;
     bool is_loopback = d->is_loopback;
     struct error err;
-    char *path = file_join(c->data_dir, "state.db");
+    char *path = layout_state(c->data_dir);
     int fd, count = 0;
     if (runs || access(path, R_OK) == 0) {
         cJSON *request = cJSON_CreateObject(), *reply;

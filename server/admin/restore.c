@@ -14,6 +14,7 @@
 #include "server/admin/commands.h"
 #include "server/admin/copy.h"
 #include "server/data/folder.h"
+#include "server/data/layout.h"
 #include "server/store/contents.h"
 
 #define SUMS_MAX_BYTES ((size_t)1 << 30)
@@ -118,7 +119,7 @@ static enum status restore_files(struct restoring *r, char *sums, char database[
     for (size_t number = 1; status == STATUS_OK && sums && *sums; number++) {
         char *line = strsep(&sums, "\n");
         status = read_line(r, line, number, &digest, &path, err);
-        if (status == STATUS_OK && strcmp(path, "state.db") == 0)
+        if (status == STATUS_OK && strcmp(path, LAYOUT_STATE) == 0)
             memcpy(database, digest, SHA256_HEX_SIZE);
         else if (status == STATUS_OK)
             status = restore_file(r, path, digest, err);
@@ -128,14 +129,14 @@ static enum status restore_files(struct restoring *r, char *sums, char database[
 
 static enum status restore_database(struct restoring *r, const char *digest, struct contents *contents, struct error *err) {
     size_t before = r->damaged;
-    char *path = file_join(r->data, "state.db");
+    char *path = layout_state(r->data);
     enum status status = STATUS_OK;
     if (syncfs(r->copy.to) != 0)
         status = error_set_errno(err, errno, "cannot write all of %s", r->data);
     if (status == STATUS_OK && !*digest)
-        tell_damage(r, "state.db", "is missing");
+        tell_damage(r, LAYOUT_STATE, "is missing");
     else if (status == STATUS_OK)
-        status = restore_file(r, "state.db", digest, err);
+        status = restore_file(r, LAYOUT_STATE, digest, err);
     if (status == STATUS_OK && r->damaged > before)
         status = error_set(err, STATUS_CORRUPT, "without its database a backup is none");
     if (status == STATUS_OK)
@@ -148,11 +149,10 @@ static enum status restore_database(struct restoring *r, const char *digest, str
 
 /* What was put there goes again: a daemon must not find a part. */
 static void clear(const struct restoring *r) {
-    static const char *const parts[] = {"state.db", "scenes", "jobs", "lock"};
+    char *parts[] = {layout_state(r->data), layout_scenes(r->data), layout_jobs(r->data), layout_lock(r->data)};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-        char *path = file_join(r->data, parts[i]);
-        file_remove_tree(path, NULL);
-        mem_free(path);
+        file_remove_tree(parts[i], NULL);
+        mem_free(parts[i]);
     }
 }
 

@@ -13,6 +13,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 #define TRIES 20 /* of 50 ms */
 
@@ -32,7 +33,7 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
     umask(077);
     if (file_make_dirs(dir, err) != STATUS_OK)
         return error_hint(err, "--data DIR takes another data folder");
-    char *path = file_join(dir, "lock");
+    char *path = layout_lock(dir);
     char holder[32] = "";
     enum status status = STATUS_OK;
     *fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);

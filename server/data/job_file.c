@@ -8,14 +8,15 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
-enum status job_file_open(const char *data_dir, const char *path, int *out, struct error *err) {
-    char *root = file_join(data_dir, "jobs");
+/* `path` is relative to the data folder and begins with jobs/, which may be a link: an administrator made it. */
+static enum status open_in_jobs(const char *data_dir, const char *path, int *out, struct error *err) {
+    char *root = layout_jobs(data_dir);
     int fd = open(root, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     mem_free(root);
-    for (const char *at = path; fd >= 0 && *at;) {
+    for (const char *at = strchr(path, '/') + 1; fd >= 0 && *at;) {
         char part[256];
         size_t length = strcspn(at, "/");
         bool is_last = at[length] == '\0';
@@ -34,5 +35,21 @@ enum status job_file_open(const char *data_dir, const char *path, int *out, stru
         at += length + (is_last ? 0 : 1);
     }
     *out = fd;
-    return fd >= 0 ? STATUS_OK : error_set_errno(err, errno, "cannot open jobs/%s", path);
+    return fd >= 0 ? STATUS_OK : error_set_errno(err, errno, "cannot open %s", path);
+}
+
+enum status job_file_open_output(const char *data_dir, int64_t job_id, const char *name, int *fd, struct error *err) {
+    char *folder = layout_job(NULL, job_id), *path = layout_output(folder, name);
+    enum status status = open_in_jobs(data_dir, path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    return status;
+}
+
+enum status job_file_open_log(const char *data_dir, int64_t job_id, int *fd, struct error *err) {
+    char *folder = layout_job(NULL, job_id), *path = layout_log(folder);
+    enum status status = open_in_jobs(data_dir, path, fd, err);
+    mem_free(path);
+    mem_free(folder);
+    return status;
 }

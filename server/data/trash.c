@@ -12,6 +12,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 #define PREFIX "gone-"
 
@@ -38,7 +39,7 @@ static void empty(struct trash *t) {
     struct error err;
     char **names;
     size_t count;
-    char *folder = file_join(t->data_dir, "trash");
+    char *folder = layout_trash(t->data_dir);
     if (file_list(folder, &names, &count, &err) != STATUS_OK)
         log_warning("what is to be removed cannot be found: %s", err.message);
     for (size_t i = 0; i < count && !is_stopping(t); i++) {
@@ -57,7 +58,7 @@ static void empty(struct trash *t) {
 static enum status drop_scraps(const char *data_dir, struct error *err) {
     char **names;
     size_t count;
-    char *folder = file_join(data_dir, "trash");
+    char *folder = layout_trash(data_dir);
     enum status status = file_list(folder, &names, &count, err);
     for (size_t i = 0; i < count && status == STATUS_OK; i++) {
         char *path = file_join(folder, names[i]);
@@ -140,7 +141,8 @@ static void wake(struct trash *t) {
 
 enum status trash_take(struct trash *t, const char *path, struct error *err) {
     char *from = file_join(t->data_dir, path);
-    char *to = mem_printf("%s/trash/" PREFIX "%lld-%llu", t->data_dir, t->started_ns, atomic_fetch_add(&t->number, 1));
+    char *name = mem_printf(PREFIX "%lld-%llu", t->started_ns, atomic_fetch_add(&t->number, 1));
+    char *to = layout_trash_file(t->data_dir, name);
     enum status status = STATUS_OK;
     bool is_moved = rename(from, to) == 0;
     if (!is_moved && (errno == ENOSPC || errno == EDQUOT))
@@ -150,6 +152,7 @@ enum status trash_take(struct trash *t, const char *path, struct error *err) {
     wake(t);
     mem_free(from);
     mem_free(to);
+    mem_free(name);
     return status;
 }
 

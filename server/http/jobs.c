@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/settings.h"
 #include "common/sha256.h"
+#include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/field.h"
@@ -266,14 +267,16 @@ struct response *jobs_patch(struct api *api, struct request *r) {
 static struct response *measure_job(struct api *api, const struct request *r, int64_t id) {
     struct job job;
     struct error err;
-    char path[40];
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
-    snprintf(path, sizeof path, "jobs/%lld", (long long)id);
     bool is_running = job.state == JOB_RUNNING;
     job_release(&job);
-    return is_running ? problem_full(r, 409, "the job is running", "Cancel it first.", NULL)
-                      : keeping_would_free(api, r, path);
+    if (is_running)
+        return problem_full(r, 409, "the job is running", "Cancel it first.", NULL);
+    char *path = layout_job(NULL, id);
+    struct response *reply = keeping_would_free(api, r, path);
+    mem_free(path);
+    return reply;
 }
 
 struct response *jobs_delete(struct api *api, struct request *r) {
@@ -287,9 +290,9 @@ struct response *jobs_delete(struct api *api, struct request *r) {
     struct error err;
     enum status status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
-        char path[40];
-        snprintf(path, sizeof path, "jobs/%lld", (long long)id);
+        char *path = layout_job(NULL, id);
         status = trash_take(api->trash, path, &err);
+        mem_free(path);
     }
     return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
 }
@@ -436,13 +439,14 @@ struct response *jobs_extend(struct api *api, struct request *r) {
     if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
         return problem_from(r, &err);
     char *settings = longer_settings(r, &job, &refusal);
-    char *checkpoint = mem_printf("%s/jobs/%lld/checkpoint.db", api->config.data_dir, (long long)id);
+    char *folder = layout_job(api->config.data_dir, id), *checkpoint = layout_checkpoint(folder);
     if (!refusal && job_is_terminal(job.state) && access(checkpoint, F_OK) != 0)
         refusal = problem_full(r, 409, "the job's checkpoint is no longer there: there is nothing to go on from",
                                "submit the room again, with more iterations or time", NULL);
     if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &limits, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
     mem_free(checkpoint);
+    mem_free(folder);
     mem_free(settings);
     job_release(&job);
     if (refusal)

@@ -44,8 +44,8 @@ struct response *keeping_dry_run(const struct request *r, bool *dry_run) {
 struct response *keeping_would_free(struct api *api, const struct request *r, const char *path) {
     struct error err;
     uint64_t files = 0, bytes = 0;
-    char *full = file_join(api->config.data_dir, path);
-    enum status status = file_tree_size(full, &files, &bytes, &err);
+    char *full = path ? file_join(api->config.data_dir, path) : NULL;
+    enum status status = path ? file_tree_size(full, &files, &bytes, &err) : STATUS_OK;
     mem_free(full);
     if (status != STATUS_OK)
         return problem_from(r, &err);

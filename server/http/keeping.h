@@ -11,7 +11,7 @@ bool keeping_read(struct keeping *k, const cJSON *member, cJSON *params);
 
 /* `dry_run` of a query, 0 or 1; NULL, or the refusal. */
 struct response *keeping_dry_run(const struct request *r, bool *dry_run);
-/* The reply to a dry run of removing DATA/`path`. */
+/* The reply to a dry run of removing DATA/`path`, or (NULL) nothing. */
 struct response *keeping_would_free(struct api *api, const struct request *r, const char *path);
 
 #endif

@@ -149,9 +149,7 @@ struct response *outputs_get(struct api *api, struct request *r) {
     mem_free(name);
     if (status != STATUS_OK)
         return problem_from(r, &err);
-    char *path = mem_printf("%lld/out/%s", (long long)id, row.name);
-    status = job_file_open(api->config.data_dir, path, &fd, &err);
-    mem_free(path);
+    status = job_file_open_output(api->config.data_dir, id, row.name, &fd, &err);
     if (status == STATUS_OK)
         reply = send_file(api, r, id, fd, &row);
     else
@@ -193,12 +191,10 @@ struct response *jobs_log(struct api *api, struct request *r) {
     int64_t id = auth_job_id(api, r, ACCESS_READ, &refusal);
     if (refusal)
         return refusal;
-    char path[48];
-    snprintf(path, sizeof path, "%lld/worker.log", (long long)id);
     int fd = -1;
     size_t length = 0;
     struct error err;
-    enum status status = job_file_open(api->config.data_dir, path, &fd, &err);
+    enum status status = job_file_open_log(api->config.data_dir, id, &fd, &err);
     if (status != STATUS_OK && status != STATUS_NOT_FOUND)
         return problem_from(r, &err);
     char *text = fd >= 0 ? read_tail(fd, (size_t)bytes, &length) : mem_strdup("");

@@ -11,6 +11,7 @@
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 struct readiness {
     struct store *store;
@@ -29,7 +30,7 @@ struct readiness {
 static enum status probe_disk(const struct readiness *r, struct error *err) {
     static const char text[] = "can this be read back?\n";
     struct buf found;
-    char *path = file_join(r->data_dir, "trash/probe"); /* swept at the next start */
+    char *path = layout_trash_file(r->data_dir, "probe"); /* removed at the next start, too */
     buf_init(&found, 4096);
     enum status status = file_replace(path, text, sizeof text - 1, err);
     if (status == STATUS_OK)

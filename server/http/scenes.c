@@ -5,6 +5,7 @@
 #include "common/mem.h"
 #include "common/sha256.h"
 #include "common/utf8.h"
+#include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/body.h"
@@ -165,14 +166,14 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     struct response *reply = keeping_dry_run(r, &dry_run);
     if (reply || !auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
         return reply;
-    char *path = mem_printf("scenes/%s", row.id);
+    char *path = layout_scene(NULL, row.id);
     pthread_mutex_lock(&api->scene_mutex);
     enum status status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
         status = trash_take(api->trash, path, &err);
     pthread_mutex_unlock(&api->scene_mutex);
     if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
-        reply = keeping_would_free(api, r, is_gone ? path : "scenes/none");
+        reply = keeping_would_free(api, r, is_gone ? path : NULL);
     mem_free(path);
     scene_row_release(&row);
     return reply ? reply : status == STATUS_OK ? response_new(204) : problem_from(r, &err);

@@ -15,6 +15,7 @@
 #include "common/sha1.h"
 #include "common/sha256.h"
 #include "common/utf8.h"
+#include "server/data/layout.h"
 #include "server/http/body.h"
 #include "server/uploads/upload_writer.h"
 #include "server/http/field.h"
@@ -404,7 +405,7 @@ struct response *uploads_delete(struct api *api, struct request *r) {
     if (reply)
         return reply;
     if (dry_run) {
-        char *path = mem_printf("uploads/%s", id);
+        char *path = layout_upload(NULL, id);
         reply = keeping_would_free(api, r, path);
         mem_free(path);
         return reply;

@@ -8,6 +8,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
 #include "server/job/oom.h"
@@ -16,7 +17,7 @@
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
 
 static enum status write_order(const char *dir, cJSON *order, struct error *err) {
-    char *text = json_text(order), *path = file_join(dir, "job.json");
+    char *text = json_text(order), *path = layout_order(dir);
     enum status status = file_replace(path, text, strlen(text), err);
     mem_free(text);
     mem_free(path);
@@ -33,10 +34,6 @@ static cJSON *new_order(const char *kind, const struct scheduler_config *config,
     return order;
 }
 
-static char *scene_dir(const struct scheduler_config *config, const char *scene_id) {
-    return mem_printf("%s/scenes/%s", config->data_dir, scene_id);
-}
-
 static enum status order_job(struct attempt *a, const struct scheduler_config *config,
                              const struct job *job, int thread_count, struct error *err) {
     cJSON *settings;
@@ -44,8 +41,8 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
         json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
         return status;
-    char *out = file_join(a->dir, "out"), *scene = scene_dir(config, job->scene_id);
-    char *files = file_join(scene, "files");
+    char *out = layout_out(a->dir), *scene = layout_scene(config->data_dir, job->scene_id);
+    char *files = layout_files(scene);
     struct buf reduced;
     buf_init(&reduced, 4096);
     cJSON *smaller = memory_reduce(settings, job->memory_step, &thread_count, &reduced);
@@ -150,7 +147,7 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     *a = (struct attempt){.job_id = job_id, .number = number, .iteration = -1.0,
                           .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
                           .worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = mem_printf("%s/jobs/%lld", config->data_dir, (long long)job_id)};
+                          .dir = layout_job(config->data_dir, job_id)};
     status = store_job_get(store, job_id, &job, &why);
     if (status == STATUS_OK) {
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
@@ -189,7 +186,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     struct error why = {0};
     const char *scene_id = scene->id;
     *a = (struct attempt){.owner_id = scene->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = scene_dir(config, scene_id), .user_max_bytes = config->user_max_bytes, .problems = cJSON_CreateArray()};
+                          .dir = layout_scene(config->data_dir, scene_id), .user_max_bytes = config->user_max_bytes, .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);

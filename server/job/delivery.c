@@ -12,6 +12,7 @@
 #include "common/json.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/worker/progress.h"
 
 /* Who did not answer in time has less of it the next time: others wait for their turns. */
@@ -37,7 +38,7 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     char number[32];
     *d = (struct delivery){.id = row->id, .job_id = row->job_id, .owner_id = row->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
                            .kill_at_sec = clock_sec() + (row->tries > 0 ? LIMIT_AGAIN_SEC : LIMIT_SEC),
-                           .dir = mem_printf("%s/trash/message-%lld", config->data_dir, (long long)row->id)};
+                           .dir = layout_message(config->data_dir, row->id)};
     cJSON *order = cJSON_CreateObject();
     json_add_string(order, "kind", "deliver");
     json_add_bool(order, "sandbox", config->sandbox);
@@ -47,7 +48,7 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
     snprintf(number, sizeof number, "msg_%lld", (long long)row->id);
     json_add_string(order, "message_id", number);
     json_add_bool(order, "allow_private", config->webhook_private);
-    char *text = json_text(order), *path = file_join(d->dir, "job.json");
+    char *text = json_text(order), *path = layout_order(d->dir);
     enum status status = file_make_dirs(d->dir, err);
     if (status == STATUS_OK)
         status = file_replace(path, text, strlen(text), err);

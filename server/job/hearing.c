@@ -17,6 +17,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
+#include "server/data/layout.h"
 
 #define THINNED_SEC 1.0
 #define UNTAKEN_MAX 2000  /* files; an honest job has some hundred */
@@ -99,7 +100,7 @@ static enum status put_file(const struct attempt *a, struct store *store, const 
         status = json_number(line, "bytes", type, -1.0, &bytes, err);
     if (status == STATUS_OK) {
         struct stat info;
-        char *path = mem_printf("%s/out/%s", a->dir, name);
+        char *path = layout_output(a->dir, name);
         bool is_there = lstat(path, &info) == 0;
         if (!is_there && errno != ENOENT && !is_last)
             status = error_set_errno(err, errno, "cannot look at %s", path);

@@ -11,18 +11,18 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/job/measure.h"
 
 enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
     /* The journal first: what is left of the two is looked for by the other's name, and a journal must not meet a
      * database that is not its own. */
-    static const char *const names[] = {"checkpoint.db-journal", "checkpoint.db"};
-    enum status status = STATUS_OK;
-    for (size_t i = 0; status == STATUS_OK && i < sizeof names / sizeof names[0]; i++) {
-        char *path = file_join(dir, names[i]);
-        status = file_remove_tree(path, err);
-        mem_free(path);
-    }
+    char *journal = layout_checkpoint_journal(dir), *checkpoint = layout_checkpoint(dir);
+    enum status status = file_remove_tree(journal, err);
+    if (status == STATUS_OK)
+        status = file_remove_tree(checkpoint, err);
+    mem_free(checkpoint);
+    mem_free(journal);
     return status;
 }
 
@@ -55,7 +55,7 @@ static void drop_scraps(const char *dir, bool and_below) {
 }
 
 void housekeeping_drop_scraps(const char *dir) {
-    char *out = file_join(dir, "out");
+    char *out = layout_out(dir);
     drop_scraps(dir, false);
     drop_scraps(out, true);
     mem_free(out);
@@ -71,7 +71,7 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
             return;
         }
         for (size_t i = 0; i < count; i++) {
-            char *dir = mem_printf("%s/jobs/%lld", config->data_dir, (long long)jobs[i].id);
+            char *dir = layout_job(config->data_dir, jobs[i].id);
             housekeeping_drop_scraps(dir);
             before = jobs[i].id;
             mem_free(dir);
@@ -102,7 +102,7 @@ static bool is_old(struct store *store, int64_t id, int64_t before_ms) {
 
 static void drop_old_checkpoints(const struct scheduler_config *config, struct store *store) {
     int64_t before_ms = (int64_t)(((double)time(NULL) - config->checkpoint_keep_sec) * 1e3);
-    char *jobs = file_join(config->data_dir, "jobs");
+    char *jobs = layout_jobs(config->data_dir);
     struct error err;
     char **names;
     size_t count;
@@ -110,7 +110,7 @@ static void drop_old_checkpoints(const struct scheduler_config *config, struct s
         log_warning("old checkpoints cannot be found: %s", err.message);
     for (size_t i = 0; i < count; i++) {
         int64_t id = strtoll(names[i], NULL, 10);
-        char *folder = file_join(jobs, names[i]), *file = file_join(folder, "checkpoint.db");
+        char *folder = file_join(jobs, names[i]), *file = layout_checkpoint(folder);
         if (id > 0 && access(file, F_OK) == 0 && is_old(store, id, before_ms) &&
             drop_checkpoint(store, id, folder, &err) != STATUS_OK)
             log_warning("job %lld: %s", (long long)id, err.message);

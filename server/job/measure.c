@@ -4,6 +4,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 #define AT_ONCE 64 /* entered in one transaction */
 
@@ -22,8 +23,8 @@ enum status measure_job(struct store *store, int64_t job_id, const char *dir, st
 }
 
 static void measure(const struct scheduler_config *config, struct disk_use *use) {
-    char *dir = use->job_id ? mem_printf("%s/jobs/%lld", config->data_dir, (long long)use->job_id)
-                            : mem_printf("%s/scenes/%s", config->data_dir, use->scene_id);
+    char *dir = use->job_id ? layout_job(config->data_dir, use->job_id)
+                            : layout_scene(config->data_dir, use->scene_id);
     use->bytes = measure_folder(dir);
     mem_free(dir);
 }

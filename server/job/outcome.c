@@ -9,6 +9,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/job/hearing.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
@@ -155,7 +156,7 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
  * of another only the archive is kept. */
 static void remove_unpacked(const struct attempt *a) {
     struct error err;
-    char *files = file_join(a->dir, "files");
+    char *files = layout_files(a->dir);
     if (file_remove_tree(files, &err) != STATUS_OK)
         log_warning("scene %.12s: %s", a->scene_id, err.message);
     mem_free(files);

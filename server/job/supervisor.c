@@ -18,6 +18,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/worker/progress.h"
 
 #define LOG_KEEP 65536       /* of earlier attempts, when the log has grown past LOG_LARGE */
@@ -108,7 +109,7 @@ static void become_worker(const struct spawn *spawn) {
 
 enum status supervisor_start(struct worker *w, const char *binary, const char *dir,
                              struct error *err) {
-    *w = (struct worker){.pid_fd = -1, .pipe_fd = -1, .log_path = file_join(dir, SUPERVISOR_LOG)};
+    *w = (struct worker){.pid_fd = -1, .pipe_fd = -1, .log_path = layout_log(dir)};
     buf_init(&w->line, PROGRESS_LINE_MAX);
     char *argv[] = {mem_strdup("unbaked"), mem_strdup("worker"), mem_strdup(dir), NULL};
     char **environment = worker_environment();

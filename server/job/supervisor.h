@@ -17,8 +17,6 @@
 #include "common/buf.h"
 #include "common/error.h"
 
-#define SUPERVISOR_LOG "worker.log"
-
 struct worker {
     pid_t pid;       /* 0: none, or buried */
     int pid_fd;      /* readable when the process has ended; -1 where the kernel has none */

@@ -21,6 +21,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
@@ -145,7 +146,7 @@ void reserve_close(struct store *store) {
 /* --- the file ------------------------------------------------------------------------------ */
 
 bool store_reserve_spend(struct store *store) {
-    char *path = file_join(store->reserve.dir, "reserve");
+    char *path = layout_reserve(store->reserve.dir);
     bool spent = unlink(path) == 0;
     if (spent)
         log_warning("the disk is full: %s was given up so that something can be stopped or removed", path);
@@ -154,7 +155,7 @@ bool store_reserve_spend(struct store *store) {
 }
 
 void store_reserve_renew(struct store *store) {
-    char *path = file_join(store->reserve.dir, "reserve");
+    char *path = layout_reserve(store->reserve.dir);
     uint64_t room = 0;
     /* Not all that there is: others need it more. */
     if (access(path, F_OK) != 0 && file_free_bytes(store->reserve.dir, &room, NULL) == STATUS_OK &&

@@ -5,6 +5,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/store/internal.h"
 
 #define EVENTS_PER_JOB 20000
@@ -66,7 +67,7 @@ enum status store_open(struct store **out, const char *dir, struct error *err) {
     pthread_mutex_init(&store->mutex, NULL);
     store->reserve.wal_fd = -1;
     store->events_per_job = EVENTS_PER_JOB;
-    char *path = file_join(dir, "state.db");
+    char *path = layout_state(dir);
     enum status status = sql_open(&store->sql, path, SQL_WAL, 0, err);
     if (status == STATUS_OK)
         status = check_tables(store, err);

@@ -128,13 +128,11 @@ static bool compute(struct digests *d, int64_t job_id, const struct output_row *
                     char hex[SHA256_HEX_SIZE], bool *is_had) {
     struct error err;
     int fd;
-    char *path = mem_printf("%lld/out/%s", (long long)job_id, row->name);
-    enum status status = job_file_open(d->data_dir, path, &fd, &err);
+    enum status status = job_file_open_output(d->data_dir, job_id, row->name, &fd, &err);
     if (status == STATUS_OK) {
         status = digests_hash(fd, &d->stopping, version, hex, &err);
         close(fd);
     }
-    mem_free(path);
     *is_had = status == STATUS_OK;
     if (*is_had)
         atomic_fetch_add(&d->hashed_bytes, version->bytes);

@@ -12,6 +12,7 @@
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/uploads/upload_session.h"
 #include "server/uploads/upload.h"
@@ -195,10 +196,11 @@ enum status resumable_look(struct resumables *p, const char *id, struct upload_r
 }
 
 enum status resumable_forget(struct resumables *p, const char *id, struct error *err) {
-    char path[sizeof "uploads/" + UPLOAD_ID_SIZE];
+    char *path = layout_upload(NULL, id);
     upload_session_mark_gone(p, id);
-    snprintf(path, sizeof path, "uploads/%s", id);
-    return trash_take(p->api->trash, path, err);
+    enum status status = trash_take(p->api->trash, path, err);
+    mem_free(path);
+    return status;
 }
 
 enum status resumable_remove(struct resumables *p, const char *id, struct error *err) {

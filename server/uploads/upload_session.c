@@ -12,11 +12,12 @@
 
 #include "common/log.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 #define CHUNK_BYTES ((size_t)256 << 10)
 
 char *upload_session_path(const struct resumables *p, const char *id) {
-    return mem_printf("%s/uploads/%s", p->api->config.data_dir, id);
+    return layout_upload(p->api->config.data_dir, id);
 }
 
 /* --- loading ------------------------------------------------------------------------------- */

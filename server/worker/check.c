@@ -9,6 +9,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/parallel.h"
+#include "server/data/layout.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/facts.h"
 #include "server/worker/tasks.h"
@@ -37,7 +38,7 @@ static void tell_problems(struct progress *progress, const cJSON *problems) {
 
 enum status task_check(const struct order *order, struct progress *progress, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
-    char *archive = file_join(order->dir, "archive"), *files = file_join(order->dir, "files");
+    char *archive = layout_archive(order->dir), *files = layout_files(order->dir);
     struct parallel *pool = parallel_new(order->thread_count);
     cJSON *problems = cJSON_CreateArray();
     struct scene scene;

@@ -7,6 +7,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 
 #define WHAT "job.json"
 
@@ -57,7 +58,7 @@ static enum status read_deliver(struct order *o, struct error *err) {
 enum status order_read(struct order *o, const char *dir, struct error *err) {
     *o = (struct order){.dir = dir};
     double thread_count, memory_bytes;
-    char *path = file_join(dir, "job.json");
+    char *path = layout_order(dir);
     enum status status = json_read(path, (size_t)1 << 20, &o->json, err);
     mem_free(path);
     if (status == STATUS_OK)

@@ -24,6 +24,7 @@
 #include "common/parallel.h"
 #include "common/protocol.h"
 #include "common/sha256.h"
+#include "server/data/layout.h"
 #include "server/export/outputs.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/photo_color.h"
@@ -286,7 +287,7 @@ static enum status load_scene(struct run *run, const struct settings *settings,
 
 static enum status open_checkpoint(struct run *run, struct error *err) {
     char note[512];
-    char *path = file_join(run->order->dir, "checkpoint.db");
+    char *path = layout_checkpoint(run->order->dir);
     char *fingerprint = fingerprint_of(run->order);
     enum status status = checkpoint_open(&run->checkpoint, path, fingerprint, note, err);
     if (status == STATUS_OK && note[0])
@@ -340,7 +341,7 @@ enum status task_reconstruct(const struct order *order, struct progress *progres
     signals_of_ours(&set);
     sigprocmask(SIG_BLOCK, &set, NULL); /* before the pool's threads, which inherit it */
     settings_init(&settings);
-    run.out_dir = file_join(order->dir, "out");
+    run.out_dir = layout_out(order->dir);
     struct parallel *pool = NULL;
     enum status status = settings_apply(&settings, order->settings, NULL, err);
     if (status == STATUS_OK)

@@ -11,6 +11,7 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/layout.h"
 #include "server/worker/progress.h"
 #include "tests/check.h"
 
@@ -111,7 +112,7 @@ static void test_large_log(void) {
     struct worker w;
     struct heard heard;
     struct stat info;
-    char *log = file_join(dir, SUPERVISOR_LOG);
+    char *log = layout_log(dir);
     run(&w, "head -c 1100000 /dev/zero | tr '\\0' a >&2; echo end >&2", &heard);
     supervisor_release(&w);
     CHECK(stat(log, &info) == 0 && info.st_size > 1100000);
@@ -133,7 +134,7 @@ static void test_refusals(void) {
     supervisor_signal(&w, SIGKILL); /* nobody */
     supervisor_release(&w);
     /* A log that is a link leads elsewhere. */
-    char *log = file_join(dir, SUPERVISOR_LOG);
+    char *log = layout_log(dir);
     unlink(log);
     CHECK(symlink("/dev/null", log) == 0);
     CHECK(supervisor_start(&w, "/bin/true", dir, &err) == STATUS_IO);

@@ -1,0 +1,48 @@
+/* layout.h -- what lies where in the data folder (DATA). Every path below it is made here.
+ *
+ *   DATA/state.db        the database (server/store), with SQLite's -wal and -shm
+ *   DATA/reserve         room that is given up on a full disk (store/reserve.c)
+ *   DATA/lock            locked by the daemon (folder.h)
+ *   DATA/admin.sock      on which the daemon answers its administrator (server/admin)
+ *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; job.json, worker.log: of its check
+ *   DATA/jobs/N/         job.json: the worker's order; worker.log; checkpoint.db; out/NAME: outputs
+ *   DATA/uploads/ID      an upload that is not a scene yet
+ *   DATA/trash/          what is being removed (trash.h), and files that no restart needs
+ *
+ * Each function returns a path, which is the caller's (mem_free). Where `data_dir` is NULL, the path is relative to DATA.
+ * `work_dir` is the folder that a worker is started in: a scene's, a job's or a message's. */
+#ifndef UNBAKE_DATA_LAYOUT_H
+#define UNBAKE_DATA_LAYOUT_H
+
+#include <stdint.h>
+
+#define LAYOUT_STATE "state.db"
+#define LAYOUT_SOCKET "admin.sock"
+#define LAYOUT_RANDOM "XXXXXX" /* as an id: for mkostemp */
+
+char *layout_state(const char *data_dir);
+char *layout_reserve(const char *data_dir);
+char *layout_lock(const char *data_dir);
+char *layout_socket(const char *data_dir);
+char *layout_probe(const char *data_dir); /* a file by which `unbaked doctor` tries to write; for mkostemp */
+
+char *layout_scenes(const char *data_dir);
+char *layout_scene(const char *data_dir, const char *scene_id);
+char *layout_jobs(const char *data_dir);
+char *layout_job(const char *data_dir, int64_t job_id);
+char *layout_uploads(const char *data_dir);
+char *layout_upload(const char *data_dir, const char *upload_id);
+char *layout_trash(const char *data_dir);
+char *layout_trash_file(const char *data_dir, const char *name);
+char *layout_message(const char *data_dir, int64_t message_id); /* the work_dir of a webhook's message */
+
+char *layout_order(const char *work_dir);
+char *layout_log(const char *work_dir);
+char *layout_archive(const char *work_dir);
+char *layout_files(const char *work_dir);
+char *layout_checkpoint(const char *work_dir);
+char *layout_checkpoint_journal(const char *work_dir);
+char *layout_out(const char *work_dir);
+char *layout_output(const char *work_dir, const char *name);
+
+#endif
