@@ -15,9 +15,8 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/store/sql.h"
-#include "server/worker/hash64.h"
+#include "common/hash64.h"
 
-#define FORMAT_VERSION 1
 /* The largest page there is: a tile is then a chain of 16, not of 256. */
 #define PAGE_SIZE 65536
 
@@ -36,6 +35,9 @@ struct checkpoint {
     struct sql sql;
     char *fingerprint;
     bool complete; /* there is a commit, described by what follows */
+    int format;    /* of the file */
+    char *program; /* version that wrote it */
+    char note[512];
     long iteration;
     size_t array_count;
     struct stored_array *array;
@@ -74,11 +76,17 @@ static uint64_t digest_of(const struct stored_array *array, size_t count, long i
 
 /* --- opening ------------------------------------------------------------------------------ */
 
+/* Within a transaction. */
+static enum status write_format(struct checkpoint *c, struct error *err) {
+    char text[48];
+    snprintf(text, sizeof text, "PRAGMA user_version=%d", STATE_FORMAT);
+    return sql_script(&c->sql, text, err);
+}
+
 static enum status create_tables(struct checkpoint *c, struct error *err) {
     enum status status = sql_begin(&c->sql, err);
     if (status != STATUS_OK)
         return status;
-    char *version = mem_printf("PRAGMA user_version=%d", FORMAT_VERSION);
     status = sql_script(&c->sql,
                         "CREATE TABLE newest (id INTEGER PRIMARY KEY CHECK (id = 1),"
                         " fingerprint TEXT NOT NULL, program TEXT NOT NULL,"
@@ -90,8 +98,7 @@ static enum status create_tables(struct checkpoint *c, struct error *err) {
                         " STRICT;",
                         err);
     if (status == STATUS_OK)
-        status = sql_script(&c->sql, version, err);
-    mem_free(version);
+        status = write_format(c, err);
     return sql_end(&c->sql, status, err);
 }
 
@@ -170,15 +177,15 @@ static enum status read_commit(struct checkpoint *c, char note[512], struct erro
         status = sql_int(&c->sql, 0, &table_count, err, "SELECT count(*) FROM sqlite_schema", "");
     if (status == STATUS_OK && version == 0 && table_count == 0)
         return create_tables(c, err);
-    if (status == STATUS_OK && version != FORMAT_VERSION)
-        snprintf(note, 512, "the checkpoint has format %lld, this program writes %d",
-                 (long long)version, FORMAT_VERSION);
+    if (status == STATUS_OK && (version < 1 || version > STATE_FORMAT))
+        snprintf(note, 512, "the checkpoint has format %lld, this program reads up to %d", (long long)version,
+                 STATE_FORMAT);
     if (status != STATUS_OK || note[0])
         return status;
     sqlite3_stmt *stmt;
     bool row;
     uint64_t digest = 0;
-    status = sql_query(&c->sql, &stmt, err, "SELECT fingerprint, iteration, digest FROM newest", "");
+    status = sql_query(&c->sql, &stmt, err, "SELECT fingerprint, iteration, digest, program FROM newest", "");
     if (status == STATUS_OK)
         status = sql_step(&c->sql, stmt, &row, err);
     if (status != STATUS_OK || !row)
@@ -186,6 +193,8 @@ static enum status read_commit(struct checkpoint *c, char note[512], struct erro
     bool same = strcmp(sql_text(stmt, 0), c->fingerprint) == 0;
     c->iteration = (long)sqlite3_column_int64(stmt, 1);
     digest = (uint64_t)sqlite3_column_int64(stmt, 2);
+    c->format = (int)version;
+    c->program = sql_dup(stmt, 3);
     sqlite3_reset(stmt);
     if (!same) {
         snprintf(note, 512, "the checkpoint belongs to another scene or other settings");
@@ -203,6 +212,8 @@ static enum status read_commit(struct checkpoint *c, char note[512], struct erro
 
 static void forget(struct checkpoint *c) {
     arrays_release(c->array, c->array_count);
+    mem_free(c->program);
+    c->program = NULL;
     c->array = NULL;
     c->array_count = 0;
     c->complete = false;
@@ -278,6 +289,7 @@ void checkpoint_close(struct checkpoint *c) {
     arrays_release(c->array, c->array_count);
     if (c->sql.db)
         sql_close(&c->sql);
+    mem_free(c->program);
     mem_free(c->fingerprint);
     mem_free(c);
 }
@@ -360,7 +372,7 @@ static enum status write_heads(struct checkpoint *c, long iteration,
                          " digest) VALUES (1, ?, ?, ?, ?)",
                          "ttii", c->fingerprint, UNBAKE_VERSION, (int64_t)iteration,
                          (int64_t)digest_of(next, count, iteration, c->fingerprint));
-    return status;
+    return status == STATUS_OK ? write_format(c, err) : status;
 }
 
 enum status checkpoint_save(struct checkpoint *c, long iteration, const struct state_array *array,
@@ -389,6 +401,7 @@ enum status checkpoint_save(struct checkpoint *c, long iteration, const struct s
     c->array_count = count;
     c->next_row = row;
     c->iteration = iteration;
+    c->format = STATE_FORMAT;
     c->complete = true;
     spent.seconds = clock_sec() - start;
     if (cost)
@@ -423,27 +436,84 @@ static enum status load_tile(struct checkpoint *c, const struct tile *tile, void
                                            c->sql.path);
 }
 
+/* The stored array of that name; NULL: none. */
+static const struct stored_array *stored_named(const struct checkpoint *c, const char *name) {
+    for (size_t i = 0; i < c->array_count; i++)
+        if (strcmp(c->array[i].name, name) == 0)
+            return &c->array[i];
+    return NULL;
+}
+
+static enum status load_array(struct checkpoint *c, const struct stored_array *from, void *to, struct error *err) {
+    enum status status = STATUS_OK;
+    for (size_t t = 0; t < from->tile_count && status == STATUS_OK; t++)
+        status = load_tile(c, &from->tile[t], (char *)to + t * CHECKPOINT_TILE_BYTES, tile_bytes(from->bytes, t), err);
+    return status;
+}
+
+static enum status check_surface(struct checkpoint *c, const struct stored_array *from, const struct state_array *now,
+                                 struct error *err) {
+    void *stored = mem_alloc(from->bytes ? from->bytes : 1);
+    enum status status = load_array(c, from, stored, err);
+    bool same = status == STATUS_OK && memcmp(stored, now->data, now->bytes) == 0;
+    mem_free(stored);
+    return status != STATUS_OK || same ? status : damaged(c, "this program lays textures out in another way", err);
+}
+
+/* Whether all that is wanted is there as it is wanted. */
+static enum status check_arrays(struct checkpoint *c, const struct state_array *array, size_t count, struct error *err) {
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        const struct stored_array *from = stored_named(c, array[i].name);
+        if (!from && array[i].since <= c->format)
+            status = error_set(err, STATUS_CORRUPT, "%s has no %s", c->sql.path, array[i].name);
+        else if (from && from->bytes != array[i].bytes)
+            status = error_set(err, STATUS_CORRUPT, "%s has %zu bytes of %s, not %zu", c->sql.path, from->bytes,
+                               array[i].name, array[i].bytes);
+        else if (from && strcmp(array[i].name, STATE_SURFACE) == 0)
+            status = check_surface(c, from, &array[i], err);
+    }
+    return status;
+}
+
+/* Says what of an older format nobody asks for. */
+static void note_dropped(struct checkpoint *c, const struct state_array *array, size_t count) {
+    const size_t size = sizeof c->note;
+    size_t used = 0;
+    for (size_t s = 0; s < c->array_count && used < size; s++) {
+        size_t i = 0;
+        while (i < count && strcmp(array[i].name, c->array[s].name) != 0)
+            i++;
+        if (i == count)
+            used += (size_t)snprintf(c->note + used, size - used, "%s%s", used ? ", " : "dropped of the checkpoint: ",
+                                     c->array[s].name);
+    }
+    if (used < size && c->format < STATE_FORMAT)
+        snprintf(c->note + used, size - used, "%sthe checkpoint is of format %d, by unbaked %.40s; %s", used ? "; " : "",
+                 c->format, c->program, used ? "the rest of it is used" : "all of it is used");
+}
+
 enum status checkpoint_load(struct checkpoint *c, struct state_array *array, size_t count,
                             bool *found, long *iteration, struct error *err) {
     *found = false;
+    c->note[0] = '\0';
     if (!c->complete)
         return STATUS_OK;
-    if (!same_arrays(c, array, count))
-        return error_set(err, STATUS_CORRUPT, "%s holds arrays of other names or sizes",
-                         c->sql.path);
-    for (size_t i = 0; i < count; i++) {
-        for (size_t t = 0; t < c->array[i].tile_count; t++) {
-            enum status status =
-                load_tile(c, &c->array[i].tile[t], (char *)array[i].data + t * CHECKPOINT_TILE_BYTES,
-                          tile_bytes(array[i].bytes, t), err);
-            if (status != STATUS_OK)
-                return status;
-        }
+    enum status status = check_arrays(c, array, count, err);
+    for (size_t i = 0; i < count && status == STATUS_OK; i++) {
+        const struct stored_array *from = stored_named(c, array[i].name);
+        if (from)
+            status = load_array(c, from, array[i].data, err);
     }
+    if (status != STATUS_OK)
+        return status;
+    note_dropped(c, array, count);
     *found = true;
     *iteration = c->iteration;
     return STATUS_OK;
 }
+
+const char *checkpoint_note(const struct checkpoint *c) { return c->note; }
 
 enum status checkpoint_clear(struct checkpoint *c, struct error *err) {
     enum status status = sql_begin(&c->sql, err);

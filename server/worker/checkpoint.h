@@ -11,7 +11,9 @@
  * 3. Each tile carries its hash, and a digest binds all of them, the iteration and the
  *    fingerprint. Opening reads everything; damage is noted and the file removed: the attempt
  *    then starts from the beginning, never from a state that is half wrong.
- * 4. One connection, holding an exclusive lock while it is open: of a stale and a new worker only
+ * 4. The file has the format of the state in it (STATE_FORMAT), not the program's version. One of an older format is
+ *    read, array by array by their names; the next save makes it one of today's.
+ * 5. One connection, holding an exclusive lock while it is open: of a stale and a new worker only
  *    one can ever write.
  *
  * Not thread-safe. */
@@ -47,10 +49,14 @@ enum status checkpoint_save(struct checkpoint *checkpoint, long iteration,
                             const struct state_array *array, size_t count,
                             struct checkpoint_cost *cost, struct error *err);
 
-/* Fills the arrays; *found is false, and nothing is touched, when there is no checkpoint.
- * STATUS_CORRUPT, and nothing is touched, when it holds other arrays or sizes. */
+/* Fills the arrays; *found is false, and nothing is touched, when there is no checkpoint. Of one of an older format
+ * those that it cannot have keep what they hold.
+ * STATUS_CORRUPT, and nothing is touched, when it lacks others, when sizes differ, or STATE_SURFACE does. */
 enum status checkpoint_load(struct checkpoint *checkpoint, struct state_array *array, size_t count,
                             bool *found, long *iteration, struct error *err);
+/* A sentence for the user on what the last load dropped, and of which format that was; "" where there is nothing to
+ * say. Borrowed. */
+const char *checkpoint_note(const struct checkpoint *checkpoint);
 
 /* Forgets what is stored: for a state that its reader cannot use. */
 enum status checkpoint_clear(struct checkpoint *checkpoint, struct error *err);

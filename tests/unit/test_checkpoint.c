@@ -12,7 +12,8 @@
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "server/worker/hash64.h"
+#include "common/protocol.h"
+#include "common/hash64.h"
 #include "tests/check.h"
 
 static struct error err;
@@ -25,9 +26,9 @@ static struct error err;
 
 /* Three arrays: five tiles and a bit, a few bytes, none. */
 static void state_init(struct state_array array[ARRAYS]) {
-    array[0] = (struct state_array){"texture", mem_calloc(5 * TILE + 12, 1), 5 * TILE + 12};
-    array[1] = (struct state_array){"counter", mem_calloc(8, 1), 8};
-    array[2] = (struct state_array){"empty", mem_calloc(1, 1), 0};
+    array[0] = (struct state_array){"texture", mem_calloc(5 * TILE + 12, 1), 5 * TILE + 12, 1};
+    array[1] = (struct state_array){"counter", mem_calloc(8, 1), 8, 1};
+    array[2] = (struct state_array){"empty", mem_calloc(1, 1), 0, 1};
 }
 
 static void state_release(struct state_array array[ARRAYS]) {
@@ -161,6 +162,72 @@ static void test_round_trip(const char *path) {
     checkpoint_close(c);
     state_release(array);
     state_release(loaded);
+}
+
+static void script(const char *path, const char *text) {
+    sqlite3 *db;
+    CHECK(sqlite3_open(path, &db) == SQLITE_OK && sqlite3_exec(db, text, NULL, NULL, NULL) == SQLITE_OK);
+    sqlite3_close(db);
+}
+
+/* Opens what `format` wrote and loads those arrays; the iteration that was found, -1 for none. */
+static long load_format(const char *path, int format, struct state_array *array, size_t count, enum status wanted,
+                        char note[512]) {
+    struct checkpoint *c;
+    bool found = false;
+    long iteration = -1;
+    char *text = mem_printf("PRAGMA user_version=%d", format);
+    script(path, text);
+    mem_free(text);
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    IS(checkpoint_load(c, array, count, &found, &iteration, &err), wanted);
+    if (found)
+        snprintf(note, 512, "%s", checkpoint_note(c));
+    if (found) /* the next save is of today's format */
+        OK(checkpoint_save(c, iteration, array, count, NULL, &err));
+    checkpoint_close(c);
+    return found ? iteration : -1;
+}
+
+/* A file of the format before is read, by the names of its arrays; what is dropped of it is said; what it does not fit
+ * is not used. */
+static void test_format_before(const char *path) {
+    struct checkpoint *c;
+    uint32_t kept[3] = {1, 2, 3}, gone[2] = {4, 5}, added = 6, plan[3] = {0};
+    uint64_t surface = 7;
+    struct state_array old[] = {{"gone", gone, sizeof gone, 1}, {"kept", kept, sizeof kept, 1}};
+    struct state_array now[] = {{"kept", plan, sizeof plan, 1},
+                                {"added", &added, sizeof added, 2},
+                                {STATE_SURFACE, &surface, sizeof surface, 2}};
+    char note[512];
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    OK(checkpoint_save(c, 30, old, 2, NULL, &err));
+    checkpoint_close(c);
+    CHECK(load_format(path, 1, now, 3, STATUS_OK, note) == 30);
+    CHECK(memcmp(plan, kept, sizeof kept) == 0 && added == 6);
+    CHECK_STRING(note, "dropped of the checkpoint: gone; the checkpoint is of format 1, by unbaked " UNBAKE_VERSION
+                       "; the rest of it is used");
+    /* That has made it one of today's. */
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    bool found;
+    long iteration;
+    OK(checkpoint_load(c, now, 3, &found, &iteration, &err));
+    CHECK(found && iteration == 30 && !*checkpoint_note(c));
+    /* Textures that are laid over another surface would be a wrong answer. */
+    surface = 8;
+    IS(checkpoint_load(c, now, 3, &found, &iteration, &err), STATUS_CORRUPT);
+    CHECK(!found && strstr(err.message, "another way"));
+    checkpoint_close(c);
+    surface = 7;
+    /* What today's format has to have is missing. */
+    OK(checkpoint_open(&c, path, "scene+settings", note, &err));
+    OK(checkpoint_save(c, 31, now, 1, NULL, &err));
+    IS(checkpoint_load(c, now, 3, &found, &iteration, &err), STATUS_CORRUPT);
+    CHECK(strstr(err.message, "has no added"));
+    checkpoint_close(c);
+    /* One of a later program is not guessed at. */
+    CHECK(load_format(path, STATE_FORMAT + 1, now, 1, STATUS_OK, note) == -1);
+    CHECK(strstr(note, "reads up to"));
 }
 
 static void save_iteration(const char *path, long k) {
@@ -353,6 +420,7 @@ int main(void) {
     test_read_twice(path);
     test_full_disk(path);
     test_kill(path);
+    test_format_before(path);
     OK(file_remove_tree(dir, &err));
     mem_free(path);
     mem_free(dir);

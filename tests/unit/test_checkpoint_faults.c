@@ -18,7 +18,7 @@ static char *path;
 static long strikes, iteration; /* that was saved last */
 static uint32_t texture[CHECKPOINT_TILE_BYTES / 4 + 3], counter[2];
 static struct state_array array[ARRAYS] = {
-    {"texture", texture, sizeof texture}, {"counter", counter, sizeof counter}, {"empty", counter, 0}};
+    {"texture", texture, sizeof texture, 1}, {"counter", counter, sizeof counter, 1}, {"empty", counter, 0, 1}};
 
 /* One tile stays as it is. */
 static void set(long k) {

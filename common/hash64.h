@@ -2,8 +2,8 @@
  *
  * It finds accidents (a flipped bit, a page of another time), not attacks: every change of up to
  * eight bytes at one aligned place changes the hash, others slip through once in 2^64. */
-#ifndef UNBAKE_WORKER_HASH64_H
-#define UNBAKE_WORKER_HASH64_H
+#ifndef UNBAKE_COMMON_HASH64_H
+#define UNBAKE_COMMON_HASH64_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* hash64.c -- see hash64.h. */
-#include "server/worker/hash64.h"
+#include "common/hash64.h"
 
 #include <string.h>
 
