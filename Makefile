@@ -142,7 +142,7 @@ bench: ## print the speed ratios and write build/bench.json; LONG=1: also what t
 	@+$(BUILD) benches
 	@LONG=$(LONG) tests/bench/run.sh $(B)
 
-fidelity: deps ## compare with the truth of known rooms, 10 minutes each; FIDELITY_SEC, FIDELITY_ROOMS
+fidelity: deps ## compare with the truth of known rooms, some 6 minutes each; FIDELITY_QUALITY, FIDELITY_ROOMS
 	@+$(BUILD) all $(B)/tests/bench/reconstruct_room
 	@tests/bench/fidelity.sh $(B)
 

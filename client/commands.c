@@ -31,7 +31,7 @@ static const struct command table[] = {
      "server has already is not sent again. With --scene no ROOM is needed.\n",
      "  unbake submit living-room/ --watch\n"
      "  unbake submit room.zip --name kitchen --set texture_size=4096 --set seed=7\n"
-     "  unbake submit --scene 3f2a91c0 --set time_limit_sec=3600 --priority 5\n",
+     "  unbake submit --scene 3f2a91c0 --set quality=fine --priority 5\n",
      0, 1, submit_options, submit_run},
     {"list", "", "list jobs, newest first", "",
      "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0, list_options, list_run},
@@ -68,7 +68,7 @@ static const struct command table[] = {
      "  unbake redeliver 17\n", 1, ANY_NUMBER, no_options, redeliver_run},
     {"extend", "JOB", "let a job that has ended go on for longer",
      "It goes on from its checkpoint, which the server keeps for a while.\n",
-     "  unbake extend 17 --time 3600\n  unbake extend last --iterations 500\n", 1, 1, extend_options,
+     "  unbake extend 17 --looks 1000\n  unbake extend last --time 3600\n", 1, 1, extend_options,
      extend_run},
     {"edit", "JOB...", "change the name, priority, labels, place in the queue or time of removal", "",
      "  unbake edit 17 --priority 10\n  unbake edit 17 --before 12\n  unbake edit last --name kitchen\n",

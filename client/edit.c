@@ -20,6 +20,7 @@ const struct option edit_options[] = {
 };
 const struct option extend_options[] = {
     {"iterations", 'i', OPTION_WHOLE, "N", "so many more, for a job with that limit"},
+    {"looks", 0, OPTION_WHOLE, "N", "so many more observations at each part of the texture"},
     {"time", 't', OPTION_SECONDS, "SEC", "so much more working time, for all others"},
     {0},
 };
@@ -126,14 +127,18 @@ int extend_run(struct client *c, const struct options *o) {
     int code;
     cJSON *body = cJSON_CreateObject();
     const char *time = options_text(o, "time", NULL), *iterations = options_text(o, "iterations", NULL);
+    const char *looks = options_text(o, "looks", NULL);
     enum status status = STATUS_OK;
     reply_init(&reply);
-    if ((time != NULL) == (iterations != NULL)) {
-        error_set(&err, STATUS_INPUT, "extend takes --iterations or --time");
-        status = error_hint(&err, "`unbake show %.40s` says which of the two limits the job", o->word[0]);
+    if ((time != NULL) + (iterations != NULL) + (looks != NULL) != 1) {
+        error_set(&err, STATUS_INPUT, "extend takes --looks, --iterations or --time");
+        status = error_hint(&err, "--iterations or --time where `unbake show %.40s` has such a limit, else --looks",
+                            o->word[0]);
     }
     if (status == STATUS_OK)
         status = client_job_id(c, o->word[0], &id, &reply, &err);
+    if (looks)
+        json_add_int(body, "looks", options_whole(o, "looks", 0));
     if (iterations)
         json_add_int(body, "iterations", options_whole(o, "iterations", 0));
     if (time)

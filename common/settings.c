@@ -30,6 +30,8 @@ static const struct setting table[] = {
      "solve: take the photographs' noise out of base colour"},
     {"denoise_mesh", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
      "put the vertices of a rough mesh back to where its surfaces are; one that has normals stays as it is"},
+    {"detail_steps", SETTING_INT, "steps", 0, 1000, NULL, "16", "solve",
+     "solve: steps that find detail finer than a photograph's pixel, where every texel is measured; 0: none"},
     {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.002", NULL,
      "first step size of emission, in logarithms of radiance"},
     {"emitters", SETTING_CHOICE, "", 0, 0, "decide|any", "decide", "listing1",
@@ -38,18 +40,28 @@ static const struct setting table[] = {
      "of a look's radiance in the loss: two independent ones, or one, whose squared error is biased"},
     {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",
      "solve: directions from which light is gathered at each point where it is"},
+    {"gloss_passes", SETTING_INT, "", 1, 2, NULL, "2", "solve",
+     "solve: how many times roughness and specular are fitted, each in light that is better known"},
     {"hold_out_every", SETTING_INT, "frames", 0, 1000000, NULL, "10", NULL,
      "where the capture holds out no frame, every how many-th is; 0: none"},
     {"iterations", SETTING_INT, "", 0, 1e9, NULL, "0", NULL,
-     "optimiser steps; 0: as many as time_limit_sec holds"},
+     "optimiser steps; 0: as many as refine_looks or listing1_looks take"},
+    {"listing1_looks", SETTING_INT, "looks", 1, 1000000000, NULL, "4000", "listing1",
+     "listing1: ends when so many looks were taken at each part of the texture; with iterations: goes on to the end"},
     {"max_depth", SETTING_INT, "segments", 2, 32, NULL, "16", NULL,
      "longest path from the camera; light that takes more segments is missing from renders, most of all in white rooms"},
+    {"measure_stride", SETTING_INT, "texels", 1, 8, NULL, "1", "solve",
+     "solve: base colour is measured of one texel in so many squared"},
     {"method", SETTING_CHOICE, "", 0, 0, "solve|listing1", "solve", NULL,
      "how materials are found: solved from the measured light, then refined; or the published algorithm from a neutral start"},
     {"preview_interval_sec", SETTING_REAL, "s", 1, 86400, NULL, "15", NULL,
      "time between preview pictures while the job runs"},
+    {"quality", SETTING_CHOICE, "", 0, 0, "draft|standard|fine", "standard", NULL,
+     "how much work is done: it sets those of detail_steps, gather_samples, gloss_passes, listing1_looks, measure_stride, refine_looks "
+     "and report_samples that are not given"},
     {"refine_looks", SETTING_INT, "looks", 0, 1000000000, NULL, "1000", "solve",
-     "refine: ends when so many looks were taken at each part of the texture; 0, or with iterations: goes on to the end"},
+     "refine: ends when so many looks were taken at each part of the texture; with iterations, or 0 and a time_limit_sec: "
+     "goes on to the end of that"},
     {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64", NULL,
      "samples per pixel of the held-out re-renders"},
     {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1",
@@ -70,13 +82,32 @@ static const struct setting table[] = {
      "density of the textures; 0: the greatest that texture_size holds"},
     {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048", NULL,
      "side of the square textures"},
-    {"time_limit_sec", SETTING_REAL, "s", 1, 2592000, NULL, "600", NULL,
-     "working time after which the optimiser stops; ignored when iterations is given"},
+    {"time_limit_sec", SETTING_REAL, "s", 0, 2592000, NULL, "0", NULL,
+     "most working time of the whole job, not counting what other processes take; work is left out to keep it, "
+     "first of refine, then samples of the report, detail, three texels of four, gather_samples; 0: no limit"},
     {"transforms", SETTING_TEXT, "", 0, 0, NULL, "transforms.json", NULL,
      "the file of the bundle that lists photographs and cameras"},
 };
 
 #define TABLE_COUNT (sizeof table / sizeof table[0])
+
+/* The amounts of work that `quality` names, in the order of its choices; the middle ones are the defaults above. Of
+ * staircase2 and bathroom at 2048 x 2048 the standard is what two cores did in 4.6 and 5.4 minutes when ten minutes
+ * were the limit. */
+enum { QUALITIES = 3 };
+static const struct {
+    const char *name;
+    double amount[QUALITIES];
+} by_quality[] = {
+    {"detail_steps", {0, 16, 16}}, /* 16 bring it to rest */
+    {"gather_samples", {128, 512, 2048}},
+    {"gloss_passes", {1, 2, 2}},
+    {"listing1_looks", {400, 4000, 16000}},
+    {"measure_stride", {2, 1, 1}},
+    {"refine_looks", {100, 1000, 4000}},
+    {"report_samples", {16, 64, 256}},
+};
+#define BY_QUALITY_COUNT (sizeof by_quality / sizeof by_quality[0])
 
 const struct setting *settings_table(size_t *count) {
     *count = TABLE_COUNT;
@@ -129,7 +160,37 @@ static double default_number(const struct setting *t) {
     return strtod(t->default_text, NULL);
 }
 
+/* The row of by_quality; NULL where quality does not set it. */
+static const double *amounts_of(const char *name) {
+    for (size_t i = 0; i < BY_QUALITY_COUNT; i++) {
+        if (strcmp(by_quality[i].name, name) == 0)
+            return by_quality[i].amount;
+    }
+    return NULL;
+}
+
+/* What entry i is where it is not given. */
+static double usual_number(const struct settings *s, size_t i) {
+    const double *amount = amounts_of(table[i].name);
+    return amount ? amount[(int)settings_number(s, "quality")] : default_number(&table[i]);
+}
+
+double settings_of_quality(const struct settings *s, const char *name) {
+    int i = index_of(name);
+    assert(i >= 0);
+    return usual_number(s, (size_t)i);
+}
+
+/* Gives those that are not given what quality says. */
+static void follow_quality(struct settings *s) {
+    for (size_t i = 0; i < TABLE_COUNT; i++) {
+        if (table[i].type != SETTING_TEXT && !s->is_given[i])
+            s->number[i] = usual_number(s, i);
+    }
+}
+
 void settings_init(struct settings *s) {
+    s->is_given = mem_calloc(TABLE_COUNT, sizeof *s->is_given);
     s->number = mem_calloc(TABLE_COUNT, sizeof *s->number);
     s->text = mem_calloc(TABLE_COUNT, sizeof *s->text);
     for (size_t i = 0; i < TABLE_COUNT; i++) {
@@ -145,6 +206,7 @@ void settings_release(struct settings *s) {
         mem_free(s->text[i]);
     mem_free(s->text);
     mem_free(s->number);
+    mem_free(s->is_given);
     *s = (struct settings){0};
 }
 
@@ -269,9 +331,9 @@ static void check_method(struct settings *s, const cJSON *object, struct faults 
     for (const cJSON *value = object->child; value; value = value->next) {
         int i = index_of(value->string);
         const struct setting *t = i < 0 ? NULL : &table[i];
-        if (!t || !t->method || strcmp(t->method, chosen) == 0 || s->number[i] == default_number(t))
+        if (!t || !t->method || strcmp(t->method, chosen) == 0 || s->number[i] == usual_number(s, (size_t)i))
             continue;
-        s->number[i] = default_number(t);
+        s->number[i] = usual_number(s, (size_t)i);
         if (!f)
             continue;
         snprintf(reason, sizeof reason, "only method=%s uses it, and the method is %s", t->method, chosen);
@@ -296,8 +358,11 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
         } else if (!apply_one(s, (size_t)i, value, reason, sizeof reason)) {
             add_fault(&faults, value->string, reason, table[i].help);
             method_is_good = method_is_good && strcmp(value->string, "method") != 0;
+        } else {
+            s->is_given[i] = true;
         }
     }
+    follow_quality(s);
     check_method(s, object, method_is_good ? &faults : NULL);
     if (faults.count == 0)
         return STATUS_OK;
@@ -349,6 +414,22 @@ cJSON *settings_to_json(const struct settings *s) {
     return object;
 }
 
+/* "by_quality": {"draft": 128, "standard": 512, "fine": 2048}; in words, too, after the help. */
+static void add_help(cJSON *entry, const struct setting *t) {
+    const double *amount = amounts_of(t->name);
+    char word[NAME_MAX_LENGTH], help[512];
+    snprintf(help, sizeof help, "%s", t->help);
+    cJSON *object = amount ? cJSON_AddObjectToObject(entry, "by_quality") : NULL;
+    for (int q = 0; object && q < QUALITIES; q++) {
+        size_t used = strlen(help);
+        choice_at(settings_find("quality")->choices, q, word, sizeof word);
+        json_add_number(object, word, amount[q]);
+        snprintf(help + used, sizeof help - used, "%s%s %.0f%s", q ? ", " : " (", word, amount[q],
+                 q + 1 < QUALITIES ? "" : ")");
+    }
+    json_add_string(entry, "help", help);
+}
+
 cJSON *settings_describe(void) {
     static const char *const type_names[] = {"int", "real", "bool", "choice", "text"};
     struct settings defaults;
@@ -372,7 +453,7 @@ cJSON *settings_describe(void) {
                                                   choice_at(at, 0, word, sizeof word)));
         }
         add_value(entry, "default", i, &defaults);
-        json_add_string(entry, "help", t->help);
+        add_help(entry, t);
         if (t->method)
             json_add_string(entry, "method", t->method);
         cJSON_AddItemToArray(list, entry);

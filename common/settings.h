@@ -32,8 +32,10 @@ const struct setting *settings_find(const char *name);
 /* The valid name nearest to `name` by edit distance, or NULL when none is near. */
 const char *settings_nearest(const char *name);
 
-/* What a job uses: one value per table entry, defaults filled in. */
+/* What a job uses: one value per table entry, what is not given filled in: by the setting `quality` where that names an
+ * amount of work, else by the default. */
 struct settings {
+    bool *is_given; /* [table count] settings_apply was given a value; owned */
     double *number; /* [table count] numbers and booleans (0 or 1); choices by index; owned */
     char **text;    /* [table count] SETTING_TEXT values, NULL for the others; owned */
 };
@@ -41,6 +43,8 @@ struct settings {
 void settings_init(struct settings *s); /* all defaults */
 void settings_release(struct settings *s);
 double settings_number(const struct settings *s, const char *name); /* name must exist */
+/* What it would be if it were not given: by the quality, or the default. Numbers only; name must exist. */
+double settings_of_quality(const struct settings *s, const char *name);
 bool settings_bool(const struct settings *s, const char *name);
 /* Whether a SETTING_CHOICE has the value `word`. */
 bool settings_is(const struct settings *s, const char *name, const char *word);

@@ -1,13 +1,13 @@
 #!/bin/bash
 # The demo: makes a small room whose materials are known, reconstructs it through the daemon and
 # the client as a user would, and compares what was found with what is true. Everything stays
-# under BUILD/demo. UNBAKE_DEMO_SECONDS is the time that the reconstruction gets (60).
+# under BUILD/demo. UNBAKE_DEMO_QUALITY is that of the reconstruction (draft).
 #
 # usage: tests/demo.sh BUILD
 set -u
 build=${1:-build}
 dir=$build/demo
-seconds=${UNBAKE_DEMO_SECONDS:-60}
+quality=${UNBAKE_DEMO_QUALITY:-draft}
 daemon=
 
 fail() {
@@ -61,9 +61,9 @@ done
 UNBAKE_SERVER=http://127.0.0.1:$(cat "$data/port")
 export UNBAKE_SERVER
 
-step "reconstructing it for $seconds s"
+step "reconstructing it, $quality"
 "$build/unbake" submit "$dir/room.tar" --name "demo room" --watch --set texture_size=512 \
-    --set "time_limit_sec=$seconds" || fail "the job did not succeed"
+    --set "quality=$quality" || fail "the job did not succeed"
 
 step "fetching the results"
 "$build/unbake" get last -o "$dir/out" || fail "the results could not be fetched"

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "common/image.h"
 #include "common/json.h"
@@ -47,6 +48,8 @@ struct export_input {
      *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */
     const cJSON *report;
     vec3 up; /* the axis of the room that points up, see scene_up; 0: y */
+    bool has_materials;                /* false: materials are only their neutral start, which no preview shows */
+    const uint16_t (*radiance)[3];     /* [height][width] measured light, half precision; NULL while not known */
 };
 
 #endif

@@ -177,11 +177,24 @@ static enum status put_environment(struct export *e, struct error *err) {
     return status;
 }
 
+static enum status put_radiance_preview(struct export *e, struct error *err) {
+    struct image image;
+    if (!e->input->radiance)
+        return STATUS_OK;
+    picture_radiance(e->input, &image);
+    enum status status = put_image(e, EVENT_PREVIEW, "preview/radiance.png", &image, FORMAT_PNG,
+                                   "measured light: what the photographs show of each texel, its median at mid grey", err);
+    image_release(&image);
+    return status;
+}
+
 /* --- previews and textures ---------------------------------------------------------------- */
 
 static enum status put_previews(struct export *e, struct error *err) {
     enum status status = make_folder(e, "preview", err);
-    for (size_t k = 0; k < KIND_COUNT && status == STATUS_OK; k++) {
+    if (status == STATUS_OK)
+        status = put_radiance_preview(e, err);
+    for (size_t k = 0; e->input->has_materials && k < KIND_COUNT && status == STATUS_OK; k++) {
         struct image image;
         char name[64];
         if (kinds[k].kind == PICTURE_CONFIDENCE && !e->input->confidence_count)

@@ -14,6 +14,7 @@
  *                    some was seen
  *   environment_confidence.exr   float: by direction the `count` of photographs that show it, 0 where it
  *                    was filled in, and the `spread` of what they show
+ *   preview/radiance.png   what the photographs show of each texel: known before anything else
  *   preview/base_color.png roughness.png specular.png emission.png confidence.png
  *           environment.png
  *                    at most EXPORT_PREVIEW_SIZE texels a side
@@ -41,7 +42,7 @@
 typedef enum status export_announce(void *user, const char *type, const char *name,
                                     const char *content_type, struct error *err);
 
-/* Writes preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
+/* Writes what is known by now to preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
 enum status export_preview(const char *dir, const struct export_input *input,
                            export_announce *announce, void *user, struct error *err);
 

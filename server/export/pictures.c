@@ -147,18 +147,17 @@ static rgb show(enum picture_kind kind, rgb value, float count_max) {
     return ramp(log1pf(value.r) / log1pf(fmaxf(count_max, 1.0f)));
 }
 
-void picture_preview(const struct export_input *input, enum picture_kind kind,
-                     struct image *image) {
-    const struct inverse_uv *inverse = input->inverse;
+typedef rgb texel_value(const void *user, size_t texel);
+typedef rgb texel_look(const void *user, rgb mean);
+
+/* Means of value() over valid texels, as look() shows them. */
+static void shrink(const struct inverse_uv *inverse, texel_value *value, texel_look *look, const void *user,
+                   struct image *image) {
     uint32_t larger = inverse->width > inverse->height ? inverse->width : inverse->height;
     uint32_t step = (larger + EXPORT_PREVIEW_SIZE - 1) / EXPORT_PREVIEW_SIZE;
     uint32_t width = (inverse->width + step - 1) / step;
     uint32_t height = (inverse->height + step - 1) / step;
     const rgb nothing = {0.012f, 0.012f, 0.015f};
-    float count_max = 0.0f;
-    if (kind == PICTURE_CONFIDENCE)
-        for (size_t i = 0; i < inverse->valid_count; i++)
-            count_max = fmaxf(count_max, input->confidence_count[inverse->valid[i]]);
     image_init_rgb(image, width, height);
     for (uint32_t y = 0; y < height; y++) {
         for (uint32_t x = 0; x < width; x++) {
@@ -169,17 +168,73 @@ void picture_preview(const struct export_input *input, enum picture_kind kind,
                     size_t texel = (size_t)j * inverse->width + i;
                     if (inverse->triangle[texel] == INVERSE_UV_NONE)
                         continue;
-                    sum = rgb_add(sum, value_at(input, kind, texel));
+                    sum = rgb_add(sum, value(user, texel));
                     valid++;
                 }
             }
-            rgb c = valid ? show(kind, rgb_scale(sum, 1.0f / (float)valid), count_max) : nothing;
+            rgb c = valid ? look(user, rgb_scale(sum, 1.0f / (float)valid)) : nothing;
             float *pixel = &image->pixel[((size_t)y * width + x) * 3];
             pixel[0] = c.r;
             pixel[1] = c.g;
             pixel[2] = c.b;
         }
     }
+}
+
+struct preview {
+    const struct export_input *input;
+    enum picture_kind kind;
+    float count_max; /* of confidence */
+};
+
+static rgb preview_value(const void *user, size_t texel) {
+    const struct preview *p = user;
+    return value_at(p->input, p->kind, texel);
+}
+
+static rgb preview_look(const void *user, rgb mean) {
+    const struct preview *p = user;
+    return show(p->kind, mean, p->count_max);
+}
+
+void picture_preview(const struct export_input *input, enum picture_kind kind,
+                     struct image *image) {
+    const struct inverse_uv *inverse = input->inverse;
+    struct preview p = {input, kind, 0.0f};
+    if (kind == PICTURE_CONFIDENCE)
+        for (size_t i = 0; i < inverse->valid_count; i++)
+            p.count_max = fmaxf(p.count_max, input->confidence_count[inverse->valid[i]]);
+    shrink(inverse, preview_value, preview_look, &p, image);
+}
+
+#define RADIANCE_GRAY 0.2f /* of the median */
+#define RADIANCE_EVERY 16  /* texels, for the median */
+
+struct radiance {
+    const uint16_t (*texel)[3];
+    float scale;
+};
+
+static rgb radiance_value(const void *user, size_t texel) {
+    return rgb_from_half(((const struct radiance *)user)->texel[texel]);
+}
+
+static rgb radiance_look(const void *user, rgb mean) { return rgb_scale(mean, ((const struct radiance *)user)->scale); }
+
+void picture_radiance(const struct export_input *input, struct image *image) {
+    const struct inverse_uv *inverse = input->inverse;
+    struct radiance radiance = {input->radiance, 1.0f};
+    float *luminance = mem_array(inverse->valid_count / RADIANCE_EVERY + 1, sizeof *luminance);
+    size_t count = 0;
+    for (size_t i = 0; i < inverse->valid_count; i += RADIANCE_EVERY) {
+        float l = rgb_luminance(rgb_from_half(input->radiance[inverse->valid[i]]));
+        if (l > 0.0f)
+            luminance[count++] = l;
+    }
+    if (count > 0)
+        radiance.scale = RADIANCE_GRAY / quantile(luminance, count, 0.5);
+    mem_free(luminance);
+    shrink(inverse, radiance_value, radiance_look, &radiance, image);
 }
 
 #define ENVIRONMENT_GRAY 0.2f

@@ -33,6 +33,9 @@ void picture_texture(const struct export_input *input, enum picture_kind kind,
 void picture_preview(const struct export_input *input, enum picture_kind kind,
                      struct image *image);
 
+/* The measured light, as large as the others, its median at mid grey. It must be there. */
+void picture_radiance(const struct export_input *input, struct image *image);
+
 /* The environment with the typical luminance of what was seen at mid grey; what was filled in is
  * at half its brightness. There must be one. */
 void picture_environment(const struct export_input *input, struct image *image);

@@ -379,9 +379,54 @@ static enum status read_settings(const struct job *job, cJSON **given, struct se
     return err->status = STATUS_CORRUPT; /* they were checked when the job was made */
 }
 
-/* The job's settings with its limit, of iterations or of time, put off by what the body says (and all of that time
- * used);
- * NULL, and *refusal, where that makes no sense. The caller's (mem_free). */
+/* What may be put off of the job's limits, by its name in a request: iterations, where it has that limit; else the
+ * observations at each part of the texture, where it has an end by them, and the time, where that is limited. The name of
+ * the setting; NULL: not that. */
+static const char *limit_setting(const struct settings *full, const char *name) {
+    const char *looks = settings_is(full, "method", "solve") ? "refine_looks" : "listing1_looks";
+    bool by_iterations = settings_number(full, "iterations") > 0.0;
+    if (strcmp(name, "iterations") == 0)
+        return by_iterations ? "iterations" : NULL;
+    if (strcmp(name, "looks") == 0)
+        return !by_iterations && settings_number(full, looks) > 0.0 ? looks : NULL;
+    if (strcmp(name, "time_limit_sec") == 0)
+        return !by_iterations && settings_number(full, name) > 0.0 ? "time_limit_sec" : NULL;
+    return NULL;
+}
+
+/* Puts off the limit that the body names, in the settings as they were given; problems go to params. All of a time is
+ * used: the job may have ended before the old one. */
+static void put_off(cJSON *settings, struct settings *full, const cJSON *body, cJSON *params) {
+    static const char *const names[] = {"iterations", "time_limit_sec", "looks"};
+    const char *limit = limit_setting(full, body->string), *right = NULL;
+    double more = cJSON_IsNumber(body) ? body->valuedouble : -1.0;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        right = !right && limit_setting(full, names[i]) ? names[i] : right;
+    if (!limit) {
+        problem_param(params, body->string, NULL, "is not what limits this job: %s is", right);
+        return;
+    }
+    double sum = settings_number(full, limit) + more;
+    if (!(more > 0.0) || sum <= settings_number(full, limit)) { /* one that counts, too */
+        problem_param(params, body->string, NULL, "must be a number above 0");
+        return;
+    }
+    if (strcmp(limit, "time_limit_sec") != 0 && more != floor(more)) {
+        problem_param(params, body->string, NULL, "must be a whole number");
+        return;
+    }
+    cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
+    json_add_number(settings, limit, sum);
+    if (strcmp(limit, "time_limit_sec") == 0) {
+        cJSON_DeleteItemFromObjectCaseSensitive(settings, "refine_looks");
+        if (settings_is(full, "method", "solve"))
+            json_add_number(settings, "refine_looks", 0);
+    }
+    settings_apply(full, settings, params, NULL);
+}
+
+/* The job's settings with its limit put off by what the body says; NULL, and *refusal, where that makes no sense. The
+ * caller's (mem_free). */
 static char *longer_settings(const struct request *r, const struct job *job, struct response **refusal) {
     struct error err;
     cJSON *body = NULL, *settings = NULL, *params = cJSON_CreateArray();
@@ -391,29 +436,12 @@ static char *longer_settings(const struct request *r, const struct job *job, str
     if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK) {
         *refusal = problem(r, 400, "%s", err.message);
     } else if (!cJSON_IsObject(body) || cJSON_GetArraySize(body) != 1) {
-        *refusal = problem(r, 400, "the request body is not {\"iterations\": N} or {\"time_limit_sec\": SEC}");
+        *refusal = problem(r, 400,
+                           "the request body is not {\"looks\": N}, {\"iterations\": N} or {\"time_limit_sec\": SEC}");
     } else if (read_settings(job, &settings, &full, &err) != STATUS_OK) {
         *refusal = problem_from(r, &err);
     } else {
-        /* The limit that the job has is the one that can be put off. */
-        const char *limit = settings_number(&full, "iterations") > 0 ? "iterations" : "time_limit_sec";
-        double more = cJSON_IsNumber(body->child) ? body->child->valuedouble : -1.0;
-        if (strcmp(body->child->string, limit) != 0)
-            problem_param(params, body->child->string, NULL, "is not what limits this job: %s is", limit);
-        else if (!(more > 0.0) || settings_number(&full, limit) + more <= settings_number(&full, limit))
-            problem_param(params, limit, NULL, "must be a number above 0"); /* one that counts, too */
-        else if (strcmp(limit, "iterations") == 0 && more != floor(more))
-            problem_param(params, limit, NULL, "must be a whole number");
-        double sum = settings_number(&full, limit) + more;
-        cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
-        json_add_number(settings, limit, sum);
-        if (strcmp(limit, "time_limit_sec") == 0) { /* it may have ended before its time */
-            cJSON_DeleteItemFromObjectCaseSensitive(settings, "refine_looks");
-            if (settings_is(&full, "method", "solve"))
-                json_add_number(settings, "refine_looks", 0);
-        }
-        if (cJSON_GetArraySize(params) == 0)
-            settings_apply(&full, settings, params, NULL);
+        put_off(settings, &full, body->child, params);
         if (cJSON_GetArraySize(params) > 0) {
             *refusal = problem_invalid(r, "the job cannot be extended by that", params);
             params = NULL;

@@ -63,7 +63,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
     switch (code) {
     case PROGRESS_EXIT_OK:
         if (a->has_end && a->end_status == STATUS_OK)
-            say(v, OUTCOME_OK, "", "");
+            say(v, OUTCOME_OK, message, "");
         else
             say(v, OUTCOME_CRASH, "the worker ended without a result", "");
         return;
@@ -140,7 +140,7 @@ static enum status settle_memory(const struct attempt *a, struct store *store,
 static enum status settle_job(const struct attempt *a, struct store *store, const struct verdict *v,
                               struct error *err) {
     switch (v->outcome) {
-    case OUTCOME_OK: return store_job_succeed(store, a->job_id, a->number, err);
+    case OUTCOME_OK: return store_job_succeed_but(store, a->job_id, a->number, v->reason, err);
     case OUTCOME_INPUT:
         return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_BLOCKED:

@@ -8,6 +8,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/capture/clip.h"
+#include "server/capture/glance.h"
 #include "server/capture/orient.h"
 #include "server/capture/shown.h"
 #include "server/capture/sparks.h"
@@ -27,12 +28,19 @@
 #include "server/scene/mesh_denoise.h"
 #include "server/scene/normals.h"
 #include "server/state/evidence.h"
+#include "server/state/pace.h"
 
 /* Where every surface starts, with a neutral base colour: half rough, half glossy. */
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 
 #define HOLD_OUT_LEAST 16
+
+/* Of the time of prepare, about, in staircase2 at 2048 x 2048: mapping the surface; what photographs see of it;
+ * what they tell of themselves. The rest maps it anew. */
+#define MAP_SHARE 0.08
+#define VIEWS_SHARE 0.06
+#define CALIBRATE_SHARE 0.72
 
 struct run {
     struct reconstruction *r;
@@ -51,6 +59,7 @@ static enum status run_stage(struct run *run, const char *name,
                              enum status (*stage)(struct run *, struct error *), struct error *err) {
     double begin = clock_sec();
     run->hooks->stage(run->hooks->user, name);
+    pace_begin_stage(run->r, run->hooks, name);
     enum status status = stage(run, err);
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", name);
@@ -178,6 +187,8 @@ static enum status remap_surface(struct run *run, bool has_split, struct error *
     if (density)
         shown_density(&run->views, &r->atlas, r->pool, density);
     forget_surface(r);
+    mem_free(r->glance); /* of the former atlas */
+    r->glance = NULL;
     enum status status = map_surface(r, density, err);
     mem_free(density);
     if (status != STATUS_OK)
@@ -206,6 +217,23 @@ static void estimate_normals(struct run *run) {
     run->normals = had_some ? "given" : mesh->normal ? "estimated" : "none";
 }
 
+static enum status preview_if_due(struct run *run, struct error *err) {
+    const struct reconstruct_hooks *hooks = run->hooks;
+    return hooks->preview_due(hooks->user) ? hooks->preview(hooks->user, run->r, err) : STATUS_OK;
+}
+
+/* A first picture, before what takes longer. */
+static enum status show_glance(struct run *run, struct error *err) {
+    struct reconstruction *r = run->r;
+    if (!run->hooks->preview_due(run->hooks->user))
+        return STATUS_OK;
+    r->glance = glance(&run->views, &r->atlas, &r->inverse, r->pool);
+    return preview_if_due(run, err);
+}
+
+/* So much more of prepare is done. */
+static void prepared(struct run *run, double share) { pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share); }
+
 static enum status prepare(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -222,7 +250,12 @@ static enum status prepare(struct run *run, struct error *err) {
     status = map_surface(r, NULL, err);
     if (status != STATUS_OK)
         return status;
+    prepared(run, MAP_SHARE);
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
+    prepared(run, VIEWS_SHARE);
+    status = show_glance(run, err);
+    if (status != STATUS_OK)
+        return status;
     calibrate(r, &run->views, run->hooks);
     noise_measure(&r->noise, &run->views);
     noise_tell_black(&r->noise, r->scene);
@@ -230,8 +263,11 @@ static enum status prepare(struct run *run, struct error *err) {
     sparks_mark(r->scene, &run->views, &r->noise, r->pool);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
+    prepared(run, CALIBRATE_SHARE);
     status = remap_surface(run, split_shining(run), err);
     add_prepare_figures(run);
+    pace_measure_room(r);
+    prepared(run, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
     return status;
 }
 
@@ -250,7 +286,6 @@ static void log_unseen(const struct run *run) {
 }
 
 static enum status fuse_photographs(struct run *run, struct error *err) {
-    (void)err; /* nothing here can fail */
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     saturated_light_estimate(run->r, &run->views);
     lamp_find(run->r, &run->views);
@@ -261,15 +296,15 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
         environment_make_unseen(&run->r->environment); /* it is drawn there when solve is done */
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
-    return STATUS_OK;
+    mem_free(run->r->glance);
+    run->r->glance = NULL;
+    pace_advance(run->r, run->hooks, "fuse", PLAN_FUSE, 1.0);
+    return preview_if_due(run, err);
 }
 
 static enum status solve(struct run *run, struct error *err) {
-    double begin = clock_sec();
     enum status status = solve_run(run->r, &run->views, run->hooks, err);
-    if (status == STATUS_OK)
-        status = refine_start(run->optimiser, clock_sec() - begin, err);
-    return status;
+    return status == STATUS_OK ? refine_start(run->optimiser, err) : status;
 }
 
 static enum status optimise(struct run *run, struct error *err) {
@@ -285,6 +320,7 @@ static enum status run_resumable(struct run *run, struct error *err) {
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
     bool was_solved = status == STATUS_OK && solves && found;
+    run->r->has_materials = status == STATUS_OK;
     if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* a checkpoint holds no map, only what solve did to it */
         lamps_brighten_sky(run->r, run->r->sky_factor);
     if (was_solved)
@@ -303,7 +339,11 @@ static enum status run_resumable(struct run *run, struct error *err) {
 static enum status report(struct run *run, struct error *err) {
     world_update_lights(&run->r->world);
     report_emitters(run->r);
-    return report_held_out(run->r, &run->views, run->hooks, err);
+    enum status status = report_held_out(run->r, &run->views, run->hooks, err);
+    plan_close(&run->r->plan, PLAN_REPORT);
+    if (status == STATUS_OK)
+        pace_report(run->r, run->hooks);
+    return status;
 }
 
 enum status reconstruct_run(struct scene *scene, const struct settings *settings,
@@ -317,6 +357,7 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
     json_add(r->report, "settings", settings_to_json(settings));
     struct run run = {.r = r, .hooks = hooks};
     run.stages = cJSON_AddArrayToObject(r->report, "stages");
+    pace_start(r, hooks);
     enum status status = run_stage(&run, "prepare", prepare, err);
     if (status == STATUS_OK)
         status = run_stage(&run, "fuse", fuse_photographs, err);
@@ -334,6 +375,7 @@ void reconstruct_release(struct reconstruction *r) {
         image_release(&r->held_out[i].render);
     }
     mem_free(r->held_out);
+    mem_free(r->glance);
     mem_free(r->is_emitter);
     mem_free(r->evidence);
     environment_release(&r->environment);

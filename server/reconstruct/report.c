@@ -10,6 +10,7 @@
 #include "server/render/film.h"
 #include "server/render/path.h"
 #include "server/state/evidence.h"
+#include "server/state/pace.h"
 
 /* HDR frames are shown with their median at this fraction of white. */
 #define SHOWN_MEDIAN 0.2
@@ -78,11 +79,21 @@ static void clip_image(struct image *image, const struct photograph *photo) {
     }
 }
 
+/* Samples a pixel of the next view, of views that have so many pixels in all: those that are asked for, or what the plan
+ * leaves. */
+static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
+    const struct plan_work *work = &r->plan.part[PLAN_REPORT];
+    double samples = settings_number(r->settings, "report_samples");
+    if (plan_is_cut(&r->plan, PLAN_REPORT))
+        samples = fmin(fmax(floor((work->now - work->done) / pixels_left), 1.0), samples);
+    return (uint32_t)samples;
+}
+
 /* The room as recovered, from a camera, as an R G B picture, and the standard errors of its values as another. */
-static void render_radiance(struct reconstruction *r, const struct camera *camera,
+static void render_radiance(struct reconstruction *r, const struct camera *camera, uint32_t samples,
                             const struct path_settings *path, struct image *image, struct image *error) {
     struct image film;
-    film_render(&r->world, camera, (uint32_t)settings_number(r->settings, "report_samples"), path, 0,
+    film_render(&r->world, camera, samples, path, 0,
                 r->pool, &film);
     image_take_rgb(&film, image);
     image_init_rgb(error, film.width, film.height);
@@ -106,7 +117,7 @@ static void photograph_noise(const struct reconstruction *r, const struct photog
 }
 
 static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view,
-                        double median) {
+                        uint32_t samples, double median) {
     const struct settings *set = r->settings;
     struct path_settings path = {
         .max_depth = (int)settings_number(set, "max_depth"),
@@ -117,7 +128,7 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     view->camera = &photo->camera;
     photograph_radiance(photo, &view->photograph);
     struct image error, noise;
-    render_radiance(r, &photo->camera, &path, &view->render, &error);
+    render_radiance(r, &photo->camera, samples, &path, &view->render, &error);
     fit_light(r, photo, view);
     if (!photo->is_hdr)
         clip_image(&view->render, photo);
@@ -144,18 +155,28 @@ static void mean_add(struct mean *mean, double value) {
     mean->count += 1.0;
 }
 
+static double pixels_of(const struct photograph *photo) {
+    return (double)photo->camera.width * (double)photo->camera.height;
+}
+
 enum status report_held_out(struct reconstruction *r, const struct views *views,
                             const struct reconstruct_hooks *hooks, struct error *err) {
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");
+    double pixels_left = 0.0;
+    for (size_t i = 0; i < scene->photograph_count; i++)
+        pixels_left += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
     struct mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
     r->held_out = mem_calloc(total + 1, sizeof *r->held_out);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
             continue;
         struct held_out *view = &r->held_out[r->held_out_count++];
-        render_view(r, &scene->photograph[i], view, (double)views->median_radiance);
+        double pixels = pixels_of(&scene->photograph[i]);
+        uint32_t samples = samples_of(r, pixels_left);
+        render_view(r, &scene->photograph[i], view, samples, (double)views->median_radiance);
+        pixels_left -= pixels;
         mean_add(&msre, view->msre);
         mean_add(&render_noise, view->msre_render_noise);
         mean_add(&photograph_noise, view->msre_photograph_noise);
@@ -163,13 +184,14 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
         mean_add(&ssim, view->ssim);
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", view->name);
+        json_add_int(entry, "samples", samples);
         json_add_number(entry, "msre", view->msre);
         json_add_number(entry, "msre_render_noise", view->msre_render_noise);
         json_add_number(entry, "msre_photograph_noise", view->msre_photograph_noise);
         json_add_number(entry, "psnr_db", view->psnr_db);
         json_add_number(entry, "ssim", view->ssim);
         cJSON_AddItemToArray(list, entry);
-        hooks->progress(hooks->user, "report", (double)r->held_out_count, (double)total, -1.0);
+        pace_advance(r, hooks, "report", PLAN_REPORT, pixels * (double)samples);
         if (hooks->stop_requested(hooks->user))
             return error_set(err, STATUS_CANCELLED, "stopped while rendering the held-out views");
     }

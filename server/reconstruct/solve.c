@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "common/clock.h"
 #include "common/mem.h"
 #include "server/gather/probes.h"
 #include "server/gather/sun_mirrored.h"
@@ -19,6 +18,7 @@
 #include "server/material/gloss.h"
 #include "server/scene/by_segment.h"
 #include "server/state/evidence.h"
+#include "server/state/pace.h"
 
 /* The first tells what each place sends out, the second what is glossy in that light, the last all. The second is left
  * out where most light is an estimate (unseen_light.h), which is off by more than it puts right. */
@@ -28,12 +28,9 @@ enum { PASS_LIGHT, PASS_GLOSS, PASS_ALL, PASSES };
 #define LEAST_SPACING 4
 /* Part of gather_samples that all passes but the last take. */
 #define EARLY_PASS_PART 0.25
-/* They measure one texel in so many squared: only what texels send out is taken from them. So does the last where the
- * time limit is too short for all of them. */
+/* They measure one texel in so many squared of those that the last does: only what texels send out is taken from them.
+ * So does the last where a time limit is too short for all of them. */
 #define COARSE_STRIDE 2
-#define TRIED 0.03 /* of all texels: so many tell how long they will take */
-/* Steps of detail.h after it has measured every texel: so many bring it to rest. */
-#define DETAIL_STEPS 16
 /* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
  * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
  * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
@@ -61,94 +58,121 @@ struct solve {
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
     double texels_a_pixel;   /* detail_texels_a_pixel */
     double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
-    double begin_sec;
-    double work_done, work_total;
+    size_t samples;          /* directions of each probe, in the newest pass */
+    bool is_shown;           /* the newest pass, by a preview */
 };
 
 /* --- progress and stopping ---------------------------------------------------------------------- */
 
-/* Notes a part of the work as done; false when the run is to stop. */
-static bool advance(struct solve *s, double work) {
-    s->work_done += work;
-    s->hooks->progress(s->hooks->user, "solve", s->work_done, s->work_total, -1.0);
-    return !s->hooks->stop_requested(s->hooks->user);
+/* Shows what the newest pass found, when it is time for that. */
+static enum status show(struct solve *s, struct error *err) {
+    if (s->is_shown || !s->hooks->preview_due(s->hooks->user))
+        return STATUS_OK;
+    s->is_shown = true;
+    return s->hooks->preview(s->hooks->user, s->r, err);
 }
 
-/* Rays are the measure of work: about so many a texel when its highlights are gathered. */
-#define RAYS_A_TEXEL 100.0
-#define RAYS_A_DETAIL 2.0 /* and step */
+/* Notes a part of the work as done; STATUS_CANCELLED when the run is to stop. */
+static enum status advance(struct solve *s, enum plan_part part, double work, struct error *err) {
+    pace_advance(s->r, s->hooks, "solve", part, work);
+    if (s->hooks->stop_requested(s->hooks->user))
+        return error_set(err, STATUS_CANCELLED, "stopped while solving");
+    return show(s, err);
+}
 
-static size_t samples_of(const struct solve *s, int pass) {
+static bool is_left_out(const struct solve *s, int pass) {
+    return pass == PASS_GLOSS && (s->r->sky_is_fitted || settings_number(s->r->settings, "gloss_passes") < 2.0);
+}
+
+static double wanted_samples(const struct solve *s, int pass) {
     double samples = settings_number(s->r->settings, "gather_samples");
-    return (size_t)(pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART));
+    return pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART);
 }
 
-static bool is_left_out(const struct solve *s, int pass) { return pass == PASS_GLOSS && s->r->sky_is_fitted; }
+/* What the plan leaves of the directions of this pass and those after it. */
+static size_t planned_samples(const struct solve *s, int first) {
+    const struct plan_work *work = &s->r->plan.part[PLAN_GATHER];
+    double left = 0.0;
+    if (!plan_is_cut(&s->r->plan, PLAN_GATHER))
+        return (size_t)wanted_samples(s, first);
+    for (int pass = first; pass < PASSES; pass++)
+        left += is_left_out(s, pass) ? 0.0 : wanted_samples(s, pass) * (double)s->probes.count;
+    double share = left > 0.0 ? (work->now - work->done) / left : 1.0;
+    return (size_t)ceil(fmin(fmax(share, PACE_LEAST_GATHER), 1.0) * wanted_samples(s, first));
+}
+
+static uint32_t stride_of(const struct solve *s, int pass) {
+    uint32_t stride = (uint32_t)settings_number(s->r->settings, "measure_stride");
+    return pass == PASS_ALL ? stride : COARSE_STRIDE * stride;
+}
+
+static bool finds_detail(const struct solve *s) {
+    return stride_of(s, PASS_ALL) == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 &&
+           settings_number(s->r->settings, "detail_steps") > 0.0;
+}
 
 static void plan_work(struct solve *s) {
-    for (int pass = 0; pass < PASSES; pass++)
-        if (!is_left_out(s, pass))
-            s->work_total += (double)s->probes.count * (double)samples_of(s, pass) +
-                             RAYS_A_TEXEL * (double)s->r->inverse.valid_count;
-    s->work_total += DETAIL_STEPS * RAYS_A_DETAIL * (double)s->r->inverse.valid_count;
+    double valid = (double)s->r->inverse.valid_count, directions = 0.0, early = 0.0;
+    double last = (double)stride_of(s, PASS_ALL), coarse = (double)stride_of(s, PASS_LIGHT);
+    for (int pass = 0; pass < PASSES; pass++) {
+        if (is_left_out(s, pass))
+            continue;
+        directions += (double)s->probes.count * wanted_samples(s, pass);
+        early += pass == PASS_ALL ? 0.0 : valid / (coarse * coarse);
+    }
+    pace_plan_solve(s->r, valid, directions, early, valid / (last * last),
+                    finds_detail(s) ? settings_number(s->r->settings, "detail_steps") * valid : 0.0);
 }
 
-static bool gather(struct solve *s, int pass) {
+static enum status gather(struct solve *s, int pass, struct error *err) {
     const struct reconstruction *r = s->r;
     uint64_t seed = (uint64_t)settings_number(r->settings, "seed") + (uint64_t)pass;
-    size_t samples = samples_of(s, pass);
-    for (size_t first = 0; first < s->probes.count; first += SLICE_PROBES) {
+    enum status status = STATUS_OK;
+    s->samples = planned_samples(s, pass);
+    for (size_t first = 0; first < s->probes.count && status == STATUS_OK; first += SLICE_PROBES) {
         size_t count = s->probes.count - first < SLICE_PROBES ? s->probes.count - first : SLICE_PROBES;
-        probes_gather(&s->probes, &s->field, &r->scene->mesh, &r->atlas, &r->inverse, seed, samples, first,
+        probes_gather(&s->probes, &s->field, &r->scene->mesh, &r->atlas, &r->inverse, seed, s->samples, first,
                       count, r->pool);
-        if (!advance(s, (double)(count * samples)))
-            return false;
+        status = advance(s, PLAN_GATHER, (double)(count * s->samples), err);
     }
-    return true;
+    return status;
 }
 
-/* Whether the time limit, where there is one, leaves less time than the rest of the work takes at the rate of the last
- * `work`, begun at begin_sec. */
-static bool is_short(const struct solve *s, double begin_sec, double work) {
-    const struct settings *set = s->r->settings;
-    double now = clock_sec(), rest_sec = (now - begin_sec) / work * (s->work_total - s->work_done);
-    return settings_number(set, "iterations") == 0.0 &&
-           now - s->begin_sec + rest_sec > settings_number(set, "time_limit_sec");
-}
-
-/* Measures all texels; one in COARSE_STRIDE squared, also of those before, from when time is found to be short. */
-static bool divide_all(struct solve *s) {
+/* Measures all texels; in the last pass one in COARSE_STRIDE squared of them, also of those before, from when the plan
+ * has no time for more. */
+static enum status divide_all(struct solve *s, int pass, struct error *err) {
     size_t valid = s->r->inverse.valid_count;
-    double begin_sec = clock_sec();
-    for (size_t first = 0; first < valid; first += SLICE_TEXELS) {
+    enum status status = STATUS_OK;
+    s->divide.stride = stride_of(s, pass);
+    for (size_t first = 0; first < valid && status == STATUS_OK; first += SLICE_TEXELS) {
         size_t count = valid - first < SLICE_TEXELS ? valid - first : SLICE_TEXELS;
+        if (pass == PASS_ALL && plan_is_cut(&s->r->plan, PLAN_MEASURE))
+            s->divide.stride = COARSE_STRIDE * stride_of(s, PASS_ALL);
         divide_texels(&s->divide, s->r->inverse.valid + first, count);
-        if (!advance(s, RAYS_A_TEXEL * (double)count))
-            return false;
-        double done = (double)(first + count);
-        if (done >= TRIED * (double)valid && is_short(s, begin_sec, RAYS_A_TEXEL * done))
-            s->divide.stride = COARSE_STRIDE;
+        double stride = (double)s->divide.stride;
+        status = advance(s, PLAN_MEASURE, (double)count / (stride * stride), err);
     }
-    return true;
+    return status;
 }
 
 /* Sharpens what was measured of every texel. */
-static bool find_detail(struct solve *s) {
+static enum status find_detail(struct solve *s, struct error *err) {
     const struct reconstruction *r = s->r;
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     uint16_t(*white)[3] = mem_calloc_large(texels, sizeof *white);
+    int steps = (int)settings_number(r->settings, "detail_steps");
+    enum status status = STATUS_OK;
     struct detail detail;
-    bool going = true;
     divide_white_all(&s->divide, white);
     detail_init(&detail, r, s->views, (const uint16_t(*)[3])white, s->divide.measured);
-    for (int i = 0; i < DETAIL_STEPS && going; i++) {
+    for (int i = 0; i < steps && status == STATUS_OK; i++) {
         detail_step(&detail);
-        going = advance(s, RAYS_A_DETAIL * (double)r->inverse.valid_count);
+        status = advance(s, PLAN_DETAIL, (double)r->inverse.valid_count, err);
     }
     detail_finish(&detail);
     detail_release(&detail);
     mem_free(white);
-    return going;
+    return status;
 }
 
 /* --- emitters ----------------------------------------------------------------------------------- */
@@ -268,7 +292,7 @@ static uint32_t spacing_for(const struct atlas *atlas) {
 static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views,
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .begin_sec = clock_sec()};
+    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .is_shown = true};
     s->sent = (struct divide_sent){mem_calloc_large(texels, sizeof *s->sent.all),
                                    mem_calloc_large(texels, sizeof *s->sent.unmirrored),
                                    mem_calloc(r->segments.count, sizeof *s->sent.lobe)};
@@ -318,15 +342,8 @@ static void refit_lamps(struct solve *s, int pass) {
     }
 }
 
-static bool solve_pass(struct solve *s, int pass) {
-    if (pass == PASS_LIGHT) {
-        emitters_light_bright(s->r, s->views, s->r->evidence);
-    } else {
-        refit_lamps(s, pass);
-        set_lights(s);
-    }
-    if (!gather(s, pass))
-        return false;
+/* What lies between gathering and measuring, as so much of the plan's part. */
+static enum status fit(struct solve *s, int pass, struct error *err) {
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
         gloss_fit(s->r, s->views, &s->probes, &s->evenly);
@@ -335,13 +352,30 @@ static bool solve_pass(struct solve *s, int pass) {
         s->mirrored_share = sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
                                              (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
-    s->divide.stride = pass == PASS_ALL ? 1 : COARSE_STRIDE;
-    if (!divide_all(s))
-        return false;
-    if (s->divide.stride == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 && !find_detail(s))
-        return false;
+    return advance(s, PLAN_FIT, 1.0 / (is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES), err);
+}
+
+static enum status solve_pass(struct solve *s, int pass, struct error *err) {
+    if (pass == PASS_LIGHT) {
+        emitters_light_bright(s->r, s->views, s->r->evidence);
+    } else {
+        refit_lamps(s, pass);
+        set_lights(s);
+    }
+    enum status status = gather(s, pass, err);
+    if (status == STATUS_OK)
+        status = fit(s, pass, err);
+    if (status == STATUS_OK)
+        status = divide_all(s, pass, err);
+    bool sharpens = s->divide.stride == 1 && finds_detail(s) && !plan_is_cut(&s->r->plan, PLAN_DETAIL);
+    if (status == STATUS_OK && sharpens)
+        status = find_detail(s, err);
+    if (status != STATUS_OK)
+        return status;
     divide_finish(&s->divide, &s->sent);
-    return true;
+    s->r->has_materials = true;
+    s->is_shown = false;
+    return show(s, err);
 }
 
 /* What each segment was found to be. */
@@ -365,7 +399,7 @@ static void report(const struct solve *s) {
     json_add_int(figures, "passes", is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES);
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
-    json_add_int(figures, "directions_a_probe", (int64_t)samples_of(s, PASS_ALL));
+    json_add_int(figures, "directions_a_probe", (int64_t)s->samples);
     json_add_number(figures, "mirrored_sun_share_of_light", s->mirrored_share);
     json_add(figures, "segments", segment_list(s->r));
     json_add_int(figures, "measured_one_texel_in", (int64_t)s->divide.stride * (int64_t)s->divide.stride);
@@ -375,15 +409,17 @@ static void report(const struct solve *s) {
 enum status solve_run(struct reconstruction *r, const struct views *views,
                       const struct reconstruct_hooks *hooks, struct error *err) {
     struct solve s;
-    bool going = true;
+    enum status status = STATUS_OK;
     solve_init(&s, r, views, hooks);
     emitters_observe(r, views, r->evidence);
-    for (int pass = 0; pass < PASSES && going; pass++)
-        going = is_left_out(&s, pass) || solve_pass(&s, pass);
-    if (going) {
+    for (int pass = 0; pass < PASSES && status == STATUS_OK; pass++)
+        status = is_left_out(&s, pass) ? STATUS_OK : solve_pass(&s, pass, err);
+    if (status == STATUS_OK) {
         set_emission(&s);
         report(&s);
     }
     solve_release(&s);
-    return going ? STATUS_OK : error_set(err, STATUS_CANCELLED, "stopped while solving");
+    for (int part = PLAN_GATHER; part <= PLAN_DETAIL; part++)
+        plan_close(&r->plan, (enum plan_part)part);
+    return status;
 }

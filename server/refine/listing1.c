@@ -134,7 +134,7 @@ static void release(void *self) {
     mem_free(l);
 }
 
-static const struct optimiser_method method = {iterate, resumed, NULL, NULL, release};
+static const struct optimiser_method method = {iterate, resumed, NULL, release};
 
 struct optimiser *listing1_new(struct reconstruction *r, const struct views *views,
                                const struct reconstruct_hooks *hooks) {

@@ -5,19 +5,32 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "common/clock.h"
+#include "common/hash64.h"
 #include "common/mem.h"
 #include "server/state/evidence.h"
+#include "server/state/pace.h"
 
 /* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. */
 #define RATE_FALL 15.0
 
-/* Seconds between two messages of progress. */
-#define TELL_SEC 1.0
+/* Where hardly anything of the surface is seen, visits that found no photograph end a run by observations: so many times
+ * the observations that are wanted. */
+#define VISITS_MOST 10.0
+
+void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {
+    assert(o->state_count < OPTIMISER_ARRAYS);
+    o->state[o->state_count++] = (struct state_array){name, data, bytes, format};
+}
 
 void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes) {
-    assert(o->state_count < OPTIMISER_ARRAYS);
-    o->state[o->state_count++] = (struct state_array){name, data, bytes};
+    optimiser_keep_since(o, 1, name, data, bytes);
+}
+
+/* A checkpoint speaks of texels and segments by number: they are the same ones where this is. */
+static uint64_t surface_of(const struct reconstruction *r) {
+    size_t texels = (size_t)r->inverse.width * r->inverse.height;
+    uint64_t of_texels = hash64(r->inverse.triangle, texels * sizeof *r->inverse.triangle, r->inverse.width);
+    return hash64(r->segments.of_triangle, r->scene->mesh.triangle_count * sizeof *r->segments.of_triangle, of_texels);
 }
 
 static void keep_common(struct optimiser *o) {
@@ -36,6 +49,8 @@ static void keep_common(struct optimiser *o) {
     optimiser_keep(o, "environment.factor", &r->sky_factor, sizeof r->sky_factor);
     optimiser_keep(o, "sun.irradiance", &r->sun.irradiance, sizeof r->sun.irradiance);
     optimiser_keep(o, "emission.is_emitter", r->is_emitter, segments * sizeof *r->is_emitter);
+    optimiser_keep_since(o, 2, "plan", &o->plan, sizeof o->plan);
+    optimiser_keep_since(o, 2, STATE_SURFACE, &o->surface, sizeof o->surface);
 }
 
 struct optimiser *optimiser_new(struct reconstruction *r, const struct views *views,
@@ -45,7 +60,7 @@ struct optimiser *optimiser_new(struct reconstruction *r, const struct views *vi
     struct optimiser *o = mem_alloc(sizeof *o);
     *o = (struct optimiser){.r = r, .views = views, .hooks = hooks, .method = method, .self = self};
     o->iteration_limit = (uint64_t)settings_number(set, "iterations");
-    o->time_limit_sec = settings_number(set, "time_limit_sec");
+    o->surface = surface_of(r);
     const struct path_settings path = {
         .max_depth = (int)settings_number(set, "max_depth"),
         .roulette_depth = (int)settings_number(set, "roulette_depth"),
@@ -66,14 +81,42 @@ void optimiser_free(struct optimiser *o) {
     mem_free(o);
 }
 
-/* How much of the run is done, in [0, 1]. */
+/* Observations so far. */
+static double look_count(const struct optimiser *o) {
+    return (double)o->counters.path_count / settings_number(o->r->settings, "samples_per_camera");
+}
+
+/* Observations of an iteration, at most. */
+static double visits_an_iteration(const struct optimiser *o) {
+    return (double)o->pass.chooser.stratum_count * settings_number(o->r->settings, "cameras_per_texel");
+}
+
+/* Iterations, or else observations, that are to be done; infinite where the time limit alone ends them. */
+static double wanted(const struct optimiser *o) {
+    return o->iteration_limit ? (double)o->iteration_limit : pace_looks_wanted(o->r);
+}
+
+/* How much of the run is done, in [0, 1]: a matter of the clock only where there is a time limit. */
 static double fraction_done(const struct optimiser *o) {
-    double fraction = o->iteration_limit
-                          ? (double)o->counters.iteration / (double)o->iteration_limit
-                          : o->counters.elapsed_sec / o->time_limit_sec;
-    if (!o->iteration_limit && o->method->done)
-        fraction = fmax(fraction, o->method->done(o->self));
+    const struct plan_work *work = &o->r->plan.part[PLAN_REFINE];
+    double iteration = (double)o->counters.iteration, fraction;
+    if (o->iteration_limit)
+        fraction = iteration / (double)o->iteration_limit;
+    else if (isinf(work->wanted))
+        fraction = 0.0;
+    else
+        fraction = fmax(look_count(o), iteration * visits_an_iteration(o) / VISITS_MOST) / wanted(o);
+    if (isinf(work->wanted) || plan_is_cut(&o->r->plan, PLAN_REFINE))
+        fraction = fmax(fraction, work->now > work->done ? work->done / work->now : 1.0);
     return fraction < 1.0 ? fraction : 1.0;
+}
+
+/* Iterations as observations, by those that there were. */
+static void plan_iterations(struct optimiser *o) {
+    double iteration = (double)o->counters.iteration;
+    double each = iteration > 0.0 && look_count(o) > 0.0 ? look_count(o) / iteration : visits_an_iteration(o);
+    if (o->iteration_limit)
+        pace_plan_looks(o->r, each * (double)o->iteration_limit);
 }
 
 float optimiser_rate_fall(double fraction) {
@@ -82,15 +125,21 @@ float optimiser_rate_fall(double fraction) {
 }
 
 enum status optimiser_save(struct optimiser *o, struct error *err) {
+    plan_pass_time(&o->r->plan, o->hooks->worked_sec(o->hooks->user));
+    o->counters.elapsed_sec = o->r->plan.used_sec;
+    for (int i = 0; i < PLAN_PARTS; i++) {
+        o->plan.wanted[i] = o->r->plan.part[i].wanted;
+        o->plan.done[i] = o->r->plan.part[i].done;
+    }
     return o->hooks->checkpoint_save(o->hooks->user, (long)o->counters.iteration, o->state, o->state_count, err);
 }
 
 /* The run was extended: what the curve has lies in a smaller part of it. */
-static void redraw_curve(struct optimiser *o) {
+static void redraw_curve(struct optimiser *o, bool is_extended) {
     struct optimiser_counters *c = &o->counters;
-    double planned = o->iteration_limit ? (double)o->iteration_limit : o->time_limit_sec;
-    for (size_t i = 0; planned > c->planned && i < OPTIMISER_CURVE_POINTS; i++) {
-        size_t bin = (size_t)((double)i * c->planned / planned);
+    double planned = wanted(o);
+    for (size_t i = 0; is_extended && planned > c->planned && i < OPTIMISER_CURVE_POINTS; i++) {
+        size_t bin = isinf(planned) ? 0 : (size_t)((double)i * c->planned / planned);
         double sum = c->curve_sum[i], count = c->curve_count[i];
         c->curve_sum[i] = c->curve_count[i] = 0.0;
         c->curve_sum[bin] += sum;
@@ -99,12 +148,32 @@ static void redraw_curve(struct optimiser *o) {
     c->planned = planned;
 }
 
+/* Takes up the plan of the attempts before. */
+static void resume_plan(struct optimiser *o) {
+    struct plan *plan = &o->r->plan;
+    for (int i = PLAN_GATHER; i <= PLAN_DETAIL; i++) {
+        plan_resume(plan, (enum plan_part)i, o->plan.done[i]);
+        plan->part[i].wanted = o->plan.wanted[i];
+        plan_close(plan, (enum plan_part)i);
+    }
+    plan_resume(plan, PLAN_REFINE, look_count(o));
+    /* Extended by time, the job goes on for so long after the limit that it ended by. */
+    bool is_extended = o->plan.ended_at_sec > 0.0 && plan->limit_sec > o->plan.ended_at_sec;
+    plan->used_sec += is_extended ? fmax(o->counters.elapsed_sec, o->plan.ended_at_sec) : o->counters.elapsed_sec;
+    o->plan.ended_at_sec = 0.0;
+}
+
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err) {
     enum status status =
         o->hooks->checkpoint_load(o->hooks->user, o->state, o->state_count, found, err);
-    redraw_curve(o);
-    if (status != STATUS_OK || !*found)
+    if (status != STATUS_OK)
         return status;
+    /* The plan's first part is never without work: where it has none the checkpoint is of format 1, whose curve was
+     * drawn over seconds. */
+    redraw_curve(o, *found && o->plan.wanted[0] > 0.0);
+    if (!*found)
+        return STATUS_OK;
+    resume_plan(o);
     char line[128];
     snprintf(line, sizeof line, "resumed at iteration %llu", (unsigned long long)o->counters.iteration);
     o->hooks->log(o->hooks->user, line);
@@ -127,42 +196,33 @@ static double iterate(struct optimiser *o, double fraction) {
     return loss;
 }
 
-/* Seconds that iterations will still take, after the first. */
-static double seconds_left(const struct optimiser *o) {
-    const struct optimiser_counters *c = &o->counters;
-    double done = o->iteration_limit ? (double)c->iteration / (double)o->iteration_limit
-                  : o->method->done  ? o->method->done(o->self)
-                                     : 0.0;
-    double by_work = done > 0.0 ? fmax(c->iterate_sec * (1.0 / done - 1.0), 0.0) : INFINITY;
-    return o->iteration_limit ? by_work : fmin(by_work, fmax(o->time_limit_sec - c->elapsed_sec, 0.0));
-}
-
-/* How far it is, after an iteration of this loss. */
+/* What an iteration of this loss tells. */
 static void tell(const struct optimiser *o, double loss) {
     const struct reconstruct_hooks *hooks = o->hooks;
     long iteration = (long)o->counters.iteration;
     uint64_t rays, dropped;
     pass_ray_counts(&o->pass, &rays, &dropped);
-    hooks->progress(hooks->user, "refine", fraction_done(o), 1.0, seconds_left(o));
     hooks->metric(hooks->user, "loss", iteration, loss);
     hooks->metric(hooks->user, "rays", iteration, (double)rays); /* of this attempt */
 }
 
+/* Iterates once and says how far it is. */
+static void go_on(struct optimiser *o, double fraction) {
+    double before = o->r->plan.part[PLAN_REFINE].spent_sec;
+    double loss = iterate(o, fraction);
+    plan_iterations(o);
+    pace_advance(o->r, o->hooks, "refine", PLAN_REFINE, (double)pass_look_count(&o->pass));
+    o->counters.iterate_sec += o->r->plan.part[PLAN_REFINE].spent_sec - before;
+    tell(o, loss);
+}
+
 static enum status loop(struct optimiser *o, struct error *err) {
     const struct reconstruct_hooks *hooks = o->hooks;
-    double told = 0.0;
-    for (;;) {
-        double begin = clock_sec(), fraction = fraction_done(o);
-        if (fraction >= 1.0)
-            break;
-        double loss = iterate(o, fraction);
-        double end = clock_sec();
-        o->counters.elapsed_sec += end - begin;
-        o->counters.iterate_sec += end - begin;
-        if (end - told > TELL_SEC || fraction_done(o) >= 1.0) {
-            told = end;
-            tell(o, loss);
-        }
+    plan_iterations(o);
+    if (isfinite(o->r->plan.limit_sec))
+        plan_fit(&o->r->plan);
+    for (double fraction = fraction_done(o); fraction < 1.0; fraction = fraction_done(o)) {
+        go_on(o, fraction);
         bool stop = hooks->stop_requested(hooks->user);
         if (stop || hooks->checkpoint_due(hooks->user)) {
             enum status status = optimiser_save(o, err);
@@ -180,7 +240,8 @@ static enum status loop(struct optimiser *o, struct error *err) {
     }
     if (o->method->finish)
         o->method->finish(o->self);
-    o->counters.elapsed_sec = fmax(o->counters.elapsed_sec, o->time_limit_sec); /* extended, it goes on for that long */
+    plan_close(&o->r->plan, PLAN_REFINE);
+    o->plan.ended_at_sec = isfinite(o->r->plan.limit_sec) ? o->r->plan.limit_sec : 0.0;
     return optimiser_save(o, err);
 }
 

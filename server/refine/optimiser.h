@@ -1,8 +1,9 @@
-/* optimiser.h -- iterating on a reconstruction until its iterations or its time are up: what the two
- * methods that follow paths, listing1.h and refine.h, have in common.
+/* optimiser.h -- iterating on a reconstruction until its iterations or its observations are done: what the two
+ * methods that follow paths, listing1.h and refine.h, have in common. Time ends it only where the plan has a limit
+ * (plan.h).
  *
  * An iteration is a pass over the surface (pass.h) and a step by what it found; both are the
- * method's. Around them here: the clock, progress, the loss curve, checkpoints, previews, figures.
+ * method's. Around them here: progress, the loss curve, checkpoints, previews, figures.
  * A checkpoint holds the materials, the evidence and decision about emitters, what is told with
  * optimiser_keep, and the counters; the method says what it needs beyond that. */
 #ifndef UNBAKE_REFINE_OPTIMISER_H
@@ -28,8 +29,6 @@ struct optimiser_method {
     void (*iterate)(void *self, double fraction);
     /* The arrays that are kept were just filled from a checkpoint. */
     void (*resumed)(void *self);
-    /* What part of its work is done, in [0, 1], for a run by time that may end before; NULL: it never does. */
-    double (*done)(const void *self);
     /* After the last iteration, before it is saved; NULL: nothing is left to do. */
     void (*finish)(void *self);
     void (*free)(void *self);
@@ -38,10 +37,16 @@ struct optimiser_method {
 /* What a checkpoint holds of the run itself. */
 struct optimiser_counters {
     uint64_t iteration, path_count;
-    double elapsed_sec; /* of the time limit, over all attempts; all of it when the run is over */
+    double elapsed_sec; /* working time of all attempts */
     double iterate_sec; /* that iterations took */
-    double planned;     /* iterations or seconds that the curve is drawn over */
+    double planned;     /* iterations or observations that the curve is drawn over */
     double curve_sum[OPTIMISER_CURVE_POINTS], curve_count[OPTIMISER_CURVE_POINTS]; /* of mean losses */
+};
+
+/* What a checkpoint holds of the plan: of each part what was wanted and what is done. */
+struct optimiser_plan {
+    double wanted[PLAN_PARTS], done[PLAN_PARTS];
+    double ended_at_sec; /* the time limit that was in force when the run was over; 0: it is not */
 };
 
 struct optimiser {
@@ -53,8 +58,9 @@ struct optimiser {
     struct pass pass;
     struct emission emission;
     struct optimiser_counters counters;
-    uint64_t iteration_limit;              /* 0: by time */
-    double time_limit_sec;
+    struct optimiser_plan plan;
+    uint64_t surface;                      /* names what textures are laid over */
+    uint64_t iteration_limit;              /* 0: by observations */
     size_t state_count;
     struct state_array state[OPTIMISER_ARRAYS]; /* what a checkpoint holds */
 };
@@ -69,7 +75,10 @@ void optimiser_free(struct optimiser *o);
 /* Checkpoints hold data[bytes], too, from now on. It stays where it is; the name is not copied. */
 void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes);
 
-/* Takes up the newest checkpoint where there is one; saves one. */
+/* Checkpoints of formats before `format` (state.h) do not have it: it keeps what it holds. */
+void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes);
+
+/* Takes up the newest checkpoint where there is one that fits; saves one. */
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err);
 enum status optimiser_save(struct optimiser *o, struct error *err);
 

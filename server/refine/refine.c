@@ -7,9 +7,8 @@
 #include "server/refine/correction.h"
 #include "server/refine/match.h"
 
-/* Cells of the correction that lie across the texture, and windows, by which looks are counted. */
+/* Cells of the correction that lie across the texture. */
 #define CELLS_ACROSS 128
-#define WINDOWS_ACROSS 64
 /* Base colour moves when there are so many times the looks of the last time. */
 #define LOOKS_GROW 1.25
 
@@ -99,16 +98,7 @@ static uint32_t part_of(const struct texture *t, uint32_t across) {
     return side > across ? side / across : 1;
 }
 
-/* Part of the looks that windows are to have, in the mean. */
-static double done(const void *self) {
-    const struct refine *f = self;
-    double wanted = settings_number(f->o->r->settings, "refine_looks");
-    double side = (double)part_of(&f->o->r->materials.base_color, WINDOWS_ACROSS);
-    double windows = ceil((double)f->o->r->inverse.valid_count / (side * side));
-    return wanted > 0.0 ? look_count(f) / (wanted * windows) : 0.0;
-}
-
-static const struct optimiser_method method = {iterate, resumed, done, finish, release};
+static const struct optimiser_method method = {iterate, resumed, finish, release};
 
 struct optimiser *refine_new(struct reconstruction *r, const struct views *views,
                              const struct reconstruct_hooks *hooks) {
@@ -127,11 +117,10 @@ struct optimiser *refine_new(struct reconstruction *r, const struct views *views
     return o;
 }
 
-enum status refine_start(struct optimiser *o, double seconds, struct error *err) {
+enum status refine_start(struct optimiser *o, struct error *err) {
     emission_fix(&o->emission, o->r->is_emitter);
     for (size_t s = 0; s < o->r->segments.count; s++)
         emission_set(&o->emission, s, o->r->materials.emission[s]);
-    o->counters.elapsed_sec = seconds;
     correction_start(&((struct refine *)o->self)->correction);
     correction_set_light(&((struct refine *)o->self)->correction, &o->r->fused);
     return optimiser_save(o, err);

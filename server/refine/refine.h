@@ -5,7 +5,7 @@
  * moves by smooth factors, as what was shown and what was rendered tell them together (match.h, correction.h); the
  * emitters move by what is seen of them (emission.h); roughness and specular stay.
  *
- * It ends before its time when each part of the texture had enough looks (setting refine_looks). */
+ * It ends when each part of the texture had the looks that are asked for (setting refine_looks). */
 #ifndef UNBAKE_REFINE_REFINE_H
 #define UNBAKE_REFINE_REFINE_H
 
@@ -15,8 +15,7 @@
 struct optimiser *refine_new(struct reconstruction *r, const struct views *views,
                              const struct reconstruct_hooks *hooks);
 
-/* Tells that solve has filled r->materials and r->is_emitter, in so many seconds of the time limit;
- * saves a checkpoint. */
-enum status refine_start(struct optimiser *o, double seconds, struct error *err);
+/* Tells that solve has filled r->materials and r->is_emitter; saves a checkpoint. */
+enum status refine_start(struct optimiser *o, struct error *err);
 
 #endif

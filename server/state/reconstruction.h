@@ -17,6 +17,7 @@
 #include "server/scene/inverse_uv.h"
 #include "server/scene/materials.h"
 #include "server/scene/scene.h"
+#include "server/state/plan.h"
 #include "server/state/state_array.h"
 
 /* Of a surface of which nothing is known, and of an emitter, whose own light hides it. */
@@ -33,6 +34,10 @@ struct reconstruct_hooks {
     void (*progress)(void *user, const char *stage, double done, double total, double eta_sec);
     void (*metric)(void *user, const char *series, long step, double value);
     void (*log)(void *user, const char *message);
+    void (*warning)(void *user, const char *message);
+    /* Seconds that this attempt has really had, from its start: other processes' shares, stops and sleep of the machine
+     * do not count. Nothing but forecasts and the time limit comes of it. */
+    double (*worked_sec)(void *user);
     /* True when a checkpoint / preview is due (the surroundings keep the clock). */
     bool (*checkpoint_due)(void *user);
     bool (*preview_due)(void *user);
@@ -58,6 +63,9 @@ struct held_out {
 struct reconstruction {
     struct scene *scene;             /* borrowed */
     const struct settings *settings; /* borrowed */
+    struct plan plan;                /* of work and time (pace.h) */
+    char left_out[512];              /* what a time limit left out, as a sentence; "": nothing */
+    bool has_materials;              /* materials are more than their neutral start */
     struct parallel *pool;           /* borrowed */
     struct segments segments;
     struct atlas atlas;
@@ -71,6 +79,7 @@ struct reconstruction {
     bool exposures_drift, colors_drift; /* told exposures, white balance (calibrate.h) */
     bool sky_is_fitted;              /* what comes from there is told by surfaces (unseen_light.h), not filled in */
     struct noise noise;              /* of the photographs' pixels */
+    uint16_t (*glance)[3];           /* [height][width] a first picture of that (glance.h), or NULL; owned */
     struct fused fused;              /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
     struct emitter_evidence *evidence; /* [segment_count] why; owned */

@@ -192,6 +192,8 @@ enum status store_job_extend(struct store *store, int64_t id, int max_attempts, 
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
 enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
+/* The same, with what a user should know of it: what a time limit left out. */
+enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, const char *reason, struct error *err);
 /* The input is at fault: trying again will not help. */
 enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,
                            const char *hint, struct error *err);

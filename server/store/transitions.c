@@ -321,7 +321,11 @@ static enum status finish(struct store *store, int64_t id, int attempt, enum job
 }
 
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err) {
-    return finish(store, id, attempt, JOB_SUCCEEDED, "", "", err);
+    return store_job_succeed_but(store, id, attempt, "", err);
+}
+
+enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, const char *reason, struct error *err) {
+    return finish(store, id, attempt, JOB_SUCCEEDED, reason, "", err);
 }
 
 enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,

@@ -288,7 +288,9 @@ $("submit").addEventListener("submit", async (event) => {
   $("submit-problem").textContent = "";
   try {
     const scene = await send($("archive").files[0]);
-    const job = await (await post("v1/jobs", { scene: scene.id, settings: { time_limit_sec: 60 * $("minutes").valueAsNumber } })).json();
+    const settings = { quality: $("quality").value }, minutes = $("minutes").valueAsNumber;
+    if (minutes > 0) settings.time_limit_sec = 60 * minutes;
+    const job = await (await post("v1/jobs", { scene: scene.id, settings })).json();
     jobs.set(job.id, job);
     $("archive").value = "";
     choose(job.id);

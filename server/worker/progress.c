@@ -127,7 +127,7 @@ void progress_scene(struct progress *p, cJSON *facts) {
 void progress_end(struct progress *p, enum status status, const char *message, const char *hint) {
     cJSON *object = line("end");
     json_add_string(object, "status", status_name(status));
-    add_cut(object, "message", message);
+    add_cut(object, "message", status == STATUS_OK ? p->remark : message);
     add_cut(object, "hint", hint);
     send_line(p, object);
 }

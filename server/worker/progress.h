@@ -35,7 +35,8 @@ enum progress_exit {
 
 /* Writing, in the worker. A daemon that is gone is no reason to stop: errors are ignored. */
 struct progress {
-    int fd; /* -1: nowhere */
+    int fd;           /* -1: nowhere */
+    char remark[512]; /* what a user should know of a success; "": nothing */
 };
 void progress_stage(struct progress *p, const char *stage);
 void progress_step(struct progress *p, const char *stage, double done, double total, double eta_sec);
@@ -47,6 +48,7 @@ void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, dou
 /* hint may be NULL. */
 void progress_problem(struct progress *p, const char *file, const char *reason, const char *hint);
 void progress_scene(struct progress *p, cJSON *facts); /* takes facts */
+/* Of a success the message is the remark. */
 void progress_end(struct progress *p, enum status status, const char *message, const char *hint);
 
 #endif

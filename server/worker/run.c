@@ -33,6 +33,7 @@
 #include "server/worker/read_back.h"
 #include "server/worker/results.h"
 #include "server/worker/tasks.h"
+#include "server/worker/working_time.h"
 
 #define CHECKPOINT_SHARE 0.02
 #define CHECKPOINT_STRETCH 5.0
@@ -50,6 +51,7 @@ struct run {
     bool stop;
     bool preview_asked; /* by SIGUSR1 */
     const struct mesh *mesh; /* that outputs are of */
+    struct working_time worked;
     double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
     double preview_interval_sec;
     size_t series_count;
@@ -122,6 +124,7 @@ static void tell_stage(void *user, const char *stage) {
     struct run *run = user;
     tell_held_metrics(run);
     progress_stage(run->progress, stage);
+    run->next_progress = 0.0; /* the stage's own time left, at once */
 }
 
 static void tell_progress(void *user, const char *stage, double done, double total,
@@ -160,6 +163,16 @@ static void tell_log(void *user, const char *message) {
     progress_log(run->progress, "info", message);
 }
 
+static void tell_warning(void *user, const char *message) {
+    const struct run *run = user;
+    progress_log(run->progress, "warning", message);
+}
+
+static double worked_sec(void *user) {
+    struct run *run = user;
+    return working_time_sec(&run->worked);
+}
+
 /* --- checkpoints ----------------------------------------------------------------------------- */
 
 static enum status save_checkpoint(void *user, long iteration, const struct state_array *array,
@@ -177,17 +190,20 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
     return STATUS_OK;
 }
 
-/* A checkpoint that does not fit (of another version of the program) is as good as none: its
- * work is lost, the job is not. */
+/* A checkpoint that does not fit (what its format or the surface says) is as good as none: its work is lost, the job is
+ * not. */
 static enum status load_checkpoint(void *user, struct state_array *array, size_t count,
                                    bool *found, struct error *err) {
     struct run *run = user;
     long iteration;
+    char note[512];
     enum status status = checkpoint_load(run->checkpoint, array, count, found, &iteration, err);
+    if (status == STATUS_OK && *checkpoint_note(run->checkpoint))
+        progress_log(run->progress, "info", checkpoint_note(run->checkpoint));
     if (status != STATUS_CORRUPT)
         return status;
-    progress_log(run->progress, "warning",
-                 "the checkpoint does not fit this program's state: starting from the beginning");
+    snprintf(note, sizeof note, "the checkpoint cannot be used: %.300s; starting from the beginning", err->message);
+    progress_log(run->progress, "warning", note);
     *found = false;
     return checkpoint_clear(run->checkpoint, err);
 }
@@ -197,7 +213,7 @@ static enum status load_checkpoint(void *user, struct state_array *array, size_t
  * takes on (which is less after running out of memory). */
 static char *fingerprint_of(const struct order *order) {
     char hex[SHA256_HEX_SIZE];
-    static const char *const apart[] = {"iterations", "time_limit_sec", "refine_looks", "texels_per_iteration"};
+    static const char *const apart[] = {"iterations", "time_limit_sec", "refine_looks", "texels_per_iteration", "listing1_looks"};
     cJSON *kept = cJSON_Duplicate(order->settings, true);
     for (size_t i = 0; i < sizeof apart / sizeof *apart; i++)
         cJSON_DeleteItemFromObjectCaseSensitive(kept, apart[i]);
@@ -251,6 +267,7 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
     results_make(&input, r, title_of(run));
     run->mesh = input.mesh;
     tell_stage(run, "export");
+    tell_progress(run, "export", 0.0, 1.0, plan_left_sec(&r->plan));
     enum status status = export_outputs(run->out_dir, &input, announce, run, err);
     mem_free((void *)input.comparison);
     return status;
@@ -308,6 +325,8 @@ static enum status reconstruct(struct run *run, const struct settings *settings,
         .progress = tell_progress,
         .metric = tell_metric,
         .log = tell_log,
+        .warning = tell_warning,
+        .worked_sec = worked_sec,
         .checkpoint_due = checkpoint_due,
         .preview_due = preview_due,
         .checkpoint_save = save_checkpoint,
@@ -328,6 +347,8 @@ static enum status reconstruct(struct run *run, const struct settings *settings,
         json_add_string(r.report, "reduced_after_out_of_memory", run->order->reduced);
     if (status == STATUS_OK)
         status = write_outputs(run, &r, err);
+    if (status == STATUS_OK)
+        snprintf(run->progress->remark, sizeof run->progress->remark, "%s", r.left_out);
     reconstruct_release(&r);
     scene_release(&scene);
     return status;
@@ -351,6 +372,7 @@ enum status task_reconstruct(const struct order *order, struct progress *progres
     if (status == STATUS_OK) {
         run.preview_interval_sec = settings_number(&settings, "preview_interval_sec");
         pool = parallel_new(order->thread_count);
+        working_time_init(&run.worked, parallel_thread_count(pool));
         status = reconstruct(&run, &settings, pool, err);
     }
     parallel_free(pool);

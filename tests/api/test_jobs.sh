@@ -141,14 +141,14 @@ call DELETE "/v1/scenes/$scene"; expect 409 "a scene with queued jobs"
 call POST "/v1/jobs/$job/retry?from=lunch"; expect 400; field .hint | grep -q refine || fail "no stages in the hint"
 call POST "/v1/jobs/$job/retry?from=report"; expect 202; state "$job" queued
 move start "$job"; move succeed "$job" 5
-post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend without a checkpoint"
+post "/v1/jobs/$job/extend" '{"looks":60}'; expect 409 "extend without a checkpoint"
 mkdir -p "$idle_dir/jobs/$job"; head -c 20000 /dev/zero >"$idle_dir/jobs/$job/checkpoint.db"
 for bad in '{}' '[]' '{"time_limit_sec":1,"iterations":1}'; do post "/v1/jobs/$job/extend" "$bad"; expect 400 "extend by $bad"; done
-for bad in '{"time_limit_sec":0}' '{"time_limit_sec":"x"}' '{"time_limit_sec":1e9}' '{"time_limit_sec":1e-300}' '{"iterations":5}'; do
+for bad in '{"looks":0}' '{"looks":"x"}' '{"looks":1e10}' '{"looks":1e-300}' '{"looks":1.5}' '{"iterations":5}' '{"time_limit_sec":60}'; do
     post "/v1/jobs/$job/extend" "$bad"; expect 422 "extend by $bad"
 done
-post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 202; equal "$(field .settings.time_limit_sec)" 660; equal "$(field .settings.refine_looks)" 0
-post "/v1/jobs/$job/extend" '{"time_limit_sec":60}'; expect 409 "extend of a queued job"
+post "/v1/jobs/$job/extend" '{"looks":60}'; expect 202; equal "$(field .settings.refine_looks)" 1060
+post "/v1/jobs/$job/extend" '{"looks":60}'; expect 409 "extend of a queued job"
 move start "$job"; move succeed "$job" 6
 call DELETE "/v1/jobs/$job?dry_run=1"; expect 200; equal "$(field .files)" 1 files; [ "$(field .bytes)" -ge 20000 ] || fail "$(field .bytes) bytes"
 call DELETE "/v1/jobs/$job?dry_run=x"; expect 400

@@ -148,7 +148,7 @@ block() {
     cat "$place/preamble"
     awk -v n="$1" '/^```sh$/ { inside = ++count == n; next } /^```/ { inside = 0 } inside' "$document" |
         sed -E "s#(^|[ =])/(tmp|var|etc|backup)/#\\1$place/\\2/#g" | sed -e "s/127.0.0.1:7117/127.0.0.1:$port/g" -e 's/texture_size=512/texture_size=64/g' \
-            -e 's/time_limit_sec=60/iterations=1/g' -e 's/"texture_size": 512, "time_limit_sec": 60/"texture_size": 64, "iterations": 1/'
+            -e 's/quality=draft/iterations=1/g' -e 's/"texture_size": 512, "quality": "draft"/"texture_size": 64, "iterations": 1/'
 }
 
 # What deploy/README.md takes for granted.

@@ -40,9 +40,9 @@ int main(int argc, char **argv) {
     char dir[] = "/tmp/unbake-bench-checkpoint-XXXXXX";
     if (!mkdtemp(dir))
         return 1;
-    struct state_array array[] = {{"base_color", NULL, side * side * 16},
-                                  {"mean", NULL, side * side * 12},
-                                  {"square", NULL, side * side * 12}};
+    struct state_array array[] = {{"base_color", NULL, side * side * 16, 1},
+                                  {"mean", NULL, side * side * 12, 1},
+                                  {"square", NULL, side * side * 12, 1}};
     size_t total = 0;
     for (size_t i = 0; i < 3; i++) {
         array[i].data = mem_calloc_large(array[i].bytes, 1);

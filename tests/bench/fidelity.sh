@@ -7,14 +7,14 @@
 # HDR photographs in both cases, with so many samples a pixel (1024) that what is left is the photographs' noise and
 # ours, not that of the re-renders.
 #
-# FIDELITY_SEC    working time of a reconstruction (600)
+# FIDELITY_QUALITY  setting quality of a reconstruction (standard)
 # FIDELITY_ROOMS  names under the test data's rooms/, or paths ("staircase2 bathroom")
 # FIDELITY_KINDS  "hdr sdr"
 #
 # usage: fidelity.sh BUILD
 set -u
 build=$1
-seconds=${FIDELITY_SEC:-600}
+quality=${FIDELITY_QUALITY:-standard}
 . tests/bench/lib.sh
 rows=$build/fidelity.tsv
 : >"$rows"
@@ -48,7 +48,7 @@ measure() { # ROOM KIND
     rm -rf "$dir"
     mkdir -p "$dir"
     echo "== $label" >&2
-    reconstruct "$room" "$dir/out" texture_size=2048 "time_limit_sec=$seconds" \
+    reconstruct "$room" "$dir/out" texture_size=2048 "quality=$quality" \
         "transforms=$transforms" report_samples=1 &&
         evaluate "$room" "$dir/out" --spp 1024 --pictures "$dir" &&
         jq -r '[.stages[] | "\(.name) \(.seconds | round) s"] | join(", ")' "$dir/out/report.json" >&2

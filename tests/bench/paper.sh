@@ -5,7 +5,8 @@
 #
 # PAPER       short: small photographs and textures, seconds instead of minutes, to see that
 #             everything runs. Its figures say little. Otherwise the long form: hours.
-# PAPER_SEC   working time of one reconstruction (600; short: 5)
+# PAPER_QUALITY  setting quality of a reconstruction (standard; short: draft)
+# PAPER_SEC   longest time limit that "speed" tries (600; short: 5)
 # PAPER_ONLY  some of "fig7 fig8 table1 fig5 speed ablations"
 #
 # usage: paper.sh BUILD
@@ -15,10 +16,10 @@ build=$1
 dir=$build/paper
 rows=$build/paper.tsv
 if [ "${PAPER:-}" = short ]; then
-    seconds=${PAPER_SEC:-5} samples=4 size=512 edge=0.2
+    seconds=${PAPER_SEC:-5} quality=${PAPER_QUALITY:-draft} samples=4 size=512 edge=0.2
     views=(--width 80 --height 60 --frames 24 --test-frames 6 --spp 16 --test-spp 32)
 else
-    seconds=${PAPER_SEC:-600} samples=64 size=2048 edge=0.1
+    seconds=${PAPER_SEC:-600} quality=${PAPER_QUALITY:-standard} samples=64 size=2048 edge=0.1
     views=(--width 320 --height 240 --frames 80 --test-frames 30 --spp 64 --test-spp 256)
 fi
 mkdir -p "$dir"
@@ -39,11 +40,11 @@ demo_room() { # WALL CEILING
         echo "$made" >"$room.made"
 }
 
-# As lib.sh has it, with this form's size, samples and time where none are given.
+# As lib.sh has it, with this form's size, samples and quality where none are given.
 run() { # ROOM OUT [name=value ...]
     local from=$1 to=$2 default
     shift 2
-    for default in "texture_size=$size" "report_samples=$samples" "time_limit_sec=$seconds"; do
+    for default in "texture_size=$size" "report_samples=$samples" "quality=$quality"; do
         [[ " $* " == *" ${default%%=*}="* ]] || set -- "$@" "$default"
     done
     reconstruct "$from" "$to" "$@"
@@ -180,7 +181,7 @@ speed() {
         "$(quotient "$(working_sec "$out-default")" "$took")" 0.1 lower
 }
 
-# What each part is worth: the default without it, in the same time. Lines of settings that this
+# What each part is worth: the default without it, with as much work of the rest. Lines of settings that this
 # version does not have are passed over.
 ablations() {
     local what changes change out known
@@ -203,7 +204,7 @@ the published method,method=listing1
 published; any segment may emit,method=listing1 emitters=any
 published; one estimate instead of two,method=listing1 estimates=one
 published; pixels instead of texels,method=listing1 choose=pixels
-refined to the end of the time,refine_looks=0
+four times the observations,refine_looks=4000
 exposures and gains as given,calibrate=false
 one photograph a visit,cameras_per_texel=1
 paths of 8 segments,max_depth=8

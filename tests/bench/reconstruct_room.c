@@ -12,6 +12,17 @@
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
 #include "server/worker/results.h"
+#include "server/worker/working_time.h"
+
+struct room_clock {
+    double last; /* when a figure was printed */
+    struct working_time worked;
+};
+
+static double worked_sec(void *user) {
+    struct room_clock *clock = user;
+    return working_time_sec(&clock->worked);
+}
 
 static bool never(void *user) {
     (void)user;
@@ -24,19 +35,17 @@ static void print_stage(void *user, const char *stage) {
     fflush(stdout);
 }
 
+/* Where the environment has ROOM_ETA: each forecast, with the time that it was made at. */
 static void print_progress(void *user, const char *stage, double done, double total, double eta) {
-    (void)user;
-    (void)stage;
-    (void)done;
-    (void)total;
-    (void)eta;
+    if (getenv("ROOM_ETA"))
+        printf("eta %s %.3f after %.1f s: %.1f s left\n", stage, done / total, worked_sec(user), eta);
 }
 
 static void print_metric(void *user, const char *series, long step, double value) {
-    double *last = user;
-    if (clock_sec() - *last < 10.0)
+    struct room_clock *clock = user;
+    if (clock_sec() - clock->last < 10.0)
         return;
-    *last = clock_sec();
+    clock->last = clock_sec();
     printf("%s %ld %.5f\n", series, step, value);
     fflush(stdout);
 }
@@ -84,14 +93,17 @@ static enum status write_outputs(const char *dir, const struct reconstruction *r
 }
 
 static enum status run(int argc, char **argv, struct error *err) {
-    double last = clock_sec(), begin = last;
+    struct room_clock clock = {.last = clock_sec()};
+    double begin = clock.last;
     struct reconstruct_hooks hooks = {
-        .user = &last,
+        .user = &clock,
         .stop_requested = never,
         .stage = print_stage,
         .progress = print_progress,
         .metric = print_metric,
         .log = print_log,
+        .warning = print_log,
+        .worked_sec = worked_sec,
         .checkpoint_due = never,
         .preview_due = never,
         .checkpoint_save = keep_nothing,
@@ -107,6 +119,7 @@ static enum status run(int argc, char **argv, struct error *err) {
     if (status == STATUS_OK)
         status = settings_apply(&settings, object, NULL, err);
     struct parallel *pool = parallel_new(0);
+    working_time_init(&clock.worked, parallel_thread_count(pool));
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();

@@ -197,7 +197,7 @@ static enum status act(const struct model *m, enum action action, int attempt, b
     } else {
         snprintf(path, sizeof path, "/v1/jobs/%lld/%s", m->id, words[action]);
         status = ask("POST", path, action == EXTEND ? "Content-Type: application/json\r\n" : "",
-                     action == EXTEND ? "{\"time_limit_sec\":1}" : "", &reply);
+                     action == EXTEND ? "{\"looks\":1}" : "", &reply);
     }
     *answered = status != 0;
     CHECK_THAT(status == 0 || status == 200 || status == 202 || status == 409, "%s of job %lld gets %d: %s", path,

@@ -28,7 +28,7 @@ static void save_good(const char *path) {
     sqlite3_config(SQLITE_CONFIG_PAGECACHE, NULL, 0, 0); /* or a megabyte and more is mapped for each input */
     fill(texture, sizeof texture, 77);
     fill(counter, sizeof counter, 9);
-    struct state_array arrays[2] = {{"texture", texture, sizeof texture}, {"counter", counter, sizeof counter}};
+    struct state_array arrays[2] = {{"texture", texture, sizeof texture, 1}, {"counter", counter, sizeof counter, 1}};
     MUST(checkpoint_open(&c, path, FINGERPRINT, note, NULL) == STATUS_OK);
     MUST(checkpoint_save(c, 12, arrays, 2, NULL, NULL) == STATUS_OK);
     checkpoint_close(c);
@@ -39,7 +39,7 @@ static void save_good(const char *path) {
 /* Loads what is there; it is what was saved, or nothing. */
 static void load(const char *path) {
     static uint8_t found_texture[sizeof texture], found_counter[sizeof counter];
-    struct state_array arrays[2] = {{"texture", found_texture, sizeof texture}, {"counter", found_counter, sizeof counter}};
+    struct state_array arrays[2] = {{"texture", found_texture, sizeof texture, 1}, {"counter", found_counter, sizeof counter, 1}};
     struct checkpoint *c;
     char note[512];
     struct error err = {.message = ""};

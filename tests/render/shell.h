@@ -20,6 +20,9 @@ struct shell {
     unsigned char *saved[32];
     size_t saved_count;
     bool has_checkpoint;
+    int formats_behind;            /* of the program that wrote the checkpoint */
+    char warned[512];              /* the last warning */
+    double worked_sec, sec_a_look; /* a clock that moves on by so much whenever it is looked at */
 };
 
 static inline bool shell_stop_requested(void *user) {
@@ -37,6 +40,13 @@ static inline void shell_ignore_metric(void *user, const char *series, long step
     (void)user, (void)series, (void)step, (void)value;
 }
 static inline void shell_ignore_log(void *user, const char *message) { (void)user, (void)message; }
+static inline void shell_warn(void *user, const char *message) {
+    snprintf(((struct shell *)user)->warned, sizeof ((struct shell *)user)->warned, "%s", message);
+}
+static inline double shell_worked_sec(void *user) {
+    struct shell *s = user;
+    return s->worked_sec += s->sec_a_look;
+}
 static inline bool shell_never(void *user) {
     (void)user;
     return false;
@@ -60,7 +70,8 @@ static inline enum status shell_load(void *user, struct state_array *array, size
     (void)err;
     *found = s->has_checkpoint;
     for (size_t i = 0; *found && i < count; i++)
-        memcpy(array[i].data, s->saved[i], array[i].bytes);
+        if (array[i].since <= STATE_FORMAT - s->formats_behind)
+            memcpy(array[i].data, s->saved[i], array[i].bytes);
     return STATUS_OK;
 }
 static inline enum status shell_no_preview(void *user, const struct reconstruction *r,
@@ -78,6 +89,8 @@ static inline enum status shell_run(struct scene *scene, const struct settings *
         .progress = shell_ignore_progress,
         .metric = shell_ignore_metric,
         .log = shell_ignore_log,
+        .warning = shell_warn,
+        .worked_sec = shell_worked_sec,
         .checkpoint_due = shell_never,
         .preview_due = shell_never,
         .checkpoint_save = shell_save,

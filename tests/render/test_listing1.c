@@ -1,6 +1,6 @@
 /* A small closed room of known materials: what the default method recovers, that the outcome of
  * either method does not depend on threads, and that a stopped and resumed run ends in the same
- * bytes. */
+ * bytes, also from checkpoints of the format before. */
 #include "common/mem.h"
 #include "common/sha256.h"
 #include "server/reconstruct/reconstruct.h"
@@ -44,6 +44,7 @@ static void test_same_bytes(struct scene *scene, bool solves, const char *json) 
         struct reconstruction r;
         /* The stages before the loop ask twice, those after it as well. */
         shell.polls_until_stop = stops < ITERATIONS ? 2 : -1;
+        shell.formats_behind = stops % 2; /* every other one as the program before wrote it */
         status = shell_run(scene, &s, 1 + stops % 3, &shell, &r);
         if (status == STATUS_OK)
             digest(&r, hex);
@@ -71,26 +72,35 @@ static double refine_figure(const struct reconstruction *r, const char *name) {
     return cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(r->report, "refine"), name));
 }
 
-/* A run by time ends when windows (of one texel here) had the looks asked for; extended, it goes on from there. */
-static void test_ends_early(struct scene *scene) {
-    struct settings s = shell_settings("{\"texture_size\":64,\"time_limit_sec\":100000,\"refine_looks\":3,"
-                                      "\"report_samples\":2,\"gather_samples\":64,\"texels_per_iteration\":512}");
-    struct shell shell = {.polls_until_stop = -1};
+static const char few_looks[] = "{\"texture_size\":64,\"refine_looks\":%d,\"time_limit_sec\":%d,\"report_samples\":2,"
+                                "\"gather_samples\":64,\"texels_per_iteration\":512}";
+
+/* Goes on from the checkpoint, if there is one, to so many looks, or to the limit: the iterations by then. */
+static double run_looks(struct scene *scene, struct shell *shell, int wanted, int limit_sec, double *looks) {
+    char json[256];
+    snprintf(json, sizeof json, few_looks, wanted, limit_sec);
+    struct settings s = shell_settings(json);
     struct reconstruction r;
-    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_OK);
-    double looks = refine_figure(&r, "paths") / 16.0, wanted = 3.0 * (double)r.inverse.valid_count;
-    double iterations = refine_figure(&r, "iterations");
-    CHECK_THAT(looks >= wanted && looks < wanted + 2.0 * 512.0, "%g looks, not %g", looks, wanted);
+    CHECK(shell_run(scene, &s, 2, shell, &r) == STATUS_OK);
+    *looks = refine_figure(&r, "paths") / 16.0 / (double)r.inverse.valid_count;
+    double iterations = refine_figure(&r, "iterations"), slack = 2.0 * 512.0 / (double)r.inverse.valid_count;
+    CHECK_THAT(wanted == 0 || (*looks >= wanted && *looks < wanted + slack), "%g looks, not %d", *looks, wanted);
+    CHECK_THAT(limit_sec > 0 || !r.left_out[0], "%s", r.left_out);
     reconstruct_release(&r);
     settings_release(&s);
-    s = shell_settings("{\"texture_size\":64,\"time_limit_sec\":100000.1,\"refine_looks\":0,"
-                       "\"report_samples\":2,\"gather_samples\":64,\"texels_per_iteration\":512}");
-    CHECK(shell_run(scene, &s, 2, &shell, &r) == STATUS_OK);
-    CHECK_THAT(refine_figure(&r, "iterations") > iterations, "%g iterations, then %g", iterations,
-               refine_figure(&r, "iterations"));
-    reconstruct_release(&r);
+    return iterations;
+}
+
+/* A run ends when windows (of one texel here) had the looks asked for; extended by looks or time it goes on from there. */
+static void test_ends_early(struct scene *scene) {
+    struct shell shell = {.polls_until_stop = -1};
+    double looks, first = run_looks(scene, &shell, 3, 0, &looks);
+    double second = run_looks(scene, &shell, 4, 0, &looks);
+    CHECK_THAT(second > first, "%g iterations, then %g", first, second);
+    shell.sec_a_look = 1.0;
+    double third = run_looks(scene, &shell, 0, 200, &looks);
+    CHECK_THAT(third > second && third < second + 200.0, "%g iterations, then %g", second, third);
     shell_release(&shell);
-    settings_release(&s);
 }
 
 #define INSIDE_OUT 2 /* a wall as a careless model would have it */

@@ -34,7 +34,7 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
                                                    &r->held_out[i].render, r->held_out[i].camera};
     struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
                               r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
-                              &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}};
+                              &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}, true, NULL};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 

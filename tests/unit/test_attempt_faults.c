@@ -15,7 +15,7 @@
 /* --- the worker's side ------------------------------------------------------------------------------ */
 
 static int worker(const char *folder) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     const char *kind;
     cJSON *order;
     char *path = file_join(folder, "job.json"), *out = file_join(folder, "out/a.txt");

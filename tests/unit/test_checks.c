@@ -13,7 +13,7 @@ static int play(const char *role, const char *dir, int attempt) {
 }
 
 static int play_check(const char *role, const char *dir) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     char *files = file_join(dir, "files"), *go = file_join(dir, "../../go");
     if (file_make_dirs(files, &err) != STATUS_OK)
         return 92;

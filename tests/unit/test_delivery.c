@@ -12,7 +12,7 @@
 
 /* Does what the URL says; its message is one line of the file DATA/sent. */
 static int worker(const char *folder) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     const char *url;
     cJSON *order;
     char *path = file_join(folder, "job.json"), *sent = file_join(folder, "../../sent");

@@ -17,7 +17,7 @@ static int play_check(const char *role, const char *dir) {
 /* A call: of a URL with "hang" in it, until it is killed. */
 static int deliver(const char *dir) {
     struct buf order;
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     char *path = file_join(dir, "job.json");
     buf_init(&order, 1 << 20);
     if (file_read(path, &order, &err) != STATUS_OK)

@@ -141,7 +141,7 @@ static void export_room(const char *dir, const struct room *room) {
     cJSON *report = cJSON_CreateObject();
     struct export_input in = {"room", &room->mesh, &room->segments, &room->atlas, &room->inverse,
                               &room->materials, zero, zero, is_emitter, NULL, NULL, 0, NULL, report,
-                              {0.0f, 1.0f, 0.0f}};
+                              {0.0f, 1.0f, 0.0f}, true, NULL};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);

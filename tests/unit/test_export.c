@@ -286,7 +286,7 @@ static void test_left_out(const char *dir, struct parallel *pool) {
     struct announced heard = {.dir = dir};
     char *path = file_join(dir, "report.json"), *old = file_join(dir, "scene.glb");
     CHECK(access(old, F_OK) == 0); /* of an earlier export into this folder */
-    struct export_input in = {.title = "strips", .mesh = &mesh, .segments = &segments, .atlas = &atlas,
+    struct export_input in = {.title = "strips", .has_materials = true, .mesh = &mesh, .segments = &segments, .atlas = &atlas,
                               .inverse = &inverse, .materials = &materials, .confidence_count = zero,
                               .confidence_spread = zero, .is_emitter = is_emitter, .report = report};
     CHECK_THAT(export_outputs(dir, &in, hear, &heard, &err) == STATUS_OK, "%s", err.message);
@@ -341,7 +341,7 @@ int main(void) {
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
     struct export_input in = {
         "room <1> & \"2\"", &room.mesh, &room.segments, &room.atlas, &room.inverse, &room.materials,
-        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report, {0.0f, 1.0f, 0.0f}};
+        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report, {0.0f, 1.0f, 0.0f}, true, NULL};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);

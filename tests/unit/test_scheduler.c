@@ -91,7 +91,7 @@ static int talk(struct progress *p, const char *dir) {
 }
 
 static int play(const char *role, const char *dir, int attempt) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     if (strcmp(role, "talker") == 0)
         return talk(&p, dir);
     signal(SIGTERM, on_term);
@@ -171,7 +171,7 @@ static int play(const char *role, const char *dir, int attempt) {
 
 /* "large" fits the disk once there is a file "room" in the data folder. */
 static int play_check(const char *role, const char *dir) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     char *files = file_join(dir, "files"), *room = file_join(dir, "../../room");
     if (file_make_dirs(files, &err) != STATUS_OK)
         return 92;

@@ -57,7 +57,7 @@ static int deliver(struct progress *p) {
 }
 
 static int worker(const char *dir) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     const char *kind;
     cJSON *order;
     char *path = file_join(dir, "job.json");

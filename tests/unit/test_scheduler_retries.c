@@ -9,7 +9,7 @@
 /* --- the worker's side ----------------------------------------------------------------------- */
 
 static int play(const char *role, const char *dir, int attempt) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     char *go = file_join(dir, "go");
     (void)attempt;
     while (strcmp(role, "waits") == 0 && access(go, F_OK) != 0)
@@ -20,7 +20,7 @@ static int play(const char *role, const char *dir, int attempt) {
 
 /* Fits the disk once there is a file "room" in the data folder; each try is a line in "tries". */
 static int play_check(const char *role, const char *dir) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     char *room = file_join(dir, "../../room"), *tries = file_join(dir, "../../tries");
     int fd = open(tries, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
     if (fd < 0 || write(fd, "\n", 1) != 1)

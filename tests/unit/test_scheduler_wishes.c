@@ -8,7 +8,7 @@
 /* --- the worker's side ----------------------------------------------------------------------- */
 
 static int play(const char *role, const char *dir, int attempt) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     (void)dir, (void)attempt;
     signal(SIGTERM, on_term);
     if (strcmp(role, "good") != 0) {
@@ -22,7 +22,7 @@ static int play(const char *role, const char *dir, int attempt) {
 }
 
 static int play_check(const char *role, const char *dir) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     (void)role, (void)dir;
     check_out(&p);
     return 0;

@@ -87,6 +87,48 @@ static void test_method(void) {
     CHECK(problems_of("{\"emitters\":\"any\",\"method\":\"guess\"}", reason) == 1);
 }
 
+static double number_of(const char *text, const char *name) {
+    struct settings s;
+    struct error err;
+    cJSON *object = parse(text);
+    settings_init(&s);
+    CHECK_THAT(settings_apply(&s, object, NULL, &err) == STATUS_OK, "%s", err.message);
+    double number = settings_number(&s, name);
+    cJSON *full = settings_to_json(&s); /* what a report lists gives the same again, whatever quality it names */
+    struct settings again;
+    settings_init(&again);
+    CHECK(settings_apply(&again, full, NULL, &err) == STATUS_OK && settings_number(&again, name) == number);
+    settings_release(&again);
+    cJSON_Delete(full);
+    cJSON_Delete(object);
+    settings_release(&s);
+    return number;
+}
+
+/* Quality says what is not given, wherever it stands. */
+static void test_quality(void) {
+    CHECK(number_of("{}", "gather_samples") == 512.0 && number_of("{}", "refine_looks") == 1000.0);
+    CHECK(number_of("{\"quality\":\"draft\"}", "gather_samples") == 128.0);
+    CHECK(number_of("{\"quality\":\"fine\"}", "report_samples") == 256.0);
+    CHECK(number_of("{\"gather_samples\":512,\"quality\":\"draft\"}", "gather_samples") == 512.0);
+    CHECK(number_of("{\"quality\":\"draft\",\"refine_looks\":7}", "refine_looks") == 7.0);
+    CHECK(number_of("{\"quality\":\"draft\",\"method\":\"listing1\"}", "listing1_looks") == 400.0);
+    CHECK(number_of("{\"quality\":\"fine\"}", "texture_size") == 2048.0);
+    /* The rows of quality agree with the defaults of the table. */
+    cJSON *described = settings_describe();
+    const cJSON *entry;
+    int count = 0;
+    cJSON_ArrayForEach(entry, described) {
+        const cJSON *amounts = cJSON_GetObjectItem(entry, "by_quality");
+        double wanted = cJSON_GetNumberValue(cJSON_GetObjectItem(amounts, "standard"));
+        const struct setting *t = settings_find(cJSON_GetStringValue(cJSON_GetObjectItem(entry, "name")));
+        CHECK(!amounts || strtod(t->default_text, NULL) == wanted);
+        count += amounts != NULL;
+    }
+    CHECK(count == 7);
+    cJSON_Delete(described);
+}
+
 static void test_assignments(void) {
     cJSON *object = cJSON_CreateObject();
     struct error err;
@@ -112,6 +154,7 @@ int main(void) {
     test_table();
     test_problems_all_at_once();
     test_method();
+    test_quality();
     test_assignments();
     return check_result();
 }

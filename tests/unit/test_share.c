@@ -34,7 +34,7 @@ static void write_file(const char *folder, const char *name, size_t kib) {
 /* --- the worker's side: a scene is unpacked to 256 KiB, a job leaves an output of 4 bytes and a checkpoint of 128 KiB -- */
 
 static int worker(const char *folder) {
-    struct progress p = {PROGRESS_FD};
+    struct progress p = {.fd = PROGRESS_FD};
     const char *kind;
     cJSON *order;
     char *path = file_join(folder, "job.json");

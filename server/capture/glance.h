@@ -1,0 +1,17 @@
+/* glance.h -- a first, coarse picture of the measured light, for the eye alone: one texel of each square block, the
+ * plain mean of what photographs show there. A small part of the work of fuse.h, before exposures are solved. */
+#ifndef UNBAKE_CAPTURE_GLANCE_H
+#define UNBAKE_CAPTURE_GLANCE_H
+
+#include <stdint.h>
+
+#include "server/capture/views.h"
+#include "server/scene/atlas.h"
+#include "server/scene/inverse_uv.h"
+
+/* radiance[height][width], half precision, of valid texels; 0 where no photograph sees the block's texel. The caller's
+ * (mem_free). */
+uint16_t (*glance(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
+                  struct parallel *pool))[3];
+
+#endif
