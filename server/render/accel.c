@@ -16,12 +16,12 @@
 
 #include "common/mem.h"
 
-/* From here on triangles are small beside the room, as a scan's are: to cut them for tighter boxes
- * then costs more in a deeper hierarchy than it spares (5 % of all time at 370,000 triangles). */
+/* Above this, triangles are small compared to the room, as in scans. Splitting them for tighter boxes then makes a
+ * deeper tree that costs more than it saves (5 % of the total time at 370,000 triangles). */
 #define FINE_MESH_TRIANGLES 100000
 
-/* One thread builds, ours trace. AVX-512 is left out: packets of 8 are up to 9 % slower with it (Zen 5), and so
- * machines with and without it find the same hits, to the bit. */
+/* Threads: one builds; ours trace. No AVX-512: packets of 8 are up to 9 % slower with it (Zen 5), and without it
+ * machines of both kinds find the same hits, bit by bit. */
 #ifdef __x86_64__
 #define DEVICE "threads=1,user_threads=1,max_isa=avx2"
 #else
@@ -97,19 +97,20 @@ static void no_memory(void) {
     mem_exhausted("the ray tracing library");
 }
 
-/* TBB, under Embree, opens its allocator, whose constructor opens itself again; where that finds no memory to
- * say why it fails, glibc (2.36) takes its mark of the lack for an address. So the allocator is opened before
- * TBB does it, and after a call that fails and is told of: then glibc has that memory, and keeps it. */
+/* TBB, which Embree uses, dlopens its allocator, and that one's constructor dlopens itself again. If that fails for
+ * lack of memory for the error message, glibc 2.36 takes its out-of-memory marker for an address. So a dlopen that
+ * fails and whose message is read comes first, which makes glibc allocate and keep the buffer, and then the allocator
+ * is opened. */
 static void open_allocator(void) {
     static const char absent[] = "no such thing";
     const char *why = dlsym(RTLD_DEFAULT, absent) ? NULL : dlerror();
     if (why && strcmp(why, "out of memory") == 0)
         no_memory();
-    dlsym(RTLD_DEFAULT, absent); /* what has been told of would be freed */
-    dlopen("libtbbmalloc.so.2", RTLD_NOW); /* without it TBB does with malloc */
+    dlsym(RTLD_DEFAULT, absent); /* dlerror must follow, or the message is freed */
+    dlopen("libtbbmalloc.so.2", RTLD_NOW); /* TBB falls back to malloc without it */
 }
 
-/* Where there is no memory for a thread, TBB throws std::runtime_error, and nobody catches it. */
+/* TBB throws std::runtime_error when it cannot make a thread, and nobody catches it. */
 static void on_terminate(void) {
     const struct {
         const void *table;
@@ -123,8 +124,8 @@ static void on_terminate(void) {
     abort();
 }
 
-/* It throws std::bad_alloc also where nobody catches it, which would look like a crash: with
- * std::set_new_handler (by the name that the C++ ABI gives it) running out of memory comes to us first. */
+/* std::bad_alloc may also be thrown where nobody catches it, which would look like a crash. std::set_new_handler (by
+ * its C++ ABI name) reports out of memory before that. */
 static void watch_memory(void) {
     void (*(*set_new_handler)(void (*)(void)))(void);
     void (*(*set_terminate)(void (*)(void)))(void);
@@ -137,7 +138,7 @@ static void watch_memory(void) {
         set_new_handler(no_memory);
 }
 
-/* `code` is what rtcGetDeviceError told: asking clears it. */
+/* `code` is from rtcGetDeviceError, which clears it. */
 static enum status device_error(enum RTCError code, const char *doing, struct error *err) {
     if (code == RTC_ERROR_OUT_OF_MEMORY)
         no_memory();
@@ -146,8 +147,7 @@ static enum status device_error(enum RTCError code, const char *doing, struct er
                      (int)code);
 }
 
-/* Embree reads 16 bytes per vertex: a buffer of its own, since the last vec3 of ours may be
- * followed by the end of a page. */
+/* Embree reads 16 bytes per vertex, so vertices are copied: the last vec3 of the mesh may end at a page boundary. */
 static bool attach_mesh(RTCGeometry geometry, const struct mesh *mesh) {
     float *position = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                               RTC_FORMAT_FLOAT3, sizeof(vec3), mesh->vertex_count);
@@ -246,8 +246,8 @@ bool accel_occluded(const struct accel *a, vec3 origin, vec3 direction, float ne
     return r.tfar < 0.0f;
 }
 
-/* Copies rays[0..count) into a packet of `width` (8 or 16), whose members are arrays of that
- * length; the rest is switched off. */
+/* Copies rays[0..count) into a packet of `width` (8 or 16), a structure of arrays; the remaining lanes are masked
+ * off. */
 #define PACKET_SET(width, packet, rays, count)                                                     \
     for (size_t lane = 0; lane < (width); lane++) {                                                \
         const struct accel_ray *from = &(rays)[lane < (count) ? lane : 0];                         \
@@ -275,8 +275,8 @@ bool accel_occluded(const struct accel *a, vec3 origin, vec3 direction, float ne
         (hits)[lane].b2 = (packet)->hit.v[lane];                                                   \
     }
 
-/* Sixteen rays of one origin, all within about 15 degrees of the first: there Embree's traversal
- * by frustum takes half the time; for any others it takes twice as long. */
+/* Whether sixteen rays share their origin and are within about 15 degrees of the first. Embree's frustum traversal
+ * takes half the time for such rays and twice the time for others. */
 static bool is_coherent(const struct accel_ray *ray) {
     const struct accel_ray *a = &ray[0];
     bool coherent = true;

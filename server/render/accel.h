@@ -28,9 +28,9 @@ struct accel_ray {
     float far_m;
 };
 
-/* Borrows the mesh for its life. The build runs in one thread whatever the pool has: with more,
- * the order of triangles within a leaf, and so which of two coplanar neighbours a ray through
- * their common edge reports, would depend on timing. */
+/* Borrows the mesh for its life. The build is single-threaded whatever the pool: with more threads the order of
+ * triangles in a leaf depends on timing, and with it which of two coplanar neighbours a ray through their common edge
+ * hits. */
 enum status accel_new(struct accel **accel, const struct mesh *mesh, struct parallel *pool,
                       struct error *err);
 void accel_free(struct accel *accel);
@@ -40,16 +40,15 @@ bool accel_intersect(const struct accel *accel, vec3 origin, vec3 direction, flo
                      struct accel_hit *hit);
 bool accel_occluded(const struct accel *accel, vec3 origin, vec3 direction, float near_m, float far_m);
 
-/* The same for many rays, several at once: hit[i].triangle is ACCEL_NONE for a ray that meets
- * nothing; occluded[i] is 0 or 1. Rays beside each other that leave one point in about one
- * direction are fastest. */
+/* The same for many rays, traced in packets: hit[i].triangle is ACCEL_NONE for a miss; occluded[i] is 0 or 1. Fastest
+ * when neighbouring rays share their origin and have similar directions. */
 void accel_intersect_many(const struct accel *accel, size_t count, const struct accel_ray *ray,
                           struct accel_hit *hit);
 void accel_occluded_many(const struct accel *accel, size_t count, const struct accel_ray *ray,
                          uint8_t *occluded);
 
-/* An origin moved off the surface along its geometric normal, far enough for `point`'s
- * magnitude that a ray towards `direction` does not meet the surface it leaves. */
+/* Offsets a ray origin along the geometric normal, to the side of `direction`, far enough at the magnitude of `point`
+ * that the ray does not hit the surface it leaves. */
 static inline vec3 accel_offset(vec3 point, vec3 geometric_normal, vec3 direction) {
     float size = fmaxf(fabsf(point.x), fmaxf(fabsf(point.y), fabsf(point.z)));
     float distance = (size + 1e-2f) * 0x1p-16f;

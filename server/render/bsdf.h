@@ -30,14 +30,14 @@ struct bsdf {
     float specular_chance;  /* probability with which sampling takes the GGX lobe */
 };
 
-/* The two lobes' factors: f cos = base * diffuse + specular, and the density of bsdf_sample. */
+/* f cos = base * diffuse + specular, and the density of bsdf_sample. */
 struct bsdf_value {
     float diffuse, specular;
     float pdf; /* by solid angle of wi */
 };
 
-/* The factors again and their derivatives by the scalar parameters; `diffuse` is also the
- * derivative of f cos by base colour, channel by channel. */
+/* bsdf_eval with its derivatives by the scalar parameters; `diffuse` is also the derivative of f cos by base colour,
+ * per channel. */
 struct bsdf_derivative {
     float diffuse, specular;
     float diffuse_by_roughness;  /* times base_color */
@@ -45,7 +45,7 @@ struct bsdf_derivative {
     float specular_by_specular;
 };
 
-/* fmaxf without its care for NaN, which keeps loops from vectorising. */
+/* fmaxf without NaN handling, which prevents vectorisation. */
 static inline float bsdf_max(float a, float b) {
     return a > b ? a : b;
 }
@@ -80,8 +80,8 @@ static inline float bsdf_fresnel_by_eta(float c, float eta) {
     return s * ds + p * dp;
 }
 
-/* The density of the choice between lobes follows their rough reflectances towards the viewer; the
- * cosine lobe keeps a share even where the base is black, since its derivative is not 0. */
+/* The probability of choosing a lobe follows estimates of its reflectance towards the viewer. The cosine lobe keeps a
+ * share even where base colour is 0, since its derivative is not. */
 static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specular, float cos_wo) {
     struct bsdf b;
     b.base_color = base_color;
@@ -95,14 +95,14 @@ static inline struct bsdf bsdf_make(rgb base_color, float roughness, float specu
     return b;
 }
 
-/* The specular lobe alone: there is no base, and sampling takes nothing else. */
+/* The specular lobe alone, without base; only this lobe is sampled. */
 static inline struct bsdf bsdf_lobe(float roughness, float specular) {
     struct bsdf b = bsdf_make(rgb_gray(0.0f), roughness, specular, 1.0f);
     b.specular_chance = 1.0f;
     return b;
 }
 
-/* GGX terms that eval, pdf and derivatives share; h need not be normalised. */
+/* GGX terms shared by eval, pdf and derivatives; h need not be normalised. */
 struct bsdf_ggx {
     float cos_d;  /* wo . h = wi . h */
     float d;      /* D(h) */
@@ -133,7 +133,7 @@ static inline float bsdf_diffuse(float roughness, float cos_d, float cos_o, floa
     return cos_i * (1.0f / BSDF_PI) * (lambert + retro);
 }
 
-/* Zero for wi at or below the horizon. */
+/* 0 for wi at or below the horizon. */
 static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi) {
     float cos_i = bsdf_max(wi.z, 1e-12f); /* keeps the arithmetic finite below the horizon */
     vec3 above = {wi.x, wi.y, cos_i};
@@ -152,10 +152,9 @@ static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi
     return v;
 }
 
-/* Derivatives of bsdf_eval; `specular` is the parameter that b was made from. As specular -> 0
- * the lobe goes to 0 linearly while d eta / d specular has no limit: below 1e-4 the derivative
- * there is used, within 0.3 % of its limit except near grazing. Where roughness^2 < 0.001 the
- * lobe's width does not move. */
+/* Derivatives of bsdf_eval; `specular` is the parameter that b was made from. As specular -> 0 the lobe goes to 0
+ * linearly while d eta / d specular diverges: below 1e-4 the derivative at 1e-4 is used, within 0.3 % of the limit
+ * except near grazing. Where roughness^2 < 0.001, alpha is constant. */
 static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float specular, vec3 wo,
                                                    vec3 wi) {
     float cos_i = bsdf_max(wi.z, 1e-12f);
@@ -195,8 +194,8 @@ static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float s
     return d;
 }
 
-/* A unit vector on the circle for u in [0, 1): the angle 2 pi u by polynomials over a quarter
- * turn, accurate to 2e-7, without a call that would keep a loop from vectorising. */
+/* Unit vector at angle 2 pi u for u in [0, 1): polynomials over a quarter turn, accurate to 2e-7, without a call,
+ * which would prevent vectorisation. */
 static inline vec2 bsdf_circle(float u) {
     int quarter = (int)(4.0f * u + 0.5f);
     float x = (4.0f * u - (float)quarter) * (0.5f * BSDF_PI); /* in [-pi/4, pi/4] */
@@ -209,8 +208,8 @@ static inline vec2 bsdf_circle(float u) {
     return (vec2){sign * cosine, sign * sine};
 }
 
-/* A direction for uniform numbers in [0, 1): `lobe` chooses the lobe, (u, v) the direction. May lie
- * below the horizon (a sampled microfacet may face away): such a sample has value 0. */
+/* Samples a direction for uniform numbers in [0, 1): `lobe` chooses the lobe, (u, v) the direction. It may lie below
+ * the horizon (sampled microfacet facing away); such a sample has value 0. */
 static inline vec3 bsdf_sample(const struct bsdf *b, vec3 wo, float lobe, float u, float v) {
     /* Both lobes start from a point in the unit disk. */
     vec2 circle = bsdf_circle(u);

@@ -1,4 +1,4 @@
-/* film.c -- see film.h. Rows of pixels are the work chunks; a pixel belongs to one row. */
+/* film.c -- see film.h. A work item is a row of pixels. */
 #include "server/render/film.h"
 
 #include <math.h>
@@ -12,22 +12,22 @@ struct film {
     const struct world *world;
     const struct camera *camera;
     const struct path_settings *settings;
-    uint32_t spp, iteration; /* spp of one group */
+    uint32_t spp, iteration; /* spp per group */
     struct image *image;
-    struct slot *slot;
+    struct film_slot *slot;
 };
 
 /* Scratch of one thread. */
-struct slot {
+struct film_slot {
     struct path_batch *batch;
     struct ray *ray;
     struct path_key *key;
-    uint32_t *pixel; /* column, of each path under way */
+    uint32_t *pixel; /* column of each path of the batch */
     rgb *radiance;
     rgb *sum; /* [width][FILM_GROUPS] */
 };
 
-static void trace(struct film *f, struct slot *s, size_t count) {
+static void trace(struct film *f, struct film_slot *s, size_t count) {
     path_batch_trace(s->batch, f->world, f->settings, count, s->ray, s->key, s->radiance);
     for (size_t i = 0; i < count; i++) {
         rgb *sum = &s->sum[s->pixel[i] * FILM_GROUPS + s->key[i].iteration % FILM_GROUPS];
@@ -35,7 +35,7 @@ static void trace(struct film *f, struct slot *s, size_t count) {
     }
 }
 
-static void finish_row(const struct film *f, const struct slot *s, uint32_t y) {
+static void finish_row(const struct film *f, const struct film_slot *s, uint32_t y) {
     for (uint32_t x = 0; x < f->image->width; x++) {
         float *out = f->image->pixel + ((size_t)y * f->image->width + x) * f->image->channel_count;
         for (int c = 0; c < 3; c++) {
@@ -54,7 +54,7 @@ static void finish_row(const struct film *f, const struct slot *s, uint32_t y) {
 
 static void render_row(void *user, size_t row, int thread) {
     struct film *f = user;
-    struct slot *s = &f->slot[thread];
+    struct film_slot *s = &f->slot[thread];
     uint32_t width = f->image->width, y = (uint32_t)row;
     for (uint32_t i = 0; i < width * FILM_GROUPS; i++)
         s->sum[i] = (rgb){0.0f, 0.0f, 0.0f};
@@ -87,7 +87,7 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
     static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B"};
     image_init(image, camera->width, camera->height, 6, names);
     int thread_count = parallel_thread_count(pool);
-    struct slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
+    struct film_slot *slot = mem_calloc((size_t)thread_count, sizeof *slot);
     for (int i = 0; i < thread_count; i++) {
         slot[i].batch = path_batch_new_forward(BATCH);
         slot[i].ray = mem_array(BATCH, sizeof *slot[i].ray);

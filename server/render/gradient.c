@@ -17,20 +17,20 @@
 
 #define MIN_TILE_SHIFT 6
 #define MAX_TILES_ACROSS 32
-#define AHEAD 3 /* logs whose entries are under way to the cache */
+#define AHEAD 3 /* logs that are prefetched ahead */
 
 typedef float float4 __attribute__((vector_size(16)));
 
 /* Dense sums of one tile, all zero between uses. */
-struct tile {
+struct gradient_tile {
     float4 *sum;       /* [side * side] r g b weight; owned */
     uint64_t *touched; /* [side * side / 64] a bit per texel; owned */
 };
 
-/* A log in order of tiles. */
+/* A log sorted by tile. */
 struct sorted_log {
     size_t capacity;
-    struct gradient_entry *entry; /* copies: a tile's lie side by side; owned */
+    struct gradient_entry *entry; /* copies, grouped by tile; owned */
     uint32_t *start; /* [tile_count + 1] owned */
 };
 
@@ -40,18 +40,18 @@ struct gradient_scratch {
     size_t log_capacity;
     struct sorted_log *sorted; /* [log_capacity] owned */
     size_t capacity;           /* of the output arrays */
-    size_t *place;             /* [tile_count + 1] where a tile writes; owned */
+    size_t *place;             /* [tile_count + 1] offset of a tile's output; owned */
     size_t *touched;           /* [tile_count] owned */
     int thread_count;
-    struct tile *tile;         /* [thread_count] owned */
+    struct gradient_tile *tile;         /* [thread_count] owned */
 };
 
-static void tile_init(struct tile *tile, size_t texels) {
+static void tile_init(struct gradient_tile *tile, size_t texels) {
     tile->sum = mem_calloc_large(texels, sizeof *tile->sum);
     tile->touched = mem_calloc(texels / 64, sizeof *tile->touched);
 }
 
-static void tile_release(struct tile *tile) {
+static void tile_release(struct gradient_tile *tile) {
     mem_free(tile->sum);
     mem_free(tile->touched);
 }
@@ -141,7 +141,7 @@ static int entry_tiles(const struct gradient *g, const struct gradient_entry *e,
     tile[0] = home;
     if (!right && !below)
         return 1;
-    /* An empty home tile does no harm: it adds nothing. */
+    /* a home tile without weight adds nothing */
     int count = 1;
     if (right && (e->weight[1] > 0.0f || (!below && e->weight[3] > 0.0f)))
         tile[count++] = home + 1;
@@ -179,15 +179,15 @@ static void sort_log(void *user, size_t index, int thread) {
     for (size_t i = 0; i < log->entry_count; i++)
         for (int k = entry_tiles(r->g, &log->entry[i], tile); k-- > 0;)
             sorted->entry[start[tile[k]]++] = log->entry[i];
-    /* Each start has moved to its tile's end, the next one's start. */
+    /* Each start has moved to the end of its tile, the start of the next one. */
     memmove(start + 1, start, s->tile_count * sizeof *start);
     start[0] = 0;
 }
 
 static void add_entry(const struct gradient_entry *e, unsigned shift, uint32_t tile_x, uint32_t tile_y,
-                      struct tile *tile) {
+                      struct gradient_tile *tile) {
     uint32_t side = 1u << shift;
-    /* Unsigned: places left of or above the tile become large. */
+    /* unsigned: positions left of or above the tile wrap to large values */
     uint32_t left = e->x - (tile_x << shift), top = e->y - (tile_y << shift);
     float4 d = {e->d.r, e->d.g, e->d.b, 1.0f};
     for (uint32_t k = 0; k < 4; k++) {
@@ -201,7 +201,7 @@ static void add_entry(const struct gradient_entry *e, unsigned shift, uint32_t t
     }
 }
 
-/* Has the entries of a tile in a log fetched. */
+/* Prefetches a tile's entries in a log. */
 static void fetch_run(const struct sorted_log *sorted, size_t tile) {
     const struct gradient_entry *end = sorted->entry + sorted->start[tile + 1];
     for (const struct gradient_entry *e = sorted->entry + sorted->start[tile]; e < end; e += 2)
@@ -215,7 +215,7 @@ static void sum_tile(void *user, size_t index, int thread) {
     s->touched[index] = 0;
     if (s->place[index] == s->place[index + 1])
         return;
-    struct tile *tile = &s->tile[thread];
+    struct gradient_tile *tile = &s->tile[thread];
     uint32_t tile_y = (uint32_t)index / s->tiles_x, tile_x = (uint32_t)index - tile_y * s->tiles_x;
     for (size_t l = 0; l < r->log_count; l++) {
         const struct sorted_log *sorted = &s->sorted[l];
@@ -241,7 +241,7 @@ static void sum_tile(void *user, size_t index, int thread) {
     s->touched[index] = at - s->place[index];
 }
 
-/* Room for `log_count` logs and `thread_count` scratch tiles. */
+/* Ensures room for `log_count` logs and `thread_count` scratch tiles. */
 static void grow_scratch(struct gradient_scratch *s, size_t log_count, int thread_count) {
     if (log_count > s->log_capacity) {
         s->sorted = mem_realloc_array(s->sorted, log_count, sizeof *s->sorted);
@@ -259,7 +259,7 @@ static void grow_scratch(struct gradient_scratch *s, size_t log_count, int threa
     }
 }
 
-/* Gives each tile as much of the output as it can need. */
+/* Assigns each tile an output range of its maximum size. */
 static void place_tiles(struct gradient *g, size_t log_count) {
     struct gradient_scratch *s = g->scratch;
     size_t area = (size_t)1 << 2 * s->tile_shift, total = 0;

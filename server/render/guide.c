@@ -13,19 +13,19 @@
 #define POINTS_A_ROW 8
 #define PATCHES_MAX 256
 #define ROWS_MAX UINT16_MAX
-#define POWER_SHARE 0.1f     /* of the samples follow power */
-#define HIDDEN_SHARE 0.01f   /* of the square of hidden light is taken to arrive: rays miss gaps */
+#define POWER_SHARE 0.1f     /* of the samples */
+#define HIDDEN_SHARE 0.01f   /* of the squared unoccluded light is assumed to arrive, since a few rays miss gaps */
 #define SEED UINT64_C(0x6775696465)
 
-struct surface_point {
+struct guide_point {
     vec3 point, normal;
 };
 
-struct learn {
+struct guide_builder {
     struct guide *g;
     const struct lights *lights;
     const struct accel *accel;
-    struct surface_point *point; /* [row_capacity][POINTS_A_ROW] owned */
+    struct guide_point *point; /* [row_capacity][POINTS_A_ROW] owned */
     uint8_t *point_count;        /* [row_capacity] owned */
     size_t row_capacity;
 };
@@ -34,8 +34,7 @@ static float triangle_area(const struct light_triangle *t) {
     return 0.5f * vec3_length(vec3_cross(t->edge1, t->edge2));
 }
 
-/* Joins neighbours in the list, of one segment, up to the size into which lights_update cuts large
- * triangles. */
+/* Joins consecutive triangles of one segment, up to the size at which lights_update splits triangles. */
 static bool make_patches(struct guide *g, const struct lights *lights) {
     double total = 0.0;
     for (size_t i = 0; i < lights->triangle_count; i++)
@@ -74,7 +73,7 @@ static void make_grid(struct guide_grid *grid, const struct mesh *mesh) {
     grid->size[2] = (int32_t)(size.z * grid->cells_per_m) + 1;
 }
 
-static void add_point(struct learn *l, vec3 point, vec3 normal) {
+static void add_point(struct guide_builder *l, vec3 point, vec3 normal) {
     struct guide *g = l->g;
     uint16_t *row = &g->row[guide_cell(&g->grid, point, normal)];
     if (*row == 0 && g->row_count < ROWS_MAX) {
@@ -88,11 +87,11 @@ static void add_point(struct learn *l, vec3 point, vec3 normal) {
     }
     uint8_t *count = &l->point_count[*row];
     if (*row > 0 && *count < POINTS_A_ROW)
-        l->point[*row * POINTS_A_ROW + (size_t)(*count)++] = (struct surface_point){point, normal};
+        l->point[*row * POINTS_A_ROW + (size_t)(*count)++] = (struct guide_point){point, normal};
 }
 
-/* Points evenly over all surface, each for both sides. */
-static void find_rows(struct learn *l, const struct mesh *mesh) {
+/* Points distributed evenly over all surfaces, each for both sides. */
+static void sample_surface(struct guide_builder *l, const struct mesh *mesh) {
     double total = 0.0, until = 0.0;
     for (size_t i = 0; i < mesh->triangle_count; i++)
         total += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
@@ -111,8 +110,8 @@ static void find_rows(struct learn *l, const struct mesh *mesh) {
     }
 }
 
-/* What would arrive at a point from a random point of a patch, and whether it does. */
-static float light_between(const struct learn *l, const struct surface_point *p, size_t patch, uint64_t bits,
+/* Irradiance at a point from a random point of a patch if it is visible, and whether it is. */
+static float light_between(const struct guide_builder *l, const struct guide_point *p, size_t patch, uint64_t bits,
                            bool *arrives) {
     const struct guide *g = l->g;
     uint32_t first = g->first[patch], end = g->first[patch + 1];
@@ -131,11 +130,11 @@ static float light_between(const struct learn *l, const struct surface_point *p,
     vec3 ray = vec3_sub(accel_offset(on, normal, vec3_neg(direction)), origin);
     float length = vec3_length(ray);
     *arrives = !accel_occluded(l->accel, origin, vec3_scale(ray, 1.0f / fmaxf(length, 1e-20f)), 0.0f, length);
-    /* Near the patch it is seen as a whole, not as a point. */
+    /* Adding the area avoids the singularity close to the patch. */
     return area * emitted * received / (distance * distance + area);
 }
 
-static void learn_row(const struct learn *l, size_t row) {
+static void estimate_row(const struct guide_builder *l, size_t row) {
     const struct guide *g = l->g;
     for (size_t patch = 0; patch < g->patch_count; patch++) {
         float sum = 0.0f;
@@ -145,13 +144,12 @@ static void learn_row(const struct learn *l, size_t row) {
                                         rng_key(SEED + row, patch, i), &arrives);
             sum += light * light * (arrives ? 1.0f : HIDDEN_SHARE);
         }
-        /* The density that has the least variance follows the root of the mean square. */
-        g->reach[row * g->patch_count + patch] = sqrtf(sum / (float)l->point_count[row]);
+        /* The density of least variance is proportional to the root mean square. */
+        g->transfer[row * g->patch_count + patch] = sqrtf(sum / (float)l->point_count[row]);
     }
 }
 
-/* The greatest power of two below count, or 0: from there, halved each time, steps reach any of `count`
- * places. */
+/* The greatest power of two below count, or 0: the first step of a binary search over `count` entries. */
 static size_t first_step(size_t count) {
     size_t step = 0;
     for (size_t next = 1; next < count; next *= 2)
@@ -182,16 +180,16 @@ struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, co
     g->row = mem_calloc(6 * (size_t)g->grid.size[0] * (size_t)g->grid.size[1] * (size_t)g->grid.size[2],
                         sizeof *g->row);
     g->row_count = 1;
-    struct learn l = {.g = g, .lights = lights, .accel = accel, .row_capacity = 256};
+    struct guide_builder l = {.g = g, .lights = lights, .accel = accel, .row_capacity = 256};
     l.point = mem_array(l.row_capacity * POINTS_A_ROW, sizeof *l.point);
     l.point_count = mem_calloc(l.row_capacity, sizeof *l.point_count);
-    find_rows(&l, mesh);
-    g->reach = mem_calloc(g->row_count * g->patch_count, sizeof *g->reach); /* row 0: nothing known */
+    sample_surface(&l, mesh);
+    g->transfer = mem_calloc(g->row_count * g->patch_count, sizeof *g->transfer); /* row 0 is by power */
     g->power = mem_array(g->patch_count, sizeof *g->power);
     plan_searches(g);
     g->cumulative = mem_calloc_large(g->row_count * g->stride, sizeof *g->cumulative);
     for (size_t row = 1; row < g->row_count; row++)
-        learn_row(&l, row);
+        estimate_row(&l, row);
     mem_free(l.point);
     mem_free(l.point_count);
     guide_update(g, lights);
@@ -204,22 +202,22 @@ void guide_free(struct guide *g) {
     mem_free(g->row);
     mem_free(g->first);
     mem_free(g->patch_of);
-    mem_free(g->reach);
+    mem_free(g->transfer);
     mem_free(g->power);
     mem_free(g->cumulative);
     mem_free(g);
 }
 
 static void make_row(struct guide *g, size_t row, const float *luminance) {
-    const float *reach = g->reach + row * g->patch_count;
+    const float *transfer = g->transfer + row * g->patch_count;
     float *c = g->cumulative + row * g->stride;
     double total = 0.0, sum = 0.0;
     for (size_t p = 0; p < g->patch_count; p++)
-        total += (double)(reach[p] * luminance[p]);
+        total += (double)(transfer[p] * luminance[p]);
     double by_power = total > 0.0 ? (double)POWER_SHARE : 1.0;
-    double by_reach = total > 0.0 ? (1.0 - by_power) / total : 0.0;
+    double by_transfer = total > 0.0 ? (1.0 - by_power) / total : 0.0;
     for (size_t p = 0; p < g->patch_count; p++) {
-        sum += by_power * (double)g->power[p] + by_reach * (double)(reach[p] * luminance[p]);
+        sum += by_power * (double)g->power[p] + by_transfer * (double)(transfer[p] * luminance[p]);
         c[p] = (float)sum;
     }
     c[g->patch_count - 1] = 1.0f;

@@ -1,14 +1,13 @@
-/* guide.h -- which parts of the emitters light which parts of a room.
+/* guide.h -- light sampling by position: which emitters light which parts of a room.
  *
- * Picked by power alone, most light samples end at a wall or behind the light. So emitters are cut
- * into patches, space into cells that tell surfaces by the side they face, and for each row, a cell
- * and side in which surface lies, the light from each patch is estimated once by a few shadow rays.
- * Light samples at a point follow the estimates of its row; with a part of them power, so that
- * what the rays did not find is found all the same. Only the density of samples depends on a guide,
- * never what they bring.
+ * Sampling by power alone wastes most light samples on walls and on the back of lights. Emitters are divided into
+ * patches and space into cells, each with six sides for surface orientation. For each cell and side that contains
+ * surface (a row), the light from each patch is estimated once with a few shadow rays. Light samples follow the
+ * estimates of their row; a fraction follows power, so light that the rays missed is still sampled. A guide only
+ * changes the density of samples and never the result's expectation.
  *
- * A patch is a run of light triangles (light.h), within which power decides. A guide is a function
- * of geometry and of which segments emit, its rows also of how much: the same after a resume. */
+ * A patch is a run of light triangles (light.h), within which power decides. A guide depends only on geometry and on
+ * which segments emit, its rows also on how much: the same after a resume. */
 #ifndef UNBAKE_RENDER_GUIDE_H
 #define UNBAKE_RENDER_GUIDE_H
 
@@ -20,7 +19,7 @@
 #include "server/render/light.h"
 #include "server/scene/mesh.h"
 
-/* Cells are cubes; numbers count x fastest, and within a cell the six sides +x, -x, +y, ... */
+/* Cells are cubes, numbered with x fastest; within a cell the six sides are +x, -x, +y, ... */
 struct guide_grid {
     vec3 origin;
     float cells_per_m;
@@ -29,26 +28,27 @@ struct guide_grid {
 
 struct guide {
     struct guide_grid grid;
-    uint16_t *row;            /* [cells * 6] 0 where none was learnt; owned, as all below */
+    uint16_t *row;            /* [cells * 6] 0 where no surface was found; owned, as all below */
     size_t row_count, patch_count;
-    uint32_t *first;          /* [patch_count + 1] light triangle */
+    uint32_t *first;          /* [patch_count + 1] index of the first light triangle */
     uint16_t *patch_of;       /* [light triangles] */
-    float *reach;             /* [row_count][patch_count] what arrives of radiance 1 */
-    float *power;             /* [patch_count] share of all power */
+    float *transfer;             /* [row_count][patch_count] irradiance per unit radiance, root mean square over
+                                  * points */
+    float *power;             /* [patch_count] share of the total power */
     size_t stride;            /* patch_count rounded up to a power of two */
-    float *cumulative;        /* [row_count][stride] chance of a patch and those before it, so the last is
-                               * 1, then INFINITY; row 0 is by power */
-    int32_t row_step, patch_step; /* with which a search in a row, in a patch starts (shade_pick) */
+    float *cumulative;        /* [row_count][stride] cumulative probability of the patches, padded with 1, then
+                               * INFINITY; row 0 is by power */
+    int32_t row_step, patch_step; /* first step of the binary searches in a row and in a patch (shade_pick) */
 };
 
-/* NULL where lights have more patches than are worth while. */
+/* NULL when there are too many patches for a guide to pay off. */
 struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, const struct accel *accel);
 void guide_free(struct guide *guide);
 
 /* Takes over changed radiances of the lights that the guide was made for. */
 void guide_update(struct guide *guide, const struct lights *lights);
 
-/* The number of the cell and side of a point, for grid->row. */
+/* Index of the cell and side of a point, for grid->row. */
 static inline int32_t guide_cell(const struct guide_grid *grid, vec3 p, vec3 normal) {
     float fx = (p.x - grid->origin.x) * grid->cells_per_m;
     float fy = (p.y - grid->origin.y) * grid->cells_per_m;
@@ -71,7 +71,7 @@ static inline float guide_chance(const struct guide *g, size_t row, size_t patch
     return patch > 0 ? c[0] - c[-1] : c[0];
 }
 
-/* How many times denser than by power points of light triangle `entry` are picked. */
+/* Density of sampling points of light triangle `entry`, relative to sampling by power. */
 static inline float guide_density_factor(const struct guide *g, size_t row, uint32_t entry) {
     size_t patch = g->patch_of[entry];
     return guide_chance(g, row, patch) / g->power[patch];

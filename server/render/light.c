@@ -7,14 +7,14 @@
 
 #include "common/mem.h"
 
-#define GUIDE_DENSITY 4 /* entries of a table's guide per entry */
+#define GUIDE_DENSITY 4 /* starting points per entry of a table */
 #define MAX_BLOCK_COLUMNS 512
-/* The least that a direction's reach is taken for, as a part of the mean over the light. */
-#define LEAST_REACH 0.1
-/* The least part of the samples that either of environment and emitters gets. */
-#define LEAST_CHANCE 0.05f
+/* Lower bound of a direction's visibility, as a fraction of the mean over the light. */
+#define MIN_VISIBILITY 0.1
+/* Minimum share of samples of the environment and of the emitters. */
+#define MIN_TECHNIQUE_CHANCE 0.05f
 
-/* weight[count] >= 0; of weights that are all 0 no table is made. */
+/* weight[count] >= 0; if all are 0 there is no table. */
 static void table_make(struct light_table *t, size_t count, const float *weight) {
     t->total = 0.0;
     for (size_t i = 0; i < count; i++)
@@ -30,7 +30,7 @@ static void table_make(struct light_table *t, size_t count, const float *weight)
         t->cumulative[i] = (float)(sum / t->total);
         sum += weight[i];
     }
-    /* Trailing entries of weight 0 must keep an empty range. */
+    /* Trailing entries of weight 0 must have an empty range. */
     t->cumulative[count] = 1.0f;
     for (size_t i = 1; i <= LIGHT_TABLE_PAD; i++)
         t->cumulative[count + i] = INFINITY;
@@ -50,7 +50,7 @@ static void table_release(struct light_table *t) {
     memset(t, 0, sizeof *t);
 }
 
-/* Copies the pixels; the first column comes again behind the last. */
+/* Copies the pixels; the first column is repeated at the end. */
 static void take_pixels(struct lights *l, const struct image *environment) {
     size_t stride = (size_t)l->width + 1;
     l->environment = mem_array(stride * l->height, sizeof *l->environment);
@@ -76,13 +76,13 @@ static float cell_luminance(const struct lights *l, size_t x, size_t y) {
     return 0.25f * sum;
 }
 
-/* The reach of a cell of the map. */
-static float cell_share(const struct lights *l, const struct reach *reach, size_t x, size_t y) {
+/* Visibility of a cell of the map. */
+static float cell_visibility(const struct lights *l, const struct visibility *visibility, size_t x, size_t y) {
     struct latlong middle = {((double)x + 1.0) / l->width, ((double)y + 0.5) / (l->height - 1)};
-    return reach ? reach_share(reach, middle) : 1.0f;
+    return visibility ? visibility_at(visibility, middle) : 1.0f;
 }
 
-/* Cells of a block. */
+/* Number of cells across a block. */
 static uint32_t block_width(const struct lights *l, uint32_t block) {
     uint32_t left = l->width - block % l->block_columns * l->grain;
     return left < l->grain ? left : l->grain;
@@ -93,19 +93,19 @@ static uint32_t block_height(const struct lights *l, uint32_t block) {
     return left < l->grain ? left : l->grain;
 }
 
-static void make_blocks(struct lights *l, const struct reach *reach) {
+static void make_blocks(struct lights *l, const struct visibility *visibility) {
     l->grain = (l->width + MAX_BLOCK_COLUMNS - 1) / MAX_BLOCK_COLUMNS;
     l->block_columns = (l->width + l->grain - 1) / l->grain;
     size_t block_count = (size_t)l->block_columns * ((l->height - 2) / l->grain + 1);
     float *weight = mem_calloc(block_count, sizeof *weight);
     double shines = 0.0, arrives = 0.0;
-    /* What no ray of the reach has found may yet be there: the second time round. */
+    /* The second pass raises the visibility of directions that no ray of the estimate found open. */
     for (int pass = 0; pass < 2; pass++) {
-        float least = arrives > 0.0 ? (float)(LEAST_REACH * arrives / shines) : 1.0f;
+        float least = arrives > 0.0 ? (float)(MIN_VISIBILITY * arrives / shines) : 1.0f;
         for (uint32_t y = 0; y + 1 < l->height; y++) {
             float angle = (float)latlong_cell_angle(l->width, l->height, y);
             for (uint32_t x = 0; x < l->width; x++) {
-                float light = angle * cell_luminance(l, x, y), share = cell_share(l, reach, x, y);
+                float light = angle * cell_luminance(l, x, y), share = cell_visibility(l, visibility, x, y);
                 if (pass == 1)
                     weight[y / l->grain * l->block_columns + x / l->grain] += light * fmaxf(least, share);
                 shines += pass == 0 ? (double)light : 0.0;
@@ -113,7 +113,7 @@ static void make_blocks(struct lights *l, const struct reach *reach) {
             }
         }
     }
-    l->environment_power = reach ? arrives * reach->area : -1.0;
+    l->environment_power = visibility ? arrives * visibility->area : -1.0;
     table_make(&l->blocks, block_count, weight);
     mem_free(weight);
 }
@@ -127,10 +127,10 @@ static float chance_of_environment(const struct lights *l) {
     if (l->environment_power < 0.0)
         return 0.5f;
     double share = l->environment_power / (l->environment_power + emitter_power);
-    return clampf((float)share, LEAST_CHANCE, 1.0f - LEAST_CHANCE);
+    return clampf((float)share, MIN_TECHNIQUE_CHANCE, 1.0f - MIN_TECHNIQUE_CHANCE);
 }
 
-/* Shares samples out between environment and emitters, after either changed. */
+/* Updates the probability of environment against emitters after either changed. */
 static void share_samples(struct lights *l) {
     l->environment_chance = chance_of_environment(l);
     if (!(l->triangles.total > 0.0))
@@ -142,7 +142,7 @@ static void share_samples(struct lights *l) {
         l->triangle[i].density = l->area_density[l->triangle[i].segment];
 }
 
-void lights_set_environment(struct lights *l, const struct image *environment, const struct reach *reach) {
+void lights_set_environment(struct lights *l, const struct image *environment, const struct visibility *visibility) {
     table_release(&l->blocks);
     mem_free(l->environment);
     l->environment = NULL;
@@ -152,7 +152,7 @@ void lights_set_environment(struct lights *l, const struct image *environment, c
         l->width = environment->width;
         l->height = environment->height;
         take_pixels(l, environment);
-        make_blocks(l, reach);
+        make_blocks(l, visibility);
     }
     share_samples(l);
 }
@@ -189,7 +189,7 @@ static float cross_area(vec3 edge1, vec3 edge2) {
     return 0.5f * vec3_length(vec3_cross(edge1, edge2));
 }
 
-/* Writes the parts of a triangle, in the order of lights_part; returns how many. */
+/* Writes the parts of a triangle in the order of lights_part; returns how many. */
 static size_t cut(const struct light_triangle *whole, struct light_triangle *part) {
     uint32_t n = UINT32_C(1) << whole->level;
     vec3 step1 = vec3_scale(whole->edge1, 1.0f / (float)n), step2 = vec3_scale(whole->edge2, 1.0f / (float)n);
@@ -219,7 +219,7 @@ static struct light_triangle whole_triangle(const struct mesh *mesh, size_t tria
                                    .edge2 = vec3_sub(mesh->position[v[2]], a), .whole = (uint32_t)triangle};
 }
 
-/* Lists the triangles of the segments that emit, large ones in parts. */
+/* Lists the triangles of the emitting segments, large ones in parts. */
 static void find_triangles(struct lights *l, const struct mesh *mesh, const struct segments *segments) {
     l->first_of = mem_array(mesh->triangle_count, sizeof *l->first_of);
     double total = 0.0;
@@ -278,7 +278,7 @@ bool lights_update(struct lights *l, const struct mesh *mesh, const struct segme
     return !same;
 }
 
-/* The map at a place as latlong_place gives it. */
+/* The map at coordinates of latlong_place. */
 static rgb radiance_at(const struct lights *l, float x, float y) {
     size_t i = (size_t)x, j = (size_t)y, stride = (size_t)l->width + 1;
     float fx = x - (float)i, fy = y - (float)j;
@@ -318,7 +318,7 @@ rgb lights_pattern(const struct lights *l, const struct light_triangle *t, float
     if (!l->materials->emission_pattern)
         return rgb_gray(1.0f);
     float root = sqrtf(u), b1 = root * (1.0f - v), b2 = root * v;
-    /* Of the part to those of the whole; see lights_part for the order. */
+    /* From barycentrics of the part to those of the whole triangle; see lights_part for the order. */
     uint32_t n = UINT32_C(1) << t->level, part = (uint32_t)(t - l->triangle) - l->first_of[t->whole], i = 0;
     for (; part >= 2 * (n - i) - 1; i++)
         part -= 2 * (n - i) - 1;

@@ -1,23 +1,20 @@
 /* path.c -- see path.h.
  *
- * A batch advances all of its paths one surface at a time: nearest hits of all, then block by
- * block the shading of the vertices found (lanes.h, shade.c), then all shadow rays. Vertex k of
- * a path is kept with what the backward walk (path_backward.c) needs; with the names of struct vertex_block, the
- * radiance that leaves it is
+ * A batch advances all of its paths one segment at a time: nearest hits of all, then block by block the shading of
+ * the vertices (lanes.h, shade.c), then all shadow rays. Each vertex k of a path is stored for the backward pass
+ * (path_backward.c). With the names of struct vertex_block, the radiance that leaves it is
  *
  *   L_k = emission_weight * emission + f(light) * incident + f(wi) * scale * L_(k+1)
  *
- * where f includes the cosine, `incident` holds the light sample's radiance, density, weight and
- * visibility, and scale = 1 / (density of wi * chance of going on). Derivatives follow term by
- * term, with d L_(k+1) = d L_k * f(wi) * scale.
+ * where f includes the cosine, `incident` is the light sample's radiance with its pdf, MIS weight and visibility, and
+ * scale = 1 / (pdf of wi * probability of continuing). Derivatives follow term by term, with d L_(k+1) = d L_k *
+ * f(wi) * scale.
  *
  * Invariants:
- *   1. vertices of one depth are in the order of their paths: what a path adds and logs, and in
- *      which order, does not depend on timing;
- *   2. weights and densities are constants of the derivative (detached sampling). No path ends
- *      because its throughput is 0, only because the sampled direction is below the horizon or
- *      by roulette with a chance that is never 0, as do light samples: where a base colour is 0 its
- *      derivative is not;
+ *   1. the vertices of one depth are in the order of their paths, so sums and logs are independent of timing;
+ *   2. weights and densities are constants of the derivative (detached sampling). No path and no light sample ends
+ *      because its throughput is 0, since the derivative by base colour is not 0 where base colour is: a path ends
+ *      only below the horizon or by Russian roulette with a probability of continuing that is never 0;
  *   3. multiple importance sampling by the power heuristic (Veach 1997, section 9.2.4). */
 #include "server/render/path.h"
 
@@ -35,11 +32,11 @@
 #define MIN_CHANCE 0.05f
 #define MAX_CHANCE 0.95f
 #define MIN_LIGHT_CHANCE 0.1f
-#define EARLY_WORTH 4.0f /* before roulette_depth a path worth less than 1 / this may end */
-/* The same from there on, where derivatives are wanted. 2 takes 8 % off the variance of the gradient at equal time, and a
- * sixth off the paths per second. */
-#define DERIVATIVE_WORTH 1.25f
-#define BUCKETS 256 /* by which shadow rays are sorted */
+#define EARLY_RR_SCALE 4.0f /* before roulette_depth, paths of throughput below 1 / this may end */
+/* The same from roulette_depth on, when derivatives are wanted. A value of 2 reduces the variance of the gradient at
+ * equal time by 8 %, and the paths per second by a sixth. */
+#define DERIVATIVE_RR_SCALE 1.25f
+#define BUCKETS 256 /* of the counting sort of shadow rays */
 
 static struct path_batch *batch_new(size_t capacity, int max_depth) {
     assert(max_depth >= 1 && max_depth <= PATH_MAX_DEPTH);
@@ -48,7 +45,7 @@ static struct path_batch *batch_new(size_t capacity, int max_depth) {
     b->max_depth = max_depth;
     b->shade = mem_calloc_large(1, sizeof *b->shade);
     b->derivative = mem_calloc_large(1, sizeof *b->derivative);
-    b->flight = mem_array(capacity, sizeof *b->flight);
+    b->state = mem_array(capacity, sizeof *b->state);
     b->ray = mem_array(capacity, sizeof *b->ray);
     b->shadow_ray = mem_array(capacity, sizeof *b->shadow_ray);
     b->hit = mem_array(capacity, sizeof *b->hit);
@@ -65,7 +62,7 @@ static struct path_batch *batch_new(size_t capacity, int max_depth) {
 
 struct path_batch *path_batch_new(size_t capacity, int max_depth) {
     struct path_batch *b = batch_new(capacity, max_depth);
-    b->keeps = true;
+    b->keeps_vertices = true;
     size_t blocks = (capacity + LANES - 1) / LANES;
     for (int k = 0; k < max_depth; k++)
         b->vertex[k] = mem_calloc_large(blocks, sizeof *b->vertex[k]);
@@ -85,7 +82,7 @@ void path_batch_free(struct path_batch *b) {
         mem_free(b->vertex[k]);
     mem_free(b->shade);
     mem_free(b->derivative);
-    mem_free(b->flight);
+    mem_free(b->state);
     mem_free(b->ray);
     mem_free(b->shadow_ray);
     mem_free(b->hit);
@@ -100,18 +97,18 @@ void path_batch_free(struct path_batch *b) {
     mem_free(b);
 }
 
-/* Where the vertices of a block are while it is shaded. */
+/* The vertices of a block while it is shaded. */
 static struct vertex_block *block_at(const struct path_batch *b, int depth, size_t block) {
-    return b->keeps ? &b->vertex[depth][block] : b->vertex[0];
+    return b->keeps_vertices ? &b->vertex[depth][block] : b->vertex[0];
 }
 
 static void add(rgb *to, rgb amount) {
     *to = rgb_add(*to, amount);
 }
 
-/* What a ray that meets nothing brings. */
-static void meet_nothing(struct path_batch *b, const struct world *world, int depth,
-                         const struct flight *f, vec3 direction, rgb *radiance) {
+/* Adds the environment's radiance along a ray that left the scene. */
+static void add_environment(struct path_batch *b, const struct world *world, int depth,
+                         const struct path_state *f, vec3 direction, rgb *radiance) {
     const struct lights *lights = world->lights;
     if (!(lights->environment_chance > 0.0f))
         return;
@@ -119,7 +116,7 @@ static void meet_nothing(struct path_batch *b, const struct world *world, int de
     if (depth > 0) {
         float other = lights_pdf_environment(lights, direction);
         value = rgb_scale(value, f->pdf * f->pdf / (f->pdf * f->pdf + other * other));
-        if (b->keeps)
+        if (b->keeps_vertices)
             lanes3_set_rgb(&b->vertex[depth - 1][f->parent / LANES].next, (int)(f->parent % LANES), value);
     }
     add(&radiance[f->path], rgb_mul(f->beta, value));
@@ -130,11 +127,11 @@ typedef int16_t short4 __attribute__((vector_size(8)));
 
 static float4 corner_normal(const struct world_triangle *t, int corner) {
     short4 n;
-    memcpy(&n, t->shading[corner], sizeof n); /* the fourth is whatever follows, and not used */
+    memcpy(&n, t->shading[corner], sizeof n); /* reads one value too many, which is not used */
     return __builtin_convertvector(n, float4);
 }
 
-/* Makes the emission of a lane, that of its segment, that at its place. */
+/* Multiplies a lane's segment emission by the emission pattern at its point. */
 static void apply_pattern(const struct materials *m, const struct shade_block *s, struct vertex_block *v, int lane) {
     rgb mean = lanes3_rgb(&v->emission, lane);
     rgb pattern = rgb_is_black(mean) ? rgb_gray(1.0f)
@@ -143,12 +140,12 @@ static void apply_pattern(const struct materials *m, const struct shade_block *s
     lanes3_set_rgb(&v->emission, lane, rgb_mul(mean, pattern));
 }
 
-/* Puts the vertex that a ray hit into a lane. */
+/* Loads the hit of the path at `index` into a lane. */
 static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
-                      size_t flight, const rgb *radiance) {
-    const struct flight *f = &b->flight[flight];
-    const struct accel_ray *ray = &b->ray[flight];
-    const struct accel_hit *hit = &b->hit[flight];
+                      size_t index, const rgb *radiance) {
+    const struct path_state *f = &b->state[index];
+    const struct accel_ray *ray = &b->ray[index];
+    const struct accel_hit *hit = &b->hit[index];
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const struct materials *m = world->materials;
     struct shade_block *s = b->shade;
@@ -160,8 +157,8 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
     v->parent[lane] = f->parent;
     lanes3_set_rgb(&v->beta, lane, f->beta);
     s->pdf[lane] = f->pdf;
-    lanes3_set_rgb(&s->worth, lane, f->worth);
-    s->brought[lane] = rgb_max(radiance[f->path]);
+    lanes3_set_rgb(&s->rr_beta, lane, f->rr_beta);
+    s->path_radiance[lane] = rgb_max(radiance[f->path]);
     s->key[lane] = b->key[f->path];
     s->sample[lane] = b->sample[f->path];
     lanes3_set(&s->origin, lane, ray->origin);
@@ -193,8 +190,8 @@ static void add_emission(const struct vertex_block *v, int count, rgb *radiance)
     }
 }
 
-/* The rows of the guide, of all lanes, and what the picks will need of them fetched. */
-static void find_rows(struct shade_block *s, const struct guide *guide) {
+/* Looks up the guide row of every lane and prefetches it for shade_pick. */
+static void load_guide_rows(struct shade_block *s, const struct guide *guide) {
     shade_cells(s, &guide->grid);
     for (int i = 0; i < LANES; i++) {
         s->guide_row[i] = guide->row[s->cell[i]];
@@ -219,13 +216,13 @@ static void load_light(struct shade_block *s, struct vertex_block *v, int lane, 
     v->light_segment[lane] = t->segment;
 }
 
-/* Chooses a light for every lane and loads its triangle; false when there is no light. */
+/* Chooses a light triangle for every lane and loads it; false when the scene has no light. */
 static bool pick_lights(struct shade_block *s, struct vertex_block *v, const struct world *world, int count) {
     const struct lights *lights = world->lights;
     if (!(lights->triangles.total > 0.0))
         return lights_any(lights);
     if (world->guide) {
-        find_rows(s, world->guide);
+        load_guide_rows(s, world->guide);
         shade_pick(s, world->guide, lights);
     }
     for (int i = 0; i < count; i++) {
@@ -240,7 +237,7 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
     return true;
 }
 
-/* The lanes whose choice fell on the environment; its rare work is done lane by lane. */
+/* Light samples of the lanes that chose the environment, lane by lane, since they are few. */
 static void sample_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights,
                                int count) {
     for (int i = 0; i < count; i++) {
@@ -260,9 +257,9 @@ static void sample_environment(struct shade_block *s, struct vertex_block *v, co
     }
 }
 
-/* Has the texels fetched that the block will read. In a loop that does nothing else, so that many are
- * under way at once: most lie in a page of their own, whose address must be found first. */
-static void fetch_texels(const struct shade_block *s, const struct texture *texture, int count) {
+/* Prefetches the texels that the block will read. A loop of its own keeps many misses in flight: most texels lie in
+ * different pages, which costs a TLB miss each. */
+static void prefetch_texels(const struct shade_block *s, const struct texture *texture, int count) {
     for (int i = 0; i < count; i++) {
         const float(*texel)[4] = (const float(*)[4])texture->texel + s->texel[i];
         __builtin_prefetch(texel, 0, 2);
@@ -272,8 +269,8 @@ static void fetch_texels(const struct shade_block *s, const struct texture *text
     }
 }
 
-/* The sums over the four texels, r g b and weight at once: a texel's fourth value is 1 where it
- * is valid and 0 elsewhere. As texture_taps and texture_gather. */
+/* Weighted sum over the four texels, r g b and weight in one vector: a texel's fourth value is 1 where it is valid
+ * and 0 elsewhere. Same result as texture_taps and texture_gather. */
 static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
                           int count) {
     for (int i = 0; i < count; i++) {
@@ -296,37 +293,37 @@ static void gather_texels(struct vertex_block *v, struct shade_block *s, const s
     }
 }
 
-/* Appends the rays that the block's vertices send out. Each lane writes its rays behind the last
- * ones and then counts them or not: which lanes send is too random to branch on. */
-static void send_rays(struct path_batch *b, const struct vertex_block *v, uint32_t first, int count) {
+/* Appends the shadow and continuation rays of the block. Each lane writes its rays and then counts them or not:
+ * branching on it would be mispredicted. */
+static void spawn_rays(struct path_batch *b, const struct vertex_block *v, uint32_t first, int count) {
     const struct shade_block *s = b->shade;
-    size_t shadows = b->shadow_count, flights = b->flight_count;
+    size_t shadows = b->shadow_count, active = b->active_count;
     for (int i = 0; i < count; i++) {
         b->shadow_ray[shadows] = (struct accel_ray){lanes3_get(&s->shadow_origin, i), 0.0f,
                                                     lanes3_get(&s->shadow_direction, i), s->shadow_far[i]};
-        b->shadow[shadows] = (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->gain, i)};
+        b->shadow[shadows] = (struct shadow){v->path[i], first + (uint32_t)i, lanes3_rgb(&s->contribution, i)};
         b->bucket[shadows] = (uint8_t)(s->light[i] >> b->bucket_shift);
-        shadows += s->shadow_wanted[i];
+        shadows += s->has_shadow_ray[i];
     }
     for (int i = 0; i < count; i++) {
-        b->ray[flights] =
-            (struct accel_ray){lanes3_get(&s->way_origin, i), 0.0f, lanes3_get(&s->way, i), INFINITY};
-        b->flight[flights] = (struct flight){v->path[i], first + (uint32_t)i,
-                                             lanes3_rgb(&s->way_beta, i), lanes3_rgb(&s->way_worth, i),
-                                             s->guide_row[i], s->way_pdf[i]};
-        flights += s->way_open[i];
+        b->ray[active] =
+            (struct accel_ray){lanes3_get(&s->bounce_origin, i), 0.0f, lanes3_get(&s->bounce, i), INFINITY};
+        b->state[active] = (struct path_state){v->path[i], first + (uint32_t)i,
+                                             lanes3_rgb(&s->bounce_beta, i), lanes3_rgb(&s->bounce_rr_beta, i),
+                                             s->guide_row[i], s->bounce_pdf[i]};
+        active += s->bounce_continues[i];
     }
     b->shadow_count = shadows;
-    b->flight_count = flights;
+    b->active_count = active;
 }
 
-/* Before roulette_depth, and where derivatives are wanted, only paths that are worth little may end. */
+/* Before roulette_depth, and when derivatives are wanted, only paths of low throughput may end. */
 static struct shade_roulette roulette_at(const struct path_settings *settings, int segment) {
     bool any = settings->roulette_depth <= settings->max_depth;
     bool all = any && segment >= settings->roulette_depth;
     bool derivatives = settings->derivatives;
     return (struct shade_roulette){
-        .scale = !all ? EARLY_WORTH : derivatives ? DERIVATIVE_WORTH : 1.0f,
+        .scale = !all ? EARLY_RR_SCALE : derivatives ? DERIVATIVE_RR_SCALE : 1.0f,
         .least = any ? MIN_CHANCE : 1.0f,
         .most = all && !derivatives ? MAX_CHANCE : 1.0f,
         .least_light = any ? MIN_LIGHT_CHANCE : 1.0f,
@@ -334,7 +331,7 @@ static struct shade_roulette roulette_at(const struct path_settings *settings, i
     };
 }
 
-/* Shades the `count` vertices loaded into a block of this depth. */
+/* Shades the `count` vertices of a block of this depth. */
 static void shade(struct path_batch *b, const struct world *world, const struct path_settings *settings,
                   int depth, size_t block, int count, rgb *radiance) {
     struct vertex_block *v = block_at(b, depth, block);
@@ -343,13 +340,13 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     bool scatters = depth + 1 < settings->max_depth;
     if (scatters) {
         shade_place(v, s, texture->width, texture->height);
-        fetch_texels(s, texture, count);
+        prefetch_texels(s, texture, count);
     }
     shade_surface(v, s);
     add_emission(v, count, radiance);
     if (!scatters)
         return;
-    if (b->keeps)
+    if (b->keeps_vertices)
         memset(&v->next, 0, sizeof v->next);
     shade_numbers(s, depth);
     if (pick_lights(s, v, world, count))
@@ -361,21 +358,20 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
     gather_texels(v, s, texture, count);
     shade_texture(v, s);
     shade_scatter(v, s, roulette_at(settings, depth + 2));
-    send_rays(b, v, (uint32_t)block * LANES, count);
+    spawn_rays(b, v, (uint32_t)block * LANES, count);
 }
 
-/* Goes from the hits of this depth to the rays of the next. The new rays take the places of old
- * ones, which a block has read before it is shaded. */
+/* Shades all hits of this depth and spawns the rays of the next. New rays overwrite those of blocks already loaded. */
 static void shade_hits(struct path_batch *b, const struct world *world,
                        const struct path_settings *settings, int depth, rgb *radiance) {
-    size_t arrived = b->flight_count, block = 0;
+    size_t arrived = b->active_count, block = 0;
     int lane = 0;
-    b->flight_count = b->shadow_count = 0;
+    b->active_count = b->shadow_count = 0;
     for (size_t i = 0; i < arrived; i++) {
         if (i + 24 < arrived && b->hit[i + 24].triangle != ACCEL_NONE)
             __builtin_prefetch(&world->triangle[b->hit[i + 24].triangle]);
         if (b->hit[i].triangle == ACCEL_NONE) {
-            meet_nothing(b, world, depth, &b->flight[i], b->ray[i].direction, radiance);
+            add_environment(b, world, depth, &b->state[i], b->ray[i].direction, radiance);
             continue;
         }
         load_lane(b, world, block_at(b, depth, block), lane++, i, radiance);
@@ -389,8 +385,8 @@ static void shade_hits(struct path_batch *b, const struct world *world,
         shade(b, world, settings, depth, block, lane, radiance);
 }
 
-/* Puts shadow rays that end near each other side by side, for the cache's sake: what is around a light
- * is read once. In which order they are traced makes no other difference. */
+/* Sorts shadow rays by their light, for the cache: rays towards one light traverse the same nodes. The order does not
+ * change results. */
 static void sort_shadows(struct path_batch *b) {
     uint32_t place[BUCKETS + 1] = {0};
     for (size_t i = 0; i < b->shadow_count; i++)
@@ -404,8 +400,8 @@ static void sort_shadows(struct path_batch *b) {
     }
 }
 
-/* Traces the shadow rays; light samples that are hidden lose their radiance. */
-static void gather_light(struct path_batch *b, const struct world *world, int depth, rgb *radiance) {
+/* Traces the shadow rays; occluded light samples lose their radiance. */
+static void trace_shadow_rays(struct path_batch *b, const struct world *world, int depth, rgb *radiance) {
     if (b->tap)
         b->tap(b->tap_user, true, b->shadow_count, b->shadow_ray);
     sort_shadows(b);
@@ -414,10 +410,10 @@ static void gather_light(struct path_batch *b, const struct world *world, int de
     for (size_t i = 0; i < b->shadow_count; i++) {
         const struct shadow *shadow = &b->sorted[i];
         if (!b->occluded[i]) {
-            add(&radiance[shadow->path], shadow->gain);
+            add(&radiance[shadow->path], shadow->contribution);
             continue;
         }
-        if (!b->keeps)
+        if (!b->keeps_vertices)
             continue;
         struct vertex_block *v = &b->vertex[depth][shadow->vertex / LANES];
         int lane = (int)(shadow->vertex % LANES);
@@ -433,7 +429,7 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
     for (size_t i = 0; i < count; i++) {
         b->key[i] = sampler_key(settings->seed, key[i].index, key[i].iteration);
         b->sample[i] = key[i].sample;
-        b->flight[i] = (struct flight){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, {1.0f, 1.0f, 1.0f}, 0, 0.0f};
+        b->state[i] = (struct path_state){(uint32_t)i, 0, {1.0f, 1.0f, 1.0f}, {1.0f, 1.0f, 1.0f}, 0, 0.0f};
         b->ray[i] = (struct accel_ray){ray[i].origin, 0.0f, ray[i].direction, INFINITY};
         radiance[i] = (rgb){0.0f, 0.0f, 0.0f};
     }
@@ -441,14 +437,14 @@ void path_batch_trace(struct path_batch *b, const struct world *world,
         b->bucket_shift++;
     b->has_pattern = world->materials->emission_pattern != NULL;
     b->depth_count = 0;
-    b->flight_count = count;
-    for (int depth = 0; depth < settings->max_depth && b->flight_count > 0; depth++) {
+    b->active_count = count;
+    for (int depth = 0; depth < settings->max_depth && b->active_count > 0; depth++) {
         if (b->tap)
-            b->tap(b->tap_user, false, b->flight_count, b->ray);
-        accel_intersect_many(world->accel, b->flight_count, b->ray, b->hit);
-        b->ray_count += b->flight_count;
+            b->tap(b->tap_user, false, b->active_count, b->ray);
+        accel_intersect_many(world->accel, b->active_count, b->ray, b->hit);
+        b->ray_count += b->active_count;
         shade_hits(b, world, settings, depth, radiance);
-        gather_light(b, world, depth, radiance);
+        trace_shadow_rays(b, world, depth, radiance);
         b->depth_count = depth + 1;
     }
     b->ended = b->depth_count == settings->max_depth;

@@ -1,8 +1,8 @@
-/* path_backward.c -- from the derivative of a loss by the radiance of paths to derivatives by materials and emission.
+/* path_backward.c -- derivatives by materials and emission from the derivatives of a loss by the radiance of paths.
  *
- * Vertices are walked from the last depth to the first. Each block turns the derivatives by the radiance of its paths into
- * those by what its vertices are made of (shade_backward), logs them, and hands the radiance that leaves
- * a vertex on to the one before. See path.c for the terms. */
+ * Vertices are visited from the last depth to the first. Each block turns the derivatives by its paths' radiance into
+ * derivatives by its vertices' parameters (shade_backward), logs them, and passes the radiance that leaves a vertex
+ * to the previous one. See path.c for the terms. */
 #include <assert.h>
 
 #include "server/render/light.h"
@@ -17,7 +17,7 @@ static void log_emission(struct gradient_log *log, uint32_t segment, rgb amount)
     d[2] += (double)amount.b;
 }
 
-/* Takes derivatives by the emission at places of a block to those by the emission of their segments. */
+/* Turns derivatives by emission at the vertices of a block into derivatives by their segments' emission. */
 static void apply_patterns(const struct vertex_block *v, int count, struct shade_derivative *d) {
     for (int i = 0; i < count; i++) {
         lanes3_set_rgb(&d->d_emission, i, rgb_mul(lanes3_rgb(&d->d_emission, i), lanes3_rgb(&v->pattern, i)));
@@ -27,8 +27,8 @@ static void apply_patterns(const struct vertex_block *v, int count, struct shade
     }
 }
 
-/* The last depth's vertices only emit. */
-static rgb end_backward(const struct vertex_block *v, int lane, bool has_pattern, rgb d_radiance,
+/* Derivative at a vertex of the last depth, which only emits. */
+static rgb emission_backward(const struct vertex_block *v, int lane, bool has_pattern, rgb d_radiance,
                         struct gradient_log *log) {
     rgb adjoint = rgb_mul(d_radiance, lanes3_rgb(&v->beta, lane));
     if (has_pattern)
@@ -38,7 +38,7 @@ static rgb end_backward(const struct vertex_block *v, int lane, bool has_pattern
     return rgb_scale(lanes3_rgb(&v->emission, lane), v->emission_weight[lane]);
 }
 
-/* Writes a lane's derivatives to the log. */
+/* Appends the derivatives of one lane to the log. */
 static void log_lane(const struct vertex_block *v, const struct shade_derivative *d, int lane,
                      struct gradient_log *log) {
     struct gradient_segment *own = &log->segment[v->segment[lane]];
@@ -73,7 +73,7 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
         uint32_t path = v->path[i];
         if (b->dropped[path])
             continue;
-        rgb out = ends ? end_backward(v, i, b->has_pattern, d_radiance[path], log) : lanes3_rgb(&d->out, i);
+        rgb out = ends ? emission_backward(v, i, b->has_pattern, d_radiance[path], log) : lanes3_rgb(&d->out, i);
         if (!ends)
             log_lane(v, d, i, log);
         if (depth > 0)
@@ -83,7 +83,7 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
 }
 
 void path_batch_backward(struct path_batch *b, const rgb *d_radiance, struct gradient_log *log) {
-    assert(b->keeps);
+    assert(b->keeps_vertices);
     for (int depth = b->depth_count - 1; depth >= 0; depth--) {
         size_t count = b->vertex_count[depth];
         gradient_log_reserve(log, count);

@@ -13,9 +13,9 @@
 #define PATH_MAX_DEPTH 32
 
 /* A path under way to its next surface. */
-struct flight {
+struct path_state {
     uint32_t path, parent;
-    rgb beta, worth; /* see struct shade_block */
+    rgb beta, rr_beta; /* see struct shade_block */
     uint32_t row; /* of the guide, where it starts */
     float pdf; /* of its direction by solid angle; 0 for a camera ray */
 };
@@ -23,12 +23,12 @@ struct flight {
 /* A light sample that waits for its shadow ray. */
 struct shadow {
     uint32_t path, vertex;
-    rgb gain;
+    rgb contribution;
 };
 
 struct path_batch {
     size_t capacity;
-    bool keeps;                       /* vertices, for the backward walk */
+    bool keeps_vertices;                       /* vertices, for the backward walk */
     int max_depth, depth_count;       /* depths used by the last trace */
     bool has_pattern;                 /* the materials have an emission pattern */
     bool ended;                       /* vertices of the last depth used do not scatter */
@@ -37,7 +37,7 @@ struct path_batch {
                                              * are kept there is one block, that of the vertices at hand */
     struct shade_block *shade;
     struct shade_derivative *derivative;
-    struct flight *flight;            /* [capacity] */
+    struct path_state *state;            /* [capacity] */
     struct accel_ray *ray, *shadow_ray; /* [capacity] */
     struct accel_hit *hit;            /* [capacity] */
     struct shadow *shadow;            /* [capacity] */
@@ -47,7 +47,7 @@ struct path_batch {
     uint8_t *occluded;                /* [capacity] */
     uint32_t *key, *sample;           /* [capacity] per path, of the sampler */
     bool *dropped;                    /* [capacity] the path's estimate was not finite */
-    size_t flight_count, shadow_count;
+    size_t active_count, shadow_count;
     unsigned bucket_shift;            /* a light's bucket is its number shifted down by so many bits */
     uint64_t ray_count, dropped_count;
     void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray);

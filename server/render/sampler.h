@@ -59,7 +59,7 @@ static inline vec2 sampler_pair(uint32_t key, uint32_t sample, uint32_t pair) {
     return (vec2){rng_to_float(sampler_reverse(x)), rng_to_float(sampler_reverse(y))};
 }
 
-/* One number in [0, 1), not stratified: for decisions that gain nothing from it. */
+/* One number in [0, 1), not stratified. */
 static inline float sampler_number(uint32_t key, uint32_t sample, uint32_t pair) {
     return rng_to_float(rng_mix32(rng_mix32(key ^ (pair * UINT32_C(0x9e3779b9))) + sample));
 }

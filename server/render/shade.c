@@ -1,23 +1,23 @@
-/* shade.c -- see shade.h. What each quantity means is told in lanes.h and path.c. */
+/* shade.c -- see shade.h. Quantities are explained in lanes.h and path.c. */
 #include "server/render/shade.h"
 
 #include "server/render/accel.h"
 #include "server/render/bsdf.h"
 #include "server/render/sampler.h"
 
-#define LIGHT_SHARE 0.1f /* of the path's radiance so far: smaller gains are a gamble */
+#define MIN_CONTRIBUTION_SHARE 0.1f /* of the path's radiance so far; smaller contributions undergo roulette */
 
 /* Random numbers of a vertex: pairs 4 k + these. Pairs below 4 are the camera's. */
 enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX };
 
-/* Sanitizers cannot run the resolver that picks a clone. */
+/* Sanitizers do not support the ifunc resolver of target_clones. */
 #if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define KERNEL __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 #else
 #define KERNEL
 #endif
 
-#ifdef __clang__ /* which does not know the pragma */
+#ifdef __clang__ /* clang does not know the pragma */
 #define FOR_LANES for (int i = 0; i < LANES; i++)
 #else
 #define FOR_LANES _Pragma("GCC ivdep") for (int i = 0; i < LANES; i++)
@@ -27,8 +27,8 @@ static inline float power_heuristic(float a, float b) {
     return a * a / (a * a + b * b);
 }
 
-/* clampf in a form that stays free of branches. */
-static inline float clamp_flat(float a, float least, float most) {
+/* clampf without branches. */
+static inline float clamp_branchless(float a, float least, float most) {
     float up = a > least ? a : least;
     return up < most ? up : most;
 }
@@ -54,11 +54,11 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
         weight = pdf > 0.0f ? weight : 1.0f;
         v->emission_weight[i] = facing > 0.0f ? weight : 0.0f;
 
-        /* The distance's rounding is taken out along the normal. */
+        /* Removes the rounding error of the distance along the normal. */
         vec3 p = vec3_mad(lanes3_get(&s->origin, i), distance, direction);
         lanes3_set(&s->point, i, vec3_mad(p, s->plane[i] - vec3_dot(normal, p), normal));
 
-        /* The interpolated normal, turned to the viewer's side (materials are two-sided). */
+        /* Interpolated normal, flipped to the viewer's side (materials are two-sided). */
         vec3 n = lanes3_get(&s->shading, i);
         float length2 = vec3_dot(n, n);
         float over = 1.0f / sqrtf(bsdf_max(length2, 1e-12f));
@@ -75,13 +75,13 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
     }
 }
 
-/* As texture_taps. */
+/* Same result as texture_taps. */
 KERNEL void shade_place(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
                         uint32_t height) {
     float right = (float)width - 1.0f, bottom = (float)height - 1.0f;
     FOR_LANES {
-        float x = clamp_flat(s->place_x[i] - 0.5f, 0.0f, right);
-        float y = clamp_flat(s->place_y[i] - 0.5f, 0.0f, bottom);
+        float x = clamp_branchless(s->place_x[i] - 0.5f, 0.0f, right);
+        float y = clamp_branchless(s->place_y[i] - 0.5f, 0.0f, bottom);
         int32_t column = (int32_t)x, row = (int32_t)y;
         s->column[i] = x - (float)column;
         s->row[i] = y - (float)row;
@@ -104,21 +104,20 @@ KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
         uint32_t key = s->key[i], sample = s->sample[i];
         vec2 choices = sampler_pair(key, sample, pair + PAIR_CHOICES);
         vec2 light = sampler_pair(key, sample, pair + PAIR_LIGHT);
-        vec2 way = sampler_pair(key, sample, pair + PAIR_DIRECTION);
+        vec2 bounce = sampler_pair(key, sample, pair + PAIR_DIRECTION);
         s->pick[i] = choices.x;
         s->lobe[i] = choices.y;
         s->light_u[i] = light.x;
         s->light_v[i] = light.y;
-        s->way_u[i] = way.x;
-        s->way_v[i] = way.y;
+        s->bounce_u[i] = bounce.x;
+        s->bounce_v[i] = bounce.y;
         s->roulette[i] = sampler_number(key, sample, pair + PAIR_ROULETTE);
         s->light_roulette[i] = sampler_number(~key, sample, pair + PAIR_ROULETTE);
     }
 }
 
-/* Two searches by steps of a fixed number, since how far the right entry lies is too random to branch
- * on: for the patch in the row, then, by power, for the triangle in the patch. Every lane's row must be
- * one of the guide's. */
+/* Two binary searches with a fixed number of steps, without branches: for the patch in the guide's row, then for the
+ * triangle in the patch by power. Every lane's row must be valid. */
 KERNEL void shade_pick(struct shade_block *restrict s, const struct guide *restrict guide,
                        const struct lights *restrict lights) {
     const float *restrict until = guide->cumulative, *restrict power = guide->power;
@@ -194,7 +193,7 @@ KERNEL void shade_light(struct shade_block *restrict s) {
     }
 }
 
-static inline float greatest(rgb c) {
+static inline float max_channel(rgb c) {
     return bsdf_max(c.r, bsdf_max(c.g, c.b));
 }
 
@@ -219,41 +218,41 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         float light_pdf = s->light_pdf[i];
         bool lit = light_pdf > 0.0f && f.pdf > 0.0f;
         float factor = lit ? power_heuristic(light_pdf, f.pdf) / bsdf_max(light_pdf, 1e-30f) : 0.0f;
-        rgb possible = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
-        rgb gain = rgb_mul(beta, reflect(f, base_color, possible));
-        /* A light sample that can bring only a little, by what the path has brought already, is
-         * seldom worth a shadow ray: roulette (Veach 1997, section 10.4.1). */
-        rgb path_worth = lanes3_rgb(&s->worth, i), color = {bsdf_max(base_color.r, roulette.least_color),
+        rgb unoccluded = rgb_scale(lanes3_rgb(&s->radiance, i), factor);
+        rgb contribution = rgb_mul(beta, reflect(f, base_color, unoccluded));
+        /* Roulette for shadow rays whose contribution is small against what the path has gathered (Veach 1997,
+         * section 10.4.1). */
+        rgb path_rr_beta = lanes3_rgb(&s->rr_beta, i), color = {bsdf_max(base_color.r, roulette.least_color),
                                                            bsdf_max(base_color.g, roulette.least_color),
                                                            bsdf_max(base_color.b, roulette.least_color)};
-        float most_gain = greatest(rgb_mul(path_worth, reflect(f, color, possible)));
-        float chance = most_gain / bsdf_max(LIGHT_SHARE * s->brought[i], 1e-30f);
-        chance = clamp_flat(chance, roulette.least_light, 1.0f);
-        bool wanted = lit && s->light_roulette[i] < chance;
-        float kept = wanted ? 1.0f / chance : 0.0f;
+        float max_contribution = max_channel(rgb_mul(path_rr_beta, reflect(f, color, unoccluded)));
+        float chance = max_contribution / bsdf_max(MIN_CONTRIBUTION_SHARE * s->path_radiance[i], 1e-30f);
+        chance = clamp_branchless(chance, roulette.least_light, 1.0f);
+        bool is_traced = lit && s->light_roulette[i] < chance;
+        float kept = is_traced ? 1.0f / chance : 0.0f;
         lanes3_set(&v->light, i, light);
-        lanes3_set_rgb(&v->incident, i, rgb_scale(possible, kept));
+        lanes3_set_rgb(&v->incident, i, rgb_scale(unoccluded, kept));
         v->light_factor[i] = factor * kept;
-        lanes3_set_rgb(&s->gain, i, rgb_scale(gain, kept));
-        s->shadow_wanted[i] = wanted ? 1 : 0;
+        lanes3_set_rgb(&s->contribution, i, rgb_scale(contribution, kept));
+        s->has_shadow_ray[i] = is_traced ? 1 : 0;
 
-        vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->way_u[i], s->way_v[i]);
+        vec3 wi = bsdf_sample(&bsdf, wo, s->lobe[i], s->bounce_u[i], s->bounce_v[i]);
         f = bsdf_eval(&bsdf, wo, wi);
         float scale = f.pdf > 0.0f ? 1.0f / bsdf_max(f.pdf, 1e-30f) : 0.0f;
-        rgb onward = rgb_scale(reflect(f, base_color, beta), scale);
-        rgb worth = rgb_scale(reflect(f, color, path_worth), scale);
-        chance = clamp_flat(roulette.scale * greatest(worth), roulette.least, roulette.most);
+        rgb next_beta = rgb_scale(reflect(f, base_color, beta), scale);
+        rgb rr_beta = rgb_scale(reflect(f, color, path_rr_beta), scale);
+        chance = clamp_branchless(roulette.scale * max_channel(rr_beta), roulette.least, roulette.most);
         float over = 1.0f / chance;
         bool open = f.pdf > 0.0f && s->roulette[i] < chance;
         v->scale[i] = open ? scale * over : 0.0f;
         lanes3_set(&v->wi, i, wi);
-        vec3 way = vec3_mad(vec3_mad(vec3_scale(a, wi.x), wi.y, b), wi.z, n);
-        lanes3_set(&s->way, i, way);
-        lanes3_set(&s->way_origin, i, offset(lanes3_get(&s->point, i), lanes3_get(&s->normal, i), way));
-        lanes3_set_rgb(&s->way_beta, i, rgb_scale(onward, over));
-        lanes3_set_rgb(&s->way_worth, i, rgb_scale(worth, over));
-        s->way_pdf[i] = f.pdf;
-        s->way_open[i] = open ? 1 : 0;
+        vec3 bounce = vec3_mad(vec3_mad(vec3_scale(a, wi.x), wi.y, b), wi.z, n);
+        lanes3_set(&s->bounce, i, bounce);
+        lanes3_set(&s->bounce_origin, i, offset(lanes3_get(&s->point, i), lanes3_get(&s->normal, i), bounce));
+        lanes3_set_rgb(&s->bounce_beta, i, rgb_scale(next_beta, over));
+        lanes3_set_rgb(&s->bounce_rr_beta, i, rgb_scale(rr_beta, over));
+        s->bounce_pdf[i] = f.pdf;
+        s->bounce_continues[i] = open ? 1 : 0;
     }
 }
 
@@ -268,31 +267,31 @@ KERNEL void shade_backward(const struct vertex_block *restrict v, struct shade_d
         rgb out = rgb_scale(lanes3_rgb(&v->emission, i), v->emission_weight[i]);
         lanes3_set_rgb(&d->d_emission, i, rgb_scale(adjoint, v->emission_weight[i]));
 
-        /* Both terms that pass through the reflection: the light sample's and the path's. */
+        /* The two reflected terms: light sample and continued path. */
         rgb from_light = lanes3_rgb(&v->incident, i);
-        rgb from_way = rgb_scale(lanes3_rgb(&v->next, i), v->scale[i]);
+        rgb from_bounce = rgb_scale(lanes3_rgb(&v->next, i), v->scale[i]);
         struct bsdf_derivative to_light = bsdf_backward(&bsdf, specular, wo, lanes3_get(&v->light, i));
-        struct bsdf_derivative to_way = bsdf_backward(&bsdf, specular, wo, lanes3_get(&v->wi, i));
+        struct bsdf_derivative to_bounce = bsdf_backward(&bsdf, specular, wo, lanes3_get(&v->wi, i));
         struct bsdf_value light_value = {to_light.diffuse, to_light.specular, 0.0f};
-        struct bsdf_value way_value = {to_way.diffuse, to_way.specular, 0.0f};
+        struct bsdf_value bounce_value = {to_bounce.diffuse, to_bounce.specular, 0.0f};
         out = rgb_add(out, reflect(light_value, base_color, from_light));
-        out = rgb_add(out, reflect(way_value, base_color, from_way));
+        out = rgb_add(out, reflect(bounce_value, base_color, from_bounce));
         lanes3_set_rgb(&d->out, i, out);
         lanes3_set_rgb(&d->d_light_emission, i,
                        reflect(light_value, base_color, rgb_scale(adjoint, v->light_factor[i])));
 
-        rgb light = rgb_mul(adjoint, from_light), way = rgb_mul(adjoint, from_way);
+        rgb light = rgb_mul(adjoint, from_light), bounce = rgb_mul(adjoint, from_bounce);
         lanes3_set_rgb(&d->d_base_color, i,
-                       rgb_mad(rgb_scale(light, to_light.diffuse), to_way.diffuse, way));
-        float light_sum = light.r + light.g + light.b, way_sum = way.r + way.g + way.b;
-        rgb tinted_light = rgb_mul(light, base_color), tinted_way = rgb_mul(way, base_color);
+                       rgb_mad(rgb_scale(light, to_light.diffuse), to_bounce.diffuse, bounce));
+        float light_sum = light.r + light.g + light.b, bounce_sum = bounce.r + bounce.g + bounce.b;
+        rgb tinted_light = rgb_mul(light, base_color), tinted_bounce = rgb_mul(bounce, base_color);
         float light_tinted = tinted_light.r + tinted_light.g + tinted_light.b;
-        float way_tinted = tinted_way.r + tinted_way.g + tinted_way.b;
+        float bounce_tinted = tinted_bounce.r + tinted_bounce.g + tinted_bounce.b;
         d->d_roughness[i] = light_tinted * to_light.diffuse_by_roughness +
                             light_sum * to_light.specular_by_roughness +
-                            way_tinted * to_way.diffuse_by_roughness +
-                            way_sum * to_way.specular_by_roughness;
+                            bounce_tinted * to_bounce.diffuse_by_roughness +
+                            bounce_sum * to_bounce.specular_by_roughness;
         d->d_specular[i] =
-            light_sum * to_light.specular_by_specular + way_sum * to_way.specular_by_specular;
+            light_sum * to_light.specular_by_specular + bounce_sum * to_bounce.specular_by_specular;
     }
 }

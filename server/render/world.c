@@ -49,10 +49,10 @@ enum status world_init(struct world *w, const struct mesh *mesh, const struct se
 }
 
 void world_set_environment(struct world *w, const struct image *environment, struct parallel *pool) {
-    struct reach reach;
+    struct visibility visibility;
     if (environment)
-        reach_measure(&reach, w->mesh, w->accel, pool);
-    lights_set_environment(w->lights, environment, environment ? &reach : NULL);
+        visibility_measure(&visibility, w->mesh, w->accel, pool);
+    lights_set_environment(w->lights, environment, environment ? &visibility : NULL);
 }
 
 void world_release(struct world *w) {

@@ -1,4 +1,4 @@
-/* world.h -- all that a ray can meet: geometry, materials, emitters, distant light. */
+/* world.h -- the scene as rays see it: geometry, materials, lights. */
 #ifndef UNBAKE_RENDER_WORLD_H
 #define UNBAKE_RENDER_WORLD_H
 
@@ -17,12 +17,12 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
-/* All that shading needs of a triangle, in one cache line. */
+/* Shading data of a triangle, in one cache line. */
 struct world_triangle {
     vec3 normal;               /* unit, geometric */
     float plane;               /* normal . p for points p of the triangle */
     vec2 corner[3];            /* atlas coordinates, texels */
-    int16_t shading[3][3];     /* unit normals of the corners, times 32767; 0: the mesh has none */
+    int16_t shading[3][3];     /* unit vertex normals, times 32767; 0: the mesh has none */
     int16_t pad;               /* read with the last normal */
     uint32_t segment;
 };
@@ -31,27 +31,26 @@ struct world {
     const struct mesh *mesh;          /* borrowed, all four */
     const struct segments *segments;
     const struct atlas *atlas;
-    const struct materials *materials; /* may change between batches: then world_update_lights */
+    const struct materials *materials; /* may change between batches; then call world_update_lights */
     struct world_triangle *triangle;  /* [triangle_count] owned */
     struct accel *accel;              /* owned */
     struct lights *lights;            /* owned */
-    struct guide *guide;              /* of the lights; NULL: picked by power; owned */
+    struct guide *guide;              /* NULL: lights are sampled by power; owned */
 };
 
-/* Builds the acceleration structure and the emitter tables. environment, a map in the layout of
- * latlong.h, may be NULL: black; it is copied. The rest must keep still and unchanged until world_release, the contents
- * of materials excepted. */
+/* Builds the acceleration structure and the light tables. environment, a map in the layout of latlong.h, is copied;
+ * NULL: black. The other arguments are borrowed until world_release and must not change, except for the contents of
+ * materials. */
 enum status world_init(struct world *world, const struct mesh *mesh, const struct segments *segments,
                        const struct atlas *atlas, const struct materials *materials,
                        const struct image *environment, struct parallel *pool, struct error *err);
 void world_release(struct world *world);
 
-/* Puts another environment, which is copied, in the place of the present one; NULL: none. Measures
- * how it reaches the surfaces. */
+/* Replaces the environment by a copy of another (NULL: none) and measures its visibility. */
 void world_set_environment(struct world *world, const struct image *environment, struct parallel *pool);
 
-/* Takes over changed emission. Where other segments emit than before the guide is learnt anew, in a
- * fraction of a second. */
+/* Takes over changed emission. If the set of emitting segments changed, the guide is rebuilt, in a fraction of a
+ * second. */
 void world_update_lights(struct world *world);
 
 #endif

@@ -99,7 +99,7 @@ static inline void mask_open(struct scene *masked, struct scene *scene, float be
 static inline void forget_masked(struct scene *masked) {
     for (size_t i = 0; i < masked->photograph_count; i++) {
         mem_free(masked->photograph[i].mask);
-        mem_free(masked->photograph[i].spark); /* found in its own reconstruction */
+        mem_free(masked->photograph[i].firefly); /* found in its own reconstruction */
     }
     mem_free(masked->photograph);
 }

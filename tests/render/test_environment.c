@@ -1,4 +1,4 @@
-/* environment.h, fill.h, reach.h, relight.h: the sky behind a window is found in the photographs, whatever their
+/* environment.h, fill.h, visibility.h, relight.h: the sky behind a window is found in the photographs, whatever their
  * exposures and faults; samples go where its light finds a way in. */
 #include "common/rng.h"
 #include "common/sha256.h"

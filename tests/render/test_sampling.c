@@ -136,14 +136,14 @@ static void check_environment(uint32_t width, uint32_t height, bool has_reach) {
         }
     }
     struct lights *lights = lights_new(&map);
-    struct reach *reach = mem_calloc(1, sizeof *reach);
-    reach->area = 2.0;
-    for (int y = 0; y < REACH_ROWS; y++)
-        for (int x = 0; x < REACH_COLUMNS; x++)
-            reach->share[y][x] = x < REACH_COLUMNS / 2 ? 0.0f : 0.25f;
+    struct visibility *visibility = mem_calloc(1, sizeof *visibility);
+    visibility->area = 2.0;
+    for (int y = 0; y < VISIBILITY_ROWS; y++)
+        for (int x = 0; x < VISIBILITY_COLUMNS; x++)
+            visibility->share[y][x] = x < VISIBILITY_COLUMNS / 2 ? 0.0f : 0.25f;
     if (has_reach)
-        lights_set_environment(lights, &map, reach);
-    mem_free(reach);
+        lights_set_environment(lights, &map, visibility);
+    mem_free(visibility);
     CHECK(lights_any(lights) && lights->environment_chance == 1.0f);
     memset(found, 0, sizeof found);
     double sum = 0.0;

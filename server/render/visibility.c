@@ -1,5 +1,5 @@
-/* reach.c -- see reach.h. */
-#include "server/render/reach.h"
+/* visibility.c -- see visibility.h. */
+#include "server/render/visibility.h"
 
 #include <math.h>
 #include <string.h>
@@ -7,22 +7,22 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define POINTS 256 /* surface points a bin */
+#define POINTS 256 /* surface points per bin */
 #define SEED UINT64_C(0x7265616368)
 
-struct measure {
+struct visibility_bins {
     const struct mesh *mesh;
     const struct accel *accel;
-    double *area_until; /* [triangle_count] summed area up to and with the triangle */
-    float share[REACH_ROWS][REACH_COLUMNS];
+    double *area_until; /* [triangle_count] cumulative area up to and including the triangle */
+    float share[VISIBILITY_ROWS][VISIBILITY_COLUMNS];
 };
 
-/* A number in [0, 1): `which` of sample `i` of a bin. */
+/* Number `which`, in [0, 1), of sample `i` of a bin. */
 static float number(size_t bin, size_t i, uint64_t which) {
     return rng_to_float((uint32_t)(rng_key(SEED + which, bin, i) >> 32));
 }
 
-static size_t triangle_at(const struct measure *m, double area) {
+static size_t triangle_at(const struct visibility_bins *m, double area) {
     size_t first = 0, last = m->mesh->triangle_count - 1;
     while (first < last) {
         size_t middle = (first + last) / 2;
@@ -34,15 +34,16 @@ static size_t triangle_at(const struct measure *m, double area) {
     return first;
 }
 
-/* Surface points are stratified by area, directions random within the bin. */
+/* Surface points are stratified by area; directions are random within the bin. */
 static void measure_bin(void *user, size_t bin, int thread) {
     (void)thread;
-    struct measure *m = user;
+    struct visibility_bins *m = user;
     double total = m->area_until[m->mesh->triangle_count - 1];
     float sum = 0.0f;
     for (size_t i = 0; i < POINTS; i++) {
-        vec3 direction = latlong_direction(((double)(bin % REACH_COLUMNS) + (double)number(bin, i, 0)) / REACH_COLUMNS,
-                                           ((double)(bin / REACH_COLUMNS) + (double)number(bin, i, 1)) / REACH_ROWS);
+        double column = (double)(bin % VISIBILITY_COLUMNS) + (double)number(bin, i, 0);
+        double row = (double)(bin / VISIBILITY_COLUMNS) + (double)number(bin, i, 1);
+        vec3 direction = latlong_direction(column / VISIBILITY_COLUMNS, row / VISIBILITY_ROWS);
         size_t t = triangle_at(m, total * ((double)i + (double)number(bin, i, 2)) / POINTS);
         vec3 normal = vec3_normalize(mesh_cross(m->mesh, t));
         float cosine = vec3_dot(normal, direction);
@@ -54,36 +55,36 @@ static void measure_bin(void *user, size_t bin, int thread) {
         if (!accel_occluded(m->accel, origin, direction, 0.0f, INFINITY))
             sum += cosine;
     }
-    m->share[bin / REACH_COLUMNS][bin % REACH_COLUMNS] = sum / POINTS;
+    m->share[bin / VISIBILITY_COLUMNS][bin % VISIBILITY_COLUMNS] = sum / POINTS;
 }
 
-/* Few rays find a small opening: neighbours learn from each other. */
-static float blurred(const struct measure *m, int row, int column) {
+/* Average with the neighbouring bins: few rays find a small opening. */
+static float blurred(const struct visibility_bins *m, int row, int column) {
     float sum = 0.0f;
     for (int y = row - 1; y <= row + 1; y++) {
         for (int x = column - 1; x <= column + 1; x++) {
-            int inside = y < 0 ? 0 : y < REACH_ROWS ? y : REACH_ROWS - 1;
-            sum += m->share[inside][(x + REACH_COLUMNS) % REACH_COLUMNS];
+            int inside = y < 0 ? 0 : y < VISIBILITY_ROWS ? y : VISIBILITY_ROWS - 1;
+            sum += m->share[inside][(x + VISIBILITY_COLUMNS) % VISIBILITY_COLUMNS];
         }
     }
     return sum / 9.0f;
 }
 
-void reach_measure(struct reach *reach, const struct mesh *mesh, const struct accel *accel,
+void visibility_measure(struct visibility *visibility, const struct mesh *mesh, const struct accel *accel,
                    struct parallel *pool) {
-    struct measure *m = mem_calloc(1, sizeof *m);
-    *m = (struct measure){.mesh = mesh, .accel = accel};
+    struct visibility_bins *m = mem_calloc(1, sizeof *m);
+    *m = (struct visibility_bins){.mesh = mesh, .accel = accel};
     m->area_until = mem_array(mesh->triangle_count, sizeof *m->area_until);
     double total = 0.0;
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         total += 0.5 * (double)vec3_length(mesh_cross(mesh, i));
         m->area_until[i] = total;
     }
-    parallel_for(pool, (size_t)REACH_ROWS * REACH_COLUMNS, measure_bin, m);
-    for (int y = 0; y < REACH_ROWS; y++)
-        for (int x = 0; x < REACH_COLUMNS; x++)
-            reach->share[y][x] = blurred(m, y, x);
-    reach->area = total;
+    parallel_for(pool, (size_t)VISIBILITY_ROWS * VISIBILITY_COLUMNS, measure_bin, m);
+    for (int y = 0; y < VISIBILITY_ROWS; y++)
+        for (int x = 0; x < VISIBILITY_COLUMNS; x++)
+            visibility->share[y][x] = blurred(m, y, x);
+    visibility->area = total;
     mem_free(m->area_until);
     mem_free(m);
 }
