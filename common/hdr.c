@@ -17,7 +17,7 @@
 #define MAX_PIXELS_PER_BYTE 4096
 
 /* The file as a stream of bytes. */
-struct stream {
+struct hdr_stream {
     struct image_source *source;
     uint64_t offset; /* of the byte after the buffer */
     size_t at, end;
@@ -31,7 +31,7 @@ struct header {
 };
 
 /* The next byte, or -1 at the end. */
-static int next_byte(struct stream *s) {
+static int next_byte(struct hdr_stream *s) {
     if (s->at == s->end) {
         s->at = 0;
         s->end = image_source_read(s->source, s->offset, s->buffer, sizeof s->buffer);
@@ -42,7 +42,7 @@ static int next_byte(struct stream *s) {
     return s->buffer[s->at++];
 }
 
-static bool next_bytes(struct stream *s, uint8_t *out, size_t count) {
+static bool next_bytes(struct hdr_stream *s, uint8_t *out, size_t count) {
     for (size_t i = 0; i < count; i++) {
         int byte = next_byte(s);
         if (byte < 0)
@@ -53,7 +53,7 @@ static bool next_bytes(struct stream *s, uint8_t *out, size_t count) {
 }
 
 /* One line without its end; false when the file ends first or the line does not fit. */
-static bool next_line(struct stream *s, char *line, size_t size) {
+static bool next_line(struct hdr_stream *s, char *line, size_t size) {
     for (size_t length = 0; length < size; length++) {
         int byte = next_byte(s);
         if (byte < 0)
@@ -80,7 +80,7 @@ static void read_primaries(const char *text, struct header *h, struct image_info
     snprintf(info->color_warning, sizeof info->color_warning, "its PRIMARIES cannot be");
 }
 
-static enum status read_header(struct stream *s, struct image *image, struct header *h, struct image_info *info,
+static enum status read_header(struct hdr_stream *s, struct image *image, struct header *h, struct image_info *info,
                                struct error *err) {
     const char *name = s->source->name;
     char line[512];
@@ -121,7 +121,7 @@ static enum status read_header(struct stream *s, struct image *image, struct hea
 }
 
 /* Each of the four components is a row of runs (128 + count, value) and copies (count, ...). */
-static bool read_new_rle(struct stream *s, uint8_t *row, size_t width) {
+static bool read_new_rle(struct hdr_stream *s, uint8_t *row, size_t width) {
     for (int c = 0; c < 4; c++) {
         for (size_t x = 0; x < width;) {
             int code = next_byte(s);
@@ -142,7 +142,7 @@ static bool read_new_rle(struct stream *s, uint8_t *row, size_t width) {
 }
 
 /* Flat pixels and old-style runs; `pixel` is the first one, read already. */
-static bool read_old_rle(struct stream *s, uint8_t pixel[4], uint8_t *row, size_t width) {
+static bool read_old_rle(struct hdr_stream *s, uint8_t pixel[4], uint8_t *row, size_t width) {
     int shift = 0;
     for (size_t x = 0;;) {
         if (pixel[0] == 1 && pixel[1] == 1 && pixel[2] == 1) {
@@ -163,7 +163,7 @@ static bool read_old_rle(struct stream *s, uint8_t pixel[4], uint8_t *row, size_
     }
 }
 
-static bool read_row(struct stream *s, uint8_t *row, size_t width) {
+static bool read_row(struct hdr_stream *s, uint8_t *row, size_t width) {
     uint8_t pixel[4];
     if (!next_bytes(s, pixel, 4))
         return false;
@@ -174,7 +174,7 @@ static bool read_row(struct stream *s, uint8_t *row, size_t width) {
 
 enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
-    struct stream s = {.source = source};
+    struct hdr_stream s = {.source = source};
     struct header header = {.scale = 1};
     enum status status = read_header(&s, image, &header, info, err);
     if (status != STATUS_OK)

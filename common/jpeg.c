@@ -2,7 +2,7 @@
  *
  * The library tolerates damage: it fills what is missing with grey and counts a warning. Grey
  * that no camera saw would be taken for light, so data that is corrupt or ends early is an
- * error here. Errors arrive by longjmp; what must survive one is in struct reader. */
+ * error here. Errors arrive by longjmp; what must survive one is in struct jpeg_reader. */
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 /* A progressive file may ask for any number of passes over the whole picture. */
 #define MAX_SCANS 500
 
-struct reader {
+struct jpeg_reader {
     struct jpeg_decompress_struct jpeg; /* each finds its reader through client_data */
     struct jpeg_error_mgr error;
     struct jpeg_source_mgr input;
@@ -40,13 +40,13 @@ struct reader {
     JOCTET buffer[16384];
 };
 
-static void stop(struct reader *r, enum status status) {
+static void stop(struct jpeg_reader *r, enum status status) {
     r->status = status;
     longjmp(r->jump, 1);
 }
 
 static void damaged(j_common_ptr common) {
-    struct reader *r = common->client_data;
+    struct jpeg_reader *r = common->client_data;
     char message[JMSG_LENGTH_MAX];
     int which = common->err->msg_parm.i[0];
     /* Where the system gave none; 1 and 3 are pictures that ask for too much (jmemmgr.c). */
@@ -57,7 +57,7 @@ static void damaged(j_common_ptr common) {
 }
 
 static void on_message(j_common_ptr common, int level) {
-    struct reader *r = common->client_data;
+    struct jpeg_reader *r = common->client_data;
     if (level >= 0)
         return; /* a trace */
     switch (common->err->msg_code) {
@@ -78,7 +78,7 @@ static void init_source(j_decompress_ptr jpeg) {
 }
 
 static boolean fill_buffer(j_decompress_ptr jpeg) {
-    struct reader *r = jpeg->client_data;
+    struct jpeg_reader *r = jpeg->client_data;
     size_t got = image_source_read(r->source, r->offset, r->buffer, sizeof r->buffer);
     if (got == 0)
         stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: the file is cut short",
@@ -90,7 +90,7 @@ static boolean fill_buffer(j_decompress_ptr jpeg) {
 }
 
 static void skip_bytes(j_decompress_ptr jpeg, long count) {
-    struct reader *r = jpeg->client_data;
+    struct jpeg_reader *r = jpeg->client_data;
     if (count <= 0)
         return;
     size_t skip = (size_t)count;
@@ -108,13 +108,13 @@ static void end_source(j_decompress_ptr jpeg) {
 }
 
 static void on_progress(j_common_ptr common) {
-    struct reader *r = common->client_data;
+    struct jpeg_reader *r = common->client_data;
     if (r->jpeg.input_scan_number > MAX_SCANS)
         stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: more than %d scans",
                           r->source->name, MAX_SCANS));
 }
 
-static void start(struct reader *r) {
+static void start(struct jpeg_reader *r) {
     jpeg_create_decompress(&r->jpeg);
     r->input = (struct jpeg_source_mgr){.init_source = init_source,
                                         .fill_input_buffer = fill_buffer,
@@ -128,7 +128,7 @@ static void start(struct reader *r) {
     jpeg_save_markers(&r->jpeg, JPEG_APP0 + 2, 0xffff);
 }
 
-static void read_exif(struct reader *r) {
+static void read_exif(struct jpeg_reader *r) {
     static const char start_of_exif[6] = "Exif\0";
     for (jpeg_saved_marker_ptr m = r->jpeg.marker_list; m; m = m->next)
         if (m->data_length > sizeof start_of_exif &&
@@ -139,7 +139,7 @@ static void read_exif(struct reader *r) {
         }
 }
 
-static void read_header(struct reader *r) {
+static void read_header(struct jpeg_reader *r) {
     const char *name = r->source->name;
     jpeg_read_header(&r->jpeg, TRUE);
     if (r->jpeg.num_components != 1 && r->jpeg.num_components != 3)
@@ -159,7 +159,7 @@ static void read_header(struct reader *r) {
 }
 
 /* Before decompression ends, which drops the segments. */
-static void read_color(struct reader *r) {
+static void read_color(struct jpeg_reader *r) {
     unsigned length = 0;
     color_init(&r->color);
     if (jpeg_read_icc_profile(&r->jpeg, &r->profile, &length))
@@ -170,7 +170,7 @@ static void read_color(struct reader *r) {
         image_color_by_exif(r->info, &r->color);
 }
 
-static void read_pixels(struct reader *r) {
+static void read_pixels(struct jpeg_reader *r) {
     r->jpeg.out_color_space = JCS_RGB; /* grey too */
     jpeg_start_decompress(&r->jpeg);
     struct image *image = r->image;
@@ -189,7 +189,7 @@ static void read_pixels(struct reader *r) {
 
 enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
                             struct image_info *info, struct error *err) {
-    struct reader *r = mem_calloc(1, sizeof *r);
+    struct jpeg_reader *r = mem_calloc(1, sizeof *r);
     r->source = source;
     r->image = image;
     r->info = info;

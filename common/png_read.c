@@ -17,7 +17,7 @@
 /* What libpng may ask for at once, for text and profiles that we do not want. */
 #define MAX_CHUNK_BYTES ((png_alloc_size_t)8 << 20)
 
-struct reader {
+struct png_reader {
     struct image_source *source;
     uint64_t offset;
     struct image *image;
@@ -34,7 +34,7 @@ struct reader {
 };
 
 static void read_failed(png_structp png, png_const_charp message) {
-    struct reader *r = png_get_error_ptr(png);
+    struct png_reader *r = png_get_error_ptr(png);
     r->status = error_set(r->err, STATUS_INPUT, "%s: damaged PNG: %s%s%s", r->source->name, message,
                           r->warning[0] ? "; " : "", r->warning);
     longjmp(png_jmpbuf(png), 1);
@@ -42,25 +42,25 @@ static void read_failed(png_structp png, png_const_charp message) {
 
 /* Alone, warnings are about chunks that do not touch the pixels (profiles, times, text). */
 static void note_warning(png_structp png, png_const_charp message) {
-    struct reader *r = png_get_error_ptr(png);
+    struct png_reader *r = png_get_error_ptr(png);
     snprintf(r->warning, sizeof r->warning, "%s", message);
 }
 
 static void read_bytes(png_structp png, png_bytep out, size_t length) {
-    struct reader *r = png_get_io_ptr(png);
+    struct png_reader *r = png_get_io_ptr(png);
     size_t got = image_source_read(r->source, r->offset, out, length);
     r->offset += got;
     if (got < length)
         png_error(png, "the file is cut short");
 }
 
-static void stop(struct reader *r, enum status status) {
+static void stop(struct png_reader *r, enum status status) {
     r->status = status;
     longjmp(png_jmpbuf(r->png), 1);
 }
 
 /* Has libpng expand everything to grey-free 8 or 16-bit RGB or RGBA. */
-static void set_transforms(struct reader *r, int color) {
+static void set_transforms(struct png_reader *r, int color) {
     bool transparent = png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
     if (color == PNG_COLOR_TYPE_PALETTE)
         png_set_palette_to_rgb(r->png);
@@ -74,7 +74,7 @@ static void set_transforms(struct reader *r, int color) {
 
 /* libpng asks for the memory that a chunk claims before it reads it, up to 2 GiB whatever its
  * limit says: a chunk must not claim more than the file has. What follows IEND is not read. */
-static void check_chunks(struct reader *r) {
+static void check_chunks(struct png_reader *r) {
     uint64_t size = r->source->size, at = 8;
     uint8_t head[8];
     while (image_source_read(r->source, at, head, sizeof head) == sizeof head) {
@@ -87,7 +87,7 @@ static void check_chunks(struct reader *r) {
     }
 }
 
-static void read_header(struct reader *r) {
+static void read_header(struct png_reader *r) {
     check_chunks(r);
     png_read_info(r->png, r->png_info);
     png_uint_32 width, height;
@@ -112,7 +112,7 @@ static void read_header(struct reader *r) {
     set_transforms(r, color);
 }
 
-static void convert_row(const struct reader *r, const uint8_t *from, float *to) {
+static void convert_row(const struct png_reader *r, const uint8_t *from, float *to) {
     size_t count = (size_t)r->image->width * r->image->channel_count;
     if (r->info->bits == 8)
         for (size_t i = 0; i < count; i++)
@@ -124,7 +124,7 @@ static void convert_row(const struct reader *r, const uint8_t *from, float *to) 
 
 /* Rows of an interlaced picture gather over seven passes; they do so in the memory of their own
  * float row, which has room for them, and are converted once the last pass has completed them. */
-static void read_pixels(struct reader *r) {
+static void read_pixels(struct png_reader *r) {
     int pass_count = png_set_interlace_handling(r->png);
     png_read_update_info(r->png, r->png_info);
     struct image *image = r->image;
@@ -148,7 +148,7 @@ static void read_pixels(struct reader *r) {
     png_read_end(r->png, NULL);
 }
 
-static void convert(struct reader *r) {
+static void convert(struct png_reader *r) {
     if (!png_color_read(r->source, r->is_grey, r->info->bits, &r->color))
         image_color_by_exif(r->info, &r->color);
     image_convert(r->image, r->info, &r->color);
@@ -156,8 +156,8 @@ static void convert(struct reader *r) {
 
 enum status image_read_png(struct image_source *source, bool probe, struct image *image,
                            struct image_info *info, struct error *err) {
-    struct reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
-    struct reader *volatile kept = &r;
+    struct png_reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
+    struct png_reader *volatile kept = &r;
     r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL,
                                      png_memory_new, png_memory_free);
     r.png_info = r.png ? png_create_info_struct(r.png) : NULL;

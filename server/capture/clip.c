@@ -63,9 +63,9 @@ static void mark_row(void *user, size_t row, int thread) {
     const struct clip_job *job = user;
     uint32_t width = job->photo->camera.width;
     for (uint32_t x = 0; x < width; x++) {
-        job->photo->white[row * width + x] = 0;
+        job->photo->saturated[row * width + x] = 0;
         for (int c = 0; c < 3; c++)
-            job->photo->white[row * width + x] |= (uint8_t)(is_white(job, (long)x, (long)row, c) << c);
+            job->photo->saturated[row * width + x] |= (uint8_t)(is_white(job, (long)x, (long)row, c) << c);
     }
 }
 
@@ -75,8 +75,8 @@ void clip_mark(struct scene *scene, const struct views *views, const struct nois
         if (photo->is_hdr)
             continue;
         struct clip_job job = {views, noise, photo, t};
-        if (!photo->white)
-            photo->white = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->white);
+        if (!photo->saturated)
+            photo->saturated = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->saturated);
         parallel_for(pool, photo->camera.height, mark_row, &job);
     }
 }

@@ -98,7 +98,7 @@ static void look_all(const struct fuse_job *job, const struct surface_point *p, 
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (views_sees(v, t, p->position, p->normal, &view) && !photograph_sparks(photo, view.x, view.y) &&
+        if (views_sees(v, t, p->position, p->normal, &view) && !photograph_has_firefly(photo, view.x, view.y) &&
             photograph_sample(photo, view.x, view.y, &s))
             add_look(job, l, &s, &view, p->triangle);
     }

@@ -50,15 +50,15 @@ static void mark_row(void *user, size_t row, int thread) {
     const struct sparks_job *job = user;
     uint32_t width = job->photo->camera.width;
     for (uint32_t x = 0; x < width; x++)
-        job->photo->spark[row * width + x] = is_spark(job, (long)x, (long)row);
+        job->photo->firefly[row * width + x] = is_spark(job, (long)x, (long)row);
 }
 
 void sparks_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool) {
     for (uint32_t t = 0; t < views->train_count; t++) {
         struct photograph *photo = &scene->photograph[views->train[t]];
         struct sparks_job job = {noise, photo, t};
-        if (!photo->spark)
-            photo->spark = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->spark);
+        if (!photo->firefly)
+            photo->firefly = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->firefly);
         parallel_for(pool, photo->camera.height, mark_row, &job);
     }
 }

@@ -226,7 +226,7 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal,
         !camera_project(camera, point, &view->x, &view->y, &depth_m))
         return false;
     view->train = train;
-    view->weight = cosine / (squared * distance) * photograph_trust(photo);
+    view->weight = cosine / (squared * distance) * photograph_weight(photo);
     return true;
 }
 

@@ -42,7 +42,7 @@ struct views {
 struct view {
     uint32_t train;  /* index into views.train */
     float x, y;      /* place in the picture, pixels */
-    float weight;    /* solid angle per area of surface (cosine over squared distance) x photograph_trust */
+    float weight;    /* solid angle per area of surface (cosine over squared distance) x photograph_weight */
 };
 
 void views_init(struct views *v, const struct scene *scene, const struct segments *segments,

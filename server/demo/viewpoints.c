@@ -16,27 +16,27 @@
 #define HALF_ANGLE_TANGENT 0.7673f /* 75 degrees across */
 #define TEST_APART_M 0.25f    /* of a test camera to every training camera */
 
-struct surface_point {
+struct demo_point {
     vec3 position, normal;
 };
 
-struct chooser {
+struct viewpoint_chooser {
     const struct room *room;
     uint64_t seed;
-    struct surface_point *point; /* [POINTS] */
+    struct demo_point *point; /* [POINTS] */
     struct camera *candidate;    /* [CANDIDATES] */
     uint8_t *sees;               /* [CANDIDATES][POINTS] */
     bool *taken;                 /* [CANDIDATES] */
     float *count;                /* [POINTS] chosen views that see it */
 };
 
-static float uniform(const struct chooser *c, uint64_t stream, uint64_t i, uint64_t dimension) {
+static float uniform(const struct viewpoint_chooser *c, uint64_t stream, uint64_t i, uint64_t dimension) {
     uint64_t bits = rng_key(c->seed, stream, i * 16 + dimension);
     return rng_to_float((uint32_t)(bits >> 32));
 }
 
 /* Points spread by area: triangles are walked with a fixed step over their summed areas. */
-static void spread_points(struct chooser *c) {
+static void spread_points(struct viewpoint_chooser *c) {
     const struct mesh *mesh = &c->room->mesh;
     double step = mesh_area(mesh) / POINTS, next = 0.5 * step, walked = 0.0;
     size_t i = 0;
@@ -84,7 +84,7 @@ static void aim(struct camera *camera, vec3 eye, vec3 forward, uint32_t width, u
 }
 
 /* True when most of the picture's rays (a 5 x 5 grid) run farther than NEAREST_M. */
-static bool has_room_ahead(const struct chooser *c, const struct camera *camera) {
+static bool has_room_ahead(const struct viewpoint_chooser *c, const struct camera *camera) {
     int far = 0;
     for (int i = 0; i < 25; i++) {
         vec3 direction;
@@ -98,7 +98,7 @@ static bool has_room_ahead(const struct chooser *c, const struct camera *camera)
     return far >= 22;
 }
 
-static void draw_candidate(struct chooser *c, size_t i, uint32_t width, uint32_t height) {
+static void draw_candidate(struct viewpoint_chooser *c, size_t i, uint32_t width, uint32_t height) {
     for (uint64_t attempt = i;; attempt += CANDIDATES) {
         vec3 eye = {CLEARANCE_M + uniform(c, 2, attempt, 0) * (ROOM_WIDTH - 2.0f * CLEARANCE_M),
                     0.35f + uniform(c, 2, attempt, 1) * 1.9f,
@@ -114,8 +114,8 @@ static void draw_candidate(struct chooser *c, size_t i, uint32_t width, uint32_t
     }
 }
 
-static bool sees(const struct chooser *c, const struct camera *camera,
-                 const struct surface_point *p) {
+static bool sees(const struct viewpoint_chooser *c, const struct camera *camera,
+                 const struct demo_point *p) {
     float x, y, depth;
     vec3 to_eye = vec3_sub(camera_origin(camera), p->position);
     float distance = vec3_length(to_eye);
@@ -127,7 +127,7 @@ static bool sees(const struct chooser *c, const struct camera *camera,
 }
 
 /* Chooses one more training camera. */
-static size_t take_best(struct chooser *c) {
+static size_t take_best(struct viewpoint_chooser *c) {
     size_t best = CANDIDATES;
     double best_gain = -1.0;
     for (size_t i = 0; i < CANDIDATES; i++) {
@@ -158,7 +158,7 @@ static bool is_apart(const struct camera *camera, const struct camera *others, s
 
 /* Before the tests are chosen: counts from 0 again, candidates near a training camera set aside
  * where enough others remain. */
-static void start_over(struct chooser *c, const struct camera *train, size_t train_count,
+static void start_over(struct viewpoint_chooser *c, const struct camera *train, size_t train_count,
                        size_t wanted) {
     size_t free_count = CANDIDATES - train_count;
     memset(c->count, 0, POINTS * sizeof *c->count);
@@ -174,7 +174,7 @@ void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
                        size_t train_count, size_t test_count, uint64_t seed,
                        struct camera *camera) {
     assert(train_count + test_count <= CANDIDATES / 2);
-    struct chooser c = {.room = room, .seed = seed};
+    struct viewpoint_chooser c = {.room = room, .seed = seed};
     c.point = mem_array(POINTS, sizeof *c.point);
     c.candidate = mem_array(CANDIDATES, sizeof *c.candidate);
     c.sees = mem_array((size_t)CANDIDATES * POINTS, sizeof *c.sees);

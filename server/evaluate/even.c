@@ -14,7 +14,7 @@
 #define LEAST_ROUGHNESS 0.5f
 
 /* Where the channels of the truth are. */
-struct columns {
+struct even_columns {
     int color[3], roughness, object;
 };
 
@@ -22,7 +22,7 @@ static const float *pixel_at(const struct image *image, uint32_t x, uint32_t y) 
     return image->pixel + ((size_t)y * image->width + x) * image->channel_count;
 }
 
-static bool is_same(const float *a, const float *b, const struct columns *at) {
+static bool is_same(const float *a, const float *b, const struct even_columns *at) {
     for (int c = 0; c < 3; c++) {
         if (fabsf(a[at->color[c]] - b[at->color[c]]) > SAME_COLOR)
             return false;
@@ -31,7 +31,7 @@ static bool is_same(const float *a, const float *b, const struct columns *at) {
 }
 
 /* What a pixel should show by those around it; false where that is not even. */
-static bool told_around(const struct image *photograph, const struct image *truth, const struct columns *at, uint32_t x,
+static bool told_around(const struct image *photograph, const struct image *truth, const struct even_columns *at, uint32_t x,
                         uint32_t y, float told[3]) {
     const float *middle = pixel_at(truth, x, y);
     double sum[3] = {0.0, 0.0, 0.0};
@@ -54,7 +54,7 @@ static bool told_around(const struct image *photograph, const struct image *trut
 /* Makes a picture of what pixels should show where all is even, and NaN elsewhere, which metrics leave out. Returns the
  * number of the former. */
 static size_t tell(const struct image *photograph, const struct image *truth, struct image *told) {
-    const struct columns at = {
+    const struct even_columns at = {
         {image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"), image_channel(truth, "base_color.B")},
         image_channel(truth, "roughness"), image_channel(truth, "object_id")};
     size_t count = 0;

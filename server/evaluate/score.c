@@ -7,7 +7,7 @@
 #include "common/vec.h"
 
 /* Where the channels of a picture of parameters are. */
-struct columns {
+struct score_columns {
     size_t base_color[3], emission[3], roughness, specular;
 };
 
@@ -17,8 +17,8 @@ static size_t column(const struct image *image, const char *name) {
     return (size_t)c;
 }
 
-static struct columns find_columns(const struct image *image) {
-    return (struct columns){
+static struct score_columns find_columns(const struct image *image) {
+    return (struct score_columns){
         {column(image, "base_color.R"), column(image, "base_color.G"), column(image, "base_color.B")},
         {column(image, "emission.R"), column(image, "emission.G"), column(image, "emission.B")},
         column(image, "roughness"), column(image, "specular"),
@@ -43,7 +43,7 @@ static bool one_object(const struct image *truth, size_t object, uint32_t x, uin
 }
 
 static void add_emission(struct score *score, const float *found, const float *truth,
-                         const struct columns *fc, const struct columns *tc) {
+                         const struct score_columns *fc, const struct score_columns *tc) {
     bool found_emits = false, truth_emits = false;
     for (int c = 0; c < 3; c++) {
         double a = (double)found[fc->emission[c]], b = (double)truth[tc->emission[c]];
@@ -60,7 +60,7 @@ static void add_emission(struct score *score, const float *found, const float *t
 void score_add(struct score *score, const struct image *found, const struct image *truth,
                const uint8_t *flags) {
     assert(found->width == truth->width && found->height == truth->height);
-    struct columns fc = find_columns(found), tc = find_columns(truth);
+    struct score_columns fc = find_columns(found), tc = find_columns(truth);
     size_t object = column(truth, "object_id");
     for (uint32_t y = 0; y < truth->height; y++) {
         for (uint32_t x = 0; x < truth->width; x++) {

@@ -8,7 +8,7 @@
 #include "server/evaluate/score.h"
 
 /* Where a corner ray of a pixel meets the room. */
-struct corner {
+struct seen_corner {
     vec3 point, normal;
     float distance_m;
     int64_t object; /* NOTHING: it meets no surface */
@@ -20,14 +20,14 @@ struct corner {
 #define EDGE_PIXELS 3.0f
 #define EDGE_SHARE 0.002f
 
-struct edge_job {
+struct seen_edge_job {
     const struct seen *seen;
     size_t train;
 };
 
-static struct corner trace_corner(const struct seen *s, const struct camera *camera, uint32_t x,
+static struct seen_corner trace_corner(const struct seen *s, const struct camera *camera, uint32_t x,
                                   uint32_t y) {
-    struct corner corner = {.object = NOTHING};
+    struct seen_corner corner = {.object = NOTHING};
     vec3 origin = camera_origin(camera), direction;
     struct accel_hit hit;
     if (!camera_direction(camera, (float)x, (float)y, &direction) ||
@@ -40,7 +40,7 @@ static struct corner trace_corner(const struct seen *s, const struct camera *cam
     return corner;
 }
 
-static bool edge_between(const struct corner *a, const struct corner *b, float focal) {
+static bool edge_between(const struct seen_corner *a, const struct seen_corner *b, float focal) {
     if (a->object != b->object || a->object == NOTHING)
         return a->object != b->object;
     vec3 between = vec3_sub(b->point, a->point);
@@ -49,15 +49,15 @@ static bool edge_between(const struct corner *a, const struct corner *b, float f
 }
 
 static void mark_row(void *user, size_t row, int thread) {
-    const struct edge_job *job = user;
+    const struct seen_edge_job *job = user;
     const struct seen *s = job->seen;
     const struct camera *camera = &s->scene->photograph[s->train[job->train]].camera;
     uint8_t *out = s->straddles[job->train] + row * camera->width;
     uint32_t y = (uint32_t)row;
-    struct corner left_top = trace_corner(s, camera, 0, y), left_low = trace_corner(s, camera, 0, y + 1);
+    struct seen_corner left_top = trace_corner(s, camera, 0, y), left_low = trace_corner(s, camera, 0, y + 1);
     (void)thread;
     for (uint32_t x = 0; x < camera->width; x++) {
-        struct corner top = trace_corner(s, camera, x + 1, y), low = trace_corner(s, camera, x + 1, y + 1);
+        struct seen_corner top = trace_corner(s, camera, x + 1, y), low = trace_corner(s, camera, x + 1, y + 1);
         out[x] = edge_between(&left_top, &top, camera->fx) || edge_between(&left_top, &left_low, camera->fx) ||
                  edge_between(&left_top, &low, camera->fx) || edge_between(&top, &left_low, camera->fx);
         left_top = top;
@@ -74,7 +74,7 @@ void seen_init(struct seen *s, const struct scene *scene, const struct accel *ac
         const struct camera *camera = &scene->photograph[i].camera;
         if (scene->photograph[i].is_test)
             continue;
-        struct edge_job job = {s, s->train_count++};
+        struct seen_edge_job job = {s, s->train_count++};
         s->train[job.train] = (uint32_t)i;
         s->straddles[job.train] = mem_array((size_t)camera->height * camera->width, 1);
         parallel_for(pool, camera->height, mark_row, &job);

@@ -27,14 +27,14 @@
 #define PAGE_LIMIT ((size_t)1 << 29)  /* bytes */
 #define PAGE_COMPARISONS 24           /* side-by-sides embedded in the page; files of all are written */
 
-struct kind {
+struct output_kind {
     enum picture_kind kind;
     const char *stem;
     enum image_exr_type type;
     const char *title, *about; /* about: for report.json and the page */
 };
 
-static const struct kind kinds[] = {
+static const struct output_kind kinds[] = {
     {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour",
      "linear Rec. 709 reflectance by texel"},
     {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission",

@@ -40,19 +40,19 @@ static const char style[] =
 
 /* --- curves ------------------------------------------------------------------------------- */
 
-struct point {
+struct curve_point {
     double step, value;
 };
 
 /* The finite points of [[step, value], ...]; the caller's. */
-static struct point *read_series(const cJSON *series, size_t *count) {
-    struct point *point = mem_array((size_t)cJSON_GetArraySize(series) + 1, sizeof *point);
+static struct curve_point *read_series(const cJSON *series, size_t *count) {
+    struct curve_point *point = mem_array((size_t)cJSON_GetArraySize(series) + 1, sizeof *point);
     *count = 0;
     for (const cJSON *item = series->child; item; item = item->next) {
         const cJSON *step = item->child, *value = step ? step->next : NULL;
         if (!cJSON_IsNumber(step) || !cJSON_IsNumber(value) || !isfinite(value->valuedouble))
             continue;
-        point[(*count)++] = (struct point){step->valuedouble, value->valuedouble};
+        point[(*count)++] = (struct curve_point){step->valuedouble, value->valuedouble};
     }
     return point;
 }
@@ -63,7 +63,7 @@ enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
 
 struct curve {
     size_t count;
-    struct point *point; /* [count] owned */
+    struct curve_point *point; /* [count] owned */
     bool logarithmic;
     double top, range;   /* of values, or of their logarithms */
     double steps;        /* from the first to the last */
@@ -100,7 +100,7 @@ static void put_path(struct buf *out, const struct curve *c) {
     size_t stride = (c->count + CURVE_POINTS - 1) / CURVE_POINTS;
     buf_puts(out, "<path d=\"");
     for (size_t i = 0; i < c->count;) {
-        const struct point *p = &c->point[i];
+        const struct curve_point *p = &c->point[i];
         double value = c->logarithmic ? log(p->value) : p->value;
         buf_printf(out, "%c%.1f %.1f", i ? 'L' : 'M',
                    LEFT + (WIDTH - LEFT - RIGHT) * (p->step - c->point[0].step) / c->steps,

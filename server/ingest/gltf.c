@@ -17,7 +17,7 @@
 #define FAN 6
 #define NONE UINT32_MAX
 
-struct reader {
+struct gltf_reader {
     struct gltf_file file;
     struct mesh *mesh;
     struct faces *faces;
@@ -30,7 +30,7 @@ struct reader {
 
 /* --- primitives (3.7.2) --------------------------------------------------------------------- */
 
-static enum status open_attribute(struct reader *r, const cJSON *primitive, const char *key,
+static enum status open_attribute(struct gltf_reader *r, const cJSON *primitive, const char *key,
                                   const char *where, bool *found, struct gltf_span *span) {
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
     size_t accessor;
@@ -63,7 +63,7 @@ static vec3 apply(const double m[3], const double m1[3], const double m2[3], con
                   (float)(m2[0] * x + m2[1] * y + m2[2] * z)};
 }
 
-static uint32_t append_vertex(struct reader *r, const struct primitive *p, size_t number) {
+static uint32_t append_vertex(struct gltf_reader *r, const struct primitive *p, size_t number) {
     struct mesh *mesh = r->mesh;
     const struct affine *t = p->t;
     float value[3];
@@ -85,7 +85,7 @@ static uint32_t append_vertex(struct reader *r, const struct primitive *p, size_
 }
 
 /* The mesh's number for vertex `number` of the file, which is added when it is new. */
-static uint32_t vertex_of(struct reader *r, const struct primitive *p, size_t number) {
+static uint32_t vertex_of(struct gltf_reader *r, const struct primitive *p, size_t number) {
     size_t slot = rng_mix64(number) & (p->table_size - 1);
     for (; p->table[slot][1] != NONE; slot = (slot + 1) & (p->table_size - 1))
         if (p->table[slot][0] == (uint32_t)number)
@@ -102,7 +102,7 @@ static void corners_of(int mode, size_t i, size_t corner[3]) {
     corner[2] = mode == TRIANGLES ? 3 * i + 2 : mode == STRIP ? i + 2 - i % 2 : 0;
 }
 
-static enum status add_triangles(struct reader *r, const struct primitive *p, size_t triangles) {
+static enum status add_triangles(struct gltf_reader *r, const struct primitive *p, size_t triangles) {
     struct faces *f = r->faces;
     f->corner_count = 3;
     for (size_t i = 0; i < triangles; i++) {
@@ -124,7 +124,7 @@ static enum status add_triangles(struct reader *r, const struct primitive *p, si
     return STATUS_OK;
 }
 
-static enum status open_primitive(struct reader *r, const cJSON *object, struct primitive *p) {
+static enum status open_primitive(struct gltf_reader *r, const cJSON *object, struct primitive *p) {
     size_t accessor;
     bool found;
     const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
@@ -153,7 +153,7 @@ static enum status open_primitive(struct reader *r, const cJSON *object, struct 
     return status;
 }
 
-static enum status add_primitive(struct reader *r, const cJSON *object, const char *where, int mode,
+static enum status add_primitive(struct gltf_reader *r, const cJSON *object, const char *where, int mode,
                                  const struct affine *t) {
     struct primitive p = {.where = where, .mode = mode, .t = t};
     enum status status = open_primitive(r, object, &p);
@@ -175,7 +175,7 @@ static enum status add_primitive(struct reader *r, const cJSON *object, const ch
 }
 
 /* Each change of material within the node begins an object. */
-static enum status add_mesh(struct reader *r, size_t mesh, const struct affine *t) {
+static enum status add_mesh(struct gltf_reader *r, size_t mesh, const struct affine *t) {
     const cJSON *primitives = cJSON_GetObjectItemCaseSensitive(r->file.meshes.item[mesh], "primitives"), *item;
     double material = NAN; /* -1: none */
     size_t i = 0;
@@ -201,7 +201,7 @@ static enum status add_mesh(struct reader *r, size_t mesh, const struct affine *
 
 /* --- nodes ---------------------------------------------------------------------------------- */
 
-static enum status visit(struct reader *r, size_t node, const struct affine *parent, int depth) {
+static enum status visit(struct gltf_reader *r, size_t node, const struct affine *parent, int depth) {
     const cJSON *object = r->file.nodes.item[node], *item;
     struct affine own, t;
     char where[48];
@@ -234,7 +234,7 @@ static enum status visit(struct reader *r, size_t node, const struct affine *par
     return status;
 }
 
-static enum status visit_list(struct reader *r, const cJSON *list, const char *of) {
+static enum status visit_list(struct gltf_reader *r, const cJSON *list, const char *of) {
     static const struct affine identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     const cJSON *item;
     cJSON_ArrayForEach(item, list) {
@@ -250,7 +250,7 @@ static enum status visit_list(struct reader *r, const cJSON *list, const char *o
 }
 
 /* All nodes that are no other's child. */
-static enum status visit_roots(struct reader *r) {
+static enum status visit_roots(struct gltf_reader *r) {
     cJSON *roots = cJSON_CreateArray();
     bool *is_child = mem_calloc(r->file.nodes.count + 1, sizeof *is_child);
     const cJSON *item;
@@ -270,7 +270,7 @@ static enum status visit_roots(struct reader *r) {
     return status;
 }
 
-static enum status read_scene(struct reader *r) {
+static enum status read_scene(struct gltf_reader *r) {
     bool found;
     size_t scene;
     enum status status = gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found,
@@ -283,7 +283,7 @@ static enum status read_scene(struct reader *r) {
     return visit_list(r, cJSON_GetObjectItemCaseSensitive(r->file.scenes.item[scene], "nodes"), "the scene");
 }
 
-static void finish(struct reader *r) {
+static void finish(struct gltf_reader *r) {
     struct mesh *mesh = r->mesh;
     if (r->has_bare) {
         mem_free(mesh->normal);
@@ -299,7 +299,7 @@ enum status gltf_parse(const void *data, size_t size, const char *name, const ch
                        size_t triangle_limit, struct mesh *mesh, struct faces_report *report,
                        struct error *err) {
     *mesh = (struct mesh){0};
-    struct reader r = {.mesh = mesh, .err = err};
+    struct gltf_reader r = {.mesh = mesh, .err = err};
     r.faces = faces_new(mesh, name, triangle_limit, true);
     enum status status = gltf_file_open(&r.file, data, size, name, folder, err);
     if (status == STATUS_OK)

@@ -21,7 +21,7 @@ struct points {
 
 enum label { LABEL_OBJECT, LABEL_GROUP, LABEL_MATERIAL, LABEL_COUNT };
 
-struct reader {
+struct obj_reader {
     const char *name;
     const uint8_t *data;
     size_t size, at, line_end; /* `at` is within the line */
@@ -41,18 +41,18 @@ struct reader {
 
 /* --- lines and tokens ----------------------------------------------------------------------- */
 
-static enum status line_error(const struct reader *r, const char *what) {
+static enum status line_error(const struct obj_reader *r, const char *what) {
     return error_set(r->err, STATUS_INPUT, "%s, line %zu: %s", r->name, r->line, what);
 }
 
 /* Whether the line that ends at `end` goes on in the next. */
-static bool is_continued(const struct reader *r, size_t end) {
+static bool is_continued(const struct obj_reader *r, size_t end) {
     if (end > r->at && r->data[end - 1] == '\r')
         end--;
     return end > r->at && r->data[end - 1] == '\\';
 }
 
-static bool next_line(struct reader *r) {
+static bool next_line(struct obj_reader *r) {
     r->at = r->line_end < r->size && r->line > 0 ? r->line_end + 1 : r->line_end;
     if (r->at >= r->size)
         return false;
@@ -73,7 +73,7 @@ static bool is_blank(uint8_t c) {
 
 /* The next word of the line, "" at its end. One that is too long for a number or a corner is made
  * into something that is neither. */
-static size_t next_token(struct reader *r, char token[MAX_TOKEN]) {
+static size_t next_token(struct obj_reader *r, char token[MAX_TOKEN]) {
     size_t length = 0;
     while (r->at < r->line_end && is_blank(r->data[r->at]))
         r->at++;
@@ -87,7 +87,7 @@ static size_t next_token(struct reader *r, char token[MAX_TOKEN]) {
     return length;
 }
 
-static enum status read_vec3(struct reader *r, struct points *points) {
+static enum status read_vec3(struct obj_reader *r, struct points *points) {
     char token[MAX_TOKEN], *end;
     float value[3];
     for (int i = 0; i < 3; i++) {
@@ -107,7 +107,7 @@ static enum status read_vec3(struct reader *r, struct points *points) {
 
 /* --- labels --------------------------------------------------------------------------------- */
 
-static void read_label(struct reader *r, enum label kind) {
+static void read_label(struct obj_reader *r, enum label kind) {
     size_t from = r->at, to = r->line_end;
     while (from < to && is_blank(r->data[from]))
         from++;
@@ -117,7 +117,7 @@ static void read_label(struct reader *r, enum label kind) {
     r->object_known = false;
 }
 
-static uint32_t object_of_face(struct reader *r) {
+static uint32_t object_of_face(struct obj_reader *r) {
     if (!r->object_known)
         r->object = intern_number(&r->objects, r->label, sizeof r->label);
     r->object_known = true;
@@ -127,7 +127,7 @@ static uint32_t object_of_face(struct reader *r) {
 /* --- faces ---------------------------------------------------------------------------------- */
 
 /* An index of the file, 1 for the first of `count` or -1 for the last, as one from 0. */
-static enum status resolve(const struct reader *r, const char *text, char **end, size_t count,
+static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count,
                            const char *kind, uint32_t *index) {
     long value = strtol(text, end, 10);
     if (*end == text)
@@ -140,7 +140,7 @@ static enum status resolve(const struct reader *r, const char *text, char **end,
 }
 
 /* "v", "v/vt", "v//vn", "v/vt/vn": position and, or NONE, normal. */
-static enum status read_corner(const struct reader *r, char *token, uint32_t pair[2]) {
+static enum status read_corner(const struct obj_reader *r, char *token, uint32_t pair[2]) {
     char *end;
     pair[1] = NONE;
     enum status status = resolve(r, token, &end, r->position.count, "vertex", &pair[0]);
@@ -156,7 +156,7 @@ static enum status read_corner(const struct reader *r, char *token, uint32_t pai
     return status;
 }
 
-static uint32_t vertex_of(struct reader *r, const uint32_t pair[2]) {
+static uint32_t vertex_of(struct obj_reader *r, const uint32_t pair[2]) {
     size_t known = r->pairs.count;
     uint32_t vertex = intern_number(&r->pairs, pair, 2 * sizeof *pair);
     if (vertex < known)
@@ -169,7 +169,7 @@ static uint32_t vertex_of(struct reader *r, const uint32_t pair[2]) {
     return vertex;
 }
 
-static enum status read_face(struct reader *r) {
+static enum status read_face(struct obj_reader *r) {
     char token[MAX_TOKEN];
     struct faces *f = r->faces;
     f->corner_count = 0;
@@ -187,7 +187,7 @@ static enum status read_face(struct reader *r) {
     return faces_add(f, object_of_face(r), r->err);
 }
 
-static enum status read_line(struct reader *r) {
+static enum status read_line(struct obj_reader *r) {
     char word[MAX_TOKEN];
     next_token(r, word);
     if (strcmp(word, "v") == 0)
@@ -207,7 +207,7 @@ static enum status read_line(struct reader *r) {
 
 /* --- the mesh ------------------------------------------------------------------------------- */
 
-static void finish(struct reader *r, struct mesh *mesh) {
+static void finish(struct obj_reader *r, struct mesh *mesh) {
     mesh->vertex_count = r->pairs.count;
     mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
     if (!r->has_bare)
@@ -223,7 +223,7 @@ static void finish(struct reader *r, struct mesh *mesh) {
     }
 }
 
-static enum status check_whole(const struct reader *r) {
+static enum status check_whole(const struct obj_reader *r) {
     if (memchr(r->data, '\0', r->size < 4096 ? r->size : 4096))
         return error_set(r->err, STATUS_INPUT, "%s is not an OBJ file: it is not text", r->name);
     if (r->faces->mesh->triangle_count > 0)
@@ -237,8 +237,8 @@ enum status obj_parse(const void *data, size_t size, const char *name, size_t tr
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);
-    struct reader *r = mem_calloc(1, sizeof *r);
-    *r = (struct reader){.name = name, .data = data, .size = size, .next_line = 1, .err = err};
+    struct obj_reader *r = mem_calloc(1, sizeof *r);
+    *r = (struct obj_reader){.name = name, .data = data, .size = size, .next_line = 1, .err = err};
     r->faces = faces_new(mesh, name, triangle_limit, true);
     intern_init(&r->pairs);
     intern_init(&r->labels);

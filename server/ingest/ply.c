@@ -18,7 +18,7 @@
 
 #define MAX_TOKEN 64 /* characters of a number */
 
-struct reader {
+struct ply_reader {
     struct ply_cursor cursor;
     struct ply_header header;
     const char *element; /* what is being read, for messages */
@@ -28,7 +28,7 @@ struct reader {
 
 /* --- values ------------------------------------------------------------------------------ */
 
-static enum status value_error(struct reader *r, const char *what) {
+static enum status value_error(struct ply_reader *r, const char *what) {
     bool ascii = r->header.format == PLY_ASCII;
     return error_set(r->err, STATUS_INPUT, "%s, %s %zu: %s %" PRIu64 " %s", r->cursor.name,
                      ascii ? "line" : "byte", ascii ? r->cursor.line : r->cursor.at, r->element,
@@ -42,7 +42,7 @@ static uint64_t load(const uint8_t *at, size_t bytes, bool big) {
     return bits;
 }
 
-static enum status read_binary(struct reader *r, enum ply_type type, double *value) {
+static enum status read_binary(struct ply_reader *r, enum ply_type type, double *value) {
     size_t bytes = ply_type_bytes(type);
     if (r->cursor.size - r->cursor.at < bytes)
         return value_error(r, "is cut off: the file ends there");
@@ -70,7 +70,7 @@ static bool is_blank(uint8_t c) {
     return c == ' ' || c == '\t' || c == '\r';
 }
 
-static enum status read_ascii(struct reader *r, double *value) {
+static enum status read_ascii(struct ply_reader *r, double *value) {
     while (r->cursor.at < r->cursor.line_end && is_blank(r->cursor.data[r->cursor.at]))
         r->cursor.at++;
     if (r->cursor.at >= r->cursor.line_end)
@@ -90,11 +90,11 @@ static enum status read_ascii(struct reader *r, double *value) {
     return STATUS_OK;
 }
 
-static enum status read_value(struct reader *r, enum ply_type type, double *value) {
+static enum status read_value(struct ply_reader *r, enum ply_type type, double *value) {
     return r->header.format == PLY_ASCII ? read_ascii(r, value) : read_binary(r, type, value);
 }
 
-static enum status read_list_count(struct reader *r, const struct ply_property *p, uint64_t *count) {
+static enum status read_list_count(struct ply_reader *r, const struct ply_property *p, uint64_t *count) {
     double value;
     enum status status = read_value(r, p->count_type, &value);
     if (status != STATUS_OK)
@@ -105,7 +105,7 @@ static enum status read_list_count(struct reader *r, const struct ply_property *
     return STATUS_OK;
 }
 
-static enum status skip_property(struct reader *r, const struct ply_property *p) {
+static enum status skip_property(struct ply_reader *r, const struct ply_property *p) {
     uint64_t count = 1;
     double ignored;
     if (p->is_list) {
@@ -128,7 +128,7 @@ static enum status skip_property(struct reader *r, const struct ply_property *p)
 }
 
 /* Goes to the first value of the next record: in ASCII, the next line that is not blank. */
-static enum status begin_record(struct reader *r, uint64_t record) {
+static enum status begin_record(struct ply_reader *r, uint64_t record) {
     r->record = record;
     if (r->header.format != PLY_ASCII)
         return STATUS_OK;
@@ -146,13 +146,13 @@ static enum status begin_record(struct reader *r, uint64_t record) {
     return STATUS_OK;
 }
 
-static void end_record(struct reader *r) {
+static void end_record(struct ply_reader *r) {
     if (r->header.format == PLY_ASCII)
         r->cursor.at = r->cursor.line_end < r->cursor.size ? r->cursor.line_end + 1 : r->cursor.size;
 }
 
 /* Whether the rest of the file can hold the element's records at all. */
-static enum status begin_element(struct reader *r, const struct ply_element *e) {
+static enum status begin_element(struct ply_reader *r, const struct ply_element *e) {
     r->element = e->name;
     uint64_t least = 0;
     for (size_t i = 0; i < e->property_count; i++) {
@@ -172,14 +172,14 @@ static enum status begin_element(struct reader *r, const struct ply_element *e) 
 
 /* --- elements ---------------------------------------------------------------------------- */
 
-static size_t find_property(const struct reader *r, const struct ply_element *e, const char *name) {
+static size_t find_property(const struct ply_reader *r, const struct ply_element *e, const char *name) {
     for (size_t i = 0; i < e->property_count; i++)
         if (strcmp(r->header.property[e->first + i].name, name) == 0)
             return i;
     return SIZE_MAX;
 }
 
-static enum status skip_element(struct reader *r, const struct ply_element *e) {
+static enum status skip_element(struct ply_reader *r, const struct ply_element *e) {
     enum status status = begin_element(r, e);
     if (e->property_count == 0)
         return status;
@@ -192,7 +192,7 @@ static enum status skip_element(struct reader *r, const struct ply_element *e) {
     return status;
 }
 
-static enum status read_vertices(struct reader *r, const struct ply_element *e, struct mesh *mesh) {
+static enum status read_vertices(struct ply_reader *r, const struct ply_element *e, struct mesh *mesh) {
     static const char *const wanted[6] = {"x", "y", "z", "nx", "ny", "nz"};
     signed char target[PLY_MAX_PROPERTIES]; /* which of the six a property is; -1: none */
     memset(target, -1, sizeof target);
@@ -235,7 +235,7 @@ static enum status read_vertices(struct reader *r, const struct ply_element *e, 
     return STATUS_OK;
 }
 
-static enum status read_corners(struct reader *r, const struct ply_property *p,
+static enum status read_corners(struct ply_reader *r, const struct ply_property *p,
                                 struct faces *faces) {
     uint64_t count;
     enum status status = read_list_count(r, p, &count);
@@ -259,7 +259,7 @@ static enum status read_corners(struct reader *r, const struct ply_property *p,
     return status;
 }
 
-static enum status find_face_properties(struct reader *r, const struct ply_element *e, size_t *list,
+static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list,
                                         size_t *id) {
     *list = find_property(r, e, "vertex_indices");
     if (*list == SIZE_MAX)
@@ -277,7 +277,7 @@ static enum status find_face_properties(struct reader *r, const struct ply_eleme
     return STATUS_OK;
 }
 
-static enum status read_faces(struct reader *r, const struct ply_element *e, struct faces *faces) {
+static enum status read_faces(struct ply_reader *r, const struct ply_element *e, struct faces *faces) {
     size_t list = SIZE_MAX, id = SIZE_MAX;
     enum status status = find_face_properties(r, e, &list, &id);
     if (status == STATUS_OK)
@@ -314,7 +314,7 @@ static enum status read_faces(struct reader *r, const struct ply_element *e, str
     return STATUS_OK;
 }
 
-static enum status read_body(struct reader *r, struct faces *faces) {
+static enum status read_body(struct ply_reader *r, struct faces *faces) {
     bool has_vertices = false, has_faces = false;
     const struct ply_element *later = NULL; /* faces that come before the vertices */
     size_t later_at = 0, later_line = 0;
@@ -356,7 +356,7 @@ static enum status read_body(struct reader *r, struct faces *faces) {
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
                       struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
-    struct reader *r = mem_calloc(1, sizeof *r);
+    struct ply_reader *r = mem_calloc(1, sizeof *r);
     struct faces *faces = faces_new(mesh, name, triangle_limit, false);
     r->cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
     r->err = err;

@@ -5,17 +5,17 @@
 #include <assert.h>
 #include <stdbool.h>
 
-struct point {
+struct polygon_point {
     double x, y;
 };
 
 /* Twice the signed area of the triangle a, b, c. */
-static double area2(struct point a, struct point b, struct point c) {
+static double area2(struct polygon_point a, struct polygon_point b, struct polygon_point c) {
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
 /* Projects so that the polygon turns counter-clockwise. */
-static void flatten(const vec3 *corner, size_t count, struct point *flat) {
+static void flatten(const vec3 *corner, size_t count, struct polygon_point *flat) {
     double n[3] = {0.0, 0.0, 0.0};
     for (size_t i = 0; i < count; i++) {
         vec3 a = corner[i], b = corner[(i + 1) % count];
@@ -30,11 +30,11 @@ static void flatten(const vec3 *corner, size_t count, struct point *flat) {
     for (size_t i = 0; i < count; i++) {
         double p[3] = {(double)corner[i].x, (double)corner[i].y, (double)corner[i].z};
         double u = p[(axis + 1) % 3], v = p[(axis + 2) % 3];
-        flat[i] = n[axis] >= 0.0 ? (struct point){u, v} : (struct point){v, u};
+        flat[i] = n[axis] >= 0.0 ? (struct polygon_point){u, v} : (struct polygon_point){v, u};
     }
 }
 
-static bool is_convex(const struct point *flat, size_t count) {
+static bool is_convex(const struct polygon_point *flat, size_t count) {
     for (size_t i = 0; i < count; i++)
         if (area2(flat[i], flat[(i + 1) % count], flat[(i + 2) % count]) < 0.0)
             return false;
@@ -44,13 +44,13 @@ static bool is_convex(const struct point *flat, size_t count) {
 /* Whether the corner at `at` of the ring of `left` corners can be cut off: it turns left and no
  * other corner lies in its triangle. Corners at the same place as one of the three do not count
  * (a bridge to a hole visits its ends twice). */
-static bool is_ear(const struct point *flat, const uint32_t *ring, size_t left, size_t at) {
-    struct point a = flat[ring[(at + left - 1) % left]], b = flat[ring[at]],
+static bool is_ear(const struct polygon_point *flat, const uint32_t *ring, size_t left, size_t at) {
+    struct polygon_point a = flat[ring[(at + left - 1) % left]], b = flat[ring[at]],
                  c = flat[ring[(at + 1) % left]];
     if (!(area2(a, b, c) > 0.0))
         return false;
     for (size_t i = 0; i < left; i++) {
-        struct point p = flat[ring[i]];
+        struct polygon_point p = flat[ring[i]];
         if ((p.x == a.x && p.y == a.y) || (p.x == b.x && p.y == b.y) ||
             (p.x == c.x && p.y == c.y))
             continue;
@@ -62,7 +62,7 @@ static bool is_ear(const struct point *flat, const uint32_t *ring, size_t left, 
 
 void polygon_triangulate(const vec3 *corner, size_t count, uint32_t (*triangle)[3]) {
     assert(count >= 3 && count <= POLYGON_MAX_CORNERS);
-    struct point flat[POLYGON_MAX_CORNERS];
+    struct polygon_point flat[POLYGON_MAX_CORNERS];
     if (count > 3)
         flatten(corner, count, flat);
     if (count == 3 || is_convex(flat, count)) {

@@ -115,7 +115,8 @@ static void offer_look(const struct divide *d, uint32_t segment, const struct su
     rgb typical = rgb_scale(c.white, TYPICAL_BASE_COLOR);
     /* Edges and the light of others only lower it: no ray is needed to know that it is too low. */
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
-        !views_unhidden(d->views, train, at->position, at->normal) || photograph_sparks(photo, c.view.x, c.view.y) ||
+        !views_unhidden(d->views, train, at->position, at->normal) ||
+        photograph_has_firefly(photo, c.view.x, c.view.y) ||
         !photograph_sample(photo, c.view.x, c.view.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
         return;
     c.shown = s.radiance;

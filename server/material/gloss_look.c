@@ -75,7 +75,7 @@ static bool patch_shown(const struct views *views, const struct view *view, cons
         float depth_m;
         if (vec3_dot(at->shading, views_direction(views, view->train, at->position)) < FACING ||
             !camera_project(&photo->camera, at->position, &place.x, &place.y, &depth_m) ||
-            views_edge(views, &place, at->triangle) > edge || photograph_sparks(photo, place.x, place.y) ||
+            views_edge(views, &place, at->triangle) > edge || photograph_has_firefly(photo, place.x, place.y) ||
             !photograph_sample(photo, place.x, place.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
             return false;
         *shown = rgb_mad(*shown, 1.0f / (float)patch->count, s.radiance);

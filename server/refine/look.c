@@ -61,7 +61,7 @@ static bool connect(struct look_batch *b, size_t at, const struct view *view, ui
         vec3 point = mesh_point(&r->scene->mesh, triangle, b1, b2);
         size_t path = at * (size_t)b->samples + (size_t)i;
         if (!camera_project(&photo->camera, point, &place.x, &place.y, &depth_m) ||
-            (clean && !views_clean(b->views, &place)) || photograph_sparks(photo, place.x, place.y) ||
+            (clean && !views_clean(b->views, &place)) || photograph_has_firefly(photo, place.x, place.y) ||
             !photograph_sample(photo, place.x, place.y, &b->reference[path]))
             return false;
         vec3 origin = camera_origin(&photo->camera);

@@ -1,9 +1,9 @@
-/* atlas.c -- see atlas.h: charts, drawn at a density, packed; the density is searched for.
+/* atlas.c -- see atlas.h. Charts are rasterised at a density and packed; a search finds the greatest density that
+ * fits.
  *
- * Packing works on cells of `cell` texels, 1 up to MAX_GRID texels a side and a power of two
- * beyond, so its time does not grow with the size. Chart coordinates are rounded to units
- * (coverage.h) before anything is decided, and charts are moved and turned by whole texels: the
- * texels that a chart covers in the atlas are exactly those that it was packed with. */
+ * Packing works on cells of `cell` texels: 1 up to MAX_GRID texels a side, a power of two beyond, so its time does
+ * not grow with the size. Chart coordinates are rounded to units (coverage.h) before anything is decided, and charts
+ * are moved and turned by whole texels: a chart covers exactly those texels in the atlas that it was packed with. */
 #include "server/scene/atlas.h"
 
 #include <math.h>
@@ -16,17 +16,17 @@
 
 #define MAX_GRID 2048     /* cells a side */
 #define INSET 2           /* units between a chart and its box: more than coverage's margin */
-#define TEXEL_FILL 0.75   /* share of the texels that the mesh's area takes, to size a texel by */
-#define FIRST_FILL 0.96   /* share of the cells that shapes and padding take in the first try */
-#define GUESS_ROUNDS 4    /* drawings to find the density of that */
-#define SEARCH_STEP 1.015 /* of the density, until one fits and one does not */
-#define SEARCH_END 1.003  /* ratio of those two at which the search ends */
-#define MIN_DENSITY 1e-3  /* of the most that could fit: not worth less */
+#define TEXEL_FILL 0.75   /* share of the texels that the mesh's area fills; sizes a texel before packing */
+#define FIRST_FILL 0.96   /* share of the cells that shapes and padding fill in the first try */
+#define GUESS_ROUNDS 4    /* rasterisations to find the density for FIRST_FILL */
+#define SEARCH_STEP 1.015 /* factor on density until one fits and one does not */
+#define SEARCH_END 1.003  /* ratio of those two at which the search stops */
+#define MIN_DENSITY 1e-3  /* of density_bound: below this packing has failed */
 #define SHRINK 0.8        /* of a density at which a chart is larger than the grid */
-#define SPECK_FILL 0.9    /* share of the texels that charts of one texel each can take */
+#define SINGLE_TEXEL_FILL 0.9    /* share of the texels that charts of one texel each can fill */
 
-/* The charts drawn at one density. */
-struct drawing {
+/* All charts rasterised at one density. */
+struct raster {
     struct pack_item *item; /* [chart_count] */
     uint64_t *bits;
     size_t bit_capacity;    /* words */
@@ -47,14 +47,14 @@ static struct coverage_triangle place_of(const struct charts *charts, uint32_t t
 }
 
 /* Sets the boxes of all charts, in cells of `cell` units; false when one exceeds `grid` cells. */
-static bool measure(struct drawing *drawing, const struct charts *charts, double density,
+static bool measure(struct raster *raster, const struct charts *charts, double density,
                     int32_t cell, uint32_t grid, size_t *words) {
     *words = 0;
     for (size_t c = 0; c < charts->count; c++) {
         double side = (double)fmaxf(charts->extent[c].x, charts->extent[c].y) * density;
         if (side * COVERAGE_UNITS > (double)grid * cell)
             return false;
-        struct pack_item *item = &drawing->item[c];
+        struct pack_item *item = &raster->item[c];
         item->width = (uint32_t)((units_of(charts->extent[c].x, density) + INSET + cell - 1) / cell);
         item->height = (uint32_t)((units_of(charts->extent[c].y, density) + INSET + cell - 1) / cell);
         if (item->width > grid || item->height > grid)
@@ -64,21 +64,21 @@ static bool measure(struct drawing *drawing, const struct charts *charts, double
     return true;
 }
 
-/* Draws all charts at the density, in texels per metre. */
-static bool draw(struct drawing *drawing, const struct charts *charts, double density, int32_t cell,
+/* Rasterises all charts at `density` texels per metre. */
+static bool rasterise(struct raster *raster, const struct charts *charts, double density, int32_t cell,
                  uint32_t grid) {
     size_t words;
-    if (!measure(drawing, charts, density, cell, grid, &words))
+    if (!measure(raster, charts, density, cell, grid, &words))
         return false;
-    if (words > drawing->bit_capacity) {
-        mem_free(drawing->bits);
-        drawing->bits = mem_array(words, sizeof *drawing->bits);
-        drawing->bit_capacity = words;
+    if (words > raster->bit_capacity) {
+        mem_free(raster->bits);
+        raster->bits = mem_array(words, sizeof *raster->bits);
+        raster->bit_capacity = words;
     }
-    memset(drawing->bits, 0, words * sizeof *drawing->bits);
-    uint64_t *bits = drawing->bits;
+    memset(raster->bits, 0, words * sizeof *raster->bits);
+    uint64_t *bits = raster->bits;
     for (size_t c = 0; c < charts->count; c++) {
-        struct pack_item *item = &drawing->item[c];
+        struct pack_item *item = &raster->item[c];
         size_t stride = pack_words(item->width);
         item->row = bits;
         for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++) {
@@ -96,21 +96,21 @@ static bool draw(struct drawing *drawing, const struct charts *charts, double de
     return true;
 }
 
-static void drawing_release(struct drawing *drawing) {
-    mem_free(drawing->item);
-    mem_free(drawing->bits);
+static void raster_release(struct raster *raster) {
+    mem_free(raster->item);
+    mem_free(raster->bits);
 }
 
-/* The geometry of packing at a size. */
-struct grid {
+/* The geometry of packing at one size. */
+struct pack_grid {
     uint32_t size;     /* texels */
     uint32_t cell;     /* texels */
     uint32_t cells;    /* a side */
     uint32_t padding;  /* cells */
 };
 
-static struct grid grid_of(uint32_t size) {
-    struct grid grid = {.size = size, .cell = 1};
+static struct pack_grid grid_of(uint32_t size) {
+    struct pack_grid grid = {.size = size, .cell = 1};
     while (size / grid.cell > MAX_GRID)
         grid.cell *= 2;
     grid.cells = size / grid.cell;
@@ -118,16 +118,16 @@ static struct grid grid_of(uint32_t size) {
     return grid;
 }
 
-/* Cells that the shape takes with its padding: the sum with a square of padding + 1 cells, which
- * for two shapes are disjoint exactly where their distance is kept. */
+/* Area of the shape in cells, dilated by a square of padding + 1 cells. Dilated shapes are disjoint exactly where the
+ * padding is kept. */
 static size_t padded_cells(const struct pack_item *item, uint32_t padding) {
     size_t words = pack_words(item->width), count = 0;
     for (uint32_t y = 0; y < item->height + padding; y++) {
-        uint64_t before = 0; /* the word before, whose last bits reach into this one */
+        uint64_t before = 0; /* previous word, whose last bits dilate into this one */
         uint32_t first = y > padding ? y - padding : 0;
         uint32_t last = y < item->height ? y : item->height - 1;
         for (size_t i = 0; i <= words; i++) {
-            uint64_t column = 0; /* of the rows that reach this one */
+            uint64_t column = 0; /* union of the rows that dilate into this one */
             for (uint32_t r = first; r <= last && i < words; r++)
                 column |= item->row[r * words + i];
             uint64_t wide = column;
@@ -140,49 +140,48 @@ static size_t padded_cells(const struct pack_item *item, uint32_t padding) {
     return count;
 }
 
-/* Share of the grid that the drawn shapes take with their padding; infinite when one is larger
- * than the grid. Over 1 they cannot fit. */
-static double fill_at(struct drawing *drawing, const struct charts *charts, double density,
-                      const struct grid *grid) {
-    if (!draw(drawing, charts, density, (int32_t)grid->cell * COVERAGE_UNITS, grid->cells))
+/* Share of the grid that the dilated shapes fill; infinite when one is larger than the grid. Above 1 they cannot fit. */
+static double fill_at(struct raster *raster, const struct charts *charts, double density,
+                      const struct pack_grid *grid) {
+    if (!rasterise(raster, charts, density, (int32_t)grid->cell * COVERAGE_UNITS, grid->cells))
         return INFINITY;
     size_t cells = 0;
     for (size_t c = 0; c < charts->count; c++)
-        cells += padded_cells(&drawing->item[c], grid->padding);
+        cells += padded_cells(&raster->item[c], grid->padding);
     double side = (double)(grid->cells + grid->padding); /* padding may stick out */
     return (double)cells / (side * side);
 }
 
-/* A density over which the area or the longest chart cannot fit. */
-static double most_density(const struct charts *charts, const struct grid *grid) {
+/* A density above which the area or the longest chart cannot fit. */
+static double density_bound(const struct charts *charts, const struct pack_grid *grid) {
     double longest = 0.0;
     for (size_t c = 0; c < charts->count; c++)
         longest = fmax(longest, (double)fmaxf(charts->extent[c].x, charts->extent[c].y));
     return fmin((double)grid->size / sqrt(charts->flat_area), (double)grid->size / longest);
 }
 
-/* A density at which the shapes about fill the grid to FIRST_FILL. */
-static double guess_density(struct drawing *drawing, const struct charts *charts,
-                            const struct grid *grid, double full) {
+/* A density at which the shapes fill about FIRST_FILL of the grid. */
+static double guess_density(struct raster *raster, const struct charts *charts,
+                            const struct pack_grid *grid, double full) {
     double density = full;
     for (int round = 0; round < GUESS_ROUNDS; round++) {
-        double fill = fill_at(drawing, charts, density, grid);
+        double fill = fill_at(raster, charts, density, grid);
         density = fmin(density * (isfinite(fill) ? sqrt(FIRST_FILL / fill) : SHRINK), full);
     }
     return density;
 }
 
-/* Finds about the greatest density that fits and leaves its packing in `best`; 0 when none. */
-static double search_density(struct drawing *best, const struct charts *charts,
-                             const struct grid *grid) {
-    struct drawing trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
-    double full = most_density(charts, grid);
+/* Searches the greatest density that fits and leaves its packing in `best`; 0 when none does. */
+static double search_density(struct raster *best, const struct charts *charts,
+                             const struct pack_grid *grid) {
+    struct raster trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
+    double full = density_bound(charts, grid);
     double density = guess_density(&trial, charts, grid, full);
     double fits = 0.0, fails = INFINITY, step = SEARCH_STEP;
     while (density > full * MIN_DENSITY && (fits == 0.0 || fails / fits > SEARCH_END)) {
         if (fill_at(&trial, charts, density, grid) <= 1.0 &&
             pack(trial.item, charts->count, grid->cells, grid->padding)) {
-            struct drawing old = *best;
+            struct raster old = *best;
             *best = trial;
             trial = old;
             fits = density;
@@ -196,16 +195,16 @@ static double search_density(struct drawing *best, const struct charts *charts,
             step *= SEARCH_STEP; /* the first guess may be far off */
         }
     }
-    drawing_release(&trial);
+    raster_release(&trial);
     return fits;
 }
 
-/* Writes the atlas's corners from the packing of the charts in cells of grid. */
-static void put_corners(struct atlas *atlas, const struct charts *charts,
-                        const struct drawing *drawing, const struct grid *grid, double density) {
+/* Sets the atlas coordinates from the packing. */
+static void set_corners(struct atlas *atlas, const struct charts *charts,
+                        const struct raster *raster, const struct pack_grid *grid, double density) {
     int32_t cell = (int32_t)grid->cell * COVERAGE_UNITS;
     for (size_t c = 0; c < charts->count; c++) {
-        const struct pack_item *item = &drawing->item[c];
+        const struct pack_item *item = &raster->item[c];
         int32_t w = (int32_t)item->width * cell, h = (int32_t)item->height * cell;
         for (size_t i = charts->start[c]; i < charts->start[c + 1]; i++) {
             struct coverage_triangle place = place_of(charts, charts->triangle[i], density);
@@ -220,36 +219,36 @@ static void put_corners(struct atlas *atlas, const struct charts *charts,
     }
 }
 
-/* Texels covered by all charts together; redraws them texel by texel. */
-static size_t covered_texels(struct drawing *drawing, const struct charts *charts, double density) {
+/* Number of texels covered by all charts; rasterises them again, one texel per cell. */
+static size_t covered_texels(struct raster *raster, const struct charts *charts, double density) {
     size_t count = 0, words = 0;
-    draw(drawing, charts, density, COVERAGE_UNITS, UINT32_MAX / COVERAGE_UNITS);
+    rasterise(raster, charts, density, COVERAGE_UNITS, UINT32_MAX / COVERAGE_UNITS);
     for (size_t c = 0; c < charts->count; c++)
-        words += drawing->item[c].height * pack_words(drawing->item[c].width);
+        words += raster->item[c].height * pack_words(raster->item[c].width);
     for (size_t i = 0; i < words; i++)
-        count += (size_t)__builtin_popcountll(drawing->bits[i]);
+        count += (size_t)__builtin_popcountll(raster->bits[i]);
     return count;
 }
 
-static void finish(struct atlas *atlas, struct charts *charts, struct drawing *drawing,
-                   const struct grid *grid, double density, size_t triangle_count) {
+static void finish(struct atlas *atlas, struct charts *charts, struct raster *raster,
+                   const struct pack_grid *grid, double density, size_t triangle_count) {
     *atlas = (struct atlas){.width = grid->size, .height = grid->size,
                             .texels_per_metre = (float)density, .chart_count = charts->count};
     atlas->corner = mem_array(triangle_count, sizeof *atlas->corner);
-    put_corners(atlas, charts, drawing, grid, density);
-    atlas->utilisation = (double)covered_texels(drawing, charts, density) /
+    set_corners(atlas, charts, raster, grid, density);
+    atlas->utilisation = (double)covered_texels(raster, charts, density) /
                          ((double)grid->size * grid->size);
     atlas->chart_of_triangle = charts->of_triangle;
     charts->of_triangle = NULL;
 }
 
-/* The least power of two that holds `count` charts of one texel each with their padding. */
+/* The smallest power of two that holds `count` charts of one texel each, with padding. */
 static double size_for(size_t count) {
-    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / SPECK_FILL;
+    double cells = (double)count * (1 + ATLAS_PADDING) * (1 + ATLAS_PADDING) / SINGLE_TEXEL_FILL;
     return exp2(ceil(log2(sqrt(cells))));
 }
 
-/* Shrinks each chart by the greatest density of its triangles: what is drawn at one density from then on. */
+/* Scales each chart by the maximum density of its triangles. */
 static void shrink_charts(struct charts *charts, const float *density) {
     charts->flat_area = 0.0;
     for (size_t c = 0; c < charts->count; c++) {
@@ -272,16 +271,16 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
                                 const struct segments *segments, uint32_t size, const float *density_of,
                                 struct error *err) {
     struct charts charts;
-    struct grid grid = grid_of(size);
+    struct pack_grid grid = grid_of(size);
     float texel_m = (float)sqrt(mesh_area(mesh) / TEXEL_FILL) / (float)size;
     charts_make(&charts, mesh, segments, texel_m);
     if (density_of)
         shrink_charts(&charts, density_of);
-    struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
-    double density = search_density(&drawing, &charts, &grid);
+    struct raster raster = {.item = mem_calloc(charts.count, sizeof *raster.item)};
+    double density = search_density(&raster, &charts, &grid);
     enum status status = STATUS_OK;
     if (density > 0.0) {
-        finish(atlas, &charts, &drawing, &grid, density, mesh->triangle_count);
+        finish(atlas, &charts, &raster, &grid, density, mesh->triangle_count);
     } else {
         double needed = fmax(size_for(charts.count), 2.0 * size);
         status = error_set(err, STATUS_INPUT, "the mesh is in %zu pieces: a texture of %u x %u texels "
@@ -291,7 +290,7 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
         else
             error_hint(err, "no size up to %d would: join the mesh's pieces", ATLAS_MAX_SIZE);
     }
-    drawing_release(&drawing);
+    raster_release(&raster);
     charts_release(&charts);
     return status;
 }
@@ -301,7 +300,7 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
                                    struct error *err) {
     struct charts charts;
     charts_make(&charts, mesh, segments, 1.0f / texels_per_metre);
-    struct drawing drawing = {.item = mem_calloc(charts.count, sizeof *drawing.item)};
+    struct raster raster = {.item = mem_calloc(charts.count, sizeof *raster.item)};
     double density = (double)texels_per_metre, least = density * sqrt(charts.flat_area);
     uint32_t size = 64;
     enum status status = STATUS_OK;
@@ -312,13 +311,13 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
                                ceil(least), ATLAS_MAX_SIZE);
             break;
         }
-        struct grid grid = grid_of(size);
-        fits = fill_at(&drawing, &charts, density, &grid) <= 1.0 &&
-               pack(drawing.item, charts.count, grid.cells, grid.padding);
+        struct pack_grid grid = grid_of(size);
+        fits = fill_at(&raster, &charts, density, &grid) <= 1.0 &&
+               pack(raster.item, charts.count, grid.cells, grid.padding);
         if (fits)
-            finish(atlas, &charts, &drawing, &grid, density, mesh->triangle_count);
+            finish(atlas, &charts, &raster, &grid, density, mesh->triangle_count);
     }
-    drawing_release(&drawing);
+    raster_release(&raster);
     charts_release(&charts);
     return status;
 }

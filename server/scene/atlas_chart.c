@@ -22,18 +22,18 @@
 
 #define NONE UINT32_MAX
 #define LITTLE_LEAN_DEG 45.0
-#define SMALL_TEXELS 100.0    /* a region with less area is dissolved */
-#define REFINE_ROUNDS 2       /* growths with the mean normal of the one before */
-#define SAME_COSINE 0.9999f   /* between normals of which another growth would make the same: .8 degrees */
-#define LEAN_STEPS 16         /* steps of lean that growth tells apart */
-#define OVERLAP_TEXELS 0.01   /* what rounding may make of triangles that touch */
+#define SMALL_TEXELS 100.0    /* area in texels below which a region is dissolved */
+#define REFINE_ROUNDS 2       /* growths, each with the mean normal of the one before */
+#define SAME_COSINE 0.9999f   /* between mean normals of two growths that would give the same region: 0.8 degrees */
+#define LEAN_STEPS 16         /* quantisation of lean in the priority queue */
+#define OVERLAP_TEXELS 0.01   /* depth of overlap that rounding produces between touching triangles */
 
 struct builder {
     const struct mesh *mesh;
     const struct segments *segments;
     struct adjacency adjacency;
     vec3 *normal;         /* [triangle_count] unit */
-    vec3 *smooth;         /* [triangle_count] unit, without the noise of a scan */
+    vec3 *smooth;         /* [triangle_count] unit, smoothed within creases */
     double *area;         /* [triangle_count] m^2 */
     uint32_t *by_area;    /* [triangle_count] largest first */
     uint32_t *chart_of;   /* [triangle_count] or NONE */
@@ -41,14 +41,14 @@ struct builder {
     vec3 *chart_normal;   /* [chart_count] unit; room for triangle_count */
     uint32_t *seen;       /* [triangle_count] number of the last flood that met it */
     uint32_t flood;       /* number of the present flood */
-    uint64_t *heap;       /* candidates: step of lean, order of discovery, triangle */
+    uint64_t *heap;       /* priority queue: step of lean, order of discovery, triangle */
     size_t heap_count, heap_capacity;
     uint32_t *region;     /* [triangle_count] the present region, in order of growth */
     size_t region_count;
     struct flat_triangle *flat; /* [triangle_count] scratch, as is the next */
     bool *dropped;
     double overlap_m;
-    float max_lean_cos;   /* cosine of CHART_MAX_LEAN_DEG, for the normals as they are */
+    float max_lean_cos;   /* cosine of CHART_MAX_LEAN_DEG */
 };
 
 static void heap_push(struct builder *b, uint64_t key) {
@@ -77,8 +77,7 @@ static uint64_t heap_pop(struct builder *b) {
     return top;
 }
 
-/* Puts the neighbours of a triangle that are free, of its segment and lean little enough on the
- * heap; `order` counts them. */
+/* Pushes the unassigned neighbours of a triangle in its segment whose lean is small enough; `order` counts them. */
 static void offer_neighbours(struct builder *b, uint32_t t, vec3 normal, float min_cos,
                              uint64_t *order) {
     for (uint32_t e = 0; e < 3; e++) {
@@ -99,7 +98,7 @@ static void offer_neighbours(struct builder *b, uint32_t t, vec3 normal, float m
     }
 }
 
-/* Adds all free triangles that can be reached from those in region[]. */
+/* Adds all unassigned triangles reachable from those in region[], least lean first. */
 static void grow(struct builder *b, vec3 normal, float min_cos) {
     size_t given = b->region_count;
     uint64_t order = 0;
@@ -136,7 +135,7 @@ static void project(const struct builder *b, uint32_t t, vec3 u, vec3 v, struct 
     }
 }
 
-/* Removes from region[] what is not connected to its first triangle. */
+/* Removes what is not connected to region[0]. */
 static void keep_connected(struct builder *b) {
     uint32_t member = ++b->flood, reached = ++b->flood;
     for (size_t i = 0; i < b->region_count; i++)
@@ -155,7 +154,7 @@ static void keep_connected(struct builder *b) {
     b->region_count = count;
 }
 
-/* Makes region[] the chart `chart`, less what would lie over other parts of it. */
+/* Makes region[] the chart `chart`, without triangles that overlap other parts of it. */
 static void settle(struct builder *b, size_t chart, vec3 normal) {
     vec3 u, v;
     vec3_frame(normal, &u, &v);
@@ -176,10 +175,10 @@ static void settle(struct builder *b, size_t chart, vec3 normal) {
     b->chart_normal[chart] = normal;
 }
 
-/* Makes charts of all triangles that are free. */
+/* Makes charts of all unassigned triangles. */
 static void grow_all(struct builder *b, float min_cos) {
     for (bool found = true; found;) {
-        found = false; /* what is given back gets its turn in the next round */
+        found = false; /* triangles that were given back are tried again in the next round */
         for (size_t i = 0; i < b->mesh->triangle_count; i++) {
             uint32_t seed = b->by_area[i];
             if (b->chart_of[seed] != NONE)
@@ -219,8 +218,8 @@ static void list_members(const struct builder *b, size_t *start, uint32_t *trian
             triangle[--start[b->chart_of[t]]] = (uint32_t)t;
 }
 
-/* Frees the triangles of charts with less area than small_area and lets the others grow over
- * them; numbers the charts that stay anew. */
+/* Frees the triangles of charts smaller than small_area, lets the others grow over them and renumbers the charts
+ * left. */
 static void dissolve_small(struct builder *b, double small_area, float min_cos) {
     size_t n = b->mesh->triangle_count, kept = 0;
     double *area = mem_calloc(b->chart_count, sizeof *area);

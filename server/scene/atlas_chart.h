@@ -27,8 +27,8 @@ struct charts {
     double flat_area;      /* of all projections, m^2 */
 };
 
-/* texel_m is about the size of a texel: what is only a few texels large is allowed to lean more,
- * since a seam would cost it more than the distortion does. Deterministic. */
+/* texel_m is the approximate size of a texel: charts of a few texels may lean more, since a seam costs them more than
+ * the distortion. Deterministic. */
 void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments,
                  float texel_m);
 void charts_release(struct charts *charts);

@@ -10,15 +10,15 @@
 
 #define NONE UINT32_MAX
 
-struct entry {
+struct overlap_entry {
     uint32_t triangle, next;
 };
 
-struct grid {
+struct overlap_grid {
     double x0, y0, per_metre;
     size_t columns, rows;
     uint32_t *head; /* [rows][columns] first entry or NONE */
-    struct entry *entry;
+    struct overlap_entry *entry;
     size_t entry_count, entry_capacity;
 };
 
@@ -50,7 +50,7 @@ static size_t cell_at(double place, double origin, double per_metre) {
     return (size_t)fmax(0.0, (place - origin) * per_metre);
 }
 
-static void rows_of(const struct grid *g, const struct flat_triangle *t, size_t *first,
+static void rows_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t *first,
                     size_t *last) {
     *first = cell_at(min3(t->y), g->y0, g->per_metre);
     *last = cell_at(max3(t->y), g->y0, g->per_metre);
@@ -58,7 +58,7 @@ static void rows_of(const struct grid *g, const struct flat_triangle *t, size_t 
 
 /* Columns of the grid that the triangle meets in a row, which has some. The strip is taken a
  * little higher than the row: rounding must not lose a cell. */
-static void columns_of(const struct grid *g, const struct flat_triangle *t, size_t row,
+static void columns_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t row,
                        size_t *first, size_t *last) {
     double bottom = g->y0 + ((double)row - 0.01) / g->per_metre;
     double top = g->y0 + ((double)row + 1.01) / g->per_metre;
@@ -82,9 +82,9 @@ static void columns_of(const struct grid *g, const struct flat_triangle *t, size
         *last = g->columns - 1;
 }
 
-static void grid_init(struct grid *g, const struct flat_triangle *triangle, size_t count) {
+static void grid_init(struct overlap_grid *g, const struct flat_triangle *triangle, size_t count) {
     double x1 = -INFINITY, y1 = -INFINITY;
-    *g = (struct grid){.x0 = INFINITY, .y0 = INFINITY};
+    *g = (struct overlap_grid){.x0 = INFINITY, .y0 = INFINITY};
     for (size_t i = 0; i < count; i++) {
         g->x0 = fmin(g->x0, min3(triangle[i].x));
         g->y0 = fmin(g->y0, min3(triangle[i].y));
@@ -102,12 +102,12 @@ static void grid_init(struct grid *g, const struct flat_triangle *triangle, size
         g->head[i] = NONE;
 }
 
-static void grid_release(struct grid *g) {
+static void grid_release(struct overlap_grid *g) {
     mem_free(g->head);
     mem_free(g->entry);
 }
 
-static bool lies_over_one(const struct grid *g, const struct flat_triangle *triangle, size_t i,
+static bool lies_over_one(const struct overlap_grid *g, const struct flat_triangle *triangle, size_t i,
                           double depth) {
     size_t y, bottom, left, right;
     for (rows_of(g, &triangle[i], &y, &bottom); y <= bottom; y++) {
@@ -123,16 +123,16 @@ static bool lies_over_one(const struct grid *g, const struct flat_triangle *tria
     return false;
 }
 
-static void add(struct grid *g, size_t cell, size_t i) {
+static void add(struct overlap_grid *g, size_t cell, size_t i) {
     if (g->entry_count == g->entry_capacity) {
         g->entry_capacity = g->entry_capacity ? 2 * g->entry_capacity : 256;
         g->entry = mem_realloc_array(g->entry, g->entry_capacity, sizeof *g->entry);
     }
-    g->entry[g->entry_count] = (struct entry){(uint32_t)i, g->head[cell]};
+    g->entry[g->entry_count] = (struct overlap_entry){(uint32_t)i, g->head[cell]};
     g->head[cell] = (uint32_t)g->entry_count++;
 }
 
-static void enter(struct grid *g, const struct flat_triangle *triangle, size_t i) {
+static void enter(struct overlap_grid *g, const struct flat_triangle *triangle, size_t i) {
     size_t y, bottom, left, right;
     for (rows_of(g, &triangle[i], &y, &bottom); y <= bottom; y++) {
         columns_of(g, &triangle[i], y, &left, &right);
@@ -143,7 +143,7 @@ static void enter(struct grid *g, const struct flat_triangle *triangle, size_t i
 
 size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth,
                     bool *dropped) {
-    struct grid g;
+    struct overlap_grid g;
     size_t dropped_count = 0;
     grid_init(&g, triangle, count);
     for (size_t i = 0; i < count; i++) {

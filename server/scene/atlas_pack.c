@@ -19,17 +19,17 @@
 #define LEVELS 15   /* runs up to 2^14 cells and over */
 #define CLASSES 96  /* of box sides, see class_of */
 
-struct run {
+struct pack_run {
     uint32_t y, x, length;
 };
 
 struct shape {
     uint32_t width, height;
-    struct run *run; /* longest first */
+    struct pack_run *run; /* longest first */
     size_t run_count, run_capacity;
 };
 
-struct packer {
+struct atlas_packer {
     uint32_t size, padding;
     size_t words;             /* of a row */
     uint64_t *level[LEVELS];  /* [size][words] */
@@ -44,7 +44,7 @@ static bool get(const struct pack_item *item, uint32_t x, uint32_t y) {
 }
 
 static int longest_first(const void *left, const void *right) {
-    const struct run *a = left, *b = right;
+    const struct pack_run *a = left, *b = right;
     if (a->length != b->length)
         return a->length > b->length ? -1 : 1;
     if (a->y != b->y)
@@ -52,7 +52,7 @@ static int longest_first(const void *left, const void *right) {
     return a->x < b->x ? -1 : a->x > b->x;
 }
 
-static void add_run(struct shape *shape, struct run run) {
+static void add_run(struct shape *shape, struct pack_run run) {
     if (shape->run_count == shape->run_capacity) {
         shape->run_capacity = shape->run_capacity ? 2 * shape->run_capacity : 64;
         shape->run = mem_realloc_array(shape->run, shape->run_capacity, sizeof *shape->run);
@@ -80,14 +80,14 @@ static void shape_make(struct shape *shape, const struct pack_item *item, int qu
             if (taken && !inside)
                 begin = x;
             if (!taken && inside)
-                add_run(shape, (struct run){y, begin, x - begin});
+                add_run(shape, (struct pack_run){y, begin, x - begin});
             inside = taken;
         }
     }
     qsort(shape->run, shape->run_count, sizeof *shape->run, longest_first);
 }
 
-static int level_of(const struct packer *p, uint32_t length) {
+static int level_of(const struct atlas_packer *p, uint32_t length) {
     int k = 0;
     while (k + 1 < p->level_count && (2u << k) <= length)
         k++;
@@ -115,7 +115,7 @@ static void or_shifted(uint64_t *restrict hits, const uint64_t *restrict row, si
 }
 
 /* The leftmost column where the shape fits with its lowest row at y, or -1. */
-static int64_t fit_row(struct packer *p, const struct shape *shape, uint32_t y) {
+static int64_t fit_row(struct atlas_packer *p, const struct shape *shape, uint32_t y) {
     uint64_t *hits = p->hits;
     uint32_t columns = p->size - shape->width + 1;
     size_t first = 0, last = (columns - 1) / 64;
@@ -123,7 +123,7 @@ static int64_t fit_row(struct packer *p, const struct shape *shape, uint32_t y) 
     if (columns % 64)
         hits[last] = ~UINT64_C(0) << (columns % 64);
     for (size_t i = 0; i < shape->run_count; i++) {
-        const struct run *run = &shape->run[i];
+        const struct pack_run *run = &shape->run[i];
         int k = level_of(p, run->length);
         const uint64_t *row = p->level[k] + (size_t)(y + run->y) * p->words;
         uint32_t span = 1u << k;
@@ -154,10 +154,10 @@ static void set_cells(uint64_t *row, uint32_t x0, uint32_t x1) {
     }
 }
 
-static void occupy(struct packer *p, const struct shape *shape, uint32_t x, uint32_t y) {
+static void occupy(struct atlas_packer *p, const struct shape *shape, uint32_t x, uint32_t y) {
     uint32_t pad = p->padding;
     for (size_t i = 0; i < shape->run_count; i++) {
-        const struct run *run = &shape->run[i];
+        const struct pack_run *run = &shape->run[i];
         uint32_t row = y + run->y, col = x + run->x;
         uint32_t y0 = row > pad ? row - pad : 0;
         uint32_t y1 = row + pad < p->size ? row + pad : p->size - 1;
@@ -186,7 +186,7 @@ static uint32_t class_of(uint32_t side) {
     return class < CLASSES ? class : CLASSES - 1;
 }
 
-static bool place(struct packer *p, struct pack_item *item) {
+static bool place(struct atlas_packer *p, struct pack_item *item) {
     if (item->width > p->size || item->height > p->size)
         return false;
     uint32_t lowest_top = UINT32_MAX;
@@ -217,27 +217,27 @@ static bool place(struct packer *p, struct pack_item *item) {
     return true;
 }
 
-struct order {
+struct pack_order {
     uint64_t key;
     size_t index;
 };
 
 static int by_key(const void *left, const void *right) {
-    const struct order *a = left, *b = right;
+    const struct pack_order *a = left, *b = right;
     if (a->key != b->key)
         return a->key > b->key ? -1 : 1;
     return a->index < b->index ? -1 : 1;
 }
 
 bool pack(struct pack_item *item, size_t count, uint32_t size, uint32_t padding) {
-    struct packer p = {.size = size, .padding = padding, .words = pack_words(size)};
+    struct atlas_packer p = {.size = size, .padding = padding, .words = pack_words(size)};
     uint32_t widest = 1;
-    struct order *order = mem_array(count, sizeof *order);
+    struct pack_order *order = mem_array(count, sizeof *order);
     for (size_t i = 0; i < count; i++) {
         uint32_t w = item[i].width, h = item[i].height;
         uint32_t longer = w > h ? w : h, shorter = w > h ? h : w;
         widest = longer > widest ? longer : widest;
-        order[i] = (struct order){(uint64_t)longer << 32 | shorter, i};
+        order[i] = (struct pack_order){(uint64_t)longer << 32 | shorter, i};
     }
     qsort(order, count, sizeof *order, by_key);
     while (p.level_count < LEVELS && (1u << p.level_count) <= widest)

@@ -1,4 +1,4 @@
-/* by_segment.h -- the valid texels of each segment, side by side. */
+/* by_segment.h -- valid texels grouped by segment. */
 #ifndef UNBAKE_SCENE_BY_SEGMENT_H
 #define UNBAKE_SCENE_BY_SEGMENT_H
 
@@ -22,8 +22,7 @@ static inline size_t by_segment_count(const struct texels_by_segment *t, size_t 
     return t->first[segment + 1] - t->first[segment];
 }
 
-/* The i-th of `wanted` texels of a segment that are spaced evenly in its list; wanted is at least 1 and at most
- * by_segment_count. */
+/* The i-th of `wanted` evenly spaced texels of a segment; 1 <= wanted <= by_segment_count. */
 static inline uint32_t by_segment_spaced(const struct texels_by_segment *t, size_t segment, size_t i, size_t wanted) {
     return t->texel[t->first[segment] + i * by_segment_count(t, segment) / wanted];
 }

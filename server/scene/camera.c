@@ -80,8 +80,8 @@ void camera_find_fold(struct camera *c) {
     c->fold = 0.0f;
     if (!has_distortion(c))
         return;
-    /* The march goes over the angle, evenly, to just short of 90 degrees; it ends unless the
-     * growth stops first. Twice the picture's corner leaves room for the tangential part. */
+    /* March over the angle in even steps to just below 90 degrees. Twice the picture's corner leaves room for the
+     * tangential part. */
     double dx = fmax(fabs((double)c->cx), fabs((double)c->width - (double)c->cx)) / (double)c->fx;
     double dy = fmax(fabs((double)c->cy), fabs((double)c->height - (double)c->cy)) / (double)c->fy;
     double reach = 2.0 * hypot(dx, dy), inside = 0.0, outside = 0.0, distorted;
@@ -103,8 +103,7 @@ void camera_find_fold(struct camera *c) {
         else
             outside = middle;
     }
-    /* Where the march ended in time, the limit is where it ended: beyond lies nothing of the
-     * picture, and nothing is known about the polynomial there. */
+    /* A march that ended without a fold also gives a limit: the polynomial is unconstrained beyond the picture. */
     c->fold = (float)inside;
 }
 

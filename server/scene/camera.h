@@ -23,19 +23,18 @@ struct camera {
     struct rigid camera_from_world, world_from_camera;
 };
 
-/* Finds where the distortion stops growing and sets `fold`: tan of the angle from the axis
- * (OPENCV), or that angle in radians (OPENCV_FISHEYE), up to which the model is one-to-one, or
- * the place well outside the picture where the search ended; 0 without distortion. Beyond it
- * the polynomial would map directions far outside the view back into the picture. To be called
- * once after size and lens are set. */
+/* Finds where the distortion stops growing and sets `fold`, the limit up to which the model is one-to-one: tan of the
+ * angle from the axis (OPENCV) or that angle in radians (OPENCV_FISHEYE); well outside the picture if it never folds;
+ * 0 without distortion. Beyond it the polynomial maps directions outside the view into the picture. Call once after
+ * size and lens parameters are set. */
 void camera_find_fold(struct camera *camera);
 
-/* Projects a world point: closed form. False when it is behind the camera, beyond the angle at
- * which the distortion folds over, or outside the picture. *depth_m is along the optical axis. */
+/* Projects a world point, in closed form. False when it is behind the camera, beyond the fold or outside the picture.
+ * *depth_m is along the optical axis. */
 bool camera_project(const struct camera *camera, vec3 point, float *x, float *y, float *depth_m);
 
-/* Unit world direction of the ray through pixel place (x, y); inverts the distortion by
- * Newton's method. False where it does not converge (such pixels are not used). */
+/* Unit world direction of the ray through pixel coordinates (x, y); inverts the distortion by Newton's method. False
+ * when it does not converge; such pixels are not used. */
 bool camera_direction(const struct camera *camera, float x, float y, vec3 *direction);
 
 static inline vec3 camera_origin(const struct camera *camera) {

@@ -7,14 +7,15 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define CHUNK 1024 /* triangles a work item */
-#define PASSES 5   /* of the filter */
-/* Normals that differ by this many times the roughness count .6, within bounds. */
-#define ALIKE 2.0f
-#define LEAST_ALIKE 0.15f
-#define MOST_ALIKE 0.4f
-#define NEIGHBOURS_MOST 64 /* of a triangle that are looked at; more meet at the poles of spheres only */
-#define SAMPLES_MOST 65536 /* triangles of which roughness is taken */
+#define CHUNK 1024 /* triangles per work item */
+#define FILTER_PASSES 5
+/* Standard deviation of the filter's range kernel (normals differing by it weigh 0.6), in units of roughness and
+ * clamped. */
+#define SPREAD_FACTOR 2.0f
+#define MIN_SPREAD 0.15f
+#define MAX_SPREAD 0.4f
+#define MAX_NEIGHBOURS 64 /* considered per triangle; only poles of spheres have more */
+#define MAX_SAMPLES 65536 /* triangles in the roughness estimate */
 
 struct filter {
     const struct mesh *mesh;
@@ -40,13 +41,13 @@ static void collect_triangles(struct face_normals *f, const struct mesh *m) {
     mem_free(end);
 }
 
-/* Those that share a corner with a triangle; one that shares two is there twice. */
+/* Triangles that share a vertex with triangle t; those that share an edge are listed twice. */
 static size_t neighbours_of(const struct face_normals *f, const struct mesh *mesh, size_t t,
-                            uint32_t neighbour[NEIGHBOURS_MOST]) {
+                            uint32_t neighbour[MAX_NEIGHBOURS]) {
     size_t count = 0;
     for (int c = 0; c < 3; c++) {
         uint32_t v = f->weld[mesh->index[t][c]];
-        for (uint32_t i = f->first[v]; i < f->first[v + 1] && count < NEIGHBOURS_MOST; i++) {
+        for (uint32_t i = f->first[v]; i < f->first[v + 1] && count < MAX_NEIGHBOURS; i++) {
             if (f->triangle[i] != t)
                 neighbour[count++] = f->triangle[i];
         }
@@ -55,21 +56,21 @@ static size_t neighbours_of(const struct face_normals *f, const struct mesh *mes
 }
 
 static void measure_roughness(struct face_normals *f, const struct mesh *mesh) {
-    size_t triangles = mesh->triangle_count, samples = triangles < SAMPLES_MOST ? triangles : SAMPLES_MOST;
-    float *rough = mem_array(samples, sizeof *rough), *least = mem_array(samples, sizeof *least);
+    size_t triangles = mesh->triangle_count, samples = triangles < MAX_SAMPLES ? triangles : MAX_SAMPLES;
+    float *roughness = mem_array(samples, sizeof *roughness), *least = mem_array(samples, sizeof *least);
     for (size_t i = 0; i < samples; i++) {
-        uint32_t neighbour[NEIGHBOURS_MOST];
-        float off[NEIGHBOURS_MOST];
+        uint32_t neighbour[MAX_NEIGHBOURS];
+        float difference[MAX_NEIGHBOURS];
         size_t t = i * triangles / samples, count = neighbours_of(f, mesh, t, neighbour);
         for (size_t k = 0; k < count; k++)
-            off[k] = vec3_length(vec3_sub(f->normal[neighbour[k]], f->normal[t]));
-        rough[i] = quantile(off, count, 0.25);
-        least[i] = quantile(off, count, 0.0);
+            difference[k] = vec3_length(vec3_sub(f->normal[neighbour[k]], f->normal[t]));
+        roughness[i] = quantile(difference, count, 0.25);
+        least[i] = quantile(difference, count, 0.0);
     }
-    f->roughness = quantile(rough, samples, 0.5);
-    f->least = quantile(least, samples, 0.5);
+    f->roughness = quantile(roughness, samples, 0.5);
+    f->least_difference = quantile(least, samples, 0.5);
     mem_free(least);
-    mem_free(rough);
+    mem_free(roughness);
 }
 
 static void filter_chunk(void *user, size_t chunk, int thread) {
@@ -77,14 +78,14 @@ static void filter_chunk(void *user, size_t chunk, int thread) {
     const struct filter *filter = user;
     size_t begin = chunk * CHUNK, end = begin + CHUNK;
     for (size_t t = begin; t < end && t < filter->mesh->triangle_count; t++) {
-        uint32_t neighbour[NEIGHBOURS_MOST];
+        uint32_t neighbour[MAX_NEIGHBOURS];
         size_t count = neighbours_of(filter->faces, filter->mesh, t, neighbour);
         const float *area = filter->faces->area;
         vec3 sum = vec3_scale(filter->from[t], area[t]);
         for (size_t k = 0; k < count; k++) {
-            vec3 other = filter->from[neighbour[k]], off = vec3_sub(other, filter->from[t]);
-            float unlike = vec3_dot(off, off) / (2.0f * filter->spread * filter->spread);
-            sum = vec3_mad(sum, area[neighbour[k]] * expf(-unlike), other);
+            vec3 other = filter->from[neighbour[k]], difference = vec3_sub(other, filter->from[t]);
+            float exponent = vec3_dot(difference, difference) / (2.0f * filter->spread * filter->spread);
+            sum = vec3_mad(sum, area[neighbour[k]] * expf(-exponent), other);
         }
         filter->to[t] = vec3_normalize(sum);
     }
@@ -92,8 +93,8 @@ static void filter_chunk(void *user, size_t chunk, int thread) {
 
 static void filter_normals(struct face_normals *f, const struct mesh *mesh, struct parallel *pool) {
     vec3 *next = mem_array(mesh->triangle_count, sizeof *next);
-    float spread = fminf(fmaxf(ALIKE * f->roughness, LEAST_ALIKE), MOST_ALIKE);
-    for (int pass = 0; pass < PASSES; pass++) {
+    float spread = fminf(fmaxf(SPREAD_FACTOR * f->roughness, MIN_SPREAD), MAX_SPREAD);
+    for (int pass = 0; pass < FILTER_PASSES; pass++) {
         struct filter filter = {mesh, f, f->normal, next, spread};
         parallel_for(pool, (mesh->triangle_count + CHUNK - 1) / CHUNK, filter_chunk, &filter);
         next = f->normal;
@@ -113,7 +114,7 @@ void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct p
         f->normal[t] = vec3_normalize(cross);
     }
     measure_roughness(f, mesh);
-    if (face_normals_rough(f))
+    if (face_normals_are_rough(f))
         filter_normals(f, mesh, pool);
 }
 

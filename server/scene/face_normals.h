@@ -1,7 +1,7 @@
-/* face_normals.h -- the normals of a rough mesh's triangles, with the roughness filtered out.
+/* face_normals.h -- triangle normals of a scanned mesh, without its noise.
  *
- * Those of triangles that share a corner are averaged, like with like (the bilateral filter of normals, Zheng et al.
- * 2011), the wider the rougher the mesh is. Edges stay, and what is plane stays so to the bit. */
+ * Bilateral normal filter (Zheng et al. 2011) over triangles that share a vertex; its width follows the roughness of
+ * the mesh. Edges survive, and planar surfaces keep their normals bit by bit. */
 #ifndef UNBAKE_SCENE_FACE_NORMALS_H
 #define UNBAKE_SCENE_FACE_NORMALS_H
 
@@ -11,25 +11,27 @@
 struct face_normals {
     vec3 *normal;        /* [triangle_count] unit, filtered */
     float *area;         /* [triangle_count] twice the area, m^2 */
-    uint32_t *weld;      /* [vertex_count] as mesh_weld has it */
-    uint32_t *first;     /* [vertex_count + 1] the triangles at welded vertex v are ... */
-    uint32_t *triangle;  /* ... those at [first[v], first[v + 1]) here, ascending */
-    float least;         /* by how much at least each differs from a neighbour, median, before the filter: 0 of what was
-                          * modelled by hand, whose walls have two triangles */
-    float roughness;     /* by how much neighbours' normals differ before the filter: length of the difference; half
-                          * of the triangles have a quarter of their neighbours nearer */
+    uint32_t *weld;      /* [vertex_count] from mesh_weld */
+    uint32_t *first;     /* [vertex_count + 1] the triangles of welded vertex v are */
+    uint32_t *triangle;  /* those at [first[v], first[v + 1]), ascending */
+    float least_difference; /* to the most similar adjacent normal, median over triangles, before filtering: 0 for
+                             * modelled meshes, whose walls consist of pairs of coplanar triangles */
+    float roughness;     /* difference of adjacent normals (length) before filtering: median over triangles of the
+                          * lower quartile over neighbours */
 };
 
-/* A mesh is rough enough to be worth the filter of normals. */
-static inline bool face_normals_rough(const struct face_normals *f) { return f->roughness > 0.005f; }
+/* Rough enough for the normals to be filtered. */
+static inline bool face_normals_are_rough(const struct face_normals *f) { return f->roughness > 0.005f; }
 
-/* It is noise that makes it rough, not that it has few triangles. */
-static inline bool face_normals_noisy(const struct face_normals *f) { return face_normals_rough(f) && f->least > 0.002f; }
+/* Rough because of noise, and not only because triangles are large. */
+static inline bool face_normals_are_noisy(const struct face_normals *f) {
+    return face_normals_are_rough(f) && f->least_difference > 0.002f;
+}
 
-/* Unit, of welded vertex v: the mean of its triangles' by area; 0 where it has none. */
+/* Unit normal of welded vertex v: area-weighted mean over its triangles; 0 where it has none. */
 vec3 face_normals_at(const struct face_normals *f, size_t v);
 
-/* The same for any number of threads. */
+/* The result does not depend on the number of threads. */
 void face_normals_init(struct face_normals *f, const struct mesh *mesh, struct parallel *pool);
 void face_normals_release(struct face_normals *f);
 

@@ -16,12 +16,12 @@ void height_frame_init(struct height_frame *f, vec3 normal, const vec3 *position
         sum[2] += (double)from.z;
     }
     f->centre = vec3_add(first, vec3_make((float)(sum[0] / n), (float)(sum[1] / n), (float)(sum[2] / n)));
-    double squares = 0.0;
+    double residual_squares = 0.0;
     for (size_t i = 0; i < count; i++) {
         vec3 from = vec3_sub(position[vertex[i]], f->centre);
-        squares += (double)vec3_dot(from, from);
+        residual_squares += (double)vec3_dot(from, from);
     }
-    f->unit = sqrt(squares / n) + 1e-9;
+    f->unit = sqrt(residual_squares / n) + 1e-9;
     f->normal = vec3_normalize(normal);
     vec3_frame(f->normal, &f->u, &f->v);
 }
@@ -41,7 +41,7 @@ double height_fitted(const struct height_fit *fit, const struct height_frame *f,
     double term[HEIGHT_PARABOLOID], sum = 0.0;
     terms_at(f, at, term);
     for (size_t k = 0; k < fit->terms; k++)
-        sum += fit->by[k] * term[k];
+        sum += fit->coefficient[k] * term[k];
     return sum;
 }
 
@@ -64,18 +64,18 @@ bool height_fit(struct height_fit *fit, size_t terms, const struct height_frame 
         vec3 at = position[vertex[i]];
         terms_at(f, at, term);
         for (size_t r = 0; r < terms; r++) {
-            fit->by[r] += height_over(f, at) * term[r];
+            fit->coefficient[r] += height_over(f, at) * term[r];
             for (size_t c = 0; c <= r; c++)
                 fit->factor[r][c] += term[r] * term[c];
         }
     }
     if (count <= terms || !cholesky_factor(terms, HEIGHT_PARABOLOID, &fit->factor[0][0]))
         return false;
-    cholesky_solve(terms, HEIGHT_PARABOLOID, &fit->factor[0][0], fit->by);
+    cholesky_solve(terms, HEIGHT_PARABOLOID, &fit->factor[0][0], fit->coefficient);
     for (size_t i = 0; i < count; i++) {
         vec3 at = position[vertex[i]];
         double off = height_over(f, at) - height_fitted(fit, f, at);
-        fit->squares += off * off;
+        fit->residual_squares += off * off;
     }
     return true;
 }

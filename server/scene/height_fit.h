@@ -1,7 +1,7 @@
-/* height_fit.h -- the plane or the paraboloid through some vertices of a mesh, by least squares.
+/* height_fit.h -- least-squares plane or paraboloid through vertices of a mesh.
  *
- * Their heights over a frame are a polynomial of their places in it: of three terms (1, x, y) or of six (x^2, xy, y^2 as
- * well). */
+ * The height over a local frame is a polynomial in the frame's coordinates: 3 terms (1, x, y) or 6 (with x^2, xy,
+ * y^2). */
 #ifndef UNBAKE_SCENE_HEIGHT_FIT_H
 #define UNBAKE_SCENE_HEIGHT_FIT_H
 
@@ -15,33 +15,33 @@
 #define HEIGHT_PARABOLOID 6
 
 struct height_frame {
-    vec3 centre, u, v, normal; /* metres; unit, at right angles */
-    double unit;               /* root of the vertices' mean square distance from the centre, m */
+    vec3 centre, u, v, normal; /* metres; orthonormal */
+    double unit;               /* root mean square distance of the vertices from the centre, m */
 };
 
 struct height_fit {
     size_t terms;
-    double by[HEIGHT_PARABOLOID];                        /* heights in metres, places in units */
-    double factor[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]; /* Cholesky's, of the normal equations */
-    double squares;                                      /* of what is left, summed, m^2 */
+    double coefficient[HEIGHT_PARABOLOID];                        /* of heights in metres over coordinates in `unit` */
+    double factor[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]; /* Cholesky factor of the normal equations */
+    double residual_squares;                                      /* sum of squared residuals, m^2 */
 };
 
-/* Around the mean of position[vertex[0..count)], count > 0; `normal` need not be unit. */
+/* Frame centred at the mean of position[vertex[0..count)], count > 0; `normal` need not be unit. */
 void height_frame_init(struct height_frame *f, vec3 normal, const vec3 *position, const uint32_t *vertex, size_t count);
 
-/* metres along the normal */
+/* Height of a point over the frame, metres. */
 static inline double height_over(const struct height_frame *f, vec3 at) {
     return (double)vec3_dot(f->normal, vec3_sub(at, f->centre));
 }
 
-/* False where the vertices are too few, or lie so that they do not tell. */
+/* False when there are too few vertices or they are degenerate. */
 bool height_fit(struct height_fit *fit, size_t terms, const struct height_frame *f, const vec3 *position,
                 const uint32_t *vertex, size_t count);
 
-/* What the fit says of the height over the place of `at`, metres. */
+/* Height of the fitted surface at the coordinates of `at`, metres. */
 double height_fitted(const struct height_fit *fit, const struct height_frame *f, vec3 at);
 
-/* The variance of that, over that of a vertex. */
+/* Variance of height_fitted, as a multiple of the variance of a vertex. */
 double height_variance(const struct height_fit *fit, const struct height_frame *f, vec3 at);
 
 #endif

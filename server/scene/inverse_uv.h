@@ -25,14 +25,13 @@ struct inverse_uv {
                            * list are neighbours on the surface; owned */
 };
 
-/* The same for any number of threads. */
+/* The result does not depend on the number of threads. */
 void inverse_uv_make(struct inverse_uv *inverse, const struct atlas *atlas, size_t triangle_count,
                      struct parallel *pool);
 void inverse_uv_release(struct inverse_uv *inverse);
 
-/* Surface point for the place (x, y), in texels, inside the valid texel that contains it:
- * barycentrics on the texel's own triangle, of the point of it nearest the place. False when the
- * texel is not valid. */
+/* Surface point at (x, y), in texels, inside a valid texel: barycentrics, on the texel's own triangle, of its point
+ * nearest to (x, y). False when the texel is not valid. */
 bool inverse_uv_lookup(const struct inverse_uv *inverse, const struct atlas *atlas, float x, float y,
                        uint32_t *triangle, float *b1, float *b2);
 

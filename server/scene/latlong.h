@@ -1,12 +1,12 @@
-/* latlong.h -- the latitude-longitude map of distant light: which pixel shows which direction, and how much of the
- * sphere it stands for. The one layout of all that draws, measures, fills in, renders or exports such a map.
+/* latlong.h -- the latitude-longitude layout of environment maps: direction of each pixel and its solid angle.
+ * Everything that renders, measures, fills in or exports such a map uses this layout.
  *
- * The axis is y: row 0 is +y, the last row -y. A direction d has the azimuth atan2(d.x, -d.z), from -z over +x, and the
- * polar angle acos(d.y). The centre of column x is at the azimuth 2 pi (x + 1/2) / width; row y is at the polar angle
- * pi y / (height - 1), so that the first and the last row are the poles: the layout of `envmap` of Mitsuba 3, against
- * which it is tested. Between the centres of pixels radiance is bilinear.
+ * The axis is y: row 0 is +y, the last row -y. A direction d has azimuth atan2(d.x, -d.z), from -z over +x, and polar
+ * angle acos(d.y). The centre of column x is at azimuth 2 pi (x + 1/2) / width; row y is at polar angle pi y /
+ * (height - 1), so the first and the last row are the poles. This is the layout of Mitsuba 3's `envmap`, against
+ * which it is tested. Radiance is bilinear between pixel centres.
  *
- * Places are continuous: the centre of pixel (x, y) is the place (x, y). Heights are at least 2. */
+ * Coordinates are continuous: the centre of pixel (x, y) is at (x, y). Heights are at least 2. */
 #ifndef UNBAKE_SCENE_LATLONG_H
 #define UNBAKE_SCENE_LATLONG_H
 
@@ -27,7 +27,7 @@ static inline struct latlong latlong_of(vec3 direction) {
     return (struct latlong){around < 1.0 ? around : 0.0, acos(fmin(fmax((double)direction.y, -1.0), 1.0)) / PI};
 }
 
-/* The unit direction. `down` may lie beyond a pole: that leads on, to the other side. */
+/* Unit direction. Polar angles beyond a pole continue on the other side. */
 static inline vec3 latlong_direction(double around, double down) {
     double phi = 2.0 * PI * around, theta = PI * down, sine = sin(theta);
     return (vec3){(float)(sine * sin(phi)), (float)cos(theta), (float)(-sine * cos(phi))};
@@ -42,8 +42,9 @@ static inline vec3 latlong_pixel(uint32_t width, uint32_t height, double x, doub
     return latlong_direction((x + 0.5) / (double)width, y / (double)(height - 1));
 }
 
-/* The place of a unit direction: *x in [0, width), where width - 1/2 is between the last column and the first, and *y in
- * [0, height - 1). In single precision: every ray that leaves the room asks. */
+/* Map coordinates of a unit direction: *x in [0, width), where width - 1/2 is between the last column and the first,
+ * and
+ * *y in [0, height - 1). Single precision: it is evaluated for every ray that leaves the room. */
 static inline void latlong_place(uint32_t width, uint32_t height, vec3 d, float *x, float *y) {
     float turn = atan2f(d.x, -d.z) * (float)(0.5 / PI) - 0.5f / (float)width;
     turn -= floorf(turn);
@@ -59,8 +60,7 @@ static inline size_t latlong_nearest(uint32_t width, uint32_t height, vec3 direc
     return row * width + (column < width ? column : width - 1);
 }
 
-/* Solid angle of one pixel of a row, sr: what its value is multiplied by in the integral of the bilinear map over the
- * sphere. Those of all pixels come to 4 pi. */
+/* Solid angle of one pixel of a row, sr: the integral of its bilinear weight over the sphere; 4 pi over all pixels. */
 static inline double latlong_pixel_angle(uint32_t width, uint32_t height, uint32_t row) {
     double step = PI / (double)(height - 1);
     double down = row == 0 || row + 1 == height ? 1.0 - sin(step) / step
@@ -68,7 +68,7 @@ static inline double latlong_pixel_angle(uint32_t width, uint32_t height, uint32
     return 2.0 * PI / (double)width * down;
 }
 
-/* Solid angle of one of the cells between the centres of two columns and those of rows `row` and row + 1, sr. */
+/* Solid angle of a cell between two columns of pixel centres and rows `row` and row + 1, sr. */
 static inline double latlong_cell_angle(uint32_t width, uint32_t height, uint32_t row) {
     return 2.0 * PI / (double)width * (cos(latlong_polar(height, row)) - cos(latlong_polar(height, row + 1)));
 }

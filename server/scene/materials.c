@@ -3,7 +3,7 @@
 
 #include "common/mem.h"
 
-#define POLISHED 0.5f /* roughness, at most */
+#define MAX_POLISHED_ROUGHNESS 0.5f /* roughness, at most */
 
 void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count,
                     rgb base_color, float roughness, float specular) {
@@ -29,7 +29,7 @@ void materials_release(struct materials *m) {
 }
 
 bool materials_is_polished(const struct materials *m, uint32_t segment) {
-    return m->specular[segment] > 0.0f && m->roughness[segment] <= POLISHED;
+    return m->specular[segment] > 0.0f && m->roughness[segment] <= MAX_POLISHED_ROUGHNESS;
 }
 
 void materials_start_emission_pattern(struct materials *m) {
@@ -43,11 +43,11 @@ void materials_drop_emission_pattern(struct materials *m) {
     m->emission_pattern = NULL;
 }
 
-/* The least of a pattern, by channel: 0 would mean that none is told. */
-#define LEAST_PATTERN 1e-3f
+/* Lower bound of a pattern's channels, since 0 stands for unknown. */
+#define MIN_PATTERN 1e-3f
 
 static float pattern_of(float radiance, float mean) {
-    return mean > 0.0f ? fmaxf(radiance / mean, LEAST_PATTERN) : 1.0f;
+    return mean > 0.0f ? fmaxf(radiance / mean, MIN_PATTERN) : 1.0f;
 }
 
 void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radiance, rgb mean) {
@@ -55,8 +55,8 @@ void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radia
     rgb_to_half(m->emission_pattern[texel], pattern);
 }
 
-/* The place of the first of two neighbours around `at`, both within [0, size), and the share of the second. */
-static uint32_t first_of_two(float at, uint32_t size, float *share) {
+/* The first of the two texels around `at`, both within [0, size), and the weight of the second. */
+static uint32_t linear_tap(float at, uint32_t size, float *share) {
     float x = clampf(at - 0.5f, 0.0f, (float)(size - 1));
     uint32_t first = size > 1 && x >= (float)(size - 1) ? size - 2 : (uint32_t)x;
     *share = x - (float)first;
@@ -66,7 +66,7 @@ static uint32_t first_of_two(float at, uint32_t size, float *share) {
 rgb materials_emission_pattern(const struct materials *m, float x, float y) {
     uint32_t width = m->base_color.width, height = m->base_color.height;
     float right, down, weights = 0.0f;
-    uint32_t column = first_of_two(x, width, &right), row = first_of_two(y, height, &down);
+    uint32_t column = linear_tap(x, width, &right), row = linear_tap(y, height, &down);
     rgb sum = rgb_gray(0.0f);
     for (uint32_t k = 0; k < 4; k++) {
         uint32_t dx = k % 2, dy = k / 2;

@@ -7,8 +7,7 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-/* A triangle lower than this share of its longest edge has no normal to speak of: single
- * precision coordinates do not carry one. */
+/* Relative height (over the longest edge) below which a triangle has no usable normal in single precision. */
 #define MIN_RELATIVE_HEIGHT 1e-7
 
 void mesh_release(struct mesh *mesh) {
@@ -54,7 +53,7 @@ static size_t table_size(size_t count) {
 }
 
 static uint32_t float_bits(float value) {
-    value += 0.0f; /* -0 and 0 are one place */
+    value += 0.0f; /* -0 and 0 are one position */
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
@@ -123,7 +122,7 @@ static bool is_degenerate(const struct mesh *mesh, size_t triangle) {
     double x = edge[0][1] * edge[1][2] - edge[0][2] * edge[1][1];
     double y = edge[0][2] * edge[1][0] - edge[0][0] * edge[1][2];
     double z = edge[0][0] * edge[1][1] - edge[0][1] * edge[1][0];
-    if (!(vec3_length(mesh_cross(mesh, triangle)) > 0.0f)) /* what others will divide by */
+    if (!(vec3_length(mesh_cross(mesh, triangle)) > 0.0f)) /* normals are divided by this length */
         return true;
     return sqrt(x * x + y * y + z * z) <= MIN_RELATIVE_HEIGHT * longest;
 }
@@ -180,7 +179,7 @@ static void repair_normals(struct mesh *mesh) {
     size_t bad = 0;
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         vec3 n = mesh->normal[v];
-        /* Scaled first: the square of a long or short vector may not be a float. */
+        /* Scaled first, so that squares neither overflow nor underflow. */
         float largest = fmaxf(fabsf(n.x), fmaxf(fabsf(n.y), fabsf(n.z)));
         if (!vec3_is_finite(n) || !(largest > 0.0f)) {
             mesh->normal[v] = (vec3){0.0f, 0.0f, 0.0f};
@@ -200,7 +199,7 @@ static void repair_normals(struct mesh *mesh) {
         vec3 n = mesh->normal[v];
         if (n.x == 0.0f && n.y == 0.0f && n.z == 0.0f) {
             vec3 mean = vec3_normalize(sum[v]);
-            /* An unused vertex, or faces that cancel out: any unit vector serves. */
+            /* an unused vertex, or faces that cancel out: any unit vector serves */
             mesh->normal[v] = vec3_length(mean) > 0.5f ? mean : (vec3){0.0f, 0.0f, 1.0f};
         }
     }

@@ -30,11 +30,10 @@ struct mesh_report {
 
 void mesh_release(struct mesh *mesh);
 
-/* Checks indices and coordinates (STATUS_INPUT names the first bad face or vertex by its
- * number, from 0), then drops degenerate and duplicate triangles in place, keeping the order:
- * of two coincident triangles a ray meets either by chance, so only the first can be measured.
- * Normals are made unit; zero or non-finite ones are replaced by the mean of the adjacent
- * faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
+/* Checks indices and coordinates (STATUS_INPUT names the first bad face or vertex by its number, from 0), then drops
+ * degenerate and duplicate triangles in place, keeping the order. Of two coincident triangles a ray hits either, so
+ * only the first can be measured. Normals are normalised; zero or non-finite ones are replaced by the mean of the
+ * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report,
                        struct error *err);
 

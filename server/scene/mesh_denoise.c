@@ -10,31 +10,31 @@
 #include "server/scene/mesh_planes.h"
 #include "server/scene/mesh_round.h"
 
-#define CHUNK 1024      /* vertices a work item */
-#define ROUNDS 3        /* normals filtered, then vertices moved */
-#define STEPS 10        /* of the vertices in a round */
-#define ROUND_PASSES 2  /* of what smooths round surfaces: the first gives it their normals */
-#define AVERAGE_PASSES 2 /* over neighbours: some 20 vertices */
-#define SHAPE_LEAST 0.4f /* times the noise: what moved them all by as much may still be chance */
-#define EXCESS_LEAST 2.5f /* times the variance of the noise: so may be a mean square of as much */
-#define ALIKE 0.8f      /* cosine between normals of neighbours on the same surface */
-#define DEVIATION_OF_MEDIAN 0.6745f /* of a normal distribution: its median modulus over its deviation */
+#define CHUNK 1024      /* vertices per work item */
+#define ROUNDS 3        /* of filtering normals and then fitting vertices to them */
+#define STEPS_PER_ROUND 10        /* fixed-point iterations of the vertex update */
+#define CURVED_PASSES 2  /* of smoothing curved surfaces; the first gives them better normals */
+#define AVERAGE_PASSES 2 /* of averaging over direct neighbours: reaches about 20 vertices */
+#define SHAPE_SIGMA 0.4f /* of noise: a mean displacement of a neighbourhood below this may be chance */
+#define EXCESS_FACTOR 2.5f /* times the noise variance: a mean square displacement below this may be chance */
+#define SAME_SURFACE_COSINE 0.8f      /* between normals of neighbours on one surface */
+#define MAD_PER_SIGMA 0.6745f /* of a normal distribution: median absolute deviation over standard deviation */
 
 struct denoising {
     const struct face_normals *faces;
     struct mesh *mesh;
-    const vec3 *start;  /* [vertex_count] positions before anything moved */
-    vec3 *normal;       /* [vertex_count] unit; of vertices, from the filtered ones of triangles */
+    const vec3 *start;  /* [vertex_count] positions before denoising */
+    vec3 *normal;       /* [vertex_count] unit vertex normals, from the filtered triangle normals */
     vec3 *next;         /* [vertex_count] */
-    float *moved;       /* [vertex_count] metres along the normal */
-    float *value;       /* [vertex_count] to be averaged */
-    float *average;     /* [vertex_count] */
-    float noise;        /* metres */
+    float *displacement;       /* [vertex_count] along the normal, metres */
+    float *value;       /* [vertex_count] input of average(), and its output */
+    float *average;     /* [vertex_count] scratch of average() */
+    float noise;        /* standard deviation, metres */
 };
 
 static size_t chunks_of(const struct mesh *mesh) { return (mesh->vertex_count + CHUNK - 1) / CHUNK; }
 
-/* The end of a chunk of vertices. */
+/* One past the last vertex of a chunk. */
 static size_t chunk_end(const struct mesh *mesh, size_t chunk) {
     size_t end = (chunk + 1) * CHUNK;
     return end < mesh->vertex_count ? end : mesh->vertex_count;
@@ -46,8 +46,8 @@ static vec3 centre_of(const struct mesh *mesh, size_t t) {
     return vec3_scale(sum, 1.0f / 3.0f);
 }
 
-/* Vertices that coincide follow the one that stands for them. */
-static void move_together(struct mesh *mesh, const uint32_t *weld, const vec3 *to) {
+/* Coincident vertices take the position of their representative. */
+static void set_positions(struct mesh *mesh, const uint32_t *weld, const vec3 *to) {
     for (size_t v = 0; v < mesh->vertex_count; v++)
         mesh->position[v] = to[weld[v]];
 }
@@ -69,10 +69,10 @@ static void step_chunk(void *user, size_t chunk, int thread) {
     }
 }
 
-static void move_to_normals(struct denoising *d, struct parallel *pool) {
-    for (int step = 0; step < STEPS; step++) {
+static void fit_vertices_to_normals(struct denoising *d, struct parallel *pool) {
+    for (int step = 0; step < STEPS_PER_ROUND; step++) {
         parallel_for(pool, chunks_of(d->mesh), step_chunk, d);
-        move_together(d->mesh, d->faces->weld, d->next);
+        set_positions(d->mesh, d->faces->weld, d->next);
     }
 }
 
@@ -83,19 +83,19 @@ static void measure_chunk(void *user, size_t chunk, int thread) {
     const struct denoising *d = user;
     for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
         d->normal[v] = face_normals_at(d->faces, v);
-        d->moved[v] = vec3_dot(d->normal[v], vec3_sub(d->mesh->position[v], d->start[v]));
+        d->displacement[v] = vec3_dot(d->normal[v], vec3_sub(d->mesh->position[v], d->start[v]));
     }
 }
 
-/* The standard deviation of what moved vertices. */
-static float noise_of(const struct denoising *d) {
+/* Robust standard deviation of the displacements. */
+static float displacement_sigma(const struct denoising *d) {
     float *modulus = mem_array(d->mesh->vertex_count, sizeof *modulus);
     size_t count = 0;
     for (size_t v = 0; v < d->mesh->vertex_count; v++) {
         if (d->faces->first[v + 1] > d->faces->first[v])
-            modulus[count++] = fabsf(d->moved[v]);
+            modulus[count++] = fabsf(d->displacement[v]);
     }
-    float noise = quantile(modulus, count, 0.5) / DEVIATION_OF_MEDIAN;
+    float noise = quantile(modulus, count, 0.5) / MAD_PER_SIGMA;
     mem_free(modulus);
     return noise;
 }
@@ -109,7 +109,7 @@ static void average_chunk(void *user, size_t chunk, int thread) {
         for (uint32_t i = f->first[v]; i < f->first[v + 1]; i++) {
             for (int c = 0; c < 3; c++) {
                 uint32_t other = f->weld[d->mesh->index[f->triangle[i]][c]];
-                if (other == v || vec3_dot(d->normal[v], d->normal[other]) < ALIKE)
+                if (other == v || vec3_dot(d->normal[v], d->normal[other]) < SAME_SURFACE_COSINE)
                     continue;
                 sum += d->value[other];
                 count += 1.0f;
@@ -119,7 +119,7 @@ static void average_chunk(void *user, size_t chunk, int thread) {
     }
 }
 
-/* Averages d->value over some 20 neighbours on the same surface. */
+/* Averages d->value over about 20 neighbours on the same surface. */
 static void average(struct denoising *d, struct parallel *pool) {
     for (int pass = 0; pass < AVERAGE_PASSES; pass++) {
         parallel_for(pool, chunks_of(d->mesh), average_chunk, d);
@@ -129,41 +129,42 @@ static void average(struct denoising *d, struct parallel *pool) {
     }
 }
 
-/* What moved the whole neighbourhood is taken out of what moved a vertex; the square of the rest is to be averaged. */
-static void take_shape_chunk(void *user, size_t chunk, int thread) {
+/* Subtracts the mean displacement of the neighbourhood (shrunk towards 0 by what chance explains) and sets `value` to
+ * the square of the remainder. */
+static void subtract_shape_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct denoising *d = user;
-    float by_chance = SHAPE_LEAST * SHAPE_LEAST * d->noise * d->noise;
+    float shape_variance = SHAPE_SIGMA * SHAPE_SIGMA * d->noise * d->noise;
     for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
         float mean = d->value[v], square = mean * mean;
-        d->moved[v] -= square > by_chance ? mean * (1.0f - by_chance / square) : 0.0f;
-        d->value[v] = d->moved[v] * d->moved[v];
+        d->displacement[v] -= square > shape_variance ? mean * (1.0f - shape_variance / square) : 0.0f;
+        d->value[v] = d->displacement[v] * d->displacement[v];
     }
 }
 
-static void place_chunk(void *user, size_t chunk, int thread) {
+static void apply_wiener_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     const struct denoising *d = user;
     float variance = d->noise * d->noise;
     for (size_t v = chunk * CHUNK; v < chunk_end(d->mesh, chunk); v++) {
-        float excess = fmaxf(0.0f, d->value[v] - EXCESS_LEAST * variance);
+        float excess = fmaxf(0.0f, d->value[v] - EXCESS_FACTOR * variance);
         float share = variance > 0.0f ? variance / (variance + excess) : 0.0f;
-        d->next[v] = vec3_mad(d->start[v], share * d->moved[v], d->normal[v]);
+        d->next[v] = vec3_mad(d->start[v], share * d->displacement[v], d->normal[v]);
     }
 }
 
 static void restore_shape(struct denoising *d, struct parallel *pool) {
-    memcpy(d->value, d->moved, d->mesh->vertex_count * sizeof *d->value);
+    memcpy(d->value, d->displacement, d->mesh->vertex_count * sizeof *d->value);
     average(d, pool);
-    parallel_for(pool, chunks_of(d->mesh), take_shape_chunk, d);
+    parallel_for(pool, chunks_of(d->mesh), subtract_shape_chunk, d);
     average(d, pool);
-    parallel_for(pool, chunks_of(d->mesh), place_chunk, d);
-    move_together(d->mesh, d->faces->weld, d->next);
+    parallel_for(pool, chunks_of(d->mesh), apply_wiener_chunk, d);
+    set_positions(d->mesh, d->faces->weld, d->next);
 }
 
 /* ------------------------------------------------------------------------------------------------ */
 
-static void renew_normals(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
+static void recompute_normals(struct denoising *d, struct face_normals *faces, struct parallel *pool) {
     face_normals_release(faces);
     face_normals_init(faces, d->mesh, pool);
 }
@@ -176,30 +177,30 @@ static void denoise_rough(struct denoising *d, struct face_normals *faces, struc
     d->start = start;
     d->normal = mem_array(vertices, sizeof *d->normal);
     d->next = mem_array(vertices, sizeof *d->next);
-    d->moved = mem_array(vertices, sizeof *d->moved);
+    d->displacement = mem_array(vertices, sizeof *d->displacement);
     d->value = mem_array(vertices, sizeof *d->value);
     d->average = mem_array(vertices, sizeof *d->average);
     for (int round = 0; round < ROUNDS; round++) {
-        move_to_normals(d, pool);
-        renew_normals(d, faces, pool);
+        fit_vertices_to_normals(d, pool);
+        recompute_normals(d, faces, pool);
     }
     parallel_for(pool, chunks_of(d->mesh), measure_chunk, d);
-    d->noise = noise_of(d);
+    d->noise = displacement_sigma(d);
     mesh_planes_find(&planes, d->mesh, start, d->noise, faces);
     restore_shape(d, pool);
     mesh_planes_flatten(&planes, d->mesh, faces);
     mesh_planes_release(&planes);
-    renew_normals(d, faces, pool); /* those beside planes are surer now */
+    recompute_normals(d, faces, pool); /* planes have moved vertices */
     mesh_planes_find(&planes, d->mesh, start, d->noise, faces);
     mesh_planes_flatten(&planes, d->mesh, faces);
-    for (int round = 0; round < ROUND_PASSES; round++) {
-        renew_normals(d, faces, pool);
+    for (int round = 0; round < CURVED_PASSES; round++) {
+        recompute_normals(d, faces, pool);
         mesh_round_smooth(d->mesh, start, d->noise, faces, &planes, pool);
     }
     mesh_planes_release(&planes);
     mem_free(d->average);
     mem_free(d->value);
-    mem_free(d->moved);
+    mem_free(d->displacement);
     mem_free(d->next);
     mem_free(d->normal);
     mem_free(start);
@@ -211,7 +212,7 @@ float mesh_denoise(struct mesh *mesh, struct parallel *pool) {
     struct face_normals faces;
     face_normals_init(&faces, mesh, pool);
     struct denoising denoising = {.faces = &faces, .mesh = mesh};
-    if (face_normals_noisy(&faces))
+    if (face_normals_are_noisy(&faces))
         denoise_rough(&denoising, &faces, pool);
     face_normals_release(&faces);
     return denoising.noise;

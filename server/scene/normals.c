@@ -4,14 +4,14 @@
 #include "common/mem.h"
 #include "server/scene/face_normals.h"
 
-#define EDGE_COSINE 0.8f /* of the angle between filtered normals from which there is an edge */
-#define FLAT 1e-6f       /* a normal this near to the triangle's is the same */
+#define EDGE_COSINE 0.8f /* between filtered normals; below it there is an edge */
+#define FLAT_DIFFERENCE 1e-6f       /* 1 - cosine to the triangle's own normal that counts as equal */
 
-/* Vertices of the result. */
+/* The vertices being built. */
 struct vertices {
     size_t count, capacity;
     vec3 *position, *normal;
-    bool any; /* normals differ from those of the triangles */
+    bool differs; /* some normal differs from that of its triangle */
 };
 
 static uint32_t add_vertex(struct vertices *v, vec3 position, vec3 normal) {
@@ -32,8 +32,8 @@ static int corner_at(const struct face_normals *f, const struct mesh *mesh, size
     return c;
 }
 
-/* Makes vertices for the triangles at one welded vertex: each goes with the first one that is not across an edge
- * from it. The corners of the triangles are set in `index`. */
+/* Splits one welded vertex: each of its triangles joins the first new vertex whose normal is not across an edge. Sets
+ * `index` of the triangles' corners. */
 static void make_vertices(const struct face_normals *f, const struct mesh *mesh, size_t vertex, struct vertices *v,
                           uint32_t (*index)[3]) {
     size_t begin = v->count;
@@ -53,13 +53,14 @@ static void make_vertices(const struct face_normals *f, const struct mesh *mesh,
         v->normal[i] = vec3_normalize(v->normal[i]);
     for (const uint32_t *t = first; t < end; t++) {
         vec3 own = vec3_normalize(mesh_cross(mesh, *t));
-        v->any = v->any || vec3_dot(own, v->normal[index[*t][corner_at(f, mesh, *t, vertex)]]) < 1.0f - FLAT;
+        uint32_t corner = index[*t][corner_at(f, mesh, *t, vertex)];
+        v->differs = v->differs || vec3_dot(own, v->normal[corner]) < 1.0f - FLAT_DIFFERENCE;
     }
 }
 
-/* Hands the vertices over, if there is any use of them. */
-static bool take_over(struct mesh *mesh, struct vertices *v, uint32_t (*index)[3]) {
-    if (!v->any) {
+/* Installs the new vertices in the mesh, or frees them if no normal differs from its triangle's. */
+static bool move_vertices(struct mesh *mesh, struct vertices *v, uint32_t (*index)[3]) {
+    if (!v->differs) {
         mem_free(v->position);
         mem_free(v->normal);
         mem_free(index);
@@ -86,5 +87,5 @@ bool normals_estimate(struct mesh *mesh, struct parallel *pool, float *roughness
     for (size_t v = 0; v < mesh->vertex_count; v++)
         make_vertices(&faces, mesh, v, &vertices, index);
     face_normals_release(&faces);
-    return take_over(mesh, &vertices, index);
+    return move_vertices(mesh, &vertices, index);
 }

@@ -11,17 +11,16 @@
 void photograph_release(struct photograph *photo) {
     mem_free(photo->name);
     mem_free(photo->pixel);
-    mem_free(photo->white);
+    mem_free(photo->saturated);
     mem_free(photo->clipped);
     mem_free(photo->color_space);
-    mem_free(photo->spark);
+    mem_free(photo->firefly);
     mem_free(photo->mask);
     *photo = (struct photograph){0};
 }
 
-/* As image_float_from_half, inline: a look-up converts twelve values, and a refinement does
- * millions of look-ups an iteration. No step meets a subnormal float, so the result does not
- * depend on whether the thread flushes those to zero. */
+/* image_float_from_half, inlined: a lookup converts twelve values, and a refinement does millions of lookups per
+ * iteration. No step produces a subnormal float, so results do not depend on flush-to-zero. */
 static inline float half_to_float(uint16_t half) {
     uint32_t exponent = (half >> 10) & 31u, mantissa = half & 1023u;
     float magnitude;
@@ -34,21 +33,22 @@ static inline float half_to_float(uint16_t half) {
     return half & 0x8000u ? -magnitude : magnitude;
 }
 
-/* A stored value, and less than nothing for black. */
+/* The pixel value; slightly negative for a stored 0 (see photograph.h). */
 static inline float read_tap(const struct photograph *photo, uint16_t half) {
     float value = half_to_float(half);
     return value == 0.0f ? -photo->black : value;
 }
 
-/* Whether a channel saturates; what it reads is no less than the clip then. */
-static inline bool saturates(const struct photograph *photo, size_t at, int channel, float *tap) {
-    bool is_white = photo->white ? photo->white[at] >> channel & 1 : photograph_clips(photo, at, channel, *tap);
-    if (is_white)
+/* Whether a channel is saturated; raises its value to the clip if so. */
+static inline bool tap_saturates(const struct photograph *photo, size_t at, int channel, float *tap) {
+    bool is_saturated =
+        photo->saturated ? photo->saturated[at] >> channel & 1 : photograph_clips(photo, at, channel, *tap);
+    if (is_saturated)
         *tap = fmaxf(*tap, photo->clip);
-    return is_white;
+    return is_saturated;
 }
 
-/* The two pixels and the weight of the second around place x of a row of `count` pixels. */
+/* The two pixels around coordinate x in a row of `count` pixels, and the weight of the second. */
 static inline void taps(float x, uint32_t count, size_t index[2], float *weight) {
     float centred = clampf(x - 0.5f, 0.0f, (float)(count - 1));
     index[0] = (size_t)centred;
@@ -83,7 +83,7 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
             return false;
         for (int c = 0; c < 3; c++) {
             float tap = read_tap(photo, photo->pixel[at][c]);
-            sample->saturated[c] |= saturates(photo, at, c, &tap);
+            sample->saturated[c] |= tap_saturates(photo, at, c, &tap);
             value[c] += weight * tap;
         }
     }
@@ -97,14 +97,14 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     return true;
 }
 
-bool photograph_sparks(const struct photograph *photo, float x, float y) {
+bool photograph_has_firefly(const struct photograph *photo, float x, float y) {
     size_t column[2], row[2];
     float wx, wy;
     taps(x, photo->camera.width, column, &wx);
     taps(y, photo->camera.height, row, &wy);
-    for (int k = 0; k < 4 && photo->spark; k++) {
+    for (int k = 0; k < 4 && photo->firefly; k++) {
         float weight = (k & 1 ? wx : 1.0f - wx) * (k & 2 ? wy : 1.0f - wy);
-        if (weight > 0.0f && photo->spark[row[k >> 1] * photo->camera.width + column[k & 1]])
+        if (weight > 0.0f && photo->firefly[row[k >> 1] * photo->camera.width + column[k & 1]])
             return true;
     }
     return false;
@@ -120,11 +120,11 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
     photograph_cubic(y - 0.5f - (float)(row + 1), wy);
     for (long k = 0; k < 16; k++) {
         size_t at = (size_t)((row + k / 4) * width + column + k % 4);
-        if ((photo->mask && photo->mask[at] == 0) || (photo->spark && photo->spark[at]))
+        if ((photo->mask && photo->mask[at] == 0) || (photo->firefly && photo->firefly[at]))
             return false;
         for (int c = 0; c < 3; c++) {
             float tap = read_tap(photo, photo->pixel[at][c]);
-            if (saturates(photo, at, c, &tap) || !isfinite(tap))
+            if (tap_saturates(photo, at, c, &tap) || !isfinite(tap))
                 return false;
             value[c] += wx[k % 4] * wy[k / 4] * tap;
         }

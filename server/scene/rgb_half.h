@@ -1,4 +1,4 @@
-/* rgb_half.h -- colours at half precision, for where there is one for each of many texels or pixels. */
+/* rgb_half.h -- colours at half precision, for large arrays. */
 #ifndef UNBAKE_SCENE_RGB_HALF_H
 #define UNBAKE_SCENE_RGB_HALF_H
 

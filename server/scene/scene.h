@@ -1,4 +1,4 @@
-/* scene.h -- what a bundle holds once it is read: a mesh and photographs. */
+/* scene.h -- the content of a bundle: a mesh and photographs. */
 #ifndef UNBAKE_SCENE_SCENE_H
 #define UNBAKE_SCENE_SCENE_H
 
@@ -18,8 +18,7 @@ struct scene {
 
 void scene_release(struct scene *scene);
 
-/* The axis (x, y, z or one of them backwards) that points up in the photographs, as most of them
- * are held: no input says it. y where they do not tell. */
+/* The axis (x, y, z or a negative one) that points up in most photographs; inputs do not specify it. y if undecided. */
 vec3 scene_up(const struct scene *scene);
 
 #endif

@@ -1,13 +1,12 @@
 /* segment.c -- see segment.h.
  *
- * The automatic division is the graph segmentation of Felzenszwalb and Huttenlocher 2004 over
- * triangles, as Dai et al. 2017 (ScanNet) use it on scans: an edge between two triangles weighs
- * what their normals differ by, and two regions are joined over an edge that weighs no more than
- * what either has inside, plus a bonus for small regions. So a noisy surface tolerates in itself
- * what would be a border on a clean one. Three things are ours: sizes are areas, as triangles
- * of a modelled room differ by a factor of millions; normals are smoothed first, by a filter
- * that stops at creases; and a region that stays small joins its most similar neighbour, or, in a
- * scan, where small pieces that hang in the air are debris of fusing, the nearest region. */
+ * Automatic segmentation: the graph segmentation of Felzenszwalb and Huttenlocher 2004 over triangles, as used for
+ * scans by Dai et al. 2017 (ScanNet). The weight of an edge between two triangles is the difference of their normals;
+ * two regions are joined over an edge no heavier than the heaviest edge inside either of them plus a bonus for small
+ * regions. Noisy surfaces thus tolerate differences that would be borders on clean ones. Changes to the published
+ * method: sizes are areas, since triangles of a modelled room differ by a factor of millions; normals are smoothed
+ * first, but not across creases; and a region that stays small joins its most similar neighbour or, in a scan, where
+ * small floating components are fusion debris, the nearest region. */
 #include "server/scene/segment.h"
 
 #include <math.h>
@@ -19,14 +18,15 @@
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
 
-#define CONVEX_FACTOR 0.3f    /* of an outward fold's weight: objects bulge, borders between two
-                               * objects are mostly hollows */
-#define FLAT 0.002f           /* weight that is no fold at all: 3.6 degrees inwards, 6.6 outwards */
-#define BONUS 0.5             /* weight by which a region of 1 / BONUS_PARTS of the mesh may differ */
+#define CONVEX_FACTOR 0.3f    /* of the weight of a convex fold: objects are convex, and borders between objects are
+                               * mostly concave */
+#define FLAT 0.002f           /* weight below which there is no fold: 3.6 degrees concave, 6.6 convex */
+#define SIZE_BONUS 0.5             /* added to the internal difference of a region of 1 / BONUS_PARTS of the mesh's
+                                    * area */
 #define BONUS_PARTS 100000.0
 #define SMALL_PARTS 5000.0    /* a region of less than 1 / SMALL_PARTS of the mesh is small */
-#define SCAN_EVENNESS 16.0    /* mean square of the triangles' areas over their squared mean: 1 to 3
-                               * where depth was fused, hundreds where a room was modelled */
+#define SCAN_EVENNESS 16.0    /* mean square of triangle areas over their squared mean: 1 to 3 for fused depth maps,
+                               * hundreds for modelled rooms */
 
 #define NONE UINT32_MAX
 
@@ -54,14 +54,14 @@ void segments_from_object_id(struct segments *s, const struct mesh *mesh) {
 
 struct link {
     float weight;
-    uint32_t half_edge; /* and the next one of its ring */
+    uint32_t half_edge; /* continues at the next one of its ring */
 };
 
-/* Disjoint sets of triangles (union by area, paths halved). */
+/* Disjoint sets of triangles (union by area, path halving). */
 struct regions {
     uint32_t *parent; /* [triangle_count] */
     double *area;     /* [triangle_count] of a root: m^2 */
-    float *inside;    /* [triangle_count] of a root: the greatest weight joined over */
+    float *inside;    /* [triangle_count] of a root: greatest weight joined inside */
 };
 
 static uint32_t root_of(struct regions *r, uint32_t t) {
@@ -94,7 +94,7 @@ static int lightest_first(const void *left, const void *right) {
     return a->half_edge < b->half_edge ? -1 : a->half_edge > b->half_edge;
 }
 
-/* All pairs of triangles that meet at an edge, the most alike first. */
+/* All pairs of triangles that share an edge, in order of increasing weight. */
 static struct link *make_links(const struct mesh *mesh, const struct adjacency *adjacency,
                                size_t *count) {
     vec3 *normal = adjacency_smooth_normals(adjacency, mesh);
@@ -102,7 +102,7 @@ static struct link *make_links(const struct mesh *mesh, const struct adjacency *
     *count = 0;
     for (uint32_t h = 0; h < 3 * mesh->triangle_count; h++) {
         uint32_t next = adjacency->next[h];
-        if (next <= h) /* alone on its edge, or the end of the ring: the links before suffice */
+        if (next <= h) /* alone on its edge, or the end of the ring: the links so far connect it */
             continue;
         uint32_t a = h / 3, b = next / 3;
         float bend = fmaxf(0.0f, 1.0f - vec3_dot(normal[a], normal[b]));
@@ -125,7 +125,7 @@ static bool is_scan(const struct mesh *mesh, double total) {
     return squares * (double)mesh->triangle_count < SCAN_EVENNESS * total * total;
 }
 
-/* Triangles of large regions, in a hash table of cubes. */
+/* Spatial hash of the triangles of large regions. */
 struct cubes {
     const struct mesh *mesh;
     float side_m;
@@ -144,8 +144,8 @@ static size_t slot_of(const struct cubes *cubes, const int64_t cube[3]) {
     return rng_key((uint64_t)cube[0], (uint64_t)cube[1], (uint64_t)cube[2]) & cubes->mask;
 }
 
-/* The entered triangle with its centre nearest p, if nearer than *nearest_m (which it lowers) and
- * no more than a cube's side away; else `otherwise`. */
+/* The hashed triangle with its centre nearest to p, if nearer than *nearest_m (which is lowered) and within one cell;
+ * else `otherwise`. */
 static uint32_t nearest_triangle(const struct cubes *cubes, vec3 p, float *nearest_m,
                                  uint32_t otherwise) {
     int64_t middle[3];
@@ -163,9 +163,9 @@ static uint32_t nearest_triangle(const struct cubes *cubes, vec3 p, float *neare
     return otherwise;
 }
 
-/* Joins each region smaller than small_area to the large region nearest to it, or, where there is
- * none within the side of a small region, all those together. */
-static void adopt_debris(struct regions *r, const struct mesh *mesh, double small_area) {
+/* Joins each region smaller than small_area to the nearest large region; those without one within the side length of
+ * a small region are all joined together. */
+static void merge_debris(struct regions *r, const struct mesh *mesh, double small_area) {
     size_t n = mesh->triangle_count;
     struct cubes cubes = {.mesh = mesh, .side_m = (float)sqrt(small_area), .mask = 1};
     while (cubes.mask < n)
@@ -240,7 +240,7 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
         r.parent[t] = t;
         r.area[t] = 0.5 * (double)vec3_length(mesh_cross(mesh, t));
     }
-    double bonus = BONUS * total / BONUS_PARTS;
+    double bonus = SIZE_BONUS * total / BONUS_PARTS;
     for (size_t i = 0; i < link_count; i++) {
         uint32_t a = root_of(&r, link[i].half_edge / 3);
         uint32_t b = root_of(&r, adjacency.next[link[i].half_edge] / 3);
@@ -256,7 +256,7 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
             join(&r, a, b, link[i].weight);
     }
     if (is_scan(mesh, total))
-        adopt_debris(&r, mesh, total / SMALL_PARTS);
+        merge_debris(&r, mesh, total / SMALL_PARTS);
     number_regions(s, &r, n);
     mem_free(r.parent);
     mem_free(r.area);

@@ -1,4 +1,4 @@
-/* surface.h -- the piece of surface that a texel stands for. */
+/* surface.h -- the surface point of a texel. */
 #ifndef UNBAKE_SCENE_SURFACE_H
 #define UNBAKE_SCENE_SURFACE_H
 
@@ -19,14 +19,14 @@ struct surface_point {
                     * interpolated one leans behind the surface */
 };
 
-/* The shading normal at a place of a triangle that has such a geometric normal. */
+/* Interpolated shading normal at a point of a triangle with geometric normal `normal`. */
 vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float b2, vec3 normal);
 
-/* The point of the surface at the texel's centre; false when the texel is not valid. */
+/* Surface point at the texel's centre; false when the texel is not valid. */
 bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas,
                       const struct inverse_uv *inverse, uint32_t texel, struct surface_point *point);
 
-/* The same for the place (x, y) inside a valid texel, in texels. */
+/* Surface point at (x, y), in texels, inside a valid texel. */
 bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
                 float x, float y, struct surface_point *point);
 

@@ -1,9 +1,8 @@
-/* texture.h -- a colour texture over the atlas and the one filter through which it is read.
+/* texture.h -- a colour texture over the atlas, and its filter.
  *
- * A texel holds (r, g, b, valid): valid is 1 where the inverse UV map has a surface and 0
- * elsewhere. The filter is bilinear over the valid ones of the four nearest texels, weights
- * renormalised: values outside charts never leak in, and the derivative of a look-up is exactly
- * its four weights. */
+ * A texel holds (r, g, b, valid): valid is 1 where the inverse UV map has a surface and 0 elsewhere. The filter is
+ * bilinear over the valid ones of the four nearest texels with renormalised weights: nothing leaks in from outside
+ * charts, and the derivative of a lookup is its four weights. */
 #ifndef UNBAKE_SCENE_TEXTURE_H
 #define UNBAKE_SCENE_TEXTURE_H
 
@@ -27,7 +26,7 @@ struct texture_taps {
 void texture_init(struct texture *texture, const struct inverse_uv *inverse, rgb value);
 void texture_release(struct texture *texture);
 
-/* The taps of the place (x, y), in texels. */
+/* The taps at (x, y), in texels. */
 void texture_taps(const struct texture *texture, float x, float y, struct texture_taps *taps);
 rgb texture_gather(const struct texture *texture, const struct texture_taps *taps);
 

@@ -73,7 +73,7 @@ int main(void) {
     take();
     struct parallel *pool = parallel_new(2);
     clip_mark(&scene, &views, &noise, pool);
-    CHECK(photograph[0].white && !photograph[1].white && !photograph[2].white);
+    CHECK(photograph[0].saturated && !photograph[1].saturated && !photograph[2].saturated);
     struct reading below = read_stripe(0, false), about = read_stripe(1, false), at = read_stripe(2, false),
                    beyond = read_stripe(3, false), tiles = read_stripe(3, true);
     CHECK(below.white == 0.0);
@@ -84,9 +84,9 @@ int main(void) {
     CHECK(about.white < 0.05); /* a tenth is at the clip */
     CHECK_NEAR(about.mean, 0.79, 0.01); /* of those below it alone .767 */
     uint8_t *before = mem_array(PIXELS, 1);
-    memcpy(before, photograph[0].white, PIXELS);
+    memcpy(before, photograph[0].saturated, PIXELS);
     clip_mark(&scene, &views, &noise, pool);
-    CHECK_THAT(memcmp(before, photograph[0].white, PIXELS) == 0, "the same when it is done again");
+    CHECK_THAT(memcmp(before, photograph[0].saturated, PIXELS) == 0, "the same when it is done again");
     mem_free(before);
     parallel_free(pool);
     for (uint32_t t = 0; t < PHOTOGRAPHS; t++)

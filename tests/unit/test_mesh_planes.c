@@ -104,12 +104,12 @@ static void test_fit(void) {
     height_frame_init(&f, (vec3){0.0f, 0.0f, 2.0f}, position, vertex, 9);
     CHECK(f.normal.z == 1.0f);
     CHECK(height_fit(&fit, HEIGHT_PARABOLOID, &f, position, vertex, 9));
-    CHECK_THAT(fit.squares < 1e-10, "%g", fit.squares);
+    CHECK_THAT(fit.residual_squares < 1e-10, "%g", fit.residual_squares);
     vec3 beyond = {5.0f, -3.0f, 0.0f};
     double true_z = 2.0 + 2.5 + 0.75 + 3.125 + 7.5 + 9.0;
     double z = height_fitted(&fit, &f, beyond) + (double)f.centre.z;
     CHECK_THAT(fabs(z - true_z) < 1e-4, "%.9g, true is %.9g", z, true_z);
-    CHECK(height_fit(&fit, HEIGHT_PLANE, &f, position, vertex, 9) && fit.squares > 0.1);
+    CHECK(height_fit(&fit, HEIGHT_PLANE, &f, position, vertex, 9) && fit.residual_squares > 0.1);
     CHECK(!height_fit(&fit, HEIGHT_PLANE, &f, position, vertex, 3));
     for (int i = 0; i < 9; i++)
         position[i] = (vec3){(float)i, 0.0f, 0.0f};

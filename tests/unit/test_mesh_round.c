@@ -14,11 +14,11 @@
 static void smooth(struct mesh *m, bool plane, int threads) {
     struct parallel *pool = parallel_new(threads);
     struct face_normals faces;
-    struct mesh_planes planes = {.part = mem_calloc(m->triangle_count, sizeof *planes.part)};
+    struct mesh_planes planes = {.region = mem_calloc(m->triangle_count, sizeof *planes.region)};
     vec3 *measured = mem_array(m->vertex_count, sizeof *measured);
     memcpy(measured, m->position, m->vertex_count * sizeof *measured);
     if (!plane)
-        memset(planes.part, 0xff, m->triangle_count * sizeof *planes.part);
+        memset(planes.region, 0xff, m->triangle_count * sizeof *planes.region);
     face_normals_init(&faces, m, pool);
     mesh_round_smooth(m, measured, DEVIATION, &faces, &planes, pool);
     face_normals_release(&faces);

@@ -52,10 +52,11 @@ static void test_cubic(void) {
     CHECK(photograph_sample_cubic(&p, 1.5f, 1.5f, &sharp) && photograph_sample_cubic(&p, 9.9f, 5.9f, &sharp));
     p.clip = 100.0f;
     CHECK(photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp) && !photograph_sample_cubic(&p, 8.6f, 3.5f, &sharp));
-    p.spark = mem_calloc(96, sizeof *p.spark);
-    p.spark[2 * 12 + 2] = true; /* no tap may read it */
+    p.firefly = mem_calloc(96, sizeof *p.firefly);
+    p.firefly[2 * 12 + 2] = true; /* no tap may read it */
     CHECK(!photograph_sample_cubic(&p, 3.5f, 3.5f, &sharp) && photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp));
-    CHECK(photograph_sparks(&p, 2.5f, 2.5f) && photograph_sparks(&p, 3.4f, 1.6f) && !photograph_sparks(&p, 3.5f, 2.5f));
+    CHECK(photograph_has_firefly(&p, 2.5f, 2.5f) && photograph_has_firefly(&p, 3.4f, 1.6f) &&
+          !photograph_has_firefly(&p, 3.5f, 2.5f));
     p.mask = mem_calloc(96, 1);
     CHECK(!photograph_sample_cubic(&p, 7.0f, 3.5f, &sharp));
     photograph_release(&p);

@@ -60,9 +60,9 @@ static void take(void) {
 static size_t count_marked(const struct photograph *photo, float times_least) {
     size_t marked = 0;
     for (size_t i = 0; i < PIXELS; i++)
-        marked += photo->spark[i];
+        marked += photo->firefly[i];
     for (size_t k = 0; k < BRIGHT; k++)
-        CHECK_THAT(photo->spark[bright[k].y * SIDE + bright[k].x] ==
+        CHECK_THAT(photo->firefly[bright[k].y * SIDE + bright[k].x] ==
                        (bright[k].is_spark && bright[k].times >= times_least),
                    "pixel %u %u, %.1f times as bright", bright[k].x, bright[k].y, (double)bright[k].times);
     return marked;
@@ -71,13 +71,13 @@ static size_t count_marked(const struct photograph *photo, float times_least) {
 /* Pixels that a bilinear look-up does not read do not count; a cubic one reads more. */
 static void test_lookups(const struct photograph *photo) {
     rgb shown;
-    CHECK(photograph_sparks(photo, 40.5f, 40.5f) && photograph_sparks(photo, 41.4f, 40.5f) &&
-          photograph_sparks(photo, 40.6f, 39.6f) && photograph_sparks(photo, 0.1f, 0.1f));
-    CHECK(!photograph_sparks(photo, 41.5f, 40.5f) && !photograph_sparks(photo, 39.5f, 41.0f) &&
-          !photograph_sparks(photo, 30.2f, 70.8f) && !photograph_sparks(photo, 60.5f, 60.5f));
+    CHECK(photograph_has_firefly(photo, 40.5f, 40.5f) && photograph_has_firefly(photo, 41.4f, 40.5f) &&
+          photograph_has_firefly(photo, 40.6f, 39.6f) && photograph_has_firefly(photo, 0.1f, 0.1f));
+    CHECK(!photograph_has_firefly(photo, 41.5f, 40.5f) && !photograph_has_firefly(photo, 39.5f, 41.0f) &&
+          !photograph_has_firefly(photo, 30.2f, 70.8f) && !photograph_has_firefly(photo, 60.5f, 60.5f));
     CHECK(!photograph_sample_cubic(photo, 39.0f, 40.5f, &shown));
     CHECK(photograph_sample_cubic(photo, 38.0f, 40.5f, &shown));
-    CHECK_THAT(!photograph_sparks(&photograph[1], 40.5f, 40.5f), "nobody asked of this photograph");
+    CHECK_THAT(!photograph_has_firefly(&photograph[1], 40.5f, 40.5f), "nobody asked of this photograph");
 }
 
 /* Of 8 bits what should be black is not for its noise; what is brighter by far more than that still is a spark. */
@@ -97,8 +97,8 @@ static void test_black(struct parallel *pool) {
     faint.black = 0.002f;
     sparks_mark(&night, &sees, &faint, pool);
     for (size_t i = 0; i < PIXELS; i++)
-        marked += dark.spark[i];
-    CHECK_THAT(marked == 1 && dark.spark[HOT], "%zu marked", marked);
+        marked += dark.firefly[i];
+    CHECK_THAT(marked == 1 && dark.firefly[HOT], "%zu marked", marked);
     photograph_release(&dark);
 }
 
@@ -106,16 +106,16 @@ int main(void) {
     take();
     struct parallel *pool = parallel_new(2);
     sparks_mark(&scene, &views, &noise, pool);
-    CHECK(photograph[0].spark && !photograph[1].spark && photograph[2].spark);
+    CHECK(photograph[0].firefly && !photograph[1].firefly && photograph[2].firefly);
     CHECK(count_marked(&photograph[0], 0.0f) == 6);
     test_lookups(&photograph[0]);
     test_black(pool);
     CHECK_THAT(count_marked(&photograph[2], 4.5f) == 3, "noise explains what is a few times as bright");
     bool *first = mem_array(PIXELS, sizeof *first);
-    memcpy(first, photograph[0].spark, PIXELS * sizeof *first);
+    memcpy(first, photograph[0].firefly, PIXELS * sizeof *first);
     struct parallel *alone = parallel_new(1);
     sparks_mark(&scene, &views, &noise, alone);
-    CHECK(memcmp(first, photograph[0].spark, PIXELS * sizeof *first) == 0);
+    CHECK(memcmp(first, photograph[0].firefly, PIXELS * sizeof *first) == 0);
     mem_free(first);
     parallel_free(alone);
     parallel_free(pool);
