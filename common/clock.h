@@ -1,8 +1,13 @@
-/* clock.h -- the time that only grows. For dates use clock_gettime(CLOCK_REALTIME). */
+/* clock.h -- the time that only grows, and Unix time. */
 #ifndef UNBAKE_COMMON_CLOCK_H
 #define UNBAKE_COMMON_CLOCK_H
 
+#include <stdint.h>
+
 /* Seconds of CLOCK_MONOTONIC, from an arbitrary start that all processes share until a reboot. */
 double clock_sec(void);
+
+/* Milliseconds since 1970-01-01 UTC, by the system's clock, which may be set back. */
+int64_t clock_unix_ms(void);
 
 #endif

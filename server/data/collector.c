@@ -5,6 +5,7 @@
 #include <pthread.h>
 #include <time.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -28,12 +29,6 @@ struct collector {
 
 static const char *const kind_names[] = {[EXPIRED_UPLOAD] = "upload", [EXPIRED_JOB] = "job",
                                          [EXPIRED_SCENE] = "scene"};
-
-static int64_t now_ms(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 static enum status remove_expired(struct api *api, const struct expired *e, const char *path, int64_t now,
                                   struct error *err) {
@@ -82,7 +77,7 @@ static bool collect(struct api *api, const struct expired *e, int64_t now, bool 
 enum status collector_run(struct api *api, bool dry_run, cJSON *items, struct error *err) {
     enum status status;
     size_t count, removed;
-    int64_t now = now_ms();
+    int64_t now = clock_unix_ms();
     do {
         struct expired *list;
         removed = 0;

@@ -3,6 +3,7 @@
 
 #include <stdio.h>
 
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/http/hub.h"
@@ -29,7 +30,7 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
     if (api->config.user_pledge_percent == 0)
         return NULL;
     if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK ||
-        store_user_pledged(api->store, r->caller.user_id, &pledged, &err) != STATUS_OK)
+        store_user_pledged(api->store, r->caller.user_id, clock_unix_ms() - api->config.empty_upload_ms, &pledged, &err) != STATUS_OK)
         return problem_from(r, &err);
     /* What is pledged has its blocks already: it is not free any more. */
     uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;

@@ -30,12 +30,14 @@ enum status store_user_bytes(struct store *store, int64_t user_id, const char *b
     return status;
 }
 
-enum status store_user_pledged(struct store *store, int64_t user_id, uint64_t *bytes, struct error *err) {
+enum status store_user_pledged(struct store *store, int64_t user_id, int64_t since_ms, uint64_t *bytes,
+                               struct error *err) {
     int64_t sum = 0;
     store_lock(store);
     enum status status = sql_int(&store->sql, 0, &sum, err,
-                                 "SELECT ifnull(sum(length - received), 0) FROM uploads WHERE owner_id = ? AND scene_id = ''",
-                                 "i", user_id);
+                                 "SELECT ifnull(sum(length - received), 0) FROM uploads WHERE owner_id = ? AND scene_id = ''"
+                                 " AND updated_ms >= ?",
+                                 "ii", user_id, since_ms);
     store_unlock(store);
     *bytes = (uint64_t)sum;
     return status;

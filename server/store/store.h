@@ -225,8 +225,10 @@ enum status store_reconcile(struct store *store, size_t *requeued, struct error 
  * their whole length. A scene of several users counts for each of them. */
 enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, int64_t but_job,
                              uint64_t *bytes, struct error *err);
-/* What is still to come of the user's uploads under way, and how many of his scenes wait to be checked or are. */
-enum status store_user_pledged(struct store *store, int64_t user_id, uint64_t *bytes, struct error *err);
+/* What is still to come of the user's uploads of which something has arrived (or which were made) since since_ms: older
+ * ones hold no space (resumables_tend). And how many of the user's scenes wait to be checked or are being checked. */
+enum status store_user_pledged(struct store *store, int64_t user_id, int64_t since_ms, uint64_t *bytes,
+                               struct error *err);
 enum status store_user_checks(struct store *store, int64_t user_id, size_t *count, struct error *err);
 struct share {
     uint64_t limit_bytes;  /* 0: no limit */

@@ -6,9 +6,11 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/random.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/boot.h"
+#include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
@@ -18,6 +20,7 @@
 #include "server/uploads/upload.h"
 
 #define UNFINISHED_MAX 10000 /* uploads, of all users */
+#define SPARE_BYTES (1 << 20)  /* of a file that need not be given back: file systems round up */
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
@@ -94,6 +97,45 @@ struct resumables *resumables_new(struct api *api) {
     return p;
 }
 
+/* Whether the file has blocks beyond its end. */
+static bool holds_space(const struct resumables *p, const char *id) {
+    char *path = upload_session_path(p, id);
+    struct stat info;
+    bool holds = stat(path, &info) == 0 && (uint64_t)info.st_blocks * 512 > (uint64_t)info.st_size + SPARE_BYTES;
+    mem_free(path);
+    return holds;
+}
+
+static void give_space_back(struct resumables *p, const char *id) {
+    struct upload_session *e;
+    struct error err;
+    if (upload_session_get(p, id, &e, &err) != STATUS_OK)
+        return; /* finished or removed just now */
+    if (upload_session_shrink(e, &err) != STATUS_OK)
+        log_warning("upload %s: %s", id, err.message);
+    upload_session_put(e);
+}
+
+/* What has not grown for empty_upload_ms needs no room. */
+static enum status give_idle_space_back(struct resumables *p, struct error *err) {
+    int64_t since_ms = clock_unix_ms() - p->api->config.empty_upload_ms;
+    char cursor[128] = "";
+    enum status status;
+    do {
+        struct upload_row rows[64];
+        size_t count;
+        char next[128];
+        status = store_upload_list(p->api->store, NULL, "", cursor, 64, rows, &count, next, err);
+        for (size_t i = 0; i < count; i++) {
+            if (!*rows[i].scene_id && rows[i].updated_ms < since_ms && holds_space(p, rows[i].id))
+                give_space_back(p, rows[i].id);
+            upload_row_release(&rows[i]);
+        }
+        memcpy(cursor, next, sizeof cursor);
+    } while (status == STATUS_OK && *cursor);
+    return status;
+}
+
 void resumables_tend(struct resumables *p) {
     struct upload_session *e;
     pthread_mutex_lock(&p->mutex);
@@ -105,6 +147,9 @@ void resumables_tend(struct resumables *p) {
             log_warning("upload %s: %s", e->id, err.message);
         upload_session_put(e);
     }
+    struct error why;
+    if (give_idle_space_back(p, &why) != STATUS_OK)
+        log_warning("cannot look for idle uploads: %s", why.message);
 }
 
 void resumables_free(struct resumables *p) {

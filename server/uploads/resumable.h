@@ -10,7 +10,8 @@
  * 3. A daemon that was killed leaves bytes in the file that no row counts. They are hashed and
  *    counted when the upload is next looked at, provided that the machine has run on since (its
  *    boot id says so): then the kernel has kept them. After a power cut they are cut off.
- * 4. All of the space is reserved when the upload is created.
+ * 4. All of the space is reserved when the upload is created, and given back when nothing has arrived for
+ *    empty_upload_ms: such an upload goes on while the disk has room.
  * 5. A file that is whole moves to DATA/scenes/ID/archive, then the scene's row is made, then the
  *    upload's row names it. resumables_recover goes on from any point in between.
  *
@@ -29,7 +30,8 @@ struct resumables *resumables_new(struct api *api);
 void resumables_free(struct resumables *p); /* what is in files but not yet counted is counted */
 /* Puts in order what an earlier life left: finishes what is whole. Before the folders are swept. */
 enum status resumables_recover(struct resumables *p, struct error *err);
-/* Counts what was written by requests that were cut off. From time to time. */
+/* Counts what was written by requests that were cut off; gives back the space that idle uploads hold beyond what has
+ * arrived. From time to time. */
 void resumables_tend(struct resumables *p);
 
 /* Takes owner_id, name, metadata, sha256 and length of *row; fills the rest but for times. Reserves the

@@ -190,6 +190,16 @@ bool upload_session_is_whole(struct upload_session *e) {
     return is_whole;
 }
 
+enum status upload_session_shrink(struct upload_session *e, struct error *err) {
+    enum status status = STATUS_OK;
+    pthread_mutex_lock(&e->mutex);
+    /* To the size that it has: what fallocate has set aside beyond it goes. */
+    if (!e->is_gone && !e->holder && e->fd >= 0 && ftruncate(e->fd, (off_t)e->received) != 0)
+        status = error_set_errno(err, errno, "cannot give back the space of upload %s", e->id);
+    pthread_mutex_unlock(&e->mutex);
+    return status;
+}
+
 void upload_session_close(struct upload_session *e) {
     pthread_mutex_lock(&e->mutex);
     e->is_loaded = false; /* the next to come reads its row */

@@ -56,6 +56,8 @@ void upload_session_mark_gone(struct resumables *p, const char *id);
 /* What was received is on disk and counted. Where the disk fails, what is not counted is forgotten. */
 enum status upload_session_commit(struct upload_session *e, struct error *err);
 bool upload_session_is_whole(struct upload_session *e); /* and counted */
+/* Gives back the blocks beyond what has arrived, unless somebody writes. */
+enum status upload_session_shrink(struct upload_session *e, struct error *err);
 /* It has become a scene: the next to come finds it so. */
 void upload_session_close(struct upload_session *e);
 /* From now on the file's tail is not to be believed, since unchecked bytes come. */

@@ -1,11 +1,16 @@
 /* test_http_quota.c -- what one user may take of what all share, each with its own status, the option's name and who can
  * raise it; admins are not bound. Uploads that never begin give their space back soon. */
+#include <sys/stat.h>
+
+#include "common/clock.h"
 #include "server/data/collector.h"
+#include "server/uploads/resumable.h"
 #include "tests/api/rig.h"
 
 static struct rig rig;
 static struct error err;
 static char anna[TOKEN_SIZE], chief[TOKEN_SIZE];
+static int64_t anna_id;
 
 /* POST /v1/uploads of so many bytes; its id goes to `id` where it is made. */
 static int create(const char *token, uint64_t bytes, char id[33], struct buf *reply) {
@@ -100,6 +105,47 @@ static void test_age(void) {
     CHECK(!is_there(empty) && is_there(begun));
 }
 
+static uint64_t held_bytes(const char *id) {
+    char *path = mem_printf("%s/uploads/%s", rig.dir, id);
+    struct stat info = {0};
+    CHECK(stat(path, &info) == 0);
+    mem_free(path);
+    return (uint64_t)info.st_blocks * 512;
+}
+
+/* An upload that stands still gives back what it holds, is not counted as pledged, and goes on where it was. */
+static void test_idle(void) {
+    const uint64_t length = 64 << 20;
+    char id[33], body[1000];
+    struct buf reply;
+    uint64_t pledged;
+    int64_t user = anna_id;
+    memset(body, 'x', sizeof body);
+    CHECK(create(anna, length, id, &reply) == 201);
+    buf_release(&reply);
+    for (int part = 0; part < 2; part++) {
+        char *text = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
+                                "Tus-Resumable: 1.0.0\r\nUpload-Offset: %d\r\nContent-Type: application/offset+octet-stream\r\n"
+                                "Content-Length: 1000\r\n\r\n%.1000s", id, anna, part * 1000, body);
+        int status = rig_ask(&rig, text, strlen(text), &reply);
+        CHECK_THAT(status == 204, "part %d: %d: %s", part, status, buf_text(&reply));
+        buf_release(&reply);
+        mem_free(text);
+        rig.api->config.empty_upload_ms = 3600000;
+        resumables_tend(rig.api->resumables);
+        rig_must(store_user_pledged(rig.store, user, 0, &pledged, &err), &err, "store_user_pledged");
+        CHECK_THAT(pledged >= length - 2000, "%llu bytes are pledged", (unsigned long long)pledged);
+        CHECK(part == 1 || held_bytes(id) >= length); /* it has just grown */
+        usleep(5000);
+        rig.api->config.empty_upload_ms = 1;
+        resumables_tend(rig.api->resumables);
+        CHECK_THAT(held_bytes(id) < 2 << 20, "it holds %llu bytes", (unsigned long long)held_bytes(id));
+        rig_must(store_user_pledged(rig.store, user, clock_unix_ms() - 1, &pledged, &err), &err, "store_user_pledged");
+        CHECK_THAT(pledged < length - 2000, "%llu bytes are pledged", (unsigned long long)pledged);
+    }
+    rig_must(store_upload_delete(rig.store, id, &err), &err, "store_upload_delete");
+}
+
 /* The last streams are kept for admins. */
 static void test_streams(void) {
     struct buf reply;
@@ -134,6 +180,8 @@ int main(void) {
     test_pledges();
     test_checks(who.user_id);
     test_age();
+    anna_id = who.user_id;
+    test_idle();
     test_streams();
     rig_stop(&rig);
     return check_result();
