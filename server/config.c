@@ -79,7 +79,7 @@ static const struct option table[] = {
     INT(user_max_checks, "scenes", 0, 10000, "50",
         "Scenes of one user that wait to be checked; more uploads are refused with 429. 0: no limit."),
     REAL(upload_start_minutes, "min", 0.001, 1440, "10",
-         "Time for which an upload holds its space while no byte of it arrives; then it is removed."),
+         "Time for which an upload holds space for what is still to come while nothing of it arrives; one without a byte is removed then."),
     REAL(upload_keep_hours, "h", 0.0001, 87600, "24",
          "Time after its last byte for which an unfinished upload can be resumed."),
     REAL(job_keep_days, "days", 0, 36500, "0",
