@@ -21,10 +21,10 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/admin/admin.h"
-#include "server/data/folder.h"
 #include "server/commands.h"
-#include "server/http/address.h"
 #include "server/data/collector.h"
+#include "server/data/folder.h"
+#include "server/http/address.h"
 #include "server/http/hub.h"
 #include "server/http/listener.h"
 #include "server/http/service.h"
@@ -200,7 +200,7 @@ static enum status build(struct daemon *d, struct error *err) {
     if (status == STATUS_OK)
         status = admin_start(&d->admin, c->data_dir, d->store, on_revoked, d, err);
     if (status == STATUS_OK)
-        status = collector_start(&d->collector, d->api, c->collect_interval_sec, err);
+        status = collector_start(&d->collector, &d->api->collector_config, c->collect_interval_sec, err);
     return status;
 }
 

@@ -39,19 +39,22 @@ forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' '
 forbid server/ingest 'server/export/' 'ingest does not see export'
 forbid server/export 'server/ingest/' 'export does not see ingest'
 forbid "$(for folder in $engine_order ingest export; do echo "server/$folder"; done)" \
-    'server/(http|store|job|worker)/' 'the engine never sees http, SQL or jobs'
+    'server/(http|uploads|data|store|job|worker)/' 'the engine never sees http, SQL or jobs'
 
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
+# The daemon: http -> uploads -> data -> store; store knows of data only the paths.
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
-forbid server/admin "$engine|server/http/[^t]" 'admin never sees the engine, and of http only tls.h'
-forbid server/store "$engine|server/(http|worker)/" 'store never sees the engine, http or the worker'
-forbid server/job "$engine|server/http/" 'job never sees the engine or http'
+forbid server/uploads "$engine|server/(http|job|worker|admin)/" 'uploads see only data and store'
+forbid server/data "$engine|server/(http|uploads|job|worker|admin)/" 'data sees only store'
+forbid server/admin "$engine|server/(uploads|job)/|server/http/[^t]" 'admin sees data and store, and of http only tls.h'
+forbid server/store "$engine|server/(http|uploads|worker|admin)/|server/data/[^l]" 'store sees only job.h and data/layout.h'
+forbid server/job "$engine|server/(http|uploads|admin)/" 'job never sees the engine, http or uploads'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
-forbid server/worker 'server/(http|job)/|server/store/(store|internal)' \
+forbid server/worker 'server/(http|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 
-forbid "server/demo server/evaluate" 'server/(http|store|job|worker)/' 'tools know only the engine'
+forbid "server/demo server/evaluate" 'server/(http|uploads|data|store|job|worker)/' 'tools know only the engine'
 forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c sees the tools'
@@ -66,6 +69,11 @@ own 'png\.h' common/png_memory.h
 own 'lcms2' common/color_icc.c
 own 'jpeglib\.h' common/jpeg.c
 own 'seccomp\.h' server/worker/confine_calls.c
+
+# Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
+paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
+    server/*.c server/{http,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
+[ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 
 # Each unit and one that it includes, a pair a line.
 units() {

@@ -1,25 +1,21 @@
 /* collector.c -- see collector.h. */
-#include "server/data/trash.h"
 #include "server/data/collector.h"
 
 #include <pthread.h>
+#include <stdlib.h>
 #include <time.h>
 
 #include "common/clock.h"
 #include "common/file.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/handlers.h"
-#include "server/http/keeping.h"
-#include "server/uploads/resumable.h"
-#include "server/http/problem.h"
-#include "server/http/space.h"
-#include "server/http/views.h"
+#include "server/data/layout.h"
+#include "server/data/trash.h"
 
 #define ROUND_MAX 500
 
 struct collector {
-    struct api *api;
+    const struct collector_config *config;
     double interval_sec;
     pthread_t thread;
     pthread_mutex_t mutex;
@@ -30,60 +26,64 @@ struct collector {
 static const char *const kind_names[] = {[EXPIRED_UPLOAD] = "upload", [EXPIRED_JOB] = "job",
                                          [EXPIRED_SCENE] = "scene"};
 
-static enum status remove_expired(struct api *api, const struct expired *e, const char *path, int64_t now,
+const char *collector_kind_name(const struct expired *e) {
+    return kind_names[e->kind];
+}
+
+static char *path_of(const char *data_dir, const struct expired *e) {
+    return e->kind == EXPIRED_UPLOAD  ? layout_upload(data_dir, e->id)
+           : e->kind == EXPIRED_SCENE ? layout_scene(data_dir, e->id)
+                                      : layout_job(data_dir, strtoll(e->id, NULL, 10));
+}
+
+static enum status remove_expired(const struct collector_config *c, const struct expired *e, int64_t now,
                                   struct error *err) {
+    char *path = path_of(NULL, e);
     if (e->kind == EXPIRED_SCENE)
-        pthread_mutex_lock(&api->scene_mutex);
-    enum status status = store_expired_delete(api->store, e, now, err);
+        pthread_mutex_lock(&c->folder->scene_mutex);
+    enum status status = store_expired_delete(c->store, e, now, err);
     if (status == STATUS_OK)
-        status = e->kind == EXPIRED_UPLOAD ? resumable_forget(api->resumables, e->id, err)
-                                           : trash_take(api->trash, path, err);
+        status = e->kind == EXPIRED_UPLOAD ? c->forget_upload(c->uploads, e->id, err)
+                                           : trash_take(c->folder->trash, path, err);
     if (e->kind == EXPIRED_SCENE)
-        pthread_mutex_unlock(&api->scene_mutex);
+        pthread_mutex_unlock(&c->folder->scene_mutex);
+    mem_free(path);
     return status;
 }
 
-/* True when it is gone, or would go. */
-static bool collect(struct api *api, const struct expired *e, int64_t now, bool dry_run, cJSON *items) {
+/* False where it stays; else what it took of the disk, or takes. */
+static bool collect(const struct collector_config *c, const struct expired *e, int64_t now, bool dry_run,
+                    uint64_t *files, uint64_t *bytes) {
     struct error err;
-    uint64_t files = 0, bytes = 0;
-    char *path = mem_printf("%ss/%s", kind_names[e->kind], e->id);
-    char *full = file_join(api->config.data_dir, path);
-    enum status status = file_tree_size(full, &files, &bytes, &err);
+    char *path = path_of(c->folder->dir, e);
+    enum status status = file_tree_size(path, files, bytes, &err);
     if (status == STATUS_OK && !dry_run)
-        status = remove_expired(api, e, path, now, &err);
+        status = remove_expired(c, e, now, &err);
     if (status != STATUS_OK && status != STATUS_CONFLICT)
         log_warning("%s %s has expired and cannot be removed: %s", kind_names[e->kind], e->id, err.message);
     else if (status == STATUS_OK && !dry_run)
         log_info("%s %s has expired: removed, %llu bytes", kind_names[e->kind], e->id,
-                 (unsigned long long)bytes);
-    if (status == STATUS_OK && items) {
-        char time[VIEW_TIME_SIZE];
-        cJSON *item = cJSON_CreateObject();
-        view_time(e->expires_ms, time);
-        json_add_string(item, "kind", kind_names[e->kind]);
-        json_add_string(item, "id", e->id);
-        json_add_string(item, "name", e->name);
-        json_add_string(item, "expires_at", time);
-        json_add_int(item, "files", (int64_t)files);
-        json_add_int(item, "bytes", (int64_t)bytes);
-        cJSON_AddItemToArray(items, item);
-    }
-    mem_free(full);
+                 (unsigned long long)*bytes);
     mem_free(path);
     return status == STATUS_OK;
 }
 
-enum status collector_run(struct api *api, bool dry_run, cJSON *items, struct error *err) {
+enum status collector_run(const struct collector_config *config, bool dry_run,
+                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes), void *user,
+                          struct error *err) {
     enum status status;
     size_t count, removed;
     int64_t now = clock_unix_ms();
     do {
         struct expired *list;
         removed = 0;
-        status = store_expired_list(api->store, now, ROUND_MAX, &list, &count, err);
+        status = store_expired_list(config->store, now, ROUND_MAX, &list, &count, err);
         for (size_t i = 0; i < count; i++) {
-            removed += collect(api, &list[i], now, dry_run, items);
+            uint64_t files = 0, bytes = 0;
+            bool goes = collect(config, &list[i], now, dry_run, &files, &bytes);
+            removed += goes;
+            if (goes && found)
+                found(user, &list[i], files, bytes);
             mem_free(list[i].name);
         }
         mem_free(list);
@@ -92,6 +92,41 @@ enum status collector_run(struct api *api, bool dry_run, cJSON *items, struct er
     return status;
 }
 
+/* --- what has no row ---------------------------------------------------------------------- */
+
+/* `inner` is relative to the data folder. */
+static enum status sweep(struct store *store, struct folder *folder, const char *inner, enum store_files kind,
+                         struct error *err) {
+    char *path = file_join(folder->dir, inner), **names = NULL;
+    size_t count = 0;
+    enum status status = file_list(path, &names, &count, err);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        if (store_has_files(store, kind, names[i]))
+            continue;
+        char *left = file_join(inner, names[i]);
+        log_info("removing %s, left over from an earlier run", left);
+        status = trash_take(folder->trash, left, err);
+        mem_free(left);
+    }
+    file_free_names(names, count);
+    mem_free(path);
+    return status;
+}
+
+enum status collector_sweep(struct store *store, struct folder *folder, struct error *err) {
+    char *folders[] = {[STORE_FILES_SCENE] = layout_scenes(NULL), [STORE_FILES_JOB] = layout_jobs(NULL),
+                       [STORE_FILES_UPLOAD] = layout_uploads(NULL)};
+    enum status status = STATUS_OK;
+    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
+        if (status == STATUS_OK)
+            status = sweep(store, folder, folders[i], (enum store_files)i, err);
+        mem_free(folders[i]);
+    }
+    return status;
+}
+
+/* --- the thread ---------------------------------------------------------------------------- */
+
 static void *run(void *user) {
     struct collector *c = user;
     pthread_mutex_lock(&c->mutex);
@@ -99,10 +134,10 @@ static void *run(void *user) {
         struct error err;
         struct timespec until;
         pthread_mutex_unlock(&c->mutex);
-        resumables_tend(c->api->resumables);
-        if (collector_run(c->api, false, NULL, &err) != STATUS_OK)
+        c->config->tend_uploads(c->config->uploads);
+        if (collector_run(c->config, false, NULL, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
-        store_reserve_renew(c->api->store);
+        store_reserve_renew(c->config->store);
         pthread_mutex_lock(&c->mutex);
         clock_gettime(CLOCK_MONOTONIC, &until);
         double seconds = (double)until.tv_sec + 1e-9 * (double)until.tv_nsec + c->interval_sec;
@@ -115,10 +150,10 @@ static void *run(void *user) {
     return NULL;
 }
 
-enum status collector_start(struct collector **out, struct api *api, double interval_sec,
+enum status collector_start(struct collector **out, const struct collector_config *config, double interval_sec,
                             struct error *err) {
     struct collector *c = mem_calloc(1, sizeof *c);
-    c->api = api;
+    c->config = config;
     c->interval_sec = interval_sec;
     pthread_mutex_init(&c->mutex, NULL);
     pthread_condattr_t monotonic;
@@ -148,29 +183,4 @@ void collector_stop(struct collector *c) {
     pthread_cond_destroy(&c->changed);
     pthread_mutex_destroy(&c->mutex);
     mem_free(c);
-}
-
-/* --- /v1/collect ------------------------------------------------------------------------- */
-
-struct response *collect_now(struct api *api, struct request *r) {
-    bool dry_run;
-    struct error err;
-    struct response *refusal = keeping_dry_run(r, &dry_run);
-    if (refusal)
-        return refusal;
-    cJSON *items = cJSON_CreateArray();
-    if (collector_run(api, dry_run, items, &err) != STATUS_OK) {
-        cJSON_Delete(items);
-        return problem_from(r, &err);
-    }
-    double bytes = 0;
-    const cJSON *item;
-    cJSON_ArrayForEach(item, items) {
-        bytes += cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(item, "bytes"));
-    }
-    cJSON *value = cJSON_CreateObject();
-    json_add_bool(value, "dry_run", dry_run);
-    json_add_number(value, "bytes", bytes);
-    json_add(value, "items", items);
-    return response_json(200, value);
 }

@@ -1,22 +1,39 @@
-/* collector.h -- removes what has expired (store/retention.h), and sees to what is left to be done
- * about uploads, once in a while. */
+/* collector.h -- removes what has expired (store/retention.h) and what an earlier life left without a row, and sees to
+ * what is left to be done about uploads, once in a while. */
 #ifndef UNBAKE_DATA_COLLECTOR_H
 #define UNBAKE_DATA_COLLECTOR_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "common/error.h"
-#include "common/json.h"
-#include "server/http/api.h"
+#include "server/data/folder.h"
+#include "server/store/store.h"
+
+struct collector_config { /* pointers are borrowed */
+    struct store *store;
+    struct folder *folder;
+    /* Called with `uploads`: puts uploads that were cut off in order; removes one whose row is gone. */
+    void (*tend_uploads)(void *uploads);
+    enum status (*forget_upload)(void *uploads, const char *id, struct error *err);
+    void *uploads;
+};
+
+/* Removes the files and folders that the store has no row for. At the start, before others add to them. */
+enum status collector_sweep(struct store *store, struct folder *folder, struct error *err);
+
+/* Removes what has expired by now, or (dry_run) only finds it. `found`, unless it is NULL, is called for each with what it
+ * takes of the disk. What cannot be removed is logged and left for the next time. */
+enum status collector_run(const struct collector_config *config, bool dry_run,
+                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes), void *user,
+                          struct error *err);
+const char *collector_kind_name(const struct expired *e); /* "upload", "job" or "scene" */
 
 struct collector; /* its thread; opaque */
 
 /* Starts the thread, which collects at once and then every interval_sec; *c is to be stopped. */
-enum status collector_start(struct collector **c, struct api *api, double interval_sec,
+enum status collector_start(struct collector **c, const struct collector_config *config, double interval_sec,
                             struct error *err);
 void collector_stop(struct collector *c); /* NULL is fine */
-
-/* Removes what has expired by now, or only says what would go. Each is appended to the array
- * `items` ({kind, id, name, expires_at, files, bytes}) unless that is NULL. What cannot be removed
- * is logged and left for the next time. */
-enum status collector_run(struct api *api, bool dry_run, cJSON *items, struct error *err);
 
 #endif

@@ -14,6 +14,42 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+#include "server/data/trash.h"
+
+enum status folder_open(struct folder *f, const char *dir, void (*emptied)(void *user), void *user, struct error *err) {
+    char *parts[] = {layout_trash(dir), layout_scenes(dir), layout_jobs(dir), layout_uploads(dir)};
+    enum status status = STATUS_OK;
+    *f = (struct folder){.dir = dir};
+    pthread_mutex_init(&f->scene_mutex, NULL);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        if (status == STATUS_OK)
+            status = file_make_dirs(parts[i], err);
+        mem_free(parts[i]);
+    }
+    return status == STATUS_OK ? trash_new(&f->trash, dir, emptied, user, err) : status;
+}
+
+void folder_close(struct folder *f) {
+    if (!f->dir)
+        return;
+    trash_free(f->trash);
+    pthread_mutex_destroy(&f->scene_mutex);
+}
+
+enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t bytes, struct error *err) {
+    uint64_t room;
+    enum status status = file_free_bytes(f->dir, &room, err);
+    if (status != STATUS_OK || (room >= keep && room - keep >= bytes))
+        return status;
+    error_set(err, STATUS_NO_SPACE, "%llu MiB are wanted, and of the %llu MiB that are free, %llu MiB must stay so",
+              (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20), (unsigned long long)(keep >> 20));
+    return error_hint(err, trash_is_busy(f->trash)
+                               ? "what was deleted is still being removed: try again in a moment"
+                               : "delete jobs or scenes that nobody needs; an administrator can lower the options"
+                                 " min_free_mib and admin_free_mib");
+}
+
+/* --- the lock ------------------------------------------------------------------------------ */
 
 #define TRIES 20 /* of 50 ms */
 

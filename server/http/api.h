@@ -2,9 +2,10 @@
 #ifndef UNBAKE_HTTP_API_H
 #define UNBAKE_HTTP_API_H
 
-#include <pthread.h>
 #include <stdatomic.h>
 
+#include "server/data/collector.h"
+#include "server/data/folder.h"
 #include "server/http/message.h"
 #include "server/job/scheduler.h"
 #include "server/store/store.h"
@@ -47,26 +48,24 @@ struct api_config {
 };
 
 struct hub;      /* hub.h */
-struct digests;  /* digests.h */
-struct resumables; /* resumable.h */
+struct digests;  /* uploads/digests.h */
+struct resumables; /* uploads/resumable.h */
 struct listener; /* listener.h */
 struct tally;    /* tally.h */
 struct brake;    /* brake.h */
-struct trash;    /* data/trash.h */
 struct readiness; /* readiness.h */
 
 struct api {
     struct api_config config; /* pointers in it are borrowed */
     struct store *store;      /* borrowed */
+    struct folder folder;     /* the data folder */
+    struct collector_config collector_config;
     struct scheduler *scheduler; /* borrowed */
     struct hub *hub;
     struct digests *digests;
     struct resumables *resumables;
-    struct trash *trash;
     struct readiness *readiness;
     struct listener *listener; /* NULL before it listens; for figures */
-    /* Held while a scene's row and its file appear or disappear together. */
-    pthread_mutex_t scene_mutex;
     struct tally *tally; /* of requests */
     struct brake *brake; /* on wrong tokens */
     atomic_ullong uploaded_bytes;

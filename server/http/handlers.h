@@ -28,7 +28,7 @@ struct response *scenes_get(struct api *api, struct request *r);
 struct response *scenes_patch(struct api *api, struct request *r);
 struct response *scenes_delete(struct api *api, struct request *r);
 
-/* collector.c */
+/* collect.c */
 struct response *collect_now(struct api *api, struct request *r);
 
 /* uploads.c */

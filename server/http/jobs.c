@@ -291,7 +291,7 @@ struct response *jobs_delete(struct api *api, struct request *r) {
     enum status status = store_job_delete(api->store, id, &err);
     if (status == STATUS_OK) {
         char *path = layout_job(NULL, id);
-        status = trash_take(api->trash, path, &err);
+        status = trash_take(api->folder.trash, path, &err);
         mem_free(path);
     }
     return status == STATUS_OK ? response_new(204) : problem_from(r, &err);

@@ -9,7 +9,7 @@
 /* Whether these limits bind who asks: not an admin, and nobody while the daemon is open. */
 bool limits_bind(const struct request *r);
 
-/* NULL; or the refusal of an upload of `bytes`, 0 where its length is not known. Under api->scene_mutex where it must hold:
+/* NULL; or the refusal of an upload of `bytes`, 0 where its length is not known. Under api->folder.scene_mutex where it must hold:
  * two at once would both find room. */
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes);
 /* The same for an event stream. */

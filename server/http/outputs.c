@@ -12,13 +12,13 @@
 
 #include "common/file.h"
 #include "common/mem.h"
+#include "server/data/job_file.h"
 #include "server/http/auth.h"
-#include "server/uploads/digests.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/data/job_file.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
+#include "server/uploads/digests.h"
 
 #define ETAG_SIZE 80
 #define LOG_BYTES_DEFAULT 65536

@@ -9,8 +9,9 @@
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
-#include "server/uploads/upload.h"
+#include "server/http/scene_body.h"
 #include "server/http/uploads.h"
+#include "server/uploads/upload.h"
 
 static const struct route table[] = {
     {METHOD_GET, "/", ROUTE_PUBLIC, system_root, 0, ROUTE_AT_ONCE, ""},
@@ -208,7 +209,7 @@ static struct response *begin(struct api *api, struct request *r) {
     if (r->content_length > 0 && (uint64_t)r->content_length > limit)
         return too_large(r, limit);
     buf_init(&r->body, ROUTES_BODY_MAX);
-    return body == ROUTE_BODY_UPLOAD ? upload_begin(api, r) : NULL;
+    return body == ROUTE_BODY_UPLOAD ? scene_body_begin(api, r) : NULL;
 }
 
 struct response *routes_begin(struct api *api, struct request *r) {
@@ -222,7 +223,7 @@ static struct response *take(struct api *api, struct request *r, const void *dat
     if (r->upload) {
         if (upload_bytes(r->upload) + length > api->config.max_upload_bytes)
             return too_large(r, api->config.max_upload_bytes);
-        return upload_data(api, r, data, length);
+        return scene_body_data(api, r, data, length);
     }
     if (r->patch)
         return uploads_data(api, r, data, length);

@@ -13,9 +13,10 @@
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
 #include "server/http/problem.h"
+#include "server/http/scene_body.h"
 #include "server/http/space.h"
-#include "server/uploads/upload.h"
 #include "server/http/views.h"
+#include "server/uploads/upload.h"
 
 /* A scene has no revision: what is shown of it is its tag. */
 static void scene_tag(const struct scene_row *row, char tag[SHA256_HEX_SIZE + 2]) {
@@ -67,7 +68,7 @@ struct response *scenes_list(struct api *api, struct request *r) {
 
 struct response *scenes_add(struct api *api, struct request *r) {
     char id[SHA256_HEX_SIZE], name[13];
-    struct response *refusal = upload_seal(api, r, id);
+    struct response *refusal = scene_body_end(r, id);
     if (refusal)
         return refusal;
     const char *given = target_query(&r->target, "name");
@@ -76,15 +77,15 @@ struct response *scenes_add(struct api *api, struct request *r) {
     struct scene_row row;
     bool existed = false;
     enum status status = STATUS_OK;
-    pthread_mutex_lock(&api->scene_mutex);
+    pthread_mutex_lock(&api->folder.scene_mutex);
     /* Not only when the body began: its length may have been unknown, and others have come meanwhile. */
     refusal = space_check_share(api, r, id, upload_bytes(r->upload));
     if (!refusal)
-        status = upload_publish(api, r->upload, id, &err);
+        status = upload_publish(r->upload, api->folder.dir, id, &err);
     if (!refusal && status == STATUS_OK)
         status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload),
                                  r->caller.user_id, &existed, &err);
-    pthread_mutex_unlock(&api->scene_mutex);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
     if (refusal)
         return refusal;
     if (status == STATUS_OK)
@@ -167,11 +168,11 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     if (reply || !auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
         return reply;
     char *path = layout_scene(NULL, row.id);
-    pthread_mutex_lock(&api->scene_mutex);
+    pthread_mutex_lock(&api->folder.scene_mutex);
     enum status status = store_scene_delete(api->store, row.id, owner_of(r), dry_run, &is_gone, &err);
     if (is_gone && !dry_run)
-        status = trash_take(api->trash, path, &err);
-    pthread_mutex_unlock(&api->scene_mutex);
+        status = trash_take(api->folder.trash, path, &err);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
     if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
         reply = keeping_would_free(api, r, is_gone ? path : NULL);
     mem_free(path);

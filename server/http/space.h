@@ -11,7 +11,7 @@
 /* Refuses with the reply when the disk holds less than min_free_bytes + `bytes`. */
 struct response *space_check_room(struct api *api, const struct request *r, uint64_t bytes);
 /* The same when the caller keeps so much, but for the scene `but_scene` (NULL: all), that `bytes` more pass
- * user_max_bytes. Under api->scene_mutex where it must hold: two at once would both find room. */
+ * user_max_bytes. Under api->folder.scene_mutex where it must hold: two at once would both find room. */
 struct response *space_check_share(struct api *api, const struct request *r, const char *but_scene, uint64_t bytes);
 
 #endif

@@ -17,15 +17,15 @@
 #include "common/utf8.h"
 #include "server/data/layout.h"
 #include "server/http/body.h"
-#include "server/uploads/upload_writer.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/keeping.h"
 #include "server/http/limits.h"
-#include "server/uploads/resumable.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
+#include "server/uploads/resumable.h"
+#include "server/uploads/upload_writer.h"
 
 #define METADATA_MAX 1000 /* bytes; it is given back in a field */
 
@@ -185,15 +185,15 @@ static struct response *read_creation(struct api *api, const struct request *r, 
 /* Where there is room for it; or why it is not made. */
 static struct response *create(struct api *api, const struct request *r, struct upload_row *row) {
     struct error err;
-    pthread_mutex_lock(&api->scene_mutex); /* two at once would both find room */
+    pthread_mutex_lock(&api->folder.scene_mutex); /* two at once would both find room */
     struct response *refusal = limits_check_upload(api, r, row->length);
     if (!refusal)
         refusal = space_check_room(api, r, row->length);
     if (!refusal)
         refusal = space_check_share(api, r, NULL, row->length);
-    if (!refusal && resumable_create(api->resumables, row, &err) != STATUS_OK)
+    if (!refusal && resumable_create(api->resumables, row, api->config.user_max_uploads, &err) != STATUS_OK)
         refusal = problem_from(r, &err);
-    pthread_mutex_unlock(&api->scene_mutex);
+    pthread_mutex_unlock(&api->folder.scene_mutex);
     return refusal;
 }
 

@@ -16,8 +16,8 @@
 #include "common/mem.h"
 #include "server/data/layout.h"
 #include "server/data/trash.h"
-#include "server/uploads/upload_session.h"
 #include "server/uploads/upload.h"
+#include "server/uploads/upload_session.h"
 
 #define UNFINISHED_MAX 10000 /* uploads, of all users */
 #define SPARE_BYTES (1 << 20)  /* of a file that need not be given back: file systems round up */
@@ -27,21 +27,21 @@
 /* The file is, or was about to be, at its place among the scenes. */
 static enum status place(struct resumables *p, const struct upload_row *row, const char *scene_id,
                          struct error *err) {
-    struct api *api = p->api;
+    struct folder *folder = p->config.folder;
     char *path = upload_session_path(p, row->id);
     bool existed;
-    pthread_mutex_lock(&api->scene_mutex);
+    pthread_mutex_lock(&folder->scene_mutex);
     enum status status = STATUS_OK;
     if (access(path, F_OK) == 0 || errno != ENOENT)
-        status = upload_place(api, path, scene_id, err);
+        status = upload_place(folder->dir, path, scene_id, err);
     else /* there, but is that on disk? */
-        status = upload_sync_place(api, scene_id, err);
+        status = upload_sync_place(folder->dir, scene_id, err);
     if (status == STATUS_OK)
-        status = store_scene_add(api->store, scene_id, row->name, row->length, row->owner_id,
+        status = store_scene_add(p->config.store, scene_id, row->name, row->length, row->owner_id,
                                  &existed, err);
-    pthread_mutex_unlock(&api->scene_mutex);
+    pthread_mutex_unlock(&folder->scene_mutex);
     mem_free(path);
-    return status == STATUS_OK ? store_upload_finish(api->store, row->id, scene_id, err) : status;
+    return status == STATUS_OK ? store_upload_finish(p->config.store, row->id, scene_id, err) : status;
 }
 
 /* It is not what was announced. */
@@ -59,13 +59,13 @@ static enum status finish(struct resumables *p, const char *id, struct error *er
     struct sha256 hash;
     char scene_id[SHA256_HEX_SIZE];
     pthread_mutex_lock(&p->finishing);
-    enum status status = store_upload_get(p->api->store, id, &row, &hash, sizeof hash, err);
+    enum status status = store_upload_get(p->config.store, id, &row, &hash, sizeof hash, err);
     if (status == STATUS_OK && !*row.scene_id) {
         sha256_hex(&hash, scene_id);
         bool is_as_said = !*row.sha256 || strcmp(row.sha256, scene_id) == 0;
         status = is_as_said ? place(p, &row, scene_id, err) : reject(p, &row, scene_id, err);
         if (status == STATUS_OK)
-            scheduler_wake(p->api->scheduler);
+            p->config.scene_added(p->config.user);
     }
     pthread_mutex_unlock(&p->finishing);
     upload_row_release(&row);
@@ -85,9 +85,9 @@ static enum status settle(struct upload_session *e, struct error *err) {
 
 /* --- all of them ------------------------------------------------------------------------- */
 
-struct resumables *resumables_new(struct api *api) {
+struct resumables *resumables_new(const struct resumables_config *config) {
     struct resumables *p = mem_calloc(1, sizeof *p);
-    p->api = api;
+    p->config = *config;
     pthread_mutex_init(&p->mutex, NULL);
     pthread_mutex_init(&p->finishing, NULL);
     boot_id(p->boot);
@@ -116,16 +116,16 @@ static void give_space_back(struct resumables *p, const char *id) {
     upload_session_put(e);
 }
 
-/* What has not grown for empty_upload_ms needs no room. */
+/* What has not grown for idle_ms needs no room. */
 static enum status give_idle_space_back(struct resumables *p, struct error *err) {
-    int64_t since_ms = clock_unix_ms() - p->api->config.empty_upload_ms;
+    int64_t since_ms = clock_unix_ms() - p->config.idle_ms;
     char cursor[128] = "";
     enum status status;
     do {
         struct upload_row rows[64];
         size_t count;
         char next[128];
-        status = store_upload_list(p->api->store, NULL, "", cursor, 64, rows, &count, next, err);
+        status = store_upload_list(p->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
             if (!*rows[i].scene_id && rows[i].updated_ms < since_ms && holds_space(p, rows[i].id))
                 give_space_back(p, rows[i].id);
@@ -170,7 +170,7 @@ enum status resumables_recover(struct resumables *p, struct error *err) {
         struct upload_row rows[64];
         size_t count;
         char next[128];
-        status = store_upload_list(p->api->store, NULL, "", cursor, 64, rows, &count, next, err);
+        status = store_upload_list(p->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
             struct error why;
             if (!*rows[i].scene_id && rows[i].received == rows[i].length &&
@@ -194,7 +194,7 @@ static enum status new_id(char id[UPLOAD_ID_SIZE], struct error *err) {
     return STATUS_OK;
 }
 
-enum status resumable_create(struct resumables *p, struct upload_row *row, struct error *err) {
+enum status resumable_create(struct resumables *p, struct upload_row *row, size_t user_max, struct error *err) {
     struct sha256 hash;
     memset(&hash, 0, sizeof hash); /* all of it is stored */
     sha256_init(&hash);
@@ -213,9 +213,9 @@ enum status resumable_create(struct resumables *p, struct upload_row *row, struc
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (status == STATUS_OK)
         status = file_sync_parent(path, err);
-    const struct count_limits limits = {.all = UNFINISHED_MAX, .one_user = p->api->config.user_max_uploads};
+    const struct count_limits limits = {.all = UNFINISHED_MAX, .one_user = user_max};
     if (status == STATUS_OK)
-        status = store_upload_add(p->api->store, row, &hash, sizeof hash, &limits, err);
+        status = store_upload_add(p->config.store, row, &hash, sizeof hash, &limits, err);
     if (fd >= 0)
         close(fd);
     if (fd >= 0 && status != STATUS_OK)
@@ -226,7 +226,7 @@ enum status resumable_create(struct resumables *p, struct upload_row *row, struc
 
 enum status resumable_look(struct resumables *p, const char *id, struct upload_row *row, struct error *err) {
     struct upload_session *e;
-    enum status status = store_upload_get(p->api->store, id, row, NULL, 0, err);
+    enum status status = store_upload_get(p->config.store, id, row, NULL, 0, err);
     if (status != STATUS_OK || *row->scene_id)
         return status;
     upload_row_release(row);
@@ -237,18 +237,18 @@ enum status resumable_look(struct resumables *p, const char *id, struct upload_r
     } else if (status == STATUS_CONFLICT) {
         status = STATUS_OK; /* finished just now */
     }
-    return status == STATUS_OK ? store_upload_get(p->api->store, id, row, NULL, 0, err) : status;
+    return status == STATUS_OK ? store_upload_get(p->config.store, id, row, NULL, 0, err) : status;
 }
 
 enum status resumable_forget(struct resumables *p, const char *id, struct error *err) {
     char *path = layout_upload(NULL, id);
     upload_session_mark_gone(p, id);
-    enum status status = trash_take(p->api->trash, path, err);
+    enum status status = trash_take(p->config.folder->trash, path, err);
     mem_free(path);
     return status;
 }
 
 enum status resumable_remove(struct resumables *p, const char *id, struct error *err) {
-    enum status status = store_upload_delete(p->api->store, id, err);
+    enum status status = store_upload_delete(p->config.store, id, err);
     return status == STATUS_OK ? resumable_forget(p, id, err) : status;
 }

@@ -11,7 +11,7 @@
  *    counted when the upload is next looked at, provided that the machine has run on since (its
  *    boot id says so): then the kernel has kept them. After a power cut they are cut off.
  * 4. All of the space is reserved when the upload is created, and given back when nothing has arrived for
- *    empty_upload_ms: such an upload goes on while the disk has room.
+ *    resumables_config.idle_ms: such an upload goes on while the disk has room.
  * 5. A file that is whole moves to DATA/scenes/ID/archive, then the scene's row is made, then the
  *    upload's row names it. resumables_recover goes on from any point in between.
  *
@@ -22,11 +22,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "server/http/api.h"
+#include "common/error.h"
+#include "server/store/store.h"
+#include "server/uploads/resumables_config.h"
 
 struct resumables; /* the uploads that are being written or looked at; opaque */
 
-struct resumables *resumables_new(struct api *api);
+struct resumables *resumables_new(const struct resumables_config *config);
 void resumables_free(struct resumables *p); /* what is in files but not yet counted is counted */
 /* Puts in order what an earlier life left: finishes what is whole. Before the folders are swept. */
 enum status resumables_recover(struct resumables *p, struct error *err);
@@ -35,8 +37,8 @@ enum status resumables_recover(struct resumables *p, struct error *err);
 void resumables_tend(struct resumables *p);
 
 /* Takes owner_id, name, metadata, sha256 and length of *row; fills the rest but for times. Reserves the
- * space: STATUS_NO_SPACE. */
-enum status resumable_create(struct resumables *p, struct upload_row *row, struct error *err);
+ * space: STATUS_NO_SPACE. user_max: uploads that one user may have under way; 0: no limit. */
+enum status resumable_create(struct resumables *p, struct upload_row *row, size_t user_max, struct error *err);
 
 /* The row as it is now, everything received on disk and counted, and finished if it is whole. */
 enum status resumable_look(struct resumables *p, const char *id, struct upload_row *row, struct error *err);

@@ -5,18 +5,12 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/file.h"
 #include "common/mem.h"
-#include "common/utf8.h"
-#include "server/http/field.h"
-#include "server/http/limits.h"
-#include "server/http/problem.h"
-#include "server/http/space.h"
+#include "server/data/layout.h"
 
 /* Every so many bytes: start writing them out, so that the sync at the end is short, and look
  * whether others have filled the disk meanwhile. */
@@ -46,102 +40,58 @@ void upload_free(struct upload *u) {
     mem_free(u);
 }
 
-static struct response *check_request(const struct request *r) {
-    const char *sha256 = request_field(r, "X-Content-SHA256");
-    const char *digest = request_field(r, "Repr-Digest");
-    const char *name = target_query(&r->target, "name");
-    char hex[SHA256_HEX_SIZE];
-    if (!r->has_body || r->content_length == 0)
-        return problem_full(r, 400, "the body, an archive of the bundle, is missing",
-                            "curl -T room.zip -X POST URL", NULL);
-    if (sha256 && (strspn(sha256, "0123456789abcdefABCDEF") != 64 || sha256[64] != '\0'))
-        return problem(r, 400, "X-Content-SHA256 is not 64 hex digits");
-    if (digest && !field_digest(digest, hex))
-        return problem(r, 400, "Repr-Digest has no sha-256 that can be read");
-    if (name && (strlen(name) > API_NAME_MAX_BYTES || *name == '\0'))
-        return problem(r, 400, "name must have 1 to %d bytes, not %zu", API_NAME_MAX_BYTES, strlen(name));
-    if (name && !utf8_is_name(name))
-        return problem(r, 400, "name has a control character");
-    return NULL;
-}
-
-struct response *upload_begin(struct api *api, struct request *r) {
-    struct response *refusal = check_request(r);
-    if (!refusal)
-        refusal = limits_check_upload(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
-    if (!refusal)
-        refusal = space_check_room(api, r, r->content_length > 0 ? (uint64_t)r->content_length : 0);
-    if (!refusal)
-        refusal = space_check_share(api, r, NULL, r->content_length > 0 ? (uint64_t)r->content_length : 0);
-    if (refusal)
-        return refusal;
-    struct error err;
-    struct upload *u = mem_calloc(1, sizeof *u);
+enum status upload_new(struct upload **out, const char *data_dir, uint64_t length, struct error *err) {
+    struct upload *u = *out = mem_calloc(1, sizeof *u);
     sha256_init(&u->hash);
-    u->path = file_join(api->config.data_dir, "uploads/XXXXXX");
+    u->path = layout_upload(data_dir, LAYOUT_RANDOM);
     u->fd = mkostemp(u->path, O_CLOEXEC);
+    enum status status = STATUS_OK;
     if (u->fd < 0) {
-        error_set_errno(&err, errno, "cannot create a file in %s/uploads", api->config.data_dir);
+        char *folder = layout_uploads(data_dir);
+        status = error_set_errno(err, errno, "cannot create a file in %s", folder);
+        mem_free(folder);
         mem_free(u->path);
         u->path = NULL;
-        upload_free(u);
-        return problem_from(r, &err);
+    } else if (length > 0) {
+        u->is_reserved = fallocate(u->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)length) == 0;
+        if (!u->is_reserved && (errno == ENOSPC || errno == EDQUOT))
+            status = error_set_errno(err, errno, "cannot reserve %llu bytes for the upload", (unsigned long long)length);
     }
-    r->upload = u;
-    if (r->content_length > 0) {
-        u->is_reserved = fallocate(u->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)r->content_length) == 0;
-        if (!u->is_reserved && (errno == ENOSPC || errno == EDQUOT)) {
-            error_set_errno(&err, errno, "cannot reserve %lld bytes for the upload",
-                            (long long)r->content_length);
-            return problem_from(r, &err);
-        }
-    }
-    return NULL;
+    if (status == STATUS_OK)
+        return STATUS_OK;
+    upload_free(u);
+    *out = NULL;
+    return status;
 }
 
-struct response *upload_data(struct api *api, struct request *r, const void *data, size_t length) {
-    struct upload *u = r->upload;
-    struct error err;
-    if (file_write_all(u->fd, data, length, "the upload", &err) != STATUS_OK)
-        return problem_from(r, &err);
+enum status upload_write(struct upload *u, const void *data, size_t length, bool *must_check_room, struct error *err) {
+    *must_check_room = false;
+    enum status status = file_write_all(u->fd, data, length, "the upload", err);
+    if (status != STATUS_OK)
+        return status;
     sha256_update(&u->hash, data, length);
     u->bytes += length;
-    atomic_fetch_add(&api->uploaded_bytes, length);
     if (u->bytes - u->step_start < STEP_BYTES)
-        return NULL;
+        return STATUS_OK;
     /* Only a hint to the kernel; the sync at the end is what counts. */
     (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start),
                           SYNC_FILE_RANGE_WRITE);
     u->step_start = u->bytes;
-    if (u->is_reserved)
-        return NULL;
-    struct response *refusal = space_check_room(api, r, 0);
-    return refusal ? refusal : space_check_share(api, r, NULL, u->bytes);
+    *must_check_room = !u->is_reserved;
+    return STATUS_OK;
 }
 
-struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]) {
-    (void)api;
-    struct upload *u = r->upload;
-    struct error err;
-    const char *sha256 = request_field(r, "X-Content-SHA256");
-    const char *digest = request_field(r, "Repr-Digest");
-    char wanted[SHA256_HEX_SIZE];
-    sha256_hex(&u->hash, id);
-    if (sha256 && strcasecmp(sha256, id) != 0)
-        return problem(r, 422, "the body's SHA-256 is %s, and X-Content-SHA256 says %s", id, sha256);
-    if (digest && field_digest(digest, wanted) && strcmp(wanted, id) != 0)
-        return problem(r, 422, "the body's SHA-256 is %s, and Repr-Digest says %s", id, wanted);
-    if (u->bytes == 0)
-        return problem(r, 400, "the body, an archive of the bundle, is empty");
-    if (fsync(u->fd) == 0)
-        return NULL;
-    error_set_errno(&err, errno, "cannot sync the upload");
-    return problem_from(r, &err);
+void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]) {
+    sha256_hex(&u->hash, hex);
 }
 
-enum status upload_sync_place(struct api *api, const char *id, struct error *err) {
-    char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
-    char *archive = file_join(dir, "archive");
+enum status upload_sync(struct upload *u, struct error *err) {
+    return fsync(u->fd) == 0 ? STATUS_OK : error_set_errno(err, errno, "cannot sync the upload");
+}
+
+enum status upload_sync_place(const char *data_dir, const char *id, struct error *err) {
+    char *dir = layout_scene(data_dir, id);
+    char *archive = layout_archive(dir);
     enum status status = file_sync_parent(archive, err);
     if (status == STATUS_OK)
         status = file_sync_parent(dir, err);
@@ -150,9 +100,9 @@ enum status upload_sync_place(struct api *api, const char *id, struct error *err
     return status;
 }
 
-enum status upload_place(struct api *api, const char *path, const char *id, struct error *err) {
-    char *dir = mem_printf("%s/scenes/%s", api->config.data_dir, id);
-    char *archive = file_join(dir, "archive");
+enum status upload_place(const char *data_dir, const char *path, const char *id, struct error *err) {
+    char *dir = layout_scene(data_dir, id);
+    char *archive = layout_archive(dir);
     enum status status = file_make_dirs(dir, err);
     if (status == STATUS_OK && chmod(path, 0400) != 0)
         status = error_set_errno(err, errno, "cannot set the mode of %s", path);
@@ -160,11 +110,11 @@ enum status upload_place(struct api *api, const char *path, const char *id, stru
         status = error_set_errno(err, errno, "cannot move the upload to %s", archive);
     mem_free(archive);
     mem_free(dir);
-    return status == STATUS_OK ? upload_sync_place(api, id, err) : status;
+    return status == STATUS_OK ? upload_sync_place(data_dir, id, err) : status;
 }
 
-enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err) {
-    enum status status = upload_place(api, u->path, id, err);
+enum status upload_publish(struct upload *u, const char *data_dir, const char *id, struct error *err) {
+    enum status status = upload_place(data_dir, u->path, id, err);
     if (status == STATUS_OK) {
         mem_free(u->path);
         u->path = NULL;

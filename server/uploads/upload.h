@@ -1,31 +1,33 @@
-/* upload.h -- a body on its way to disk: written and hashed as it arrives.
+/* upload.h -- a bundle that arrives in one piece: written and hashed as it comes.
  *
- * 1. It lives in DATA/uploads/ under a name of no meaning until it is whole and synced; only then
- *    is it renamed to DATA/scenes/ID/archive. What is freed before that leaves nothing behind.
- * 2. Space is reserved at the start where the length is known; min_free_bytes stay free always. */
+ * 1. It lies in DATA/uploads/ under a random name until it is complete and synced; only then is it renamed to
+ *    DATA/scenes/ID/archive. What is freed before that leaves nothing behind.
+ * 2. Space is reserved at the start where the length is known. */
 #ifndef UNBAKE_UPLOADS_UPLOAD_H
 #define UNBAKE_UPLOADS_UPLOAD_H
 
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
+#include "common/error.h"
 #include "common/sha256.h"
-#include "server/http/api.h"
-#include "server/http/message.h"
 
 struct upload; /* opaque */
 
-/* Start of request r's body: sets r->upload, or refuses with a reply. */
-struct response *upload_begin(struct api *api, struct request *r);
-/* The next bytes; NULL, or the reply that ends it. */
-struct response *upload_data(struct api *api, struct request *r, const void *data, size_t length);
-/* All has come: checks the caller's digests, syncs, and says the content's SHA-256. */
-struct response *upload_seal(struct api *api, struct request *r, char id[SHA256_HEX_SIZE]);
-/* Moves the sealed file to its place, durably. */
-enum status upload_publish(struct api *api, struct upload *u, const char *id, struct error *err);
-/* Moves the file `path`, which is whole and synced, to where the archive of scene `id` belongs. */
-enum status upload_place(struct api *api, const char *path, const char *id, struct error *err);
+/* Makes the file; `length`: bytes that will come, 0: not known. STATUS_NO_SPACE where they cannot be reserved. */
+enum status upload_new(struct upload **u, const char *data_dir, uint64_t length, struct error *err);
+/* The next bytes. *must_check_room: space could not be reserved and much has come since the last time; the caller looks
+ * whether others have filled the disk meanwhile. */
+enum status upload_write(struct upload *u, const void *data, size_t length, bool *must_check_room, struct error *err);
+void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]); /* of what has come */
+enum status upload_sync(struct upload *u, struct error *err);
+/* Moves the synced file to where the archive of scene `id` belongs, durably. */
+enum status upload_publish(struct upload *u, const char *data_dir, const char *id, struct error *err);
+/* The same for the file `path`, which is complete and synced. */
+enum status upload_place(const char *data_dir, const char *path, const char *id, struct error *err);
 /* That the archive of scene `id` has its place is on disk: after an upload_place that failed half-way. */
-enum status upload_sync_place(struct api *api, const char *id, struct error *err);
+enum status upload_sync_place(const char *data_dir, const char *id, struct error *err);
 
 uint64_t upload_bytes(const struct upload *u);
 void upload_free(struct upload *u); /* NULL is fine */

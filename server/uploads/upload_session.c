@@ -17,7 +17,7 @@
 #define CHUNK_BYTES ((size_t)256 << 10)
 
 char *upload_session_path(const struct resumables *p, const char *id) {
-    return layout_upload(p->api->config.data_dir, id);
+    return layout_upload(p->config.folder->dir, id);
 }
 
 /* --- loading ------------------------------------------------------------------------------- */
@@ -64,13 +64,13 @@ static enum status cut_tail(struct upload_session *e, struct error *err) {
     if (fallocate(e->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)e->length) != 0 && errno != EOPNOTSUPP)
         return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s",
                                (unsigned long long)e->length, e->id);
-    return store_upload_begin(e->resumables->api->store, e->id, e->resumables->boot, err);
+    return store_upload_begin(e->resumables->config.store, e->id, e->resumables->boot, err);
 }
 
 static enum status load(struct upload_session *e, struct error *err) {
     struct resumables *p = e->resumables;
     struct upload_row row;
-    enum status status = store_upload_get(p->api->store, e->id, &row, &e->hash, sizeof e->hash, err);
+    enum status status = store_upload_get(p->config.store, e->id, &row, &e->hash, sizeof e->hash, err);
     if (status != STATUS_OK)
         return status;
     bool is_same_boot = strcmp(row.boot, p->boot) == 0;
@@ -218,7 +218,7 @@ static void forget_tail(struct upload_session *e) {
     e->is_loaded = false; /* the next to come reads row and hash again */
     e->holder = NULL;
     e->is_spoiled = ftruncate(e->fd, (off_t)e->counted) != 0 &&
-                    store_upload_begin(e->resumables->api->store, e->id, "", &err) != STATUS_OK;
+                    store_upload_begin(e->resumables->config.store, e->id, "", &err) != STATUS_OK;
     if (e->is_spoiled)
         log_warning("upload %s: %s", e->id, err.message);
     pthread_mutex_unlock(&e->mutex);
@@ -241,7 +241,7 @@ static enum status commit_alone(struct upload_session *e, struct error *err) {
         return failed;
     }
     pthread_mutex_lock(&e->mutex);
-    enum status status = store_upload_advance(e->resumables->api->store, e->id, received, &hash, sizeof hash, err);
+    enum status status = store_upload_advance(e->resumables->config.store, e->id, received, &hash, sizeof hash, err);
     if (status == STATUS_OK)
         e->counted = received;
     pthread_mutex_unlock(&e->mutex);
@@ -258,7 +258,7 @@ enum status upload_session_commit(struct upload_session *e, struct error *err) {
 enum status upload_session_disbelieve(struct upload_session *e, struct error *err) {
     enum status status = upload_session_commit(e, err);
     if (status == STATUS_OK)
-        status = store_upload_begin(e->resumables->api->store, e->id, "", err);
+        status = store_upload_begin(e->resumables->config.store, e->id, "", err);
     pthread_mutex_lock(&e->mutex);
     if (status == STATUS_OK)
         e->is_believed = false;

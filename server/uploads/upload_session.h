@@ -10,7 +10,9 @@
 #include <pthread.h>
 
 #include "common/sha256.h"
-#include "server/http/api.h"
+#include "server/data/folder.h"
+#include "server/store/store.h"
+#include "server/uploads/resumables_config.h"
 
 struct upload_writer; /* upload_writer.h */
 
@@ -34,7 +36,7 @@ struct upload_session {
 };
 
 struct resumables {
-    struct api *api;
+    struct resumables_config config;
     char boot[UPLOAD_BOOT_SIZE]; /* of the machine; "": not known */
     pthread_mutex_t mutex;       /* guards the list, users and rounds */
     struct upload_session *first;

@@ -56,7 +56,7 @@ static void check_reserve(void) {
         rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
         unlink(reserve);
         check_answer("DELETE", path, "", 204, "");
-        trash_wait(rig.api->trash);
+        trash_wait(rig.api->folder.trash);
         CHECK((access(reserve, F_OK) == 0) == is_well);
         system_mend();
         mem_free(path);
@@ -79,13 +79,13 @@ static void check_collector(void) {
     rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
     rig_must(store_keep(rig.store, 0, 1, 3600000, &err), &err, "store_keep");
     system_break(" pthread_create ", EAGAIN);
-    CHECK(collector_start(&collector, rig.api, 0.01, &err) == STATUS_IO && collector == NULL);
+    CHECK(collector_start(&collector, &rig.api->collector_config, 0.01, &err) == STATUS_IO && collector == NULL);
     CHECK_THAT(strstr(err.message, "cannot start the thread"), "%s", err.message);
     system_mend();
 
     usleep(2000);
     sql_break();
-    rig_must(collector_start(&collector, rig.api, 0.01, &err), &err, "collector_start");
+    rig_must(collector_start(&collector, &rig.api->collector_config, 0.01, &err), &err, "collector_start");
     usleep(100000);
     sql_mend();
     for (int i = 0; i < 3000 && is_there(job); i++)

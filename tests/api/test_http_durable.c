@@ -98,10 +98,10 @@ int fallocate(int fd, int mode, off_t at, off_t length) {
     REAL(fallocate);
     if (is_creating) {
         atomic_fetch_add(&reservations, 1);
-        bool is_free = pthread_mutex_trylock(&rig.api->scene_mutex) == 0;
+        bool is_free = pthread_mutex_trylock(&rig.api->folder.scene_mutex) == 0;
         atomic_fetch_add(&reserved_without_lock, is_free);
         if (is_free)
-            pthread_mutex_unlock(&rig.api->scene_mutex);
+            pthread_mutex_unlock(&rig.api->folder.scene_mutex);
     }
     return call(fd, mode, at, length);
 }

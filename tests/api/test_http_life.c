@@ -129,7 +129,7 @@ static void check_stop_when_busy(void) {
 
 static void create(char id[UPLOAD_ID_SIZE]) {
     struct upload_row row = {.name = mem_strdup("room"), .metadata = mem_strdup(""), .length = BYTES};
-    rig_must(resumable_create(rig.api->resumables, &row, &err), &err, "resumable_create");
+    rig_must(resumable_create(rig.api->resumables, &row, 0, &err), &err, "resumable_create");
     memcpy(id, row.id, UPLOAD_ID_SIZE);
     upload_row_release(&row);
 }

@@ -4,6 +4,7 @@
 
 #include "common/clock.h"
 #include "server/data/collector.h"
+#include "server/uploads/upload_session.h"
 #include "server/uploads/resumable.h"
 #include "tests/api/rig.h"
 
@@ -97,11 +98,11 @@ static void test_age(void) {
     CHECK(create(anna, 1000, begun, &reply) == 201);
     buf_release(&reply);
     rig_must(store_upload_advance(rig.store, begun, 1, hash, 10, &err), &err, "store_upload_advance");
-    rig_must(collector_run(rig.api, false, NULL, &err), &err, "collector_run");
+    rig_must(collector_run(&rig.api->collector_config, false, NULL, NULL, &err), &err, "collector_run");
     CHECK(is_there(empty) && is_there(begun));
     rig_must(store_keep_empty(rig.store, 1, &err), &err, "store_keep_empty");
     usleep(5000);
-    rig_must(collector_run(rig.api, false, NULL, &err), &err, "collector_run");
+    rig_must(collector_run(&rig.api->collector_config, false, NULL, NULL, &err), &err, "collector_run");
     CHECK(!is_there(empty) && is_there(begun));
 }
 
@@ -131,13 +132,13 @@ static void test_idle(void) {
         CHECK_THAT(status == 204, "part %d: %d: %s", part, status, buf_text(&reply));
         buf_release(&reply);
         mem_free(text);
-        rig.api->config.empty_upload_ms = 3600000;
+        rig.api->config.empty_upload_ms = rig.api->resumables->config.idle_ms = 3600000;
         resumables_tend(rig.api->resumables);
         rig_must(store_user_pledged(rig.store, user, 0, &pledged, &err), &err, "store_user_pledged");
         CHECK_THAT(pledged >= length - 2000, "%llu bytes are pledged", (unsigned long long)pledged);
         CHECK(part == 1 || held_bytes(id) >= length); /* it has just grown */
         usleep(5000);
-        rig.api->config.empty_upload_ms = 1;
+        rig.api->config.empty_upload_ms = rig.api->resumables->config.idle_ms = 1;
         resumables_tend(rig.api->resumables);
         CHECK_THAT(held_bytes(id) < 2 << 20, "it holds %llu bytes", (unsigned long long)held_bytes(id));
         rig_must(store_user_pledged(rig.store, user, clock_unix_ms() - 1, &pledged, &err), &err, "store_user_pledged");

@@ -97,7 +97,7 @@ static void test_two(struct rig *rig, enum rival rival) {
     sha256_init(&hash);
     sha256_update(&hash, bytes, sizeof bytes);
     sha256_hex(&hash, wanted);
-    rig_must(resumable_create(p, &row, &err), &err, "resumable_create");
+    rig_must(resumable_create(p, &row, 0, &err), &err, "resumable_create");
 
     struct upload_writer *writer = send_all(p, row.id, bytes);
     struct look first = {.resumables = p, .id = row.id};
@@ -140,7 +140,7 @@ static void test_overtaken(struct rig *rig) {
     unsigned long long before = atomic_load(&rig->api->uploaded_bytes);
     struct error err;
     struct buf reply;
-    rig_must(resumable_create(p, &row, &err), &err, "resumable_create");
+    rig_must(resumable_create(p, &row, 0, &err), &err, "resumable_create");
     char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nTus-Resumable: 1.0.0\r\n"
                             "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
                             "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n"

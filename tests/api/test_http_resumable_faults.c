@@ -35,7 +35,7 @@ static void create(const char *said_sha256) {
     memcpy(bytes, &(unsigned){++number}, sizeof number);
     sha256_of(bytes, sizeof bytes, sha256);
     snprintf(row.sha256, sizeof row.sha256, "%s", said_sha256);
-    OK(resumable_create(rig.api->resumables, &row, &err));
+    OK(resumable_create(rig.api->resumables, &row, 0, &err));
     snprintf(id, sizeof id, "%s", row.id);
     upload_row_release(&row);
 }
@@ -95,10 +95,12 @@ static void check_scene(void) {
 
 /* The daemon ends, without a database that would take what is not counted yet, and starts again. */
 static void restart(void) {
+    const struct resumables_config config = rig.api->resumables->config;
     sql_break();
     resumables_free(rig.api->resumables);
     sql_mend();
-    rig.api->resumables = resumables_new(rig.api);
+    rig.api->resumables = resumables_new(&config);
+    rig.api->collector_config.uploads = rig.api->resumables;
 }
 
 /* --- checks ---------------------------------------------------------------------------------------- */
@@ -286,9 +288,11 @@ static void check_recovery(void) {
         send_part(0, BYTES);
         strcpy(ids[i], id);
     }
+    const struct resumables_config config = rig.api->resumables->config;
     system_break(" rename ", EIO);
     resumables_free(rig.api->resumables); /* counts them */
-    rig.api->resumables = resumables_new(rig.api);
+    rig.api->resumables = resumables_new(&config);
+    rig.api->collector_config.uploads = rig.api->resumables;
     CHECK(counted() == BYTES);
     OK(resumables_recover(rig.api->resumables, &err));
     system_mend();

@@ -334,7 +334,7 @@ int main(void) {
     }
     for (int i = 0; i < CLIENTS; i++)
         pthread_join(threads[i], NULL);
-    trash_wait(rig.api->trash);
+    trash_wait(rig.api->folder.trash);
     check_library();
     check_hung();
     faults_watch = NULL;
