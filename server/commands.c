@@ -5,9 +5,9 @@
 
 #include "common/mem.h"
 #include "server/admin/commands.h"
-#include "server/demo/generate.h"
-#include "server/evaluate/evaluate.h"
-#include "server/evaluate/relight.h"
+#include "server/demo/demo_command.h"
+#include "server/evaluate/evaluate_command.h"
+#include "server/evaluate/relight_command.h"
 #include "server/worker/worker.h"
 
 static const struct server_command table[] = {
@@ -41,16 +41,18 @@ static const struct server_command table[] = {
      "DIR is made, or must be empty. Every file is held against its digest in the backup; where one is\n"
      "damaged, nothing is restored, or with --skip-damaged all others. Root gives the files to DIR's owner.\n",
      "  unbaked restore /backup/2026-01-31 /var/lib/unbaked\n", restore_flags, restore_command},
-    {"demo-room", "DIR", "make a room whose materials and lights are known", "",
-     "  unbaked demo-room /tmp/room\n", NULL, demo_command},
-    {"evaluate", "ROOM OUTPUTS", "compare a job's outputs with a known room", "",
-     "  unbaked evaluate /tmp/room /tmp/room-textures\n", NULL, evaluate_command},
+    {"demo-room", "DIR", "make a room whose materials and lights are known",
+     "Photographs a furnished room and writes a bundle to DIR that `unbake submit DIR` takes, with the\n"
+     "ground truth in DIR/truth.\n",
+     "  unbaked demo-room /tmp/room --sdr --wall-radiance 25 --ceiling-radiance 3\n", demo_flags, demo_command},
+    {"evaluate", "ROOM OUTPUTS", "compare a job's outputs with a known room",
+     "Compares OUTPUTS, a folder that `unbake get` filled, with ROOM/truth, as the held-out cameras see it.\n",
+     "  unbaked evaluate /tmp/room /tmp/room-textures --pictures /tmp/pictures\n", evaluate_flags, evaluate_command},
     {"manual", "PAGE", "write unbaked.8, unbaked.conf.5, or the completion for bash or zsh", "",
      "  unbaked manual unbaked.8 | man -l -\n", NULL, manual_command},
     {"relight", "OUTPUTS", "render a finished job's room from any view under any light",
-     "OUTPUTS is a folder that `unbake get` filled; nothing else of the job is needed. --help lists the\n"
-     "options.\n",
-     "  unbaked relight /tmp/room-textures --lights off --environment sky.hdr --out sky.png\n", NULL,
+     "OUTPUTS is a folder that `unbake get` filled; nothing else of the job is needed.\n",
+     "  unbaked relight /tmp/room-textures --lights off --environment sky.hdr --out sky.png\n", relight_flags,
      relight_command},
     {"worker", "DIR", "one attempt of a job; the daemon runs it", "", "", NULL, worker_main},
 };
@@ -71,7 +73,7 @@ const struct server_command *commands_find(const char *name) {
 static void print_flags(const struct flag *flags, FILE *out) {
     for (; flags && flags->name; flags++) {
         char *left = mem_printf("%s%s%s", flags->name, flags->value ? " " : "", flags->value ? flags->value : "");
-        fprintf(out, "  %-20s %s\n", left, flags->help);
+        fprintf(out, "  %-22s %s\n", left, flags->help);
         mem_free(left);
     }
 }

@@ -7,54 +7,6 @@
 #include <unistd.h>
 
 #include "common/mem.h"
-#include "common/nearest.h"
-
-/* The flag whose name the first `length` bytes of `text` are; NULL, with the problem told. */
-static const struct flag *find_flag(const struct flag *flags, const char *text, size_t length) {
-    struct nearest nearest;
-    char *name = mem_strndup(text, length);
-    const struct flag *found = NULL;
-    nearest_init(&nearest, name);
-    for (size_t i = 0; flags[i].name && !found; i++) {
-        nearest_offer(&nearest, flags[i].name);
-        if (strcmp(flags[i].name, name) == 0)
-            found = &flags[i];
-    }
-    if (!found)
-        fprintf(stderr, "unbaked: what is \"%s\"? %s%s%s\n", name, nearest.best ? "did you mean " : "",
-                nearest.best ? nearest.best : "--help lists what there is", nearest.best ? "?" : "");
-    mem_free(name);
-    return found;
-}
-
-static bool read_words(struct invocation *in, int argc, char **argv, const struct flag *flags) {
-    for (int i = 1; i < argc; i++) {
-        if (argv[i][0] != '-') {
-            if (in->word_count == WORDS_MAX) {
-                fputs("unbaked: too many words\n", stderr);
-                return false;
-            }
-            in->words[in->word_count++] = argv[i];
-            continue;
-        }
-        size_t length = strcspn(argv[i], "=");
-        const struct flag *flag = find_flag(flags, argv[i], length);
-        if (!flag)
-            return false;
-        const char *value = argv[i][length] == '=' ? argv[i] + length + 1 : NULL;
-        if (flag->value && !value && i + 1 < argc)
-            value = argv[++i];
-        if ((flag->value != NULL) != (value != NULL) ||
-            in->given_count == sizeof in->given / sizeof *in->given) {
-            fprintf(stderr, "unbaked: %s %s\n", flag->name,
-                    !flag->value ? "takes no value" : value ? "comes too often" : "needs a value");
-            return false;
-        }
-        in->given[in->given_count].flag = flag;
-        in->given[in->given_count++].value = value;
-    }
-    return true;
-}
 
 /* Applies one flag that sets an option. */
 static void apply_flag(struct config *c, const char *flag, const char *value, struct buf *problems) {
@@ -80,13 +32,13 @@ static void read_config(struct invocation *in, const char *default_file, struct 
     if (!is_told && default_file && access(default_file, F_OK) == 0 &&
         config_read(&in->config, default_file, problems, &err) != STATUS_OK)
         buf_printf(problems, "%s\n", err.message);
-    for (size_t i = 0; i < in->given_count; i++)
-        if (strcmp(in->given[i].flag->name, "--config") == 0 &&
-            config_read(&in->config, in->given[i].value, problems, &err) != STATUS_OK)
+    for (size_t i = 0; i < in->arguments.given_count; i++)
+        if (strcmp(in->arguments.given[i].flag->name, "--config") == 0 &&
+            config_read(&in->config, in->arguments.given[i].value, problems, &err) != STATUS_OK)
             buf_printf(problems, "%s\n", err.message);
-    for (size_t i = 0; i < in->given_count; i++)
-        if (in->given[i].value)
-            apply_flag(&in->config, in->given[i].flag->name, in->given[i].value, problems);
+    for (size_t i = 0; i < in->arguments.given_count; i++)
+        if (in->arguments.given[i].value)
+            apply_flag(&in->config, in->arguments.given[i].flag->name, in->arguments.given[i].value, problems);
     config_check(&in->config, problems);
 }
 
@@ -94,7 +46,7 @@ int invocation_read(struct invocation *in, int argc, char **argv, const struct f
                     const char *config_file) {
     memset(in, 0, sizeof *in);
     config_init(&in->config);
-    if (!read_words(in, argc, argv, flags))
+    if (!arguments_read(&in->arguments, argc, argv, flags))
         return EXIT_USAGE;
     if (invocation_has(in, "--help") || invocation_has(in, "--version"))
         return -1;
@@ -110,18 +62,4 @@ int invocation_read(struct invocation *in, int argc, char **argv, const struct f
 
 void invocation_release(struct invocation *in) {
     config_release(&in->config);
-}
-
-bool invocation_has(const struct invocation *in, const char *flag) {
-    for (size_t i = 0; i < in->given_count; i++)
-        if (strcmp(in->given[i].flag->name, flag) == 0)
-            return true;
-    return false;
-}
-
-const char *invocation_value(const struct invocation *in, const char *flag, const char *fallback) {
-    for (size_t i = in->given_count; i-- > 0;)
-        if (strcmp(in->given[i].flag->name, flag) == 0)
-            return in->given[i].value;
-    return fallback;
 }

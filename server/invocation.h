@@ -12,23 +12,9 @@
 
 #define CONFIG_FILE_DEFAULT "/etc/unbaked.conf" /* of the commands; the daemon is told its file */
 
-struct flag {
-    const char *name;  /* "--config"; NULL ends a table */
-    const char *value; /* what the help calls its value; NULL: it takes none */
-    const char *help;
-};
-
-#define WORDS_MAX 8
-
 struct invocation {
     struct config config;
-    const char *words[WORDS_MAX]; /* what is no flag; borrowed from argv */
-    size_t word_count;
-    struct {
-        const struct flag *flag;
-        const char *value; /* NULL where it takes none */
-    } given[64];
-    size_t given_count;
+    struct arguments arguments;
 };
 
 /* Every command that works on a data folder takes these: --config, --data, --set. */
@@ -37,10 +23,6 @@ struct invocation {
     {"--data", "DIR", "the same as --set data_dir=DIR"},                                       \
     {"--set", "NAME=VALUE", "an option; wins over the file"}
 
-/* What a command returns instead of an exit status to have its help printed: it was asked for, or the
- * words are wrong. */
-enum { COMMAND_HELP = 256, COMMAND_MISUSED };
-
 /* Reads argv[1...]. Faults are told on stderr, all those of the configuration at once. -1 to go
  * on, or the exit status. Needs invocation_release in any case. `config_file` is read where no
  * --config or --data is given and it is there; NULL: none. */
@@ -48,8 +30,12 @@ int invocation_read(struct invocation *in, int argc, char **argv, const struct f
                     const char *config_file);
 void invocation_release(struct invocation *in);
 
-bool invocation_has(const struct invocation *in, const char *flag);
-/* The last value given, or `fallback`. */
-const char *invocation_value(const struct invocation *in, const char *flag, const char *fallback);
+static inline bool invocation_has(const struct invocation *in, const char *flag) {
+    return arguments_have(&in->arguments, flag);
+}
+
+static inline const char *invocation_value(const struct invocation *in, const char *flag, const char *fallback) {
+    return arguments_value(&in->arguments, flag, fallback);
+}
 
 #endif

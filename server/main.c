@@ -347,11 +347,11 @@ static int run_daemon(struct config *config, const char *port_file) {
 int daemon_command(int argc, char **argv) {
     struct invocation in;
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
-    if (code < 0 && in.word_count > 0) {
-        if (commands_find(in.words[0]))
-            fprintf(stderr, "unbaked: a command goes before its options: unbaked %s ...\n", in.words[0]);
+    if (code < 0 && in.arguments.word_count > 0) {
+        if (commands_find(in.arguments.words[0]))
+            fprintf(stderr, "unbaked: a command goes before its options: unbaked %s ...\n", in.arguments.words[0]);
         else
-            fprintf(stderr, "unbaked: what is \"%s\"? unbaked --help lists the commands\n", in.words[0]);
+            fprintf(stderr, "unbaked: unknown command \"%s\"; unbaked --help lists the commands\n", in.arguments.words[0]);
         code = EXIT_USAGE;
     } else if (code < 0 && invocation_has(&in, "--help")) {
         code = COMMAND_HELP;

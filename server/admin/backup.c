@@ -336,11 +336,11 @@ int backup_command(int argc, char **argv) {
     bool is_damaged = false;
     int code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, backup_flags, 1, 1);
     if (code < 0) {
-        enum status status = check_new(in.words[0], &err);
+        enum status status = check_new(in.arguments.words[0], &err);
         if (status == STATUS_OK && invocation_has(&in, "--with-outputs"))
-            status = backup_all(in.config.data_dir, in.words[0], &is_damaged, &err);
+            status = backup_all(in.config.data_dir, in.arguments.words[0], &is_damaged, &err);
         else if (status == STATUS_OK)
-            status = backup_database(in.config.data_dir, in.words[0], &err);
+            status = backup_database(in.config.data_dir, in.arguments.words[0], &err);
         code = status != STATUS_OK ? command_failed(&err) : is_damaged ? EXIT_FAILURE : EXIT_SUCCESS;
     }
     invocation_release(&in);

@@ -37,7 +37,7 @@ int command_begin(const char *file, struct invocation *in, int argc, char **argv
     int code = invocation_read(in, argc, argv, flags, file);
     if (code < 0 && invocation_has(in, "--help"))
         return COMMAND_HELP;
-    if (code < 0 && (in->word_count < words_min || in->word_count > words_max))
+    if (code < 0 && (in->arguments.word_count < words_min || in->arguments.word_count > words_max))
         return COMMAND_MISUSED;
     log_set_level(LOG_WARNING);
     return code;
@@ -78,12 +78,12 @@ int token_command(int argc, char **argv) {
     struct error err;
     cJSON *request = cJSON_CreateObject(), *reply = NULL;
     int fd, code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, token_flags, 1, 2);
-    const char *action = code < 0 ? in.words[0] : "";
+    const char *action = code < 0 ? in.arguments.words[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
         fprintf(stderr, "unbaked: there is no \"token %.80s\": add, list, revoke\n", action);
         code = EXIT_USAGE;
-    } else if (code < 0 && in.word_count != (is_add || is_revoke ? 2 : 1)) {
+    } else if (code < 0 && in.arguments.word_count != (is_add || is_revoke ? 2 : 1)) {
         fprintf(stderr, "unbaked: token %s takes %s\n", action,
                 is_add ? "the user's NAME" : is_revoke ? "a token's number or a user's name" : "no more words");
         code = EXIT_USAGE;
@@ -93,9 +93,9 @@ int token_command(int argc, char **argv) {
         json_add_string(request, "command", command);
         mem_free(command);
         if (is_add)
-            json_add_string(request, "name", in.words[1]);
+            json_add_string(request, "name", in.arguments.words[1]);
         if (is_revoke)
-            json_add_string(request, "which", in.words[1]);
+            json_add_string(request, "which", in.arguments.words[1]);
         json_add_string(request, "role", invocation_value(&in, "--role", "user"));
         if (admin_call(in.config.data_dir, request, &reply, &fd, &err) != STATUS_OK) {
             code = command_failed(&err);
@@ -120,13 +120,13 @@ int check_config_command(int argc, char **argv) {
     struct buf problems;
     struct error err;
     int code = command_begin(NULL, &in, argc, argv, check_config_flags, 0, 1);
-    bool has_file = in.word_count == 1;
+    bool has_file = in.arguments.word_count == 1;
     if (code < 0 && !has_file) {
         invocation_release(&in);
         code = command_begin(CONFIG_FILE_DEFAULT, &in, argc, argv, check_config_flags, 0, 1);
     }
     buf_init(&problems, (size_t)1 << 20);
-    if (code < 0 && has_file && config_read(&in.config, in.words[0], &problems, &err) != STATUS_OK)
+    if (code < 0 && has_file && config_read(&in.config, in.arguments.words[0], &problems, &err) != STATUS_OK)
         buf_printf(&problems, "%s\n", err.message);
     if (code < 0 && has_file)
         config_check(&in.config, &problems);

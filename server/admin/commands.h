@@ -12,8 +12,6 @@ int restore_command(int argc, char **argv); /* restore.c */
 int check_config_command(int argc, char **argv);
 int doctor_command(int argc, char **argv); /* doctor.c */
 
-#define COMMAND_HELP_FLAG {"--help", NULL, "print this help"}
-
 /* -1 to go on, or what the command returns. `file` as for invocation_read. */
 int command_begin(const char *file, struct invocation *in, int argc, char **argv, const struct flag *flags,
                   size_t words_min, size_t words_max);

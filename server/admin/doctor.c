@@ -249,8 +249,8 @@ int doctor_command(int argc, char **argv) {
     char address[CONFIG_ADDRESS_SIZE];
     uint16_t port;
     int code = invocation_read(&in, argc, argv, doctor_flags, CONFIG_FILE_DEFAULT);
-    if (code < 0 && (invocation_has(&in, "--help") || in.word_count > 0))
-        code = in.word_count > 0 ? COMMAND_MISUSED : COMMAND_HELP;
+    if (code < 0 && (invocation_has(&in, "--help") || in.arguments.word_count > 0))
+        code = in.arguments.word_count > 0 ? COMMAND_MISUSED : COMMAND_HELP;
     if (code < 0) {
         struct doctor doctor = {.config = &in.config}, *d = &doctor;
         bool runs = daemon_runs(in.config.data_dir);

@@ -191,7 +191,7 @@ int restore_command(int argc, char **argv) {
     struct error err;
     int code = command_begin(NULL, &in, argc, argv, restore_flags, 2, 2);
     if (code < 0) {
-        struct restoring r = {.backup = in.words[0], .data = in.words[1], .skips = invocation_has(&in, "--skip-damaged"),
+        struct restoring r = {.backup = in.arguments.words[0], .data = in.arguments.words[1], .skips = invocation_has(&in, "--skip-damaged"),
                               .copy = {.from = -1, .to = -1}};
         enum status status = restore(&r, &contents, &err);
         if (status == STATUS_OK)

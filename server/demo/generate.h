@@ -35,7 +35,4 @@ enum status demo_generate(const char *dir, const struct demo_settings *settings,
                           void (*progress)(void *user, uint32_t done, uint32_t total), void *user,
                           struct error *err);
 
-/* `unbaked demo-room DIR [options]`: returns the exit status. argv[0] is "demo-room". */
-int demo_command(int argc, char **argv);
-
 #endif

@@ -47,7 +47,4 @@ enum status evaluate_outputs(const char *room, const char *outputs,
 /* Every figure as an object; the caller's. */
 cJSON *evaluate_to_json(const struct evaluation *evaluation);
 
-/* `unbaked evaluate ROOM OUTPUTS [options]`: returns the exit status; argv[0] is "evaluate". */
-int evaluate_command(int argc, char **argv);
-
 #endif

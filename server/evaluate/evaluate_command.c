@@ -1,74 +1,23 @@
-/* evaluate_command.c -- `unbaked evaluate`: its options and its table. */
-#include <getopt.h>
+/* evaluate_command.c -- see evaluate_command.h. */
+#include "server/evaluate/evaluate_command.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "common/mem.h"
-#include "server/arguments.h"
 #include "server/evaluate/evaluate.h"
 
-static const char usage[] =
-    "usage: unbaked evaluate ROOM OUTPUTS [option ...]\n"
-    "\n"
-    "Compares the outputs of a finished job (a folder that `unbake get` filled) with the truth of\n"
-    "its room (ROOM/truth, as `unbaked demo-room` writes it), as the held-out cameras see them.\n"
-    "\n"
-    "  --spp N          paths per pixel of the re-rendered views (64); 0: none, no MSRE\n"
-    "  --samples N      first hits per pixel of the parameters (16)\n"
-    "  --max-depth N    segments of a path (16)\n"
-    "  --pictures DIR   write side-by-sides there: truth | recovered, photograph | re-render\n"
-    "  --json           one JSON object instead of a table\n"
-    "  --threads N      0: one for each processor (0)\n"
-    "\n"
-    "example: unbaked evaluate build/demo/room build/demo/out --pictures build/demo/pictures\n";
-
-struct arguments {
-    struct evaluate_settings settings;
-    uint32_t threads;
-    bool json, help;
-    const char *room, *outputs;
+const struct flag evaluate_flags[] = {
+    {"--spp", "N", "paths per pixel of the re-rendered views; 0: none, no MSRE (64)"},
+    {"--samples", "N", "first hits per pixel of the parameters (16)"},
+    {"--max-depth", "N", "segments of a path (16)"},
+    {"--pictures", "DIR", "write side-by-sides there: truth | recovered, photograph | re-render"},
+    {"--json", NULL, "print a JSON object instead of a table"},
+    {"--threads", "N", "0: one per processor (0)"},
+    COMMAND_HELP_FLAG,
+    {0},
 };
-
-static bool read_count(const char *option, double low, double high, uint32_t *count) {
-    double value;
-    bool ok = argument_number("evaluate", option, optarg, low, high, true, &value);
-    *count = ok ? (uint32_t)value : *count;
-    return ok;
-}
-
-static bool read_arguments(int argc, char **argv, struct arguments *a) {
-    static const struct option option[] = {
-        {"spp", required_argument, NULL, 's'},     {"samples", required_argument, NULL, 'n'},
-        {"max-depth", required_argument, NULL, 'd'}, {"pictures", required_argument, NULL, 'p'},
-        {"json", no_argument, NULL, 'j'},          {"threads", required_argument, NULL, 't'},
-        {"help", no_argument, NULL, 'h'},          {NULL, 0, NULL, 0},
-    };
-    bool ok = true;
-    optind = 1;
-    for (int c; ok && (c = getopt_long(argc, argv, "", option, NULL)) != -1;) {
-        switch (c) {
-        case 's': ok = read_count("spp", 0, 1 << 20, &a->settings.spp); break;
-        case 'n': ok = read_count("samples", 16, 4096, &a->settings.samples); break;
-        case 'd': ok = read_count("max-depth", 2, 32, &a->settings.max_depth); break;
-        case 'p': a->settings.pictures_dir = optarg; break;
-        case 'j': a->json = true; break;
-        case 't': ok = read_count("threads", 0, 1024, &a->threads); break;
-        case 'h': a->help = true; return true;
-        default: ok = false;
-        }
-    }
-    if (ok && optind != argc - 2) {
-        fprintf(stderr, "unbaked evaluate: name the room's folder and the outputs' folder; --help "
-                        "says more\n");
-        ok = false;
-    }
-    if (ok) {
-        a->room = argv[optind];
-        a->outputs = argv[optind + 1];
-    }
-    return ok;
-}
 
 static void print_table(const struct evaluation *v) {
     const struct score *s = &v->score;
@@ -98,23 +47,34 @@ static void print_table(const struct evaluation *v) {
 }
 
 int evaluate_command(int argc, char **argv) {
-    struct arguments a = {.settings = evaluate_default_settings()};
+    struct evaluate_settings s = evaluate_default_settings();
+    uint32_t threads = 0;
+    const struct number_flag numbers[] = {
+        {"--spp", 0, 1 << 20, .count = &s.spp},
+        {"--samples", 16, 4096, .count = &s.samples},
+        {"--max-depth", 2, 32, .count = &s.max_depth},
+        {"--threads", 0, 1024, .count = &threads},
+    };
     struct evaluation evaluation;
+    struct arguments a;
     struct error err;
-    if (!read_arguments(argc, argv, &a))
+    if (!arguments_read(&a, argc, argv, evaluate_flags))
         return EXIT_USAGE;
-    if (a.help) {
-        fputs(usage, stdout);
-        return EXIT_SUCCESS;
-    }
-    struct parallel *pool = parallel_new((int)a.threads);
-    enum status status = evaluate_outputs(a.room, a.outputs, &a.settings, pool, &evaluation, &err);
+    if (arguments_have(&a, "--help"))
+        return COMMAND_HELP;
+    if (!arguments_numbers(&a, numbers, sizeof numbers / sizeof *numbers))
+        return EXIT_USAGE;
+    if (a.word_count != 2)
+        return COMMAND_MISUSED;
+    s.pictures_dir = arguments_value(&a, "--pictures", s.pictures_dir);
+    struct parallel *pool = parallel_new((int)threads);
+    enum status status = evaluate_outputs(a.words[0], a.words[1], &s, pool, &evaluation, &err);
     parallel_free(pool);
     if (status != STATUS_OK) {
         fprintf(stderr, "unbaked evaluate: %s\n", err.message);
         return EXIT_FAILURE;
     }
-    if (a.json) {
+    if (arguments_have(&a, "--json")) {
         cJSON *root = evaluate_to_json(&evaluation);
         char *text = json_text(root);
         puts(text);

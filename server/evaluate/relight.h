@@ -33,7 +33,4 @@ enum status relight(const char *outputs, const struct relight_settings *settings
  * turned and scaled. *out, of the same size, is the caller's. */
 void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out);
 
-/* `unbaked relight OUTPUTS [options]`: returns the exit status; argv[0] is "relight". */
-int relight_command(int argc, char **argv);
-
 #endif

@@ -1,0 +1,12 @@
+/* relight_command.h -- `unbaked relight OUTPUTS [OPTION]...`. */
+#ifndef UNBAKE_EVALUATE_RELIGHT_COMMAND_H
+#define UNBAKE_EVALUATE_RELIGHT_COMMAND_H
+
+#include "server/arguments.h"
+
+extern const struct flag relight_flags[];
+
+/* Returns an exit status, COMMAND_HELP or COMMAND_MISUSED; argv[0] is the command's name. */
+int relight_command(int argc, char **argv);
+
+#endif
