@@ -7,25 +7,25 @@ static bool is_worse(const struct best_item *a, const struct best_item *b) {
     return a->weight < b->weight || (a->weight == b->weight && a->index > b->index);
 }
 
-void best_init(struct best *best, struct best_item *item, size_t most) {
-    assert(most > 0);
-    *best = (struct best){.most = most, .item = item};
+void best_init(struct best *best, struct best_item *item, size_t capacity) {
+    assert(capacity > 0);
+    *best = (struct best){.capacity = capacity, .item = item};
 }
 
 bool best_takes(const struct best *best, float weight, uint32_t index) {
-    struct best_item offered = {.weight = weight, .index = index};
-    return weight > 0.0f && (best->count < best->most || is_worse(&best->item[0], &offered));
+    struct best_item candidate = {.weight = weight, .index = index};
+    return weight > 0.0f && (best->count < best->capacity || is_worse(&best->item[0], &candidate));
 }
 
 /* Moves an item up from a place whose parents are better, to below one that is worse. */
-static void rise(struct best *best, size_t at, struct best_item item) {
+static void sift_up(struct best *best, size_t at, struct best_item item) {
     for (; at > 0 && is_worse(&item, &best->item[(at - 1) / 2]); at = (at - 1) / 2)
         best->item[at] = best->item[(at - 1) / 2];
     best->item[at] = item;
 }
 
 /* Moves an item down from the top, to above those that are better. */
-static void sink(struct best *best, struct best_item item) {
+static void sift_down(struct best *best, struct best_item item) {
     size_t at = 0;
     for (size_t child = 1; child < best->count; child = 2 * at + 1) {
         if (child + 1 < best->count && is_worse(&best->item[child + 1], &best->item[child]))
@@ -41,11 +41,11 @@ static void sink(struct best *best, struct best_item item) {
 size_t best_put(struct best *best, float weight, uint32_t index) {
     if (!best_takes(best, weight, index))
         return BEST_NONE;
-    bool has_room = best->count < best->most;
+    bool has_room = best->count < best->capacity;
     struct best_item item = {weight, index, has_room ? (uint32_t)best->count : best->item[0].slot};
     if (has_room)
-        rise(best, best->count++, item);
+        sift_up(best, best->count++, item);
     else
-        sink(best, item);
+        sift_down(best, item);
     return item.slot;
 }

@@ -18,12 +18,12 @@ struct best_item {
 };
 
 struct best {
-    size_t count, most;
+    size_t count, capacity;
     struct best_item *item; /* [most] the heap; borrowed */
 };
 
 /* Keeps up to most > 0 of what is offered from now on. */
-void best_init(struct best *best, struct best_item *item, size_t most);
+void best_init(struct best *best, struct best_item *item, size_t capacity);
 
 /* Whether an item of this weight would be kept now. Never where it is not above 0, or not a number. */
 bool best_takes(const struct best *best, float weight, uint32_t index);

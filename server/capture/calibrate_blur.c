@@ -6,17 +6,17 @@
 
 #include "common/mem.h"
 
-#define LEAST_LOOKS 60
+#define MIN_OBSERVATIONS 60
 /* Blur of a sharp photograph at level 0, pixels of that level: the pixel, the lens and the binomial. */
 #define SHARP_PX 0.9
 /* Share of the neighbours' squared slopes below which a photograph counts as blurred. Sharp ones come
  * out at 0.6 and more, single ones of glossy places seen from afar at 0.39 (room bathroom). */
 #define BLURRED_RATIO 0.38
-#define LARGEST_RATIO 4.0f /* of one look, against outliers */
+#define RATIO_MAX 4.0f /* of one look, against outliers */
 
 /* What is summed for one photograph, by direction. */
 struct sharpness {
-    double own[2], others[2];
+    double sum[2], median[2];
     size_t count;
 };
 
@@ -68,15 +68,15 @@ static void compare_others(const struct tracks *tracks, const struct track *trac
         struct sharpness *s = &sharpness[frame[k]];
         s->count++;
         for (int d = 0; d < 2; d++) {
-            float rest[TRACK_OTHERS];
+            float other[TRACK_OTHERS];
             size_t count = 0;
             for (size_t i = 0; i < known; i++) {
                 if (i != k)
-                    rest[count++] = slope[i][d];
+                    other[count++] = slope[i][d];
             }
-            float middle = median_of(rest, count);
-            s->others[d] += (double)middle;
-            s->own[d] += (double)fminf(slope[k][d], LARGEST_RATIO * middle);
+            float median = median_of(other, count);
+            s->median[d] += (double)median;
+            s->sum[d] += (double)fminf(slope[k][d], RATIO_MAX * median);
         }
     }
 }
@@ -95,8 +95,8 @@ void calibrate_blur(struct scene *scene, const struct tracks *tracks, struct blu
     for (size_t f = 0; f < frames; f++) {
         const struct sharpness *s = &sharpness[f];
         double ratio = 1.0;
-        for (int d = 0; d < 2 && s->count >= LEAST_LOOKS; d++)
-            ratio = fmin(ratio, s->others[d] > 0.0 ? s->own[d] / s->others[d] : 1.0);
+        for (int d = 0; d < 2 && s->count >= MIN_OBSERVATIONS; d++)
+            ratio = fmin(ratio, s->median[d] > 0.0 ? s->sum[d] / s->median[d] : 1.0);
         if (ratio >= BLURRED_RATIO)
             continue;
         double width = SHARP_PX * sqrt(1.0 / (ratio * ratio) - 1.0) / (double)tracks->pyramid[f].scale;

@@ -9,17 +9,17 @@
 #include "server/capture/overlap.h"
 
 #define POINTS_PER_FRAME 60
-#define POINTS_LEAST 4000
-#define POINTS_MOST 24000
+#define POINTS_MIN 4000
+#define POINTS_MAX 24000
 
 /* A fault is taken up when it takes this share off the robust cost of the points held back, and
  * the gain stands this many standard errors above 0. Drift must be this large besides (rms, in
  * logarithms): what is glossy looks brighter in some photographs, which feigns 0.018 in the rooms
  * staircase2 and bathroom, where there is none. White balance and vignette are feigned by
  * nothing: 0.002 and 0.02 there. */
-#define LEAST_GAIN 0.04
-#define LEAST_SIGNIFICANCE 3.0
-#define LEAST_DRIFT 0.025
+#define MIN_GAIN 0.04
+#define MIN_SIGNIFICANCE 3.0
+#define MIN_DRIFT 0.025
 
 /* --- which faults there are ------------------------------------------------------------------- */
 
@@ -31,7 +31,7 @@ static size_t held_back_costs(const struct light_fit *f, const double *x, double
         if (!light_fit_is_held_back(f, p))
             continue;
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
-        double weight[OVERLAP_LOOKS_MAX], square[OVERLAP_LOOKS_MAX];
+        double weight[OVERLAP_OBSERVATIONS_MAX], square[OVERLAP_OBSERVATIONS_MAX];
         memcpy(weight, f->trust + first, count * sizeof *weight);
         for (int round = 0; round < 6; round++) {
             light_fit_residuals(f, x, p, weight, square);
@@ -57,16 +57,16 @@ static double gain_of(const double *base, const double *better, size_t count) {
         total += base[i];
     }
     double error = sqrt(fmax(squares - sum * sum / fmax((double)count, 1.0), 0.0));
-    return sum > LEAST_SIGNIFICANCE * error && total > 0.0 ? sum / total : 0.0;
+    return sum > MIN_SIGNIFICANCE * error && total > 0.0 ? sum / total : 0.0;
 }
 
 static double drift_of(const struct light_fit *f, const double *x) {
     double squares = 0.0;
     for (size_t t = 0; t < f->frames; t++) {
         double level = (x[3 * t] + x[3 * t + 1] + x[3 * t + 2]) / 3.0;
-        squares += f->told[t] ? level * level : 0.0;
+        squares += f->exposure_known[t] ? level * level : 0.0;
     }
-    return sqrt(squares / fmax(1.0, (double)(f->frames - f->untold_count)));
+    return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_exposure_count)));
 }
 
 /* Takes up faults one by one, the one that explains most first. Returns the model; x is its
@@ -77,27 +77,27 @@ static int choose_model(struct light_fit *f, double *x) {
     double *trial = mem_array(n, sizeof *trial), *best = mem_array(n, sizeof *best);
     int model = 0;
     for (;;) {
-        int taken = 0;
-        double most = LEAST_GAIN, scale;
+        int chosen = 0;
+        double most = MIN_GAIN, scale;
         light_fit_solve(f, model, x);
         scale = f->scale;
         held_back_costs(f, x, scale, base);
         for (int fault = LIGHT_DRIFT; fault < LIGHT_FAULTS; fault *= 2) {
-            if ((model & fault) || (fault == LIGHT_DRIFT && f->untold_count == f->frames))
+            if ((model & fault) || (fault == LIGHT_DRIFT && f->unknown_exposure_count == f->frames))
                 continue;
             memcpy(trial, x, n * sizeof *trial);
             light_fit_solve(f, model | fault, trial);
             used = held_back_costs(f, trial, scale, cost);
             double gain = gain_of(base, cost, used);
-            if (gain > most && (fault != LIGHT_DRIFT || drift_of(f, trial) > LEAST_DRIFT)) {
+            if (gain > most && (fault != LIGHT_DRIFT || drift_of(f, trial) > MIN_DRIFT)) {
                 most = gain;
-                taken = fault;
+                chosen = fault;
                 memcpy(best, trial, n * sizeof *best);
             }
         }
-        if (taken == 0)
+        if (chosen == 0)
             break;
-        model |= taken;
+        model |= chosen;
         memcpy(x, best, n * sizeof *x);
     }
     mem_free(best);
@@ -117,7 +117,7 @@ static double spread(const struct light_fit *f, const double *x) {
         for (int c = 0; c < 3; c++) {
             double sum = 0.0, square = 0.0;
             for (size_t i = first; i < first + count; i++) {
-                double y = (double)f->o->look[i].value[c] - light_fit_predict(f, x, i, c);
+                double y = (double)f->o->observation[i].value[c] - light_fit_predict(f, x, i, c);
                 sum += y;
                 square += y * y;
             }
@@ -136,7 +136,7 @@ static void fix_gauge(const struct light_fit *f, int model, double *x) {
             mean[c] += x[3 * t + c] / (double)f->frames;
     }
     double level = (mean[0] + mean[1] + mean[2]) / 3.0;
-    bool level_free = f->untold_count == f->frames || (model & LIGHT_DRIFT);
+    bool level_free = f->unknown_exposure_count == f->frames || (model & LIGHT_DRIFT);
     for (size_t t = 0; t < f->frames; t++) {
         for (size_t c = 0; c < 3; c++)
             x[3 * t + c] -= (level_free ? level : 0.0) + (model & LIGHT_COLOR ? mean[c] - level : 0.0);
@@ -147,7 +147,7 @@ static void apply(const struct light_fit *f, int model, const double *x, struct 
     for (size_t t = 0; t < f->frames; t++) {
         struct photograph *photo = &scene->photograph[f->views->train[t]];
         const double *g = x + 3 * t;
-        double level = f->told[t] ? 0.0 : (g[0] + g[1] + g[2]) / 3.0;
+        double level = f->exposure_known[t] ? 0.0 : (g[0] + g[1] + g[2]) / 3.0;
         photo->exposure *= (float)exp(level);
         if (model & (LIGHT_DRIFT | LIGHT_COLOR))
             photo->gain = rgb_mul(photo->gain, rgb_make((float)exp(g[0] - level), (float)exp(g[1] - level),
@@ -165,13 +165,13 @@ void calibrate_light(struct scene *scene, const struct views *views, const struc
     struct overlaps overlaps;
     struct light_fit fit;
     size_t points = POINTS_PER_FRAME * views->train_count;
-    points = points < POINTS_LEAST ? POINTS_LEAST : points > POINTS_MOST ? POINTS_MOST : points;
+    points = points < POINTS_MIN ? POINTS_MIN : points > POINTS_MAX ? POINTS_MAX : points;
     overlaps_make(&overlaps, views, atlas, inverse, points, pool);
     light_fit_init(&fit, views, &overlaps);
     double *x = mem_calloc(light_fit_parameter_count(&fit), sizeof *x);
-    *found = (struct light_found){.exposures_solved = fit.untold_count, .spread_before = spread(&fit, x)};
+    *found = (struct light_found){.exposures_solved = fit.unknown_exposure_count, .spread_before = spread(&fit, x)};
     int model = faults ? choose_model(&fit, x) : 0;
-    if (model != 0 || fit.untold_count > 0) {
+    if (model != 0 || fit.unknown_exposure_count > 0) {
         fit.all_points = true;
         light_fit_solve(&fit, model, x);
     }

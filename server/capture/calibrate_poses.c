@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "common/mem.h"
-#include "server/capture/pose_guests.h"
+#include "server/capture/held_out_poses.h"
 #include "server/capture/pose_solver.h"
 
 #define LAST_ROUNDS 4        /* after the first judgement, at the finest level */
@@ -19,7 +19,7 @@ static double shift_of(const struct pose_solver *s, size_t f, const struct camer
     double squares = 0.0;
     size_t count = 0;
     for (size_t i = 0; i < s->tracks->count[f]; i++) {
-        double square = pose_square_between(a, b, s->tracks->track[f * s->tracks->capacity + i].point);
+        double square = pose_squared_shift(a, b, s->tracks->track[f * s->tracks->capacity + i].point);
         if (isnan(square))
             continue;
         squares += square;
@@ -43,22 +43,22 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
 
 static void collect_evidence(const struct pose_solver *s, struct pose_evidence *evidence) {
     for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
-        struct pose_sight *sight = s->sight + i * POSE_SIGHTS_MAX;
-        for (size_t k = 0; k < pose_sight_count(s->track[i]); k++) {
-            const struct pose_frame *frame = &s->frame[sight[k].frame];
-            float x, y, depth_m, value = sight[k].value;
-            double look, weight[POSE_SIGHTS_MAX];
+        struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
+        for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
+            const struct pose_frame *frame = &s->frame[observation[k].frame];
+            float x, y, depth_m, value = observation[k].value;
+            double consensus, weight[POSE_OBSERVATIONS_MAX];
             if (!isfinite(value) || !camera_project(&frame->before, s->track[i]->point, &x, &y, &depth_m))
                 continue;
-            float old = pyramid_value(&s->tracks->pyramid[sight[k].frame], s->level, x, y);
-            sight[k].value = NAN; /* what the others agree on */
-            pose_weigh_track(s, i, &look, weight);
-            sight[k].value = value;
-            if (!isfinite(old) || !isfinite(look))
+            float old = pyramid_value(&s->tracks->pyramid[observation[k].frame], s->level, x, y);
+            observation[k].value = NAN; /* what the others agree on */
+            pose_weigh_track(s, i, &consensus, weight);
+            observation[k].value = value;
+            if (!isfinite(old) || !isfinite(consensus))
                 continue;
-            double cost = pose_robust((double)old - s->x[sight[k].offset] - look, frame->scale);
-            pose_evidence_add(&evidence[sight[k].frame], cost,
-                              pose_robust((double)value - s->x[sight[k].offset] - look, frame->scale));
+            double cost = pose_robust_cost((double)old - s->x[observation[k].offset] - consensus, frame->scale);
+            pose_evidence_add(&evidence[observation[k].frame], cost,
+                              pose_robust_cost((double)value - s->x[observation[k].offset] - consensus, frame->scale));
         }
     }
 }
@@ -72,49 +72,50 @@ static void judge(struct pose_solver *s, struct parallel *pool) {
     collect_evidence(s, evidence);
     for (size_t f = 0; f < s->frames; f++) {
         struct pose_frame *frame = &s->frame[f];
-        frame->shift_px = frame->stays ? 0.0 : shift_of(s, f, &frame->before, &frame->now);
-        if (frame->shift_px < POSE_LEAST_SHIFT_PX || !pose_convinces(&evidence[f]))
-            pose_put_back(s, f);
-        frame->shift_px = frame->stays ? 0.0 : frame->shift_px;
+        frame->shift_px = frame->is_fixed ? 0.0 : shift_of(s, f, &frame->before, &frame->now);
+        if (frame->shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&evidence[f]))
+            pose_reset(s, f);
+        frame->shift_px = frame->is_fixed ? 0.0 : frame->shift_px;
     }
     mem_free(evidence);
 }
 
 /* Robust cost of each held-back track with all frames where they are now, offsets fitted to that. */
 static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost) {
-    bool *stays = mem_array(s->frames + 1, sizeof *stays);
+    bool *is_fixed = mem_array(s->frames + 1, sizeof *is_fixed);
     for (size_t f = 0; f < s->frames; f++) {
-        stays[f] = s->frame[f].stays;
-        s->frame[f].stays = true;
+        is_fixed[f] = s->frame[f].is_fixed;
+        s->frame[f].is_fixed = true;
     }
     run_rounds(s, 0, 2, pool); /* of offsets only */
     for (size_t f = 0; f < s->frames; f++)
-        s->frame[f].stays = stays[f];
+        s->frame[f].is_fixed = is_fixed[f];
     for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
-        const struct pose_sight *sight = s->sight + i * POSE_SIGHTS_MAX;
-        double look, weight[POSE_SIGHTS_MAX], count = 0.0, *sum = &cost[i / POSE_HELD_BACK_EVERY];
-        pose_weigh_track(s, i, &look, weight);
+        const struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
+        double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, *sum = &cost[i / POSE_HELD_BACK_EVERY];
+        pose_weigh_track(s, i, &consensus, weight);
         *sum = 0.0;
-        for (size_t k = 0; k < pose_sight_count(s->track[i]) && isfinite(look); k++) {
-            if (!isfinite(sight[k].value))
+        for (size_t k = 0; k < pose_observation_count(s->track[i]) && isfinite(consensus); k++) {
+            if (!isfinite(observation[k].value))
                 continue;
-            *sum += pose_robust((double)sight[k].value - s->x[sight[k].offset] - look, COMMON_SCALE);
+            *sum +=
+                pose_robust_cost((double)observation[k].value - s->x[observation[k].offset] - consensus, COMMON_SCALE);
             count += 1.0;
         }
         *sum = count > 0.0 ? *sum / count : NAN;
     }
-    mem_free(stays);
+    mem_free(is_fixed);
 }
 
 /* Whether all photographs together agree clearly better than at first. */
-static bool all_convince(const double *before, const double *now, size_t count) {
+static bool all_improved(const double *before, const double *now, size_t count) {
     struct pose_evidence e = {0};
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(before[i]) || !isfinite(now[i]))
             continue;
         pose_evidence_add(&e, before[i], now[i]);
     }
-    return pose_convinces(&e);
+    return pose_is_improved(&e);
 }
 
 /* --- the whole -------------------------------------------------------------------------------- */
@@ -139,10 +140,10 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     for (int level = coarsest_level(tracks); level >= 0; level--)
         run_rounds(&s, level, POSE_ROUNDS, pool);
     costs_now(&s, pool, now);
-    bool convincing = all_convince(before, now, held_back - 1);
+    bool convincing = all_improved(before, now, held_back - 1);
     mem_free(before);
     for (size_t f = 0; f < s.frames && !convincing; f++)
-        pose_put_back(&s, f);
+        pose_reset(&s, f);
     judge(&s, pool);
     run_rounds(&s, 0, LAST_ROUNDS, pool);
     judge(&s, pool);
@@ -151,7 +152,7 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     for (size_t f = 0; f < s.frames; f++) {
         const struct pose_frame *frame = &s.frame[f];
         found->shift[f] = (float)frame->shift_px;
-        if (frame->stays)
+        if (frame->is_fixed)
             continue;
         scene->photograph[views->train[f]].camera = frame->now;
         squares += frame->shift_px * frame->shift_px;
@@ -159,7 +160,8 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     }
     found->shift_px = found->moved_count ? sqrt(squares / (double)found->moved_count) : 0.0;
     if (found->moved_count > 0)
-        found->guests_moved = pose_guests(scene, &s, coarsest_level(tracks), pool, &found->guests_shift_px);
+        found->held_out_moved_count =
+            held_out_poses_align(scene, &s, coarsest_level(tracks), pool, &found->held_out_shift_px);
     pose_solver_release(&s);
 }
 

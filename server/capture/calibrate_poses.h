@@ -15,12 +15,12 @@
 struct poses_found {
     size_t moved_count;
     double shift_px;  /* rms over the photographs that were moved, pixels */
-    size_t guests_moved; /* held-out ones */
-    double guests_shift_px;
+    size_t held_out_moved_count; /* held-out ones */
+    double held_out_shift_px;
     float *shift;     /* [train_count] rms over a photograph's tracks, 0 where it stays; owned */
 };
 
-/* Moves the cameras of training photographs and, where any is moved, those of held-out ones (pose_guests.h). The tracks
+/* Moves the cameras of training photographs and, where any is moved, those of held-out ones (held_out_poses.h). The tracks
  * stay valid, but what views knows of depth edges is then of the old poses. The same for any number of threads. */
 void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct parallel *pool,
                      struct poses_found *found);

@@ -6,10 +6,10 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define WINDOW 2       /* pixels to either side */
-#define WINDOW_LEAST 9 /* pixels that must show the same surface */
-#define SATURATED_LEAST 0.3f
-#define DEVIATIONS 3.0f /* noise goes so far */
+#define WINDOW_RADIUS 2       /* pixels to either side */
+#define WINDOW_MIN_PIXELS 9 /* pixels that must show the same surface */
+#define SATURATED_SHARE 0.3f
+#define NOISE_DEVIATIONS 3.0f /* noise goes so far */
 
 struct clip_job {
     const struct views *views;
@@ -19,17 +19,19 @@ struct clip_job {
 };
 
 /* What the pixels around one, which show the same surface and nothing else, tell of a channel. */
-struct around {
-    float count, saturated, below; /* `below`: the sum of the values that do not saturate */
+struct neighbourhood {
+    float count, saturated, unsaturated_sum; /* `below`: the sum of the values that do not saturate */
 };
 
-static struct around look_around(const struct clip_job *job, long x0, long y0, int channel) {
+static struct neighbourhood count_neighbourhood(const struct clip_job *job, long x0, long y0, int channel) {
     const struct camera *camera = &job->photo->camera;
     const uint8_t *owner = job->views->owner[job->train], *edge = job->views->edge[job->train];
     uint8_t own = owner[y0 * (long)camera->width + x0];
-    struct around a = {0.0f, 0.0f, 0.0f};
-    for (long y = y0 > WINDOW ? y0 - WINDOW : 0; y <= y0 + WINDOW && y < (long)camera->height; y++) {
-        for (long x = x0 > WINDOW ? x0 - WINDOW : 0; x <= x0 + WINDOW && x < (long)camera->width; x++) {
+    struct neighbourhood a = {0.0f, 0.0f, 0.0f};
+    for (long y = y0 > WINDOW_RADIUS ? y0 - WINDOW_RADIUS : 0; y <= y0 + WINDOW_RADIUS && y < (long)camera->height;
+         y++) {
+        for (long x = x0 > WINDOW_RADIUS ? x0 - WINDOW_RADIUS : 0; x <= x0 + WINDOW_RADIUS && x < (long)camera->width;
+             x++) {
             size_t at = (size_t)(y * (long)camera->width + x);
             if (owner[at] != own || edge[at] == VIEWS_EDGE || (job->photo->mask && !job->photo->mask[at]))
                 continue;
@@ -37,25 +39,25 @@ static struct around look_around(const struct clip_job *job, long x0, long y0, i
             bool saturates = photograph_clips(job->photo, at, channel, value);
             a.count += 1.0f;
             a.saturated += saturates;
-            a.below += saturates ? 0.0f : value;
+            a.unsaturated_sum += saturates ? 0.0f : value;
         }
     }
     return a;
 }
 
-static bool is_white(const struct clip_job *job, long x, long y, int channel) {
+static bool is_saturated(const struct clip_job *job, long x, long y, int channel) {
     float clip = job->photo->clip;
     size_t at = (size_t)(y * (long)job->photo->camera.width + x);
     float value = image_float_from_half(job->photo->pixel[at][channel]);
     bool clips = photograph_clips(job->photo, at, channel, value);
-    struct around a = look_around(job, x, y, channel);
-    if (a.saturated == 0.0f || a.count < WINDOW_LEAST)
+    struct neighbourhood a = count_neighbourhood(job, x, y, channel);
+    if (a.saturated == 0.0f || a.count < WINDOW_MIN_PIXELS)
         return clips;
     float noise = noise_deviation_of_value(job->noise, job->train, &job->photo->camera, (float)x, (float)y, clip);
-    float least = clip - DEVIATIONS * noise;
-    if (a.saturated >= SATURATED_LEAST * a.count)
-        return value >= least;
-    return clips && a.below / (a.count - a.saturated) < least;
+    float threshold = clip - NOISE_DEVIATIONS * noise;
+    if (a.saturated >= SATURATED_SHARE * a.count)
+        return value >= threshold;
+    return clips && a.unsaturated_sum / (a.count - a.saturated) < threshold;
 }
 
 static void mark_row(void *user, size_t row, int thread) {
@@ -65,7 +67,7 @@ static void mark_row(void *user, size_t row, int thread) {
     for (uint32_t x = 0; x < width; x++) {
         job->photo->saturated[row * width + x] = 0;
         for (int c = 0; c < 3; c++)
-            job->photo->saturated[row * width + x] |= (uint8_t)(is_white(job, (long)x, (long)row, c) << c);
+            job->photo->saturated[row * width + x] |= (uint8_t)(is_saturated(job, (long)x, (long)row, c) << c);
     }
 }
 

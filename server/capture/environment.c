@@ -22,12 +22,12 @@
 #define MAX_GRID 4
 /* Weight of a look-up within a pixel of the opening's rim, where poses that are a little wrong mix
  * light and frame. */
-#define RIM_TRUST 0.1f
+#define RIM_WEIGHT 0.1f
 /* Values this many deviations from the median take no part in the mean. */
 #define OUTLIER_DEVIATIONS 3.0f
 /* The least deviation, as a part of the median: two photographs that agree by chance must not make
  * a third one an outlier. */
-#define LEAST_DEVIATION 0.05f
+#define MIN_DEVIATION 0.05f
 
 /* A photograph that looks out somewhere. */
 struct window {
@@ -38,7 +38,7 @@ struct window {
     int grid;           /* places over a cell, along each side */
 };
 
-struct gather {
+struct environment_gather {
     const struct views *views;
     struct environment *e;
     size_t window_count;
@@ -50,7 +50,7 @@ struct gather {
 
 static void find_window(void *user, size_t train, int thread) {
     (void)thread;
-    struct gather *g = user;
+    struct environment_gather *g = user;
     struct window *w = &g->window[train];
     const struct views *v = g->views;
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
@@ -76,12 +76,12 @@ static void find_window(void *user, size_t train, int thread) {
     w->cosine = angle < (float)PI ? cosf(angle) : -1.0f;
 }
 
-static const struct camera *camera_of(const struct gather *g, const struct window *w) {
+static const struct camera *camera_of(const struct environment_gather *g, const struct window *w) {
     return &g->views->scene->photograph[g->views->train[w->train]].camera;
 }
 
 /* Keeps the photographs that look out and returns the width of the map; 0: there are none. */
-static uint32_t find_windows(struct gather *g, struct parallel *pool) {
+static uint32_t find_windows(struct environment_gather *g, struct parallel *pool) {
     size_t train_count = g->views->train_count;
     g->window = mem_calloc(train_count + 1, sizeof *g->window);
     parallel_for(pool, train_count, find_window, g);
@@ -111,32 +111,32 @@ static uint32_t find_windows(struct gather *g, struct parallel *pool) {
 
 /* The mean of what agrees with the median. Sorts the values. */
 static float combine(struct censored *value, size_t count, bool *is_bound) {
-    float middle = censored_quantile(value, count, 0.5f, is_bound);
+    float median = censored_quantile(value, count, 0.5f, is_bound);
     if (*is_bound || count < 3)
-        return middle;
+        return median;
     /* The median absolute deviation is the farthest when the farther half is gone. */
     size_t first = 0, end = count;
-    float half = 0.0f, gone = 0.0f, deviation = 0.0f, weight = 0.0f, sum = 0.0f;
+    float half = 0.0f, removed = 0.0f, deviation = 0.0f, weight = 0.0f, sum = 0.0f;
     for (size_t i = 0; i < count; i++)
         half += value[i].is_bound ? 0.0f : 0.5f * value[i].weight;
-    while (first < end && gone < half) {
-        bool is_low = middle - value[first].value > value[end - 1].value - middle;
-        const struct censored *far = &value[is_low ? first++ : --end];
-        gone += far->is_bound ? 0.0f : far->weight;
-        deviation = fabsf(far->value - middle);
+    while (first < end && removed < half) {
+        bool take_low = median - value[first].value > value[end - 1].value - median;
+        const struct censored *far = &value[take_low ? first++ : --end];
+        removed += far->is_bound ? 0.0f : far->weight;
+        deviation = fabsf(far->value - median);
     }
-    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, LEAST_DEVIATION * fabsf(middle));
+    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, MIN_DEVIATION * fabsf(median));
     for (size_t i = 0; i < count; i++) {
-        if (value[i].is_bound || fabsf(value[i].value - middle) > limit)
+        if (value[i].is_bound || fabsf(value[i].value - median) > limit)
             continue;
         weight += value[i].weight;
         sum += value[i].weight * value[i].value;
     }
-    return weight > 0.0f ? sum / weight : middle;
+    return weight > 0.0f ? sum / weight : median;
 }
 
 /* Solid angle of a cell. */
-static double cell_angle(const struct environment *e, size_t row) {
+static double cell_solid_angle(const struct environment *e, size_t row) {
     return latlong_pixel_angle(e->map.width, e->map.height, (uint32_t)row);
 }
 
@@ -156,12 +156,12 @@ static struct cell cell_at(const struct image *map, size_t column, size_t row) {
 }
 
 /* What a photograph shows of a cell, by channel; false: nothing. */
-static bool look_out(const struct gather *g, const struct window *w, const struct cell *cell,
+static bool sample_window(const struct environment_gather *g, const struct window *w, const struct cell *cell,
                      struct censored value[3]) {
     const struct views *v = g->views;
     const struct photograph *photo = &v->scene->photograph[v->train[w->train]];
     vec3 origin = camera_origin(&photo->camera);
-    float sum[3] = {0}, trust_sum = 0.0f;
+    float sum[3] = {0}, tap_weight_sum = 0.0f;
     bool saturated[3] = {false, false, false};
     for (int i = 0; i < w->grid * w->grid; i++) {
         float dx = ((float)(i % w->grid) + 0.5f) / (float)w->grid - 0.5f;
@@ -173,26 +173,26 @@ static bool look_out(const struct gather *g, const struct window *w, const struc
         if (!camera_project(&photo->camera, far, &x, &y, &depth_m) ||
             !views_open(v, w->train, x, y, 0) || !photograph_sample(photo, x, y, &sample))
             continue;
-        float trust = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_TRUST;
+        float tap_weight = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_WEIGHT;
         const float radiance[3] = {sample.radiance.r, sample.radiance.g, sample.radiance.b};
         for (int c = 0; c < 3; c++) {
-            sum[c] += trust * radiance[c];
+            sum[c] += tap_weight * radiance[c];
             saturated[c] |= sample.saturated[c];
         }
-        trust_sum += trust;
+        tap_weight_sum += tap_weight;
     }
-    float weight = photo->exposure * trust_sum / (float)(w->grid * w->grid);
-    for (int c = 0; c < 3 && trust_sum > 0.0f; c++)
-        value[c] = (struct censored){sum[c] / trust_sum, weight, saturated[c]};
-    return trust_sum > 0.0f;
+    float weight = photo->exposure * tap_weight_sum / (float)(w->grid * w->grid);
+    for (int c = 0; c < 3 && tap_weight_sum > 0.0f; c++)
+        value[c] = (struct censored){sum[c] / tap_weight_sum, weight, saturated[c]};
+    return tap_weight_sum > 0.0f;
 }
 
 /* Standard deviation of the logarithm of the channels' mean. */
-struct spread {
+struct environment_spread {
     double count, sum, square;
 };
 
-static void spread_add(struct spread *s, const struct censored value[3]) {
+static void spread_add(struct environment_spread *s, const struct censored value[3]) {
     float mean = (value[0].value + value[1].value + value[2].value) / 3.0f;
     if (value[0].is_bound || value[1].is_bound || value[2].is_bound || !(mean > 0.0f))
         return;
@@ -202,20 +202,20 @@ static void spread_add(struct spread *s, const struct censored value[3]) {
     s->square += x * x;
 }
 
-static float spread_of(const struct spread *s) {
+static float spread_of(const struct environment_spread *s) {
     double squares = s->count > 1.0 ? s->square - s->sum * s->sum / s->count : 0.0;
     return squares > 0.0 ? (float)sqrt(squares / (s->count - 1.0)) : 0.0f;
 }
 
-static void gather_cell(struct gather *g, size_t column, size_t row, struct censored *scratch) {
+static void gather_cell(struct environment_gather *g, size_t column, size_t row, struct censored *scratch) {
     struct environment *e = g->e;
     size_t count = 0, at = row * e->map.width + column;
     struct cell cell = cell_at(&e->map, column, row);
-    struct spread spread = {0};
+    struct environment_spread spread = {0};
     for (size_t i = 0; i < g->window_count; i++) {
         const struct window *w = &g->window[i];
         struct censored value[3];
-        if (vec3_dot(cell.centre, w->axis) < w->cosine || !look_out(g, w, &cell, value))
+        if (vec3_dot(cell.centre, w->axis) < w->cosine || !sample_window(g, w, &cell, value))
             continue;
         for (size_t c = 0; c < 3; c++)
             scratch[c * g->window_count + count] = value[c];
@@ -226,9 +226,9 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct cens
         return;
     bool is_bound = false;
     for (size_t c = 0; c < 3; c++) {
-        bool only_bound;
-        e->map.pixel[3 * at + c] = fmaxf(combine(scratch + c * g->window_count, count, &only_bound), 0.0f);
-        is_bound |= only_bound;
+        bool channel_is_bound;
+        e->map.pixel[3 * at + c] = fmaxf(combine(scratch + c * g->window_count, count, &channel_is_bound), 0.0f);
+        is_bound |= channel_is_bound;
     }
     e->confidence.pixel[2 * at] = (float)count;
     e->confidence.pixel[2 * at + 1] = spread_of(&spread);
@@ -236,7 +236,7 @@ static void gather_cell(struct gather *g, size_t column, size_t row, struct cens
 }
 
 static void gather_row(void *user, size_t row, int thread) {
-    struct gather *g = user;
+    struct environment_gather *g = user;
     for (size_t column = 0; column < g->e->map.width; column++)
         gather_cell(g, column, row, g->scratch + (size_t)thread * 3 * g->window_count);
 }
@@ -268,23 +268,23 @@ static bool is_seen(const struct environment *e, size_t cell) {
 }
 
 /* Median over directions whose light is told, the mean of the channels; 0 where none is. */
-static float median_told(const struct environment *e) {
+static float median_measured(const struct environment *e) {
     size_t cells = (size_t)e->map.width * e->map.height, count = 0;
-    float *told = mem_array(cells, sizeof *told);
+    float *measured = mem_array(cells, sizeof *measured);
     for (size_t i = 0; i < cells; i++) {
         const float *p = e->map.pixel + 3 * i;
         if (is_seen(e, i) && !e->is_bound[i])
-            told[count++] = rgb_mean(rgb_make(p[0], p[1], p[2]));
+            measured[count++] = rgb_mean(rgb_make(p[0], p[1], p[2]));
     }
-    float median = quantile(told, count, 0.5);
-    mem_free(told);
+    float median = quantile(measured, count, 0.5);
+    mem_free(measured);
     return median;
 }
 
 /* Where only frames of long exposure look out, their bound lies below what shorter ones show elsewhere, and tells less
  * than that does: such directions count as unseen. Under one exposure no bound is below what is told. */
-static void forget_weak_bounds(struct environment *e) {
-    float median = median_told(e);
+static void drop_weak_bounds(struct environment *e) {
+    float median = median_measured(e);
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
         const float *p = e->map.pixel + 3 * i;
         if (e->is_bound[i] && rgb_mean(rgb_make(p[0], p[1], p[2])) < median) {
@@ -298,7 +298,7 @@ static void forget_weak_bounds(struct environment *e) {
 static double saturated_share(const struct environment *e) {
     double seen = 0.0, saturated = 0.0;
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
-        double angle = is_seen(e, i) ? cell_angle(e, i / e->map.width) : 0.0;
+        double angle = is_seen(e, i) ? cell_solid_angle(e, i / e->map.width) : 0.0;
         seen += angle;
         saturated += e->is_bound[i] ? angle : 0.0;
     }
@@ -313,7 +313,7 @@ void environment_update_figures(struct environment *e) {
     float *spread = mem_array(cells, sizeof *spread);
     for (size_t i = 0; i < cells; i++) {
         const float *p = e->map.pixel + 3 * i, *known = e->confidence.pixel + 2 * i;
-        double angle = cell_angle(e, i / e->map.width);
+        double angle = cell_solid_angle(e, i / e->map.width);
         double light = angle * (double)rgb_luminance(rgb_make(p[0], p[1], p[2]));
         all += angle;
         luminance += light;
@@ -339,7 +339,7 @@ static void make_images(struct environment *e, uint32_t width) {
 }
 
 bool environment_make(struct environment *e, const struct views *views, struct parallel *pool) {
-    struct gather g = {.views = views, .e = e};
+    struct environment_gather g = {.views = views, .e = e};
     double saturated = -1.0;
     *e = (struct environment){0};
     uint32_t width = find_windows(&g, pool);
@@ -349,7 +349,7 @@ bool environment_make(struct environment *e, const struct views *views, struct p
         parallel_for(pool, e->map.height, gather_row, &g);
         join_pole(e, 0);
         join_pole(e, e->map.height - 1);
-        forget_weak_bounds(e);
+        drop_weak_bounds(e);
         saturated = saturated_share(e);
     }
     bool any = saturated >= 0.0; /* pixels may be open and yet masked */
@@ -379,7 +379,7 @@ bool environment_is_seen(const struct environment *e, vec3 direction) {
     return e->confidence.pixel[2 * environment_cell(e, direction)] > 0.0f;
 }
 
-bool environment_is_told(const struct environment *e, vec3 direction) {
+bool environment_is_measured(const struct environment *e, vec3 direction) {
     size_t cell = environment_cell(e, direction);
     return e->confidence.pixel[2 * cell] > 0.0f && !(e->is_bound && e->is_bound[cell]);
 }

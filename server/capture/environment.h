@@ -55,7 +55,7 @@ size_t environment_cell(const struct environment *e, vec3 direction);
 bool environment_is_seen(const struct environment *e, vec3 direction);
 
 /* Whether a photograph tells how bright it is there: shows it, and does not saturate. */
-bool environment_is_told(const struct environment *e, vec3 direction);
+bool environment_is_measured(const struct environment *e, vec3 direction);
 
 /* Unit direction of the centre of a pixel of the map. */
 vec3 environment_direction(const struct environment *e, size_t column, size_t row);

@@ -9,7 +9,7 @@
 #include "server/scene/latlong.h"
 
 /* What spreads is at most this many times the typical known luminance. */
-#define SPREAD_LIMIT 4.0
+#define LUMINANCE_LIMIT 4.0
 #define SWEEPS 32
 /* A row counts for another by the distance to the power of minus this: a tenth farther than the nearest a tenth of it. */
 #define ROW_FALLOFF 24.0
@@ -75,15 +75,15 @@ static rgb *row_colors(const struct image *map, const struct image *known, doubl
 /* --- the rest --------------------------------------------------------------------------------------- */
 
 /* One level of the pyramid: by how much colours differ from their row's, and how well that is known, 0 to 1. */
-struct level {
+struct fill_level {
     uint32_t width, height;
     float (*value)[4]; /* [height][width]; owned */
     float *angle;      /* [height] solid angle of a cell of each row; owned */
 };
 
-static void start_finest(struct level *l, const struct image *map, const struct image *known, const rgb *row_color,
+static void start_finest(struct fill_level *l, const struct image *map, const struct image *known, const rgb *row_color,
                          double limit) {
-    *l = (struct level){.width = map->width, .height = map->height};
+    *l = (struct fill_level){.width = map->width, .height = map->height};
     l->value = mem_calloc((size_t)l->width * l->height, sizeof *l->value);
     l->angle = mem_array(l->height, sizeof *l->angle);
     for (uint32_t y = 0; y < l->height; y++)
@@ -99,8 +99,8 @@ static void start_finest(struct level *l, const struct image *map, const struct 
 }
 
 /* Half the size: means by solid angle and knowledge. One known cell of four makes a known one. */
-static void pull(const struct level *fine, struct level *coarse) {
-    *coarse = (struct level){.width = fine->width / 2, .height = fine->height / 2};
+static void pull(const struct fill_level *fine, struct fill_level *coarse) {
+    *coarse = (struct fill_level){.width = fine->width / 2, .height = fine->height / 2};
     coarse->value = mem_calloc((size_t)coarse->width * coarse->height, sizeof *coarse->value);
     coarse->angle = mem_array(coarse->height, sizeof *coarse->angle);
     for (uint32_t y = 0; y < coarse->height; y++) {
@@ -125,7 +125,7 @@ static void pull(const struct level *fine, struct level *coarse) {
 }
 
 /* Mixes the coarser level, interpolated, into what is not known. */
-static void push(const struct level *coarse, struct level *fine) {
+static void push(const struct fill_level *coarse, struct fill_level *fine) {
     for (uint32_t y = 0; y < fine->height; y++) {
         float row = clampf(0.5f * ((float)y + 0.5f) - 0.5f, 0.0f, (float)(coarse->height - 1));
         uint32_t top = (uint32_t)row, low = top + 1 < coarse->height ? top + 1 : top;
@@ -149,7 +149,7 @@ static void push(const struct level *coarse, struct level *fine) {
 }
 
 /* One Gauss-Seidel sweep of the Laplace equation over the inner rows; known cells hold still. */
-static void diffuse(struct level *l) {
+static void diffuse(struct fill_level *l) {
     uint32_t w = l->width;
     double step_x = 2.0 * PI / w, step_y = latlong_polar(l->height, 1.0);
     for (uint32_t y = 1; y + 1 < l->height; y++) {
@@ -170,19 +170,19 @@ static void diffuse(struct level *l) {
 }
 
 /* A pole is one direction: the mean of the row beside it. */
-static void join_pole(struct level *l, uint32_t pole, uint32_t beside) {
+static void join_pole(struct fill_level *l, uint32_t pole, uint32_t neighbour) {
     float(*row)[4] = l->value + (size_t)pole * l->width;
     double sum[3] = {0};
     for (uint32_t x = 0; x < l->width; x++)
         for (int c = 0; c < 3; c++)
-            sum[c] += (double)l->value[(size_t)beside * l->width + x][c] / l->width;
+            sum[c] += (double)l->value[(size_t)neighbour * l->width + x][c] / l->width;
     for (uint32_t x = 0; x < l->width && row[0][3] < 1.0f; x++)
         for (int c = 0; c < 3; c++)
             row[x][c] = (float)sum[c];
 }
 
 /* Two cells: what is not known of either is their mean. */
-static void fill_coarsest(struct level *l) {
+static void fill_coarsest(struct fill_level *l) {
     float(*v)[4] = l->value;
     float weight = v[0][3] + v[1][3];
     for (int c = 0; c < 3; c++) {
@@ -193,9 +193,9 @@ static void fill_coarsest(struct level *l) {
 }
 
 void fill_sphere(struct image *map, const struct image *known) {
-    struct level level[32];
+    struct fill_level level[32];
     int count = 1;
-    double limit = SPREAD_LIMIT * typical_luminance(map, known);
+    double limit = LUMINANCE_LIMIT * typical_luminance(map, known);
     rgb *row_color = row_colors(map, known, limit);
     start_finest(&level[0], map, known, row_color, limit);
     for (; level[count - 1].height > 1; count++)
@@ -220,54 +220,54 @@ void fill_sphere(struct image *map, const struct image *known) {
 
 /* --- how far what is known is ----------------------------------------------------------------------- */
 
-#define NONE UINT32_MAX
+#define UNKNOWN UINT32_MAX
 
 /* Of each pixel the nearest known one, as its neighbours tell it (Danielsson 1980). */
-struct nearest {
+struct nearest_known {
     uint32_t width, height;
     uint32_t *of; /* [height][width] NONE: not told yet */
     vec2 *row;    /* [height] sine and cosine of the polar angle */
     vec2 *column; /* [width] of the azimuth */
 };
 
-static float cosine_between(const struct nearest *n, uint32_t a, uint32_t b) {
+static float cosine_between(const struct nearest_known *n, uint32_t a, uint32_t b) {
     vec2 row_a = n->row[a / n->width], row_b = n->row[b / n->width];
     vec2 column_a = n->column[a % n->width], column_b = n->column[b % n->width];
     float turn = column_a.x * column_b.x + column_a.y * column_b.y;
     return row_a.x * row_b.x * turn + row_a.y * row_b.y;
 }
 
-static void tell(struct nearest *n, uint32_t from, uint32_t to) {
+static void propagate(struct nearest_known *n, uint32_t from, uint32_t to) {
     uint32_t known = n->of[from];
-    if (known != NONE && (n->of[to] == NONE || cosine_between(n, known, to) > cosine_between(n, n->of[to], to)))
+    if (known != UNKNOWN && (n->of[to] == UNKNOWN || cosine_between(n, known, to) > cosine_between(n, n->of[to], to)))
         n->of[to] = known;
 }
 
 /* One row of a sweep: from the row before it, then along it both ways. */
-static void tell_row(struct nearest *n, uint32_t y, uint32_t before) {
+static void propagate_row(struct nearest_known *n, uint32_t y, uint32_t before) {
     uint32_t w = n->width, here = y * w, there = before * w;
     for (uint32_t x = 0; x < w && before != y; x++) {
-        tell(n, there + x, here + x);
-        tell(n, there + (x + 1) % w, here + x);
-        tell(n, there + (x + w - 1) % w, here + x);
+        propagate(n, there + x, here + x);
+        propagate(n, there + (x + 1) % w, here + x);
+        propagate(n, there + (x + w - 1) % w, here + x);
     }
     for (uint32_t i = 0; i < 2 * w; i++) /* twice: around the seam */
-        tell(n, here + i % w, here + (i + 1) % w);
+        propagate(n, here + i % w, here + (i + 1) % w);
     for (uint32_t i = 2 * w; i > 0; i--)
-        tell(n, here + i % w, here + (i - 1) % w);
+        propagate(n, here + i % w, here + (i - 1) % w);
 }
 
 /* Radians to the nearest known pixel. */
-static float angle_at(const struct nearest *n, uint32_t pixel) {
+static float angle_at(const struct nearest_known *n, uint32_t pixel) {
     uint32_t known = n->of[pixel];
-    if (known == NONE)
+    if (known == UNKNOWN)
         return INFINITY;
     return known == pixel ? 0.0f : acosf(clampf(cosine_between(n, known, pixel), -1.0f, 1.0f));
 }
 
-static void nearest_init(struct nearest *n, const struct image *known) {
+static void nearest_init(struct nearest_known *n, const struct image *known) {
     size_t pixels = (size_t)known->width * known->height;
-    *n = (struct nearest){known->width, known->height, mem_array(pixels, sizeof *n->of),
+    *n = (struct nearest_known){known->width, known->height, mem_array(pixels, sizeof *n->of),
                           mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
     for (uint32_t y = 0; y < n->height; y++) {
         double theta = latlong_polar(n->height, y);
@@ -278,16 +278,16 @@ static void nearest_init(struct nearest *n, const struct image *known) {
         n->column[x] = (vec2){(float)sin(phi), (float)cos(phi)};
     }
     for (size_t i = 0; i < pixels; i++)
-        n->of[i] = known->pixel[i * known->channel_count] > 0.0f ? (uint32_t)i : NONE;
+        n->of[i] = known->pixel[i * known->channel_count] > 0.0f ? (uint32_t)i : UNKNOWN;
 }
 
 void fill_angles(const struct image *known, float *angle) {
-    struct nearest n;
+    struct nearest_known n;
     nearest_init(&n, known);
     for (uint32_t y = 0; y < n.height; y++)
-        tell_row(&n, y, y > 0 ? y - 1 : y);
+        propagate_row(&n, y, y > 0 ? y - 1 : y);
     for (uint32_t y = n.height; y-- > 0;)
-        tell_row(&n, y, y + 1 < n.height ? y + 1 : y);
+        propagate_row(&n, y, y + 1 < n.height ? y + 1 : y);
     for (uint32_t i = 0; i < n.width * n.height; i++)
         angle[i] = angle_at(&n, i);
     mem_free(n.of);

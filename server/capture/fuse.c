@@ -16,7 +16,7 @@
 /* Noise of a look-up between four pixels over that of one, on average. */
 #define BILINEAR_DEVIATION 0.67f
 /* Photographs of which the mean is taken, those of the greatest weights: 24 KiB a thread, however many there are. */
-#define MAX_LOOKS 256
+#define MAX_OBSERVATIONS 256
 #define CHUNK 1024 /* valid texels a work item */
 
 struct fuse_job {
@@ -28,32 +28,32 @@ struct fuse_job {
 };
 
 /* What the photographs show of a texel: the best of those that measured it or, where none did, of the bounds. */
-struct looks {
-    bool measured;
+struct fuse_observations {
+    bool is_measured;
     struct best best;
-    struct best_item item[MAX_LOOKS];
-    struct robust_sample look[MAX_LOOKS];
-    struct view view[MAX_LOOKS];
-    float mixing[MAX_LOOKS];          /* see views_mixing */
+    struct best_item item[MAX_OBSERVATIONS];
+    struct robust_sample observation[MAX_OBSERVATIONS];
+    struct view view[MAX_OBSERVATIONS];
+    float mixing[MAX_OBSERVATIONS];          /* see views_mixing */
     size_t seen, clean;               /* of all photographs, as the next */
     double gray_sum, gray_square_sum;
 };
 
 /* The first that measured makes what bounds were met worthless. */
-static void add_look(const struct fuse_job *job, struct looks *l, const struct photograph_sample *s, const struct view *view,
-                     uint32_t triangle) {
+static void add_observation(const struct fuse_job *job, struct fuse_observations *l, const struct photograph_sample *s,
+                            const struct view *view, uint32_t triangle) {
     const struct views *v = job->views;
-    bool measured = !s->saturated[0] && !s->saturated[1] && !s->saturated[2];
+    bool is_measured = !s->saturated[0] && !s->saturated[1] && !s->saturated[2];
     float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + LOG_FLOOR * v->median_radiance);
     int edge = views_edge(v, view, triangle);
     l->seen++;
     l->clean += edge < VIEWS_EDGE;
     l->gray_sum += (double)gray;
     l->gray_square_sum += (double)gray * (double)gray;
-    if (measured && !l->measured)
-        best_init(&l->best, l->item, MAX_LOOKS);
-    l->measured |= measured;
-    if (measured != l->measured)
+    if (is_measured && !l->is_measured)
+        best_init(&l->best, l->item, MAX_OBSERVATIONS);
+    l->is_measured |= is_measured;
+    if (is_measured != l->is_measured)
         return;
     /* The noise of the same radiance in all photographs: by its own, what noise made bright would be preferred. */
     float weight = view->weight * views_trust(v, view, triangle);
@@ -61,67 +61,68 @@ static void add_look(const struct fuse_job *job, struct looks *l, const struct p
                            view->train);
     if (slot == BEST_NONE)
         return;
-    l->look[slot] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
+    l->observation[slot] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
     l->view[slot] = *view;
     l->mixing[slot] = views_mixing(v, view, triangle, s->radiance);
 }
 
 /* Weighs the looks by their noise, which depends on how bright the texel is: that is
  * told by all together, each by the light it had. */
-static void weigh_by_noise(const struct fuse_job *job, struct looks *l) {
+static void weigh_by_noise(const struct fuse_job *job, struct fuse_observations *l) {
     size_t count = l->best.count;
     rgb sum = {0.0f, 0.0f, 0.0f};
     float weights = 0.0f;
     for (size_t i = 0; i < count; i++) {
-        float weight = l->look[i].weight *
+        float weight = l->observation[i].weight *
                        job->views->scene->photograph[job->views->train[l->view[i].train]].exposure;
-        sum = rgb_mad(sum, weight, l->look[i].value);
+        sum = rgb_mad(sum, weight, l->observation[i].value);
         weights += weight;
     }
     rgb mean = rgb_scale(sum, 1.0f / weights);
     float floor_radiance = LOG_FLOOR * job->views->median_radiance;
     for (size_t i = 0; i < count; i++) {
         rgb deviation = noise_deviation(job->noise, job->views, &l->view[i], mean);
-        l->look[i].deviation = BILINEAR_DEVIATION * rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
-        float times_mean = rgb_mean(l->look[i].value) / (rgb_mean(mean) + floor_radiance);
-        l->look[i].weight *= noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i] * times_mean * times_mean);
+        l->observation[i].deviation = BILINEAR_DEVIATION * rgb_mean(deviation) / (rgb_mean(mean) + floor_radiance);
+        float times_mean = rgb_mean(l->observation[i].value) / (rgb_mean(mean) + floor_radiance);
+        l->observation[i].weight *=
+            noise_weight(job->noise, job->views, &l->view[i], mean, l->mixing[i] * times_mean * times_mean);
     }
 }
 
-static void look_all(const struct fuse_job *job, const struct surface_point *p, struct looks *l) {
+static void observe_all(const struct fuse_job *job, const struct surface_point *p, struct fuse_observations *l) {
     const struct views *v = job->views;
-    l->measured = false;
+    l->is_measured = false;
     l->seen = l->clean = 0;
     l->gray_sum = l->gray_square_sum = 0.0;
-    best_init(&l->best, l->item, MAX_LOOKS);
+    best_init(&l->best, l->item, MAX_OBSERVATIONS);
     for (uint32_t t = 0; t < v->train_count; t++) {
         const struct photograph *photo = &v->scene->photograph[v->train[t]];
         struct view view;
         struct photograph_sample s;
         if (views_sees(v, t, p->position, p->normal, &view) && !photograph_has_firefly(photo, view.x, view.y) &&
             photograph_sample(photo, view.x, view.y, &s))
-            add_look(job, l, &s, &view, p->triangle);
+            add_observation(job, l, &s, &view, p->triangle);
     }
 }
 
-static float spread_of(const struct looks *l) {
+static float spread_of(const struct fuse_observations *l) {
     double n = (double)l->seen, sum = l->gray_sum;
     return n > 1.0 ? (float)sqrt(fmax(0.0, (l->gray_square_sum - sum * sum / n) / (n - 1.0))) : 0.0f;
 }
 
 static void fuse_texel(const struct fuse_job *job, uint32_t texel) {
     struct surface_point p;
-    struct looks l;
+    struct fuse_observations l;
     if (!surface_at_texel(&job->views->scene->mesh, job->atlas, job->inverse, texel, &p))
         return;
-    look_all(job, &p, &l);
+    observe_all(job, &p, &l);
     if (l.best.count == 0)
         return;
     job->f->count[texel] = (float)l.clean;
     job->f->spread[texel] = spread_of(&l);
-    job->f->is_bound[texel] = !l.measured;
+    job->f->is_bound[texel] = !l.is_measured;
     weigh_by_noise(job, &l);
-    rgb mean = robust_mean(l.look, l.best.count, OUTLIER_SCALE);
+    rgb mean = robust_mean(l.observation, l.best.count, OUTLIER_SCALE);
     const float channel[3] = {mean.r, mean.g, mean.b};
     for (int c = 0; c < 3; c++)
         job->f->radiance[texel][c] = image_half_from_float(fmaxf(channel[c], 0.0f));

@@ -7,58 +7,58 @@
 
 /* What shows a place less sharply than this share of the best is not held against it: texture would be taken for
  * noise. Unless there is nothing else. */
-#define AS_SHARP 0.3f
+#define SHARPNESS_SHARE 0.3f
 /* Ways to part photographs are tried until the lesser half has this part of the weight. */
-#define EVEN 0.25f
+#define BALANCED_SHARE 0.25f
 
 /* A weighted mean, and its variance if its samples are as noisy as is expected. */
-struct mean {
+struct half_mean {
     float weight, variance;
     rgb value;
 };
 
-static void add(struct mean *m, const struct robust_sample *s) {
+static void add(struct half_mean *m, const struct robust_sample *s) {
     m->weight += s->weight;
     m->value = rgb_mad(m->value, s->weight, s->value);
     m->variance += s->weight * s->weight * s->deviation * s->deviation;
 }
 
-static void finish(struct mean *m) {
+static void finish(struct half_mean *m) {
     m->value = rgb_scale(m->value, 1.0f / m->weight);
     m->variance /= m->weight * m->weight;
 }
 
-int halves_of(uint32_t source, int way) {
-    return (int)(rng_mix64(source) >> way & 1);
+int halves_of(uint32_t source, int split) {
+    return (int)(rng_mix64(source) >> split & 1);
 }
 
 /* The share of the weight that the lesser half has. */
-static float lesser_part(const struct robust_sample *sample, size_t count, float least_sharp, int way) {
+static float lesser_share(const struct robust_sample *sample, size_t count, float min_sharp, int split) {
     float weight[2] = {0.0f, 0.0f};
     for (size_t i = 0; i < count; i++) {
-        if (sample[i].sharp >= least_sharp)
-            weight[halves_of(sample[i].source, way)] += sample[i].weight;
+        if (sample[i].sharp >= min_sharp)
+            weight[halves_of(sample[i].source, split)] += sample[i].weight;
     }
     return fminf(weight[0], weight[1]) / (weight[0] + weight[1]);
 }
 
 /* Of those samples alone that are as sharp as that. */
-static bool draw_of(const struct robust_sample *sample, size_t count, float least_sharp, rgb *draw) {
-    const struct mean none = {.weight = 0.0f};
-    struct mean all = none, half[2] = {none, none};
+static bool draw_from(const struct robust_sample *sample, size_t count, float min_sharp, rgb *draw) {
+    const struct half_mean none = {.weight = 0.0f};
+    struct half_mean all = none, half[2] = {none, none};
     float best = 0.0f;
-    int way = 0;
-    for (int w = 0; w < HALVES_WAYS && best < EVEN; w++) {
-        float part = lesser_part(sample, count, least_sharp, w);
-        if (part > best)
-            best = part, way = w;
+    int split = 0;
+    for (int w = 0; w < HALVES_SPLITS && best < BALANCED_SHARE; w++) {
+        float share = lesser_share(sample, count, min_sharp, w);
+        if (share > best)
+            best = share, split = w;
     }
     if (!(best > 0.0f))
         return false;
     for (size_t i = 0; i < count; i++) {
         add(&all, &sample[i]);
-        if (sample[i].sharp >= least_sharp)
-            add(&half[halves_of(sample[i].source, way)], &sample[i]);
+        if (sample[i].sharp >= min_sharp)
+            add(&half[halves_of(sample[i].source, split)], &sample[i]);
     }
     finish(&all);
     finish(&half[0]);
@@ -74,5 +74,5 @@ bool halves_draw(const struct robust_sample *sample, size_t count, rgb *draw) {
     float sharpest = 0.0f;
     for (size_t i = 0; i < count; i++)
         sharpest = fmaxf(sharpest, sample[i].sharp);
-    return draw_of(sample, count, AS_SHARP * sharpest, draw) || draw_of(sample, count, 0.0f, draw);
+    return draw_from(sample, count, SHARPNESS_SHARE * sharpest, draw) || draw_from(sample, count, 0.0f, draw);
 }

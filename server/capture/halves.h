@@ -11,9 +11,9 @@
 
 #include "server/capture/robust.h"
 
-/* In which half a photograph is, 0 or 1, in one of HALVES_WAYS ways to part them. */
-#define HALVES_WAYS 32
-int halves_of(uint32_t source, int way);
+/* In which half a photograph is, 0 or 1, in one of HALVES_SPLITS ways to part them. */
+#define HALVES_SPLITS 32
+int halves_of(uint32_t source, int split);
 
 /* Draws the error of the samples' mean by their weights. False, with `draw` as it was, where there is but one
  * source, or no noise is expected of any. */

@@ -19,9 +19,9 @@
 
 /* Standard deviations, in logarithms: of a look at a flat, frontal place; that a grazing one adds
  * (times 1 / cosine - 1); of the priors on told exposures, white balance and vignette. */
-#define LOOK_SIGMA 0.02
+#define OBSERVATION_SIGMA 0.02
 #define GRAZING_SIGMA 0.03
-#define UNTOLD_SIGMA 3.0
+#define UNKNOWN_EXPOSURE_SIGMA 3.0
 #define DRIFT_SIGMA 0.2
 #define COLOR_SIGMA 0.2
 #define VIGNETTE_SIGMA 0.5
@@ -31,31 +31,31 @@
 #define CG_TOLERANCE 1e-7
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
-    size_t looks = o->start[o->point_count];
+    size_t observations = o->start[o->point_count];
     *f = (struct light_fit){.o = o, .views = views, .frames = views->train_count, .scale = 1.0};
-    f->told = mem_calloc(f->frames + 1, sizeof *f->told);
-    f->radius = mem_calloc(looks + 1, sizeof *f->radius);
-    f->trust = mem_calloc(looks + 1, sizeof *f->trust);
-    f->weight = mem_calloc(looks + 1, sizeof *f->weight);
+    f->exposure_known = mem_calloc(f->frames + 1, sizeof *f->exposure_known);
+    f->radius = mem_calloc(observations + 1, sizeof *f->radius);
+    f->trust = mem_calloc(observations + 1, sizeof *f->trust);
+    f->weight = mem_calloc(observations + 1, sizeof *f->weight);
     for (size_t t = 0; t < f->frames; t++) {
-        f->told[t] = views->scene->photograph[views->train[t]].exposure_known;
-        f->untold_count += !f->told[t];
+        f->exposure_known[t] = views->scene->photograph[views->train[t]].exposure_known;
+        f->unknown_exposure_count += !f->exposure_known[t];
     }
-    for (size_t i = 0; i < looks; i++) {
-        const struct look_at *look = &o->look[i];
-        const struct photograph *photo = &views->scene->photograph[views->train[look->train]];
-        double s = (double)photograph_radius(photo, look->x, look->y);
-        double grazing = GRAZING_SIGMA * (1.0 / (double)look->cosine - 1.0);
-        double contrast = (double)look->contrast;
+    for (size_t i = 0; i < observations; i++) {
+        const struct overlap_observation *observation = &o->observation[i];
+        const struct photograph *photo = &views->scene->photograph[views->train[observation->train]];
+        double s = (double)photograph_radius(photo, observation->x, observation->y);
+        double grazing = GRAZING_SIGMA * (1.0 / (double)observation->cosine - 1.0);
+        double contrast = (double)observation->contrast;
         f->radius[i][0] = s;
         f->radius[i][1] = s * s;
         f->radius[i][2] = s * s * s;
-        f->trust[i] = 1.0 / (LOOK_SIGMA * LOOK_SIGMA + grazing * grazing + 0.25 * contrast * contrast);
+        f->trust[i] = 1.0 / (OBSERVATION_SIGMA * OBSERVATION_SIGMA + grazing * grazing + 0.25 * contrast * contrast);
     }
 }
 
 void light_fit_release(struct light_fit *f) {
-    mem_free(f->told);
+    mem_free(f->exposure_known);
     mem_free(f->radius);
     mem_free(f->trust);
     mem_free(f->weight);
@@ -63,9 +63,9 @@ void light_fit_release(struct light_fit *f) {
 
 /* --- the linear system ------------------------------------------------------------------------ */
 
-double light_fit_predict(const struct light_fit *f, const double *x, size_t look, int channel) {
-    const double *v = x + 3 * f->frames, *s = f->radius[look];
-    return x[3 * f->o->look[look].train + (size_t)channel] + v[0] * s[0] + v[1] * s[1] + v[2] * s[2];
+double light_fit_predict(const struct light_fit *f, const double *x, size_t observation, int channel) {
+    const double *v = x + 3 * f->frames, *s = f->radius[observation];
+    return x[3 * f->o->observation[observation].train + (size_t)channel] + v[0] * s[0] + v[1] * s[1] + v[2] * s[2];
 }
 
 /* out += A' W (I - M) z for the looks of one point and one channel, z[] by look of the point. */
@@ -81,7 +81,7 @@ static void scatter(const struct light_fit *f, size_t point, int channel, const 
     double mean = sum / weight;
     for (size_t i = 0; i < count; i++) {
         double r = f->weight[first + i] * (z[i] - mean);
-        out[3 * f->o->look[first + i].train + (size_t)channel] += r;
+        out[3 * f->o->observation[first + i].train + (size_t)channel] += r;
         for (size_t k = 0; k < 3; k++)
             out[3 * f->frames + k] += r * f->radius[first + i][k];
     }
@@ -91,7 +91,7 @@ static void scatter(const struct light_fit *f, size_t point, int channel, const 
 static void project(const struct light_fit *f, int model, double *x) {
     for (size_t t = 0; t < f->frames; t++) {
         double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
-        double level = f->told[t] && !(model & LIGHT_DRIFT) ? 0.0 : mean;
+        double level = f->exposure_known[t] && !(model & LIGHT_DRIFT) ? 0.0 : mean;
         for (int c = 0; c < 3; c++)
             g[c] = level + (model & LIGHT_COLOR ? g[c] - mean : 0.0);
     }
@@ -111,7 +111,7 @@ static void multiply(const void *user, const double *x, double *out) {
     const struct light_fit *f = system->fit;
     for (size_t t = 0; t < f->frames; t++) {
         const double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
-        double sigma = f->told[t] ? DRIFT_SIGMA : UNTOLD_SIGMA;
+        double sigma = f->exposure_known[t] ? DRIFT_SIGMA : UNKNOWN_EXPOSURE_SIGMA;
         for (int c = 0; c < 3; c++)
             out[3 * t + (size_t)c] = mean / (sigma * sigma) + (g[c] - mean) / (COLOR_SIGMA * COLOR_SIGMA);
     }
@@ -120,7 +120,7 @@ static void multiply(const void *user, const double *x, double *out) {
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         for (int c = 0; c < 3 && !light_fit_is_held_back(f, p); c++) {
-            double z[OVERLAP_LOOKS_MAX];
+            double z[OVERLAP_OBSERVATIONS_MAX];
             for (size_t i = 0; i < count; i++)
                 z[i] = light_fit_predict(f, x, first + i, c);
             scatter(f, p, c, z, out);
@@ -137,7 +137,7 @@ static void make_preconditioner(const struct light_fit *f, double *inverse) {
     for (size_t p = 0; p < f->o->point_count; p++) {
         for (size_t i = f->o->start[p]; i < f->o->start[p + 1] && !light_fit_is_held_back(f, p); i++) {
             for (size_t c = 0; c < 3; c++) {
-                inverse[3 * f->o->look[i].train + c] += f->weight[i];
+                inverse[3 * f->o->observation[i].train + c] += f->weight[i];
                 inverse[3 * f->frames + c] += 3.0 * f->weight[i] * f->radius[i][c] * f->radius[i][c];
             }
         }
@@ -162,9 +162,9 @@ static void solve_linear(const struct light_fit *f, int model, double *x) {
     for (size_t point = 0; point < f->o->point_count; point++) {
         size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
         for (int c = 0; c < 3 && !light_fit_is_held_back(f, point); c++) {
-            double y[OVERLAP_LOOKS_MAX];
+            double y[OVERLAP_OBSERVATIONS_MAX];
             for (size_t i = 0; i < count; i++)
-                y[i] = (double)f->o->look[first + i].value[c];
+                y[i] = (double)f->o->observation[first + i].value[c];
             scatter(f, point, c, y, residual);
         }
     }
@@ -182,26 +182,27 @@ void light_fit_residuals(const struct light_fit *f, const double *x, size_t poin
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
     memset(square, 0, count * sizeof *square);
     for (int c = 0; c < 3; c++) {
-        double y[OVERLAP_LOOKS_MAX], sum = 0.0, total = 1e-30;
+        double y[OVERLAP_OBSERVATIONS_MAX], sum = 0.0, total = 1e-30;
         for (size_t i = 0; i < count; i++) {
-            y[i] = (double)f->o->look[first + i].value[c] - light_fit_predict(f, x, first + i, c);
+            y[i] = (double)f->o->observation[first + i].value[c] - light_fit_predict(f, x, first + i, c);
             sum += weight[i] * y[i];
             total += weight[i];
         }
         double mean = sum / total;
         for (size_t i = 0; i < count; i++) {
-            const struct look_at *look = &f->o->look[first + i];
-            double shown = (double)look->value[c] - (y[i] - mean);
-            bool usable = shown >= (double)look->least[c] && shown <= (double)look->most[c];
+            const struct overlap_observation *observation = &f->o->observation[first + i];
+            double predicted = (double)observation->value[c] - (y[i] - mean);
+            bool usable =
+                predicted >= (double)observation->min_value[c] && predicted <= (double)observation->max_value[c];
             square[i] += usable ? f->trust[first + i] * (y[i] - mean) * (y[i] - mean) / 3.0 : INFINITY;
         }
     }
 }
 
 /* New weights and scale from the residuals; `gentle` weights do not give up on far ones. */
-static void reweight(struct light_fit *f, const double *x, bool gentle) {
-    size_t looks = f->o->start[f->o->point_count], used = 0;
-    double *square = mem_array(looks + 1, sizeof *square), *known = mem_array(looks + 1, sizeof *known);
+static void reweight(struct light_fit *f, const double *x, bool is_convex) {
+    size_t observations = f->o->start[f->o->point_count], used = 0;
+    double *square = mem_array(observations + 1, sizeof *square), *known = mem_array(observations + 1, sizeof *known);
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         light_fit_residuals(f, x, p, f->weight + first, square + first);
@@ -211,9 +212,9 @@ static void reweight(struct light_fit *f, const double *x, bool gentle) {
         }
     }
     f->scale = fmax(1.0, 1.48 * sqrt(quantile_double(known, used, 0.5)));
-    for (size_t i = 0; i < looks; i++) {
+    for (size_t i = 0; i < observations; i++) {
         double e = square[i] / (f->scale * f->scale);
-        double robust = gentle ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + 0.25 * e);
+        double robust = is_convex ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + 0.25 * e);
         f->weight[i] = f->trust[i] * robust / (f->scale * f->scale);
     }
     mem_free(known);
@@ -221,8 +222,8 @@ static void reweight(struct light_fit *f, const double *x, bool gentle) {
 }
 
 void light_fit_solve(struct light_fit *f, int model, double *x) {
-    size_t looks = f->o->start[f->o->point_count];
-    for (size_t i = 0; i < looks; i++)
+    size_t observations = f->o->start[f->o->point_count];
+    for (size_t i = 0; i < observations; i++)
         f->weight[i] = f->trust[i];
     for (int round = 0; round < ROUNDS; round++) {
         reweight(f, x, round < 4);

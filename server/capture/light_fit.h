@@ -22,8 +22,8 @@ struct light_fit {
     const struct overlaps *o;     /* borrowed, both */
     const struct views *views;
     size_t frames;                /* parameters are 3 a frame and 3 of the vignette */
-    size_t untold_count;          /* frames whose exposure nobody told */
-    bool *told;                   /* [frames] the exposure; owned, as all below */
+    size_t unknown_exposure_count;          /* frames whose exposure nobody told */
+    bool *exposure_known;                   /* [frames] the exposure; owned, as all below */
     double (*radius)[3];          /* [looks] s, s^2, s^3 */
     double *trust;                /* [looks] inverse variance by contrast and angle */
     double *weight;               /* [looks] trust made robust; 0: held back */
@@ -46,7 +46,7 @@ static inline bool light_fit_is_held_back(const struct light_fit *f, size_t poin
 void light_fit_solve(struct light_fit *f, int model, double *x);
 
 /* What x adds to the logarithm of a look's true value. */
-double light_fit_predict(const struct light_fit *f, const double *x, size_t look, int channel);
+double light_fit_predict(const struct light_fit *f, const double *x, size_t observation, int channel);
 
 /* Squared residuals of a point's looks over their expected variance, after the L that weight[] gives;
  * INFINITY where the photograph should show something too dark or too bright. Both [looks of it]. */

@@ -8,22 +8,22 @@
 #include "common/quantile.h"
 #include "common/rng.h"
 
-#define LEAST_EXPONENT (-24) /* the first octave begins at 2^-24, a half's smallest number */
+#define MIN_EXPONENT (-24) /* the first octave begins at 2^-24, a half's smallest number */
 #define SAMPLES 8192         /* differences kept of each octave */
-#define LEAST_SAMPLES 512    /* of fewer an octave tells nothing */
+#define MIN_SAMPLES 512    /* of fewer an octave tells nothing */
 #define QUANTILE 0.25
 #define QUANTILE_DEVIATIONS 0.3186f /* the quantile of the distance of normal noise from its mean */
 /* Var(b - (a + c) / 2) over that of one pixel. */
 #define DIFFERENCE_VARIANCE 1.5f
-#define MOST_SHARE 1.0f
+#define MAX_SHARE 1.0f
 /* A share that is this near to MOST_SHARE is that of values lost in noise. */
 #define LOST_SHARE 0.97f
 /* Normal noise of deviation 1 that is cut off at 0 comes out too bright by .4 where the true value is 0, and by .08
  * where it is 1; if what was cut off, or rounded down to 0, reads as minus this, by .1 at most either way. */
 #define BLACK_DEVIATIONS 0.6f
-#define LEAST_SHARE 0.01f /* poses and colours are off by as much */
+#define MIN_SHARE 0.01f /* poses and colours are off by as much */
 /* Of a block of pixels: differences that it takes, and bounds of its noise over the octaves'. */
-#define LEAST_DIFFERENCES 64
+#define MIN_DIFFERENCES 64
 #define MEDIAN_DEVIATIONS 0.6745f /* as QUANTILE_DEVIATIONS */
 #define SCALE_MIN 0.5f
 #define SCALE_MAX 4.0f
@@ -31,28 +31,28 @@
 /* Differences met so far, of one octave; a later one takes a random place, so that those kept are an
  * even sample (reservoir sampling, Vitter 1985). */
 struct octave {
-    uint64_t met;
-    float kept[SAMPLES];
+    uint64_t offered;
+    float sample[SAMPLES];
 };
 
 static int octave_of(float value) {
-    int exponent = LEAST_EXPONENT;
+    int exponent = MIN_EXPONENT;
     if (value > 0.0f)
         frexpf(value, &exponent);
-    int octave = exponent - LEAST_EXPONENT;
+    int octave = exponent - MIN_EXPONENT;
     return octave < 0 ? 0 : octave >= NOISE_OCTAVES ? NOISE_OCTAVES - 1 : octave;
 }
 
 static float middle_of(int octave) {
-    return ldexpf(0.75f, octave + LEAST_EXPONENT);
+    return ldexpf(0.75f, octave + MIN_EXPONENT);
 }
 
 static void offer(struct octave *octave, float difference) {
-    uint64_t at = octave->met++;
+    uint64_t at = octave->offered++;
     if (at >= SAMPLES)
         at = rng_mix64(at) % (at + 1);
     if (at < SAMPLES)
-        octave->kept[at] = difference;
+        octave->sample[at] = difference;
 }
 
 /* What rounding to 8 bits of sRGB adds to a linear value, as a share of it: a difference of 0 between
@@ -100,7 +100,7 @@ static void add_row(struct octave *octaves, const struct photograph *photo, cons
 /* Of the values of 8 bits that are not lost in noise, the darkest has this deviation. */
 static float darkest_deviation(const struct noise *noise) {
     for (int k = 0; k < NOISE_OCTAVES; k++)
-        if (noise->share[k] < LOST_SHARE * MOST_SHARE)
+        if (noise->share[k] < LOST_SHARE * MAX_SHARE)
             return noise->share[k] * middle_of(k);
     return 0.0f;
 }
@@ -114,12 +114,12 @@ static void measure_shares(struct noise *noise, const struct views *v) {
             add_row(octaves, photo, v->edge[t], y);
         rounded |= !photo->is_hdr;
     }
-    float share = MOST_SHARE;
+    float share = MAX_SHARE;
     for (int k = 0; k < NOISE_OCTAVES; k++) {
         struct octave *o = &octaves[k];
-        size_t count = o->met < SAMPLES ? (size_t)o->met : SAMPLES;
-        if (count >= LEAST_SAMPLES) {
-            float here = quantile(o->kept, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
+        size_t count = o->offered < SAMPLES ? (size_t)o->offered : SAMPLES;
+        if (count >= MIN_SAMPLES) {
+            float here = quantile(o->sample, count, QUANTILE) / (QUANTILE_DEVIATIONS * sqrtf(DIFFERENCE_VARIANCE));
             if (rounded)
                 here = fmaxf(here, rounding_share(middle_of(k)));
             share = fminf(share, here);
@@ -150,7 +150,7 @@ static float block_variance(const struct noise *noise, const struct photograph *
                 ratio[count++] = difference[i] / noise->share[octave_of(mean[i])];
         }
     }
-    if (count < LEAST_DIFFERENCES)
+    if (count < MIN_DIFFERENCES)
         return 0.0f;
     float median = quantile(ratio, count, 0.5) / MEDIAN_DEVIATIONS;
     return median * median / DIFFERENCE_VARIANCE;
@@ -180,7 +180,7 @@ void noise_measure(struct noise *noise, const struct views *v) {
         noise->scale[t] = measure_blocks(noise, &v->scene->photograph[v->train[t]], v->edge[t]);
 }
 
-void noise_tell_black(const struct noise *noise, struct scene *scene) {
+void noise_set_black(const struct noise *noise, struct scene *scene) {
     for (size_t i = 0; i < scene->photograph_count; i++) {
         struct photograph *photo = &scene->photograph[i];
         photo->black = photo->is_test || photo->is_hdr ? 0.0f : noise->black;
@@ -230,13 +230,13 @@ float noise_deviation_of_black(const struct noise *noise) {
 float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
                    float mixing) {
     float deviation = rgb_mean(noise_deviation(noise, v, view, radiance)), mean = rgb_mean(radiance);
-    float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
+    float share = mean > 0.0f ? fmaxf(deviation / mean, MIN_SHARE) : MAX_SHARE;
     return 1.0f / (share * share + mixing);
 }
 
 float noise_weight_of_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
     float deviation = rgb_mean(deviation_by_brightness(noise, photo, radiance)), mean = rgb_mean(radiance);
-    float share = mean > 0.0f ? fmaxf(deviation / mean, LEAST_SHARE) : MOST_SHARE;
+    float share = mean > 0.0f ? fmaxf(deviation / mean, MIN_SHARE) : MAX_SHARE;
     return 1.0f / (share * share);
 }
 

@@ -29,7 +29,7 @@ struct noise {
 
 void noise_measure(struct noise *noise, const struct views *views);
 /* Sets `black` of the photographs of 8 bits that are not held out. */
-void noise_tell_black(const struct noise *noise, struct scene *scene);
+void noise_set_black(const struct noise *noise, struct scene *scene);
 void noise_release(struct noise *noise);
 
 /* Standard deviation of the radiance that the pixel at the view's place tells, where it should tell

@@ -13,41 +13,42 @@
 
 /* --- what photographs see ------------------------------------------------------------------------- */
 
-struct look_job {
+struct trace_job {
     const struct accel *accel;
     const struct camera *camera;
-    uint32_t *met; /* [rows][columns] the triangle met there, or ACCEL_NONE */
+    uint32_t *hit_triangle; /* [rows][columns] the triangle met there, or ACCEL_NONE */
     size_t columns;
 };
 
-static void look_along_row(void *user, size_t row, int thread) {
+static void trace_row(void *user, size_t row, int thread) {
     (void)thread;
-    const struct look_job *job = user;
+    const struct trace_job *job = user;
     for (size_t column = 0; column < job->columns; column++) {
         struct accel_hit hit;
         vec3 direction;
         float x = (float)(column * PIXEL_STRIDE) + 0.5f, y = (float)(row * PIXEL_STRIDE) + 0.5f;
         bool meets = camera_direction(job->camera, x, y, &direction) &&
                      accel_intersect(job->accel, camera_origin(job->camera), direction, 0.0f, INFINITY, &hit);
-        job->met[row * job->columns + column] = meets ? hit.triangle : ACCEL_NONE;
+        job->hit_triangle[row * job->columns + column] = meets ? hit.triangle : ACCEL_NONE;
     }
 }
 
 /* Adds to balance[triangle] 1 for each pixel that shows its front and -1 for its back. */
-static void count_looks(const struct scene *scene, const struct camera *camera, const struct accel *accel,
+static void count_sides(const struct scene *scene, const struct camera *camera, const struct accel *accel,
                         struct parallel *pool, long *balance) {
     size_t columns = (camera->width + PIXEL_STRIDE - 1) / PIXEL_STRIDE;
     size_t rows = (camera->height + PIXEL_STRIDE - 1) / PIXEL_STRIDE;
-    struct look_job job = {accel, camera, mem_array(rows * columns + 1, sizeof *job.met), columns};
-    parallel_for(pool, rows, look_along_row, &job);
+    struct trace_job job = {accel, camera, mem_array(rows * columns + 1, sizeof *job.hit_triangle), columns};
+    parallel_for(pool, rows, trace_row, &job);
     for (size_t i = 0; i < rows * columns; i++) {
-        if (job.met[i] == ACCEL_NONE)
+        if (job.hit_triangle[i] == ACCEL_NONE)
             continue;
-        vec3 corner = scene->mesh.position[scene->mesh.index[job.met[i]][0]];
+        vec3 corner = scene->mesh.position[scene->mesh.index[job.hit_triangle[i]][0]];
         vec3 to_camera = vec3_sub(camera_origin(camera), corner);
-        balance[job.met[i]] += vec3_dot(to_camera, mesh_cross(&scene->mesh, job.met[i])) > 0.0f ? 1 : -1;
+        balance[job.hit_triangle[i]] +=
+            vec3_dot(to_camera, mesh_cross(&scene->mesh, job.hit_triangle[i])) > 0.0f ? 1 : -1;
     }
-    mem_free(job.met);
+    mem_free(job.hit_triangle);
 }
 
 /* --- pieces --------------------------------------------------------------------------------------- */
@@ -139,7 +140,7 @@ enum status orient_mesh(struct scene *scene, struct parallel *pool, size_t *turn
     long *balance = mem_calloc(scene->mesh.triangle_count, sizeof *balance);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
-            count_looks(scene, &scene->photograph[i].camera, accel, pool, balance);
+            count_sides(scene, &scene->photograph[i].camera, accel, pool, balance);
     }
     accel_free(accel);
     *turned = turn(&scene->mesh, balance);

@@ -14,22 +14,22 @@
 /* Share of the clip above which some of a noisy surface's pixels are clipped. */
 #define BRIGHT_SHARE 0.8f
 
-struct gathering {
+struct overlap_gathering {
     const struct views *views;
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
     size_t points, step;
-    struct look_at *look; /* [points][OVERLAP_LOOKS_MAX] */
+    struct overlap_observation *observation; /* [points][OVERLAP_OBSERVATIONS_MAX] */
     uint8_t *count;       /* [points] */
 };
 
 /* The mean of a cross of five pixels; false when one of them cannot be used. */
-static bool look_at_cross(const struct photograph *photo, struct look_at *look) {
+static bool observe_cross(const struct photograph *photo, struct overlap_observation *observation) {
     static const float offset[5][2] = {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}};
     const float w = (float)photo->camera.width, h = (float)photo->camera.height;
     double sum[3] = {0}, gray = 0.0, squares = 0.0;
     for (int i = 0; i < 5; i++) {
-        float x = look->x + offset[i][0], y = look->y + offset[i][1];
+        float x = observation->x + offset[i][0], y = observation->y + offset[i][1];
         struct photograph_sample s;
         if (x < 0.0f || y < 0.0f || x >= w || y >= h || !photograph_sample(photo, x, y, &s) ||
             s.saturated[0] || s.saturated[1] || s.saturated[2])
@@ -41,21 +41,21 @@ static bool look_at_cross(const struct photograph *photo, struct look_at *look) 
         gray += mean;
         squares += mean * mean;
     }
-    float stored = photo->exposure * photograph_falloff(photo, look->x, look->y);
+    float stored = photo->exposure * photograph_falloff(photo, observation->x, observation->y);
     float black = photo->is_hdr ? 0.0f : BLACK_VALUE, dark = photo->is_hdr ? 0.0f : DARK_VALUE;
     const float gain[3] = {photo->gain.r, photo->gain.g, photo->gain.b};
     for (int c = 0; c < 3; c++) {
         if (!(sum[c] > 0.0) || (float)(sum[c] / 5.0) * stored * gain[c] < black)
             return false;
-        look->value[c] = (float)log(sum[c] / 5.0);
-        look->least[c] = logf(dark / (stored * gain[c]));
-        look->most[c] = logf(BRIGHT_SHARE * photo->clip / (stored * gain[c]));
+        observation->value[c] = (float)log(sum[c] / 5.0);
+        observation->min_value[c] = logf(dark / (stored * gain[c]));
+        observation->max_value[c] = logf(BRIGHT_SHARE * photo->clip / (stored * gain[c]));
     }
-    look->contrast = (float)(sqrt(fmax(0.0, squares / 5.0 - gray * gray / 25.0)) / (gray / 5.0));
+    observation->contrast = (float)(sqrt(fmax(0.0, squares / 5.0 - gray * gray / 25.0)) / (gray / 5.0));
     return true;
 }
 
-static void look_at_point(struct gathering *g, size_t index) {
+static void observe_point(struct overlap_gathering *g, size_t index) {
     const struct scene *scene = g->views->scene;
     uint32_t texel = g->inverse->valid[index * g->step], triangle;
     float b1, b2;
@@ -64,16 +64,16 @@ static void look_at_point(struct gathering *g, size_t index) {
         return;
     vec3 point = mesh_point(&scene->mesh, triangle, b1, b2);
     vec3 normal = vec3_normalize(mesh_cross(&scene->mesh, triangle));
-    struct view view[OVERLAP_LOOKS_MAX];
-    size_t seen = views_pick(g->views, point, normal, texel, OVERLAP_LOOKS_MAX, view);
-    struct look_at *look = g->look + index * OVERLAP_LOOKS_MAX;
+    struct view view[OVERLAP_OBSERVATIONS_MAX];
+    size_t seen = views_pick(g->views, point, normal, texel, OVERLAP_OBSERVATIONS_MAX, view);
+    struct overlap_observation *observation = g->observation + index * OVERLAP_OBSERVATIONS_MAX;
     uint8_t count = 0;
     for (size_t k = 0; k < seen; k++) {
         const struct photograph *photo = &scene->photograph[g->views->train[view[k].train]];
         vec3 out = vec3_normalize(vec3_sub(camera_origin(&photo->camera), point));
-        look[count] = (struct look_at){.train = view[k].train, .x = view[k].x, .y = view[k].y,
+        observation[count] = (struct overlap_observation){.train = view[k].train, .x = view[k].x, .y = view[k].y,
                                        .cosine = vec3_dot(out, normal)};
-        if (views_clean(g->views, &view[k]) && look_at_cross(photo, &look[count]))
+        if (views_clean(g->views, &view[k]) && observe_cross(photo, &observation[count]))
             count++;
     }
     g->count[index] = count;
@@ -81,26 +81,27 @@ static void look_at_point(struct gathering *g, size_t index) {
 
 static void gather_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
-    struct gathering *g = user;
+    struct overlap_gathering *g = user;
     size_t end = (chunk + 1) * CHUNK < g->points ? (chunk + 1) * CHUNK : g->points;
     for (size_t i = chunk * CHUNK; i < end; i++)
-        look_at_point(g, i);
+        observe_point(g, i);
 }
 
 void overlaps_make(struct overlaps *o, const struct views *views, const struct atlas *atlas,
                    const struct inverse_uv *inverse, size_t points, struct parallel *pool) {
-    struct gathering g = {.views = views, .atlas = atlas, .inverse = inverse};
+    struct overlap_gathering g = {.views = views, .atlas = atlas, .inverse = inverse};
     g.step = inverse->valid_count / (points + 1) + 1;
     g.points = inverse->valid_count / g.step;
-    g.look = mem_array(g.points * OVERLAP_LOOKS_MAX + 1, sizeof *g.look);
+    g.observation = mem_array(g.points * OVERLAP_OBSERVATIONS_MAX + 1, sizeof *g.observation);
     g.count = mem_calloc(g.points + 1, sizeof *g.count);
     parallel_for(pool, (g.points + CHUNK - 1) / CHUNK, gather_chunk, &g);
-    *o = (struct overlaps){.start = mem_array(g.points + 1, sizeof *o->start), .look = g.look};
+    *o = (struct overlaps){.start = mem_array(g.points + 1, sizeof *o->start), .observation = g.observation};
     size_t total = 0;
     for (size_t i = 0; i < g.points; i++) {
         if (g.count[i] < 2)
             continue;
-        memmove(o->look + total, g.look + i * OVERLAP_LOOKS_MAX, g.count[i] * sizeof *o->look);
+        memmove(o->observation + total, g.observation + i * OVERLAP_OBSERVATIONS_MAX,
+                g.count[i] * sizeof *o->observation);
         o->start[o->point_count++] = total;
         total += g.count[i];
     }
@@ -110,6 +111,6 @@ void overlaps_make(struct overlaps *o, const struct views *views, const struct a
 
 void overlaps_release(struct overlaps *o) {
     mem_free(o->start);
-    mem_free(o->look);
+    mem_free(o->observation);
     *o = (struct overlaps){0};
 }

@@ -16,22 +16,22 @@
 #include "server/scene/atlas.h"
 #include "server/scene/inverse_uv.h"
 
-#define OVERLAP_LOOKS_MAX 12 /* photographs a point, drawn at random where more see it */
+#define OVERLAP_OBSERVATIONS_MAX 12 /* photographs a point, drawn at random where more see it */
 
 /* What one photograph shows of one point. */
-struct look_at {
+struct overlap_observation {
     uint32_t train;     /* index into views.train */
     float x, y;         /* place in the picture, pixels */
     float cosine;       /* between the normal and the direction to the camera */
     float value[3];     /* logarithm of radiance, by the present exposure, gain and falloff */
-    float least[3], most[3]; /* what `value` should be within: between dark and clipped, with margin */
+    float min_value[3], max_value[3]; /* what `value` should be within: between dark and clipped, with margin */
     float contrast;     /* standard deviation of the cross over its mean */
 };
 
 struct overlaps {
     size_t point_count;
     size_t *start;         /* [point_count + 1] into `look`; at least two looks a point; owned */
-    struct look_at *look;  /* owned */
+    struct overlap_observation *observation;  /* owned */
 };
 
 /* Looks at up to `points` points. The same for any number of threads. */

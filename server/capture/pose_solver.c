@@ -9,8 +9,8 @@
 
 /* A correction is clearly better when what was held back agrees better by this share of its robust cost and by so many
  * standard errors. */
-#define LEAST_GAIN 0.02
-#define LEAST_SIGNIFICANCE 6.0
+#define MIN_GAIN 0.02
+#define MIN_SIGNIFICANCE 6.0
 
 /* --- poses ----------------------------------------------------------------------------------- */
 
@@ -69,7 +69,7 @@ void pose_frame_init(struct pose_frame *frame, const struct camera *camera) {
                                  .pose = pose_of(&camera->camera_from_world)};
 }
 
-double pose_square_between(const struct camera *a, const struct camera *b, vec3 point) {
+double pose_squared_shift(const struct camera *a, const struct camera *b, vec3 point) {
     float xa, ya, xb, yb, depth_m;
     if (!camera_project(a, point, &xa, &ya, &depth_m) || !camera_project(b, point, &xb, &yb, &depth_m))
         return NAN;
@@ -90,16 +90,16 @@ void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], dou
 }
 
 void pose_move(struct pose_solver *s, size_t f, double most) {
-    if (!s->frame[f].stays)
+    if (!s->frame[f].is_fixed)
         pose_twist(&s->frame[f], s->x + POSE_UNKNOWNS * f, most);
 }
 
-void pose_put_back(struct pose_solver *s, size_t f) {
+void pose_reset(struct pose_solver *s, size_t f) {
     struct pose_frame *frame = &s->frame[f];
     frame->now = frame->before;
     frame->pose = pose_of(&frame->before.camera_from_world);
     memset(frame->total, 0, sizeof frame->total);
-    frame->stays = true;
+    frame->is_fixed = true;
 }
 
 /* --- linearisation ------------------------------------------------------------------------------ */
@@ -112,13 +112,13 @@ static float value_at(const struct pose_solver *s, uint32_t frame, vec3 point, f
 }
 
 /* What a sight shows of the track's surroundings. */
-struct patch {
+struct pose_patch {
     float value, along[2];   /* change of the value per `right` and `down` */
     float place[2][2];       /* change of the place in the picture per `right` and `down` */
 };
 
-static bool look_around(const struct pose_solver *s, const struct track *track, float step, uint32_t frame,
-                        struct patch *patch) {
+static bool sample_patch(const struct pose_solver *s, const struct track *track, float step, uint32_t frame,
+                        struct pose_patch *patch) {
     const vec3 direction[2] = {track->right, track->down};
     float x, y, x2[2], y2[2];
     patch->value = value_at(s, frame, track->point, &x, &y);
@@ -169,28 +169,29 @@ static void linearise_track(void *user, size_t index, int thread) {
     (void)thread;
     const struct pose_solver *s = user;
     const struct track *track = s->track[index];
-    struct pose_sight *sight = s->sight + index * POSE_SIGHTS_MAX;
-    struct patch patch[POSE_SIGHTS_MAX];
+    struct pose_observation *observation = s->observation + index * POSE_OBSERVATIONS_MAX;
+    struct pose_patch patch[POSE_OBSERVATIONS_MAX];
     float step = (float)(1 << s->level) / s->tracks->pyramid[s->owner[index]].scale;
     float along[2] = {0.0f, 0.0f}, total = 0.0f;
-    for (size_t k = 0; k < pose_sight_count(track); k++) {
-        const struct pose_frame *frame = &s->frame[sight[k].frame];
-        sight[k].value = NAN;
-        if (!look_around(s, track, step, sight[k].frame, &patch[k]))
+    for (size_t k = 0; k < pose_observation_count(track); k++) {
+        const struct pose_frame *frame = &s->frame[observation[k].frame];
+        observation[k].value = NAN;
+        if (!sample_patch(s, track, step, observation[k].frame, &patch[k]))
             continue;
         float trust = (float)(1.0 / (frame->scale * frame->scale));
-        sight[k].value = patch[k].value;
+        observation[k].value = patch[k].value;
         along[0] += trust * patch[k].along[0];
         along[1] += trust * patch[k].along[1];
         total += trust;
     }
     for (int i = 0; i < 2; i++)
         s->along[index][i] = total > 0.0f ? along[i] / total : NAN;
-    for (size_t k = 0; k < pose_sight_count(track) && total > 0.0f; k++) {
+    for (size_t k = 0; k < pose_observation_count(track) && total > 0.0f; k++) {
         float g[2];
-        if (isfinite(sight[k].value) && (!slope_from(s->along[index], patch[k].place, g) ||
-                                         !pose_derive(&s->frame[sight[k].frame], track->point, g, sight[k].d)))
-            sight[k].value = NAN;
+        if (isfinite(observation[k].value) &&
+            (!slope_from(s->along[index], patch[k].place, g) ||
+             !pose_derive(&s->frame[observation[k].frame], track->point, g, observation[k].d)))
+            observation[k].value = NAN;
     }
 }
 
@@ -216,39 +217,39 @@ void pose_linearise(struct pose_solver *s, struct parallel *pool) {
 /* --- weights ---------------------------------------------------------------------------------- */
 
 /* The track's L by what weights there are, offsets taken off; false where fewer than three tell. */
-static bool track_look(const struct pose_solver *s, size_t track, const double *weight, double *look) {
-    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
+static bool track_consensus(const struct pose_solver *s, size_t track, const double *weight, double *consensus) {
+    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
     double sum = 0.0, total = 0.0;
     size_t count = 0;
-    for (size_t k = 0; k < pose_sight_count(s->track[track]); k++) {
-        if (!isfinite(sight[k].value))
+    for (size_t k = 0; k < pose_observation_count(s->track[track]); k++) {
+        if (!isfinite(observation[k].value))
             continue;
-        sum += weight[k] * ((double)sight[k].value - s->x[sight[k].offset]);
+        sum += weight[k] * ((double)observation[k].value - s->x[observation[k].offset]);
         total += weight[k];
         count++;
     }
-    *look = sum / total;
+    *consensus = sum / total;
     return count >= 3;
 }
 
 /* Robust weights of a track's sights, by their distance from what they agree on. */
-void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
-                      double weight[POSE_SIGHTS_MAX]) {
-    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
-    size_t count = pose_sight_count(s->track[track]);
+void pose_weigh_track(const struct pose_solver *s, size_t track, double *consensus,
+                      double weight[POSE_OBSERVATIONS_MAX]) {
+    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    size_t count = pose_observation_count(s->track[track]);
     for (size_t k = 0; k < count; k++) {
-        double scale = s->frame[sight[k].frame].scale;
+        double scale = s->frame[observation[k].frame].scale;
         weight[k] = 1.0 / (scale * scale);
     }
-    *look = NAN;
+    *consensus = NAN;
     for (int round = 0; round < 4; round++) {
-        if (!track_look(s, track, weight, look)) {
+        if (!track_consensus(s, track, weight, consensus)) {
             memset(weight, 0, count * sizeof *weight);
             return;
         }
         for (size_t k = 0; k < count; k++) {
-            double scale = s->frame[sight[k].frame].scale;
-            double e = ((double)sight[k].value - s->x[sight[k].offset] - *look) / scale;
+            double scale = s->frame[observation[k].frame].scale;
+            double e = ((double)observation[k].value - s->x[observation[k].offset] - *consensus) / scale;
             weight[k] = isfinite(e) ? 1.0 / ((1.0 + e * e) * scale * scale) : 0.0;
         }
     }
@@ -257,36 +258,36 @@ void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
 void pose_reweight(struct pose_solver *s) {
     double *sum = mem_calloc(2 * s->frames + 1, sizeof *sum), *count = sum + s->frames;
     for (size_t i = 0; i < s->track_count; i++) {
-        struct pose_sight *sight = s->sight + i * POSE_SIGHTS_MAX;
-        double look, weight[POSE_SIGHTS_MAX];
-        pose_weigh_track(s, i, &look, weight);
-        for (size_t k = 0; k < pose_sight_count(s->track[i]); k++) {
-            sight[k].weight = pose_is_held_back(i) ? 0.0f : (float)weight[k];
+        struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
+        double consensus, weight[POSE_OBSERVATIONS_MAX];
+        pose_weigh_track(s, i, &consensus, weight);
+        for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
+            observation[k].weight = pose_is_held_back(i) ? 0.0f : (float)weight[k];
             if (weight[k] <= 0.0)
                 continue;
-            double r = fabs((double)sight[k].value - s->x[sight[k].offset] - look);
-            sum[sight[k].frame] += fmin(r, 2.0 * s->frame[sight[k].frame].scale);
-            count[sight[k].frame] += 1.0;
+            double r = fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
+            sum[observation[k].frame] += fmin(r, 2.0 * s->frame[observation[k].frame].scale);
+            count[observation[k].frame] += 1.0;
         }
     }
     for (size_t f = 0; f < s->frames; f++) {
         if (count[f] > 0.0)
-            s->frame[f].scale = fmax(POSE_LEAST_SCALE, 2.5 * sum[f] / count[f]);
+            s->frame[f].scale = fmax(POSE_MIN_SCALE, 2.5 * sum[f] / count[f]);
     }
     mem_free(sum);
 }
 
-bool pose_convinces(const struct pose_evidence *e) {
+bool pose_is_improved(const struct pose_evidence *e) {
     double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
-    return e->count >= POSE_LEAST_SIGHTS / POSE_HELD_BACK_EVERY &&
-           e->sum > LEAST_SIGNIFICANCE * error && e->sum > LEAST_GAIN * e->total;
+    return e->count >= POSE_MIN_OBSERVATIONS / POSE_HELD_BACK_EVERY &&
+           e->sum > MIN_SIGNIFICANCE * error && e->sum > MIN_GAIN * e->total;
 }
 
 /* --- the whole ---------------------------------------------------------------------------- */
 
-static void init_sights(struct pose_solver *s, size_t index) {
+static void init_observations(struct pose_solver *s, size_t index) {
     const struct track *track = s->track[index];
-    for (size_t k = 0; k < pose_sight_count(track); k++) {
+    for (size_t k = 0; k < pose_observation_count(track); k++) {
         uint32_t f = k == 0 ? s->owner[index] : track->other[k - 1];
         struct pose_frame *frame = &s->frame[f];
         float x = 0.0f, y = 0.0f, depth_m = 0.0f;
@@ -294,9 +295,10 @@ static void init_sights(struct pose_solver *s, size_t index) {
         size_t column = (size_t)(clampf(x / (float)frame->before.width, 0.0f, 0.999f) * POSE_CELL_COLUMNS);
         size_t row = (size_t)(clampf(y / (float)frame->before.height, 0.0f, 0.999f) * POSE_CELL_ROWS);
         size_t offset = POSE_UNKNOWNS * s->frames + f * POSE_CELLS + row * POSE_CELL_COLUMNS + column;
-        s->sight[index * POSE_SIGHTS_MAX + k] = (struct pose_sight){.frame = f, .offset = (uint32_t)offset};
+        s->observation[index * POSE_OBSERVATIONS_MAX + k] =
+            (struct pose_observation){.frame = f, .offset = (uint32_t)offset};
         frame->depth_m += (double)depth_m;
-        frame->sight_count++;
+        frame->observation_count++;
     }
 }
 
@@ -315,13 +317,13 @@ void pose_solver_init(struct pose_solver *s, const struct tracks *tracks) {
             s->track[s->track_count++] = &tracks->track[f * tracks->capacity + i];
         }
     }
-    s->sight = mem_calloc(s->track_count * POSE_SIGHTS_MAX + 1, sizeof *s->sight);
+    s->observation = mem_calloc(s->track_count * POSE_OBSERVATIONS_MAX + 1, sizeof *s->observation);
     s->along = mem_calloc(s->track_count + 1, sizeof *s->along);
     for (size_t i = 0; i < s->track_count; i++)
-        init_sights(s, i);
+        init_observations(s, i);
     for (size_t f = 0; f < s->frames; f++) {
-        s->frame[f].depth_m /= fmax(1.0, (double)s->frame[f].sight_count);
-        s->frame[f].stays = s->frame[f].sight_count < POSE_LEAST_SIGHTS;
+        s->frame[f].depth_m /= fmax(1.0, (double)s->frame[f].observation_count);
+        s->frame[f].is_fixed = s->frame[f].observation_count < POSE_MIN_OBSERVATIONS;
     }
 }
 
@@ -330,7 +332,7 @@ void pose_solver_release(struct pose_solver *s) {
     mem_free(s->x);
     mem_free(s->track);
     mem_free(s->owner);
-    mem_free(s->sight);
+    mem_free(s->observation);
     mem_free(s->along);
 }
 

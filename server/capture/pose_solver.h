@@ -25,14 +25,14 @@
 #define POSE_CELL_COLUMNS 8 /* of the grid of offsets */
 #define POSE_CELL_ROWS 6
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
-#define POSE_SIGHTS_MAX (TRACK_OTHERS + 1)
+#define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1)
 #define POSE_HELD_BACK_EVERY 3
-#define POSE_LEAST_SIGHTS 60 /* that must tell something, for a photograph to be moved */
+#define POSE_MIN_OBSERVATIONS 60 /* that must tell something, for a photograph to be moved */
 #define POSE_ROUNDS 12       /* at each level */
 #define POSE_STEP_PX 1.5     /* of a level, that a round moves a photograph at most */
-#define POSE_LEAST_SHIFT_PX 0.15 /* rms; less is not worth a correction */
+#define POSE_MIN_SHIFT_PX 0.15 /* rms; less is not worth a correction */
 #define POSE_DAMPING 0.01    /* of the diagonal */
-#define POSE_LEAST_SCALE 0.01 /* residuals below it are all as good */
+#define POSE_MIN_SCALE 0.01 /* residuals below it are all as good */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];
@@ -45,12 +45,12 @@ struct pose_frame {
     double depth_m;         /* mean over its sights */
     double scale;           /* of its residuals */
     double shift_px;        /* between `before` and `now`, as judged last */
-    size_t sight_count;
-    bool stays;
+    size_t observation_count;
+    bool is_fixed;
 };
 
 /* One photograph's look at one track. */
-struct pose_sight {
+struct pose_observation {
     uint32_t frame;
     uint32_t offset;     /* index into x: of its cell */
     float value;         /* NAN: none */
@@ -63,7 +63,7 @@ struct pose_solver {
     size_t frames, track_count, unknowns;
     const struct track **track; /* [track_count] */
     uint32_t *owner;            /* [track_count] the photograph it comes from */
-    struct pose_sight *sight;        /* [track_count][POSE_SIGHTS_MAX], the owner's first */
+    struct pose_observation *observation;        /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
     float (*along)[2];          /* [track_count] how what it shows changes by its `right` and `down`, at this level */
     struct pose_frame *frame;        /* [frames] */
     double *x;                  /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
@@ -86,8 +86,8 @@ void pose_reweight(struct pose_solver *s);
 
 /* What a track looks like by the robust mean of its sights, offsets taken off (NAN where fewer than
  * three tell), and the weight of each. */
-void pose_weigh_track(const struct pose_solver *s, size_t track, double *look,
-                      double weight[POSE_SIGHTS_MAX]);
+void pose_weigh_track(const struct pose_solver *s, size_t track, double *consensus,
+                      double weight[POSE_OBSERVATIONS_MAX]);
 
 /* What a frame's twist in all is held to 0 by, on the diagonal of the equations. */
 double pose_prior(const struct pose_frame *frame);
@@ -110,14 +110,14 @@ void pose_frame_init(struct pose_frame *frame, const struct camera *camera);
 bool pose_derive(const struct pose_frame *frame, vec3 point, const float g[2], float d[POSE_UNKNOWNS]);
 
 /* Square of the distance, in pixels, between a point's places in two cameras; NAN where one does not see it. */
-double pose_square_between(const struct camera *a, const struct camera *b, vec3 point);
+double pose_squared_shift(const struct camera *a, const struct camera *b, vec3 point);
 
 /* Moves a frame by a twist, at most `most` pixels of it. */
 void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], double most);
 
 /* Moves a frame by its twist in x; or back to where it was at first, for good. */
 void pose_move(struct pose_solver *s, size_t f, double most);
-void pose_put_back(struct pose_solver *s, size_t f);
+void pose_reset(struct pose_solver *s, size_t f);
 
 /* Evidence for a frame's correction: gains of robust cost over what was held back. */
 struct pose_evidence {
@@ -125,7 +125,7 @@ struct pose_evidence {
     size_t count;
 };
 
-static inline size_t pose_sight_count(const struct track *track) {
+static inline size_t pose_observation_count(const struct track *track) {
     return (size_t)track->other_count + 1;
 }
 
@@ -134,7 +134,7 @@ static inline bool pose_is_held_back(size_t track) {
     return track % POSE_HELD_BACK_EVERY == 0;
 }
 
-static inline double pose_robust(double residual, double scale) {
+static inline double pose_robust_cost(double residual, double scale) {
     double e = residual / scale;
     return log1p(e * e);
 }
@@ -148,6 +148,6 @@ static inline void pose_evidence_add(struct pose_evidence *e, double before, dou
 }
 
 /* Whether that is clearly better: by a part of it, and by many standard errors. */
-bool pose_convinces(const struct pose_evidence *e);
+bool pose_is_improved(const struct pose_evidence *e);
 
 #endif

@@ -25,29 +25,29 @@ double pose_prior(const struct pose_frame *frame) {
 
 /* out += A' W (I - M) z over the sights of a track, z[] by sight. */
 static void scatter(const struct pose_solver *s, size_t track, const double *z, double *out) {
-    const struct pose_sight *sight = s->sight + track * POSE_SIGHTS_MAX;
-    size_t count = pose_sight_count(s->track[track]);
+    const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
+    size_t count = pose_observation_count(s->track[track]);
     double sum = 0.0, weight = 0.0;
     for (size_t k = 0; k < count; k++) {
-        if (sight[k].weight > 0.0f) {
-            sum += (double)sight[k].weight * z[k];
-            weight += (double)sight[k].weight;
+        if (observation[k].weight > 0.0f) {
+            sum += (double)observation[k].weight * z[k];
+            weight += (double)observation[k].weight;
         }
     }
     for (size_t k = 0; k < count; k++) {
-        if (!(sight[k].weight > 0.0f))
+        if (!(observation[k].weight > 0.0f))
             continue;
-        double r = (double)sight[k].weight * (z[k] - sum / weight);
-        double *twist = out + POSE_UNKNOWNS * sight[k].frame;
+        double r = (double)observation[k].weight * (z[k] - sum / weight);
+        double *twist = out + POSE_UNKNOWNS * observation[k].frame;
         for (int j = 0; j < POSE_UNKNOWNS; j++)
-            twist[j] += r * (double)sight[k].d[j];
-        out[sight[k].offset] -= r;
+            twist[j] += r * (double)observation[k].d[j];
+        out[observation[k].offset] -= r;
     }
 }
 
 static void project(const struct pose_solver *s, double *x) {
     for (size_t f = 0; f < s->frames; f++) {
-        if (s->frame[f].stays)
+        if (s->frame[f].is_fixed)
             memset(x + POSE_UNKNOWNS * f, 0, POSE_UNKNOWNS * sizeof *x);
     }
 }
@@ -72,15 +72,15 @@ static void multiply(const void *user, const double *x, double *out) {
         out[i] = x[i] * (i < twists ? pose_prior(&s->frame[i / POSE_UNKNOWNS]) + system->damping[i]
                                     : 1.0 / (OFFSET_SIGMA * OFFSET_SIGMA));
     for (size_t t = 0; t < s->track_count; t++) {
-        const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
-        double z[POSE_SIGHTS_MAX];
+        const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
+        double z[POSE_OBSERVATIONS_MAX];
         if (pose_is_held_back(t))
             continue;
-        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++) {
-            const double *twist = x + POSE_UNKNOWNS * sight[k].frame;
-            z[k] = -x[sight[k].offset];
+        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++) {
+            const double *twist = x + POSE_UNKNOWNS * observation[k].frame;
+            z[k] = -x[observation[k].offset];
             for (int j = 0; j < POSE_UNKNOWNS; j++)
-                z[k] += (double)sight[k].d[j] * twist[j];
+                z[k] += (double)observation[k].d[j] * twist[j];
         }
         scatter(s, t, z, out);
     }
@@ -91,15 +91,15 @@ static void preconditioner_init(struct preconditioner *p, const struct pose_solv
     p->block = mem_calloc(s->frames + 1, sizeof *p->block);
     p->diagonal = mem_calloc(s->unknowns + 1, sizeof *p->diagonal);
     for (size_t t = 0; t < s->track_count; t++) {
-        const struct pose_sight *sight = s->sight + t * POSE_SIGHTS_MAX;
-        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++) {
-            if (!(sight[k].weight > 0.0f))
+        const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
+        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++) {
+            if (!(observation[k].weight > 0.0f))
                 continue;
-            double w = (double)sight[k].weight, (*a)[POSE_UNKNOWNS] = p->block[sight[k].frame];
-            p->diagonal[sight[k].offset] += w;
+            double w = (double)observation[k].weight, (*a)[POSE_UNKNOWNS] = p->block[observation[k].frame];
+            p->diagonal[observation[k].offset] += w;
             for (int i = 0; i < POSE_UNKNOWNS; i++)
                 for (int j = 0; j <= i; j++)
-                    a[i][j] += w * (double)sight[k].d[i] * (double)sight[k].d[j];
+                    a[i][j] += w * (double)observation[k].d[i] * (double)observation[k].d[j];
         }
     }
     for (size_t f = 0; f < s->frames; f++) {
@@ -140,9 +140,9 @@ void pose_solve(struct pose_solver *s) {
     const struct conjugate_system system = {n, multiply, precondition, &twist};
     preconditioner_init(&twist.preconditioner, s, twist.damping);
     for (size_t t = 0; t < s->track_count; t++) {
-        double y[POSE_SIGHTS_MAX];
-        for (size_t k = 0; k < pose_sight_count(s->track[t]); k++)
-            y[k] = -(double)s->sight[t * POSE_SIGHTS_MAX + k].value;
+        double y[POSE_OBSERVATIONS_MAX];
+        for (size_t k = 0; k < pose_observation_count(s->track[t]); k++)
+            y[k] = -(double)s->observation[t * POSE_OBSERVATIONS_MAX + k].value;
         if (!pose_is_held_back(t))
             scatter(s, t, y, r);
     }

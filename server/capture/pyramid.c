@@ -65,7 +65,7 @@ static void smooth(float *value, uint32_t width, uint32_t height) {
     mem_free(above);
 }
 
-static void cut_edges(float *value, uint32_t width, uint32_t height, const uint8_t *shows) {
+static void mask_edges(float *value, uint32_t width, uint32_t height, const uint8_t *shows) {
     long w = (long)width, h = (long)height;
     for (long i = 0; i < w * h; i++) {
         if (shows[i] == VIEWS_SURFACE || shows[i] == VIEWS_SEAM)
@@ -87,7 +87,7 @@ void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8
         for (uint32_t x = 0; x < w; x++)
             raw[(size_t)y * w + x] = gray_of(photo, x, y, floor);
     if (shows)
-        cut_edges(raw, w, h, shows);
+        mask_edges(raw, w, h, shows);
     while ((size_t)w * h > pixels && w > 1 && h > 1) {
         float *half = halve(raw, &w, &h);
         mem_free(raw);
@@ -111,7 +111,7 @@ void pyramid_release(struct pyramid *p) {
 }
 
 /* Bilinear look-up at place (x, y) of a level; NaN outside. */
-static float look_up(const struct pyramid *p, int level, float x, float y) {
+static float bilinear(const struct pyramid *p, int level, float x, float y) {
     float u = x - 0.5f, v = y - 0.5f;
     uint32_t w = p->width[level], h = p->height[level];
     if (!(u >= 0.0f && v >= 0.0f && u < (float)w - 1.0f && v < (float)h - 1.0f))
@@ -128,15 +128,15 @@ static float scale_of(const struct pyramid *p, int level) {
 
 float pyramid_value(const struct pyramid *p, int level, float x, float y) {
     float scale = scale_of(p, level);
-    return look_up(p, level, x * scale, y * scale);
+    return bilinear(p, level, x * scale, y * scale);
 }
 
 bool pyramid_gradient(const struct pyramid *p, int level, float x, float y, float *value, float gradient[2]) {
     float scale = scale_of(p, level);
     x *= scale;
     y *= scale;
-    *value = look_up(p, level, x, y);
-    gradient[0] = 0.5f * scale * (look_up(p, level, x + 1.0f, y) - look_up(p, level, x - 1.0f, y));
-    gradient[1] = 0.5f * scale * (look_up(p, level, x, y + 1.0f) - look_up(p, level, x, y - 1.0f));
+    *value = bilinear(p, level, x, y);
+    gradient[0] = 0.5f * scale * (bilinear(p, level, x + 1.0f, y) - bilinear(p, level, x - 1.0f, y));
+    gradient[1] = 0.5f * scale * (bilinear(p, level, x, y + 1.0f) - bilinear(p, level, x, y - 1.0f));
     return isfinite(*value) && isfinite(gradient[0]) && isfinite(gradient[1]);
 }

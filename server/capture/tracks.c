@@ -8,15 +8,15 @@
 #include "server/capture/choose.h"
 
 #define TRACKS_TOTAL 50000
-#define TRACKS_LEAST 150
-#define TRACKS_MOST 600
+#define TRACKS_MIN 150
+#define TRACKS_MAX 600
 #define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0 together, held-out photographs' too */
-#define PYRAMID_MOST ((size_t)640 * 480)
+#define PYRAMID_MAX ((size_t)640 * 480)
 #define PLACES_PER_CELL 8
-#define LEAST_COSINE 0.2f
+#define MIN_COSINE 0.2f
 #define DISTANCE_RATIO 1.7f
 /* Slope (logarithm per pixel) below which a place is not worth following. */
-#define LEAST_SLOPE 0.01f
+#define MIN_SLOPE 0.01f
 /* Radiance added before logarithms, as a share of the median. */
 #define FLOOR_SHARE 0.05f
 
@@ -33,7 +33,7 @@ static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, siz
                          float *x, float *y) {
     const struct views *views = tracks->views;
     const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
-    float best = LEAST_SLOPE;
+    float best = MIN_SLOPE;
     *x = *y = 0.0f;
     for (uint64_t k = 0; k < PLACES_PER_CELL; k++) {
         uint64_t bits = rng_key(t, cell, k);
@@ -51,7 +51,7 @@ static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, siz
             *y = py;
         }
     }
-    return best > LEAST_SLOPE;
+    return best > MIN_SLOPE;
 }
 
 /* From the point to where the ray through (x, y) meets the surface's plane. */
@@ -72,7 +72,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
         !accel_intersect(views->accel, origin, direction, 0.0f, INFINITY, &hit))
         return false;
     vec3 normal = vec3_normalize(mesh_cross(&views->scene->mesh, hit.triangle));
-    if (-vec3_dot(normal, direction) < LEAST_COSINE)
+    if (-vec3_dot(normal, direction) < MIN_COSINE)
         return false;
     *track = (struct track){.x = x, .y = y, .point = vec3_mad(origin, hit.distance_m, direction)};
     track->right = to_pixel(camera, x + 1.0f, y, track->point, normal);
@@ -85,7 +85,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
                            track->point);
         float distance = vec3_length(to);
         if (other != t && distance < DISTANCE_RATIO * hit.distance_m &&
-            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > LEAST_COSINE * distance &&
+            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > MIN_COSINE * distance &&
             views_sees(views, other, track->point, normal, &view))
             track->other[track->other_count++] = other;
     }
@@ -111,14 +111,14 @@ static void make_tracks(void *user, size_t t, int thread) {
 }
 
 void tracks_make(struct tracks *t, const struct views *views, struct parallel *pool) {
-    size_t frames = views->train_count, each = TRACKS_TOTAL / (frames + 1);
+    size_t frames = views->train_count, per_frame = TRACKS_TOTAL / (frames + 1);
     *t = (struct tracks){.views = views};
-    t->capacity = each < TRACKS_LEAST ? TRACKS_LEAST : each > TRACKS_MOST ? TRACKS_MOST : each;
+    t->capacity = per_frame < TRACKS_MIN ? TRACKS_MIN : per_frame > TRACKS_MAX ? TRACKS_MAX : per_frame;
     t->pyramid = mem_calloc(frames + 1, sizeof *t->pyramid);
     t->count = mem_calloc(frames + 1, sizeof *t->count);
     t->track = mem_array(frames * t->capacity + 1, sizeof *t->track);
     size_t pixels = PYRAMID_TOTAL / (views->scene->photograph_count + 1);
-    t->pyramid_pixels = pixels < PYRAMID_MOST ? pixels : PYRAMID_MOST;
+    t->pyramid_pixels = pixels < PYRAMID_MAX ? pixels : PYRAMID_MAX;
     parallel_for(pool, frames, make_pyramid, t);
     parallel_for(pool, frames, make_tracks, t);
 }

@@ -7,10 +7,10 @@
 #include "server/capture/censored.h"
 #include "server/render/sampler.h"
 
-#define LOOKS_PER_POINT 6
-#define MOST_POINTS 8
+#define OBSERVATIONS_PER_POINT 6
+#define MAX_POINTS 8
 #define PIXELS_PER_POINT 16.0f /* larger triangles are asked at several places */
-#define BRIGHTER_LOOKS 0.7f    /* share of the looks that show at least what is taken for shown */
+#define BRIGHTER_SHARE 0.7f    /* share of the looks that show at least what is taken for shown */
 #define KEY_POINTS 29          /* keeps these random numbers apart from others of the triangle */
 
 struct measure_job {
@@ -19,8 +19,8 @@ struct measure_job {
 };
 
 /* The looks at one triangle. */
-struct looks {
-    struct censored value[MOST_POINTS * LOOKS_PER_POINT];
+struct triangle_observations {
+    struct censored value[MAX_POINTS * OBSERVATIONS_PER_POINT];
     size_t count;
     float pixels; /* sum over them of what the whole triangle fills */
 };
@@ -34,28 +34,29 @@ static vec3 place(const struct mesh *mesh, uint32_t triangle, uint32_t i) {
     return mesh_point(mesh, triangle, root * (1.0f - u.y), root * u.y);
 }
 
-static void look_at_point(const struct views *views, uint32_t triangle, vec3 point, vec3 cross,
-                          struct looks *looks) {
-    struct view view[LOOKS_PER_POINT];
+static void observe_point(const struct views *views, uint32_t triangle, vec3 point, vec3 cross,
+                          struct triangle_observations *observations) {
+    struct view view[OBSERVATIONS_PER_POINT];
     float area = 0.5f * vec3_length(cross);
-    size_t seen = views_pick(views, point, vec3_normalize(cross), triangle, LOOKS_PER_POINT, view);
+    size_t seen = views_pick(views, point, vec3_normalize(cross), triangle, OBSERVATIONS_PER_POINT, view);
     for (size_t k = 0; k < seen; k++) {
         const struct photograph *photo = &views->scene->photograph[views->train[view[k].train]];
         struct photograph_sample s;
         if (!views_clean(views, &view[k]) || !photograph_sample(photo, view[k].x, view[k].y, &s))
             continue;
         bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
-        looks->value[looks->count++] = (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
-        looks->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;
+        observations->value[observations->count++] =
+            (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
+        observations->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;
     }
 }
 
 /* Of what was measured; of the bounds where nothing was. */
-static float mean_of(const struct looks *looks, bool *is_bound) {
+static float mean_of(const struct triangle_observations *observations, bool *is_bound) {
     float sum[2] = {0.0f, 0.0f}, count[2] = {0.0f, 0.0f};
-    for (size_t i = 0; i < looks->count; i++) {
-        sum[looks->value[i].is_bound] += looks->value[i].value;
-        count[looks->value[i].is_bound] += 1.0f;
+    for (size_t i = 0; i < observations->count; i++) {
+        sum[observations->value[i].is_bound] += observations->value[i].value;
+        count[observations->value[i].is_bound] += 1.0f;
     }
     *is_bound = count[false] == 0.0f;
     return sum[*is_bound] / count[*is_bound];
@@ -67,27 +68,28 @@ static void measure(void *user, size_t index, int thread) {
     const struct mesh *mesh = &job->views->scene->mesh;
     uint32_t triangle = (uint32_t)index, points = 1;
     vec3 cross = mesh_cross(mesh, triangle);
-    struct looks looks = {.count = 0};
+    struct triangle_observations observations = {.count = 0};
     for (uint32_t i = 0; i < points; i++) {
-        look_at_point(job->views, triangle, place(mesh, triangle, i), cross, &looks);
-        float pixels = looks.count > 0 ? looks.pixels / (float)looks.count : 0.0f;
+        observe_point(job->views, triangle, place(mesh, triangle, i), cross, &observations);
+        float pixels = observations.count > 0 ? observations.pixels / (float)observations.count : 0.0f;
         if (i == 0)
-            points = (uint32_t)clampf(pixels / PIXELS_PER_POINT, 1.0f, MOST_POINTS);
+            points = (uint32_t)clampf(pixels / PIXELS_PER_POINT, 1.0f, MAX_POINTS);
     }
     struct triangle_light *light = job->light;
-    light->shown[triangle] = light->mean[triangle] = -1.0f;
+    light->observed[triangle] = light->mean[triangle] = -1.0f;
     light->pixels[triangle] = 0.0f;
-    if (looks.count == 0)
+    if (observations.count == 0)
         return;
     bool is_bound;
-    light->mean[triangle] = mean_of(&looks, &light->is_bound[triangle]);
-    light->shown[triangle] = censored_quantile(looks.value, looks.count, 1.0f - BRIGHTER_LOOKS, &is_bound);
-    light->pixels[triangle] = looks.pixels / (float)looks.count;
+    light->mean[triangle] = mean_of(&observations, &light->is_bound[triangle]);
+    light->observed[triangle] =
+        censored_quantile(observations.value, observations.count, 1.0f - BRIGHTER_SHARE, &is_bound);
+    light->pixels[triangle] = observations.pixels / (float)observations.count;
 }
 
 void triangle_light_measure(struct triangle_light *light, const struct views *views, struct parallel *pool) {
     size_t count = views->scene->mesh.triangle_count;
-    light->shown = mem_array(count, sizeof *light->shown);
+    light->observed = mem_array(count, sizeof *light->observed);
     light->mean = mem_array(count, sizeof *light->mean);
     light->pixels = mem_array(count, sizeof *light->pixels);
     light->is_bound = mem_calloc(count, sizeof *light->is_bound);
@@ -96,7 +98,7 @@ void triangle_light_measure(struct triangle_light *light, const struct views *vi
 }
 
 void triangle_light_release(struct triangle_light *light) {
-    mem_free(light->shown);
+    mem_free(light->observed);
     mem_free(light->mean);
     mem_free(light->pixels);
     mem_free(light->is_bound);

@@ -12,7 +12,7 @@
 #include "server/capture/views.h"
 
 struct triangle_light {
-    float *shown;  /* [triangle_count] radiance, mean of the channels, that most looks show at least: a highlight
+    float *observed;  /* [triangle_count] radiance, mean of the channels, that most looks show at least: a highlight
                     * wanders with the camera, what shines itself does not; negative: no clean look; owned */
     float *mean;   /* [triangle_count] the mean of what looks show; negative as above; owned */
     bool *is_bound; /* [triangle_count] all of them saturate: it is more; owned */

@@ -24,10 +24,10 @@
 /* How far from a look-up near an edge it is asked how bright the light is that may have got into it, and
  * how many times brighter than the look-up it must be to make a difference. */
 #define MIXING_PIXELS 2.0f
-#define MIXING_FREE 2.0f
+#define MIXING_FREE_RATIO 2.0f
 /* No more can have been added than is shown. */
-#define MOST_MIXING 1.0f
-#define DARKEST 1e-3f /* shown radiance, as a share of the median */
+#define MAX_MIXING 1.0f
+#define DARK_SHARE 1e-3f /* shown radiance, as a share of the median */
 
 #define NO_SURFACE UINT32_MAX
 
@@ -43,7 +43,7 @@ struct edge_job {
     uint32_t train;
 };
 
-static bool hits_centre(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
+static bool centre_meets(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
     vec3 direction;
     return !camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) ||
            accel_occluded(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY);
@@ -78,7 +78,7 @@ static bool differ(const struct corner *a, const struct corner *b, float focal) 
 }
 
 /* Whether the difference of two corners, if there is any, is only that two surfaces meet. */
-static bool meet(const struct corner *a, const struct corner *b, float focal) {
+static bool are_adjacent(const struct corner *a, const struct corner *b, float focal) {
     if (a->segment == NO_SURFACE || b->segment == NO_SURFACE)
         return a->segment == b->segment;
     return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
@@ -106,13 +106,14 @@ static void mark_row(void *user, size_t row, int thread) {
         struct corner low = trace_corner(job, camera, x + 1, y + 1);
         bool mixed = differ(&left_top, &top, camera->fx) || differ(&left_top, &left_low, camera->fx) ||
                      differ(&left_top, &low, camera->fx) || differ(&top, &left_low, camera->fx);
-        bool seam = mixed && meet(&left_top, &top, camera->fx) && meet(&left_top, &left_low, camera->fx) &&
-                    meet(&left_top, &low, camera->fx) && meet(&top, &left_low, camera->fx);
+        bool seam = mixed && are_adjacent(&left_top, &top, camera->fx) &&
+                    are_adjacent(&left_top, &left_low, camera->fx) && are_adjacent(&left_top, &low, camera->fx) &&
+                    are_adjacent(&top, &left_low, camera->fx);
         out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
         owner[x] = owner_mark(low.segment);
         /* What is thinner than a pixel may hide between the corners. */
         if (!mixed && low.segment == NO_SURFACE)
-            out[x] = hits_centre(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
+            out[x] = centre_meets(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
         left_top = top;
         left_low = low;
     }
@@ -230,7 +231,7 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal,
     return true;
 }
 
-bool views_unhidden(const struct views *v, uint32_t train, vec3 point, vec3 normal) {
+bool views_unoccluded(const struct views *v, uint32_t train, vec3 point, vec3 normal) {
     vec3 to_camera = vec3_sub(camera_origin(&v->scene->photograph[v->train[train]].camera), point);
     float distance = vec3_length(to_camera);
     vec3 direction = vec3_scale(to_camera, 1.0f / distance);
@@ -238,7 +239,7 @@ bool views_unhidden(const struct views *v, uint32_t train, vec3 point, vec3 norm
 }
 
 bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 normal, struct view *view) {
-    return views_faces(v, train, point, normal, view) && views_unhidden(v, train, point, normal);
+    return views_faces(v, train, point, normal, view) && views_unoccluded(v, train, point, normal);
 }
 
 int views_edge(const struct views *v, const struct view *view, uint32_t triangle) {
@@ -264,16 +265,16 @@ float views_trust(const struct views *v, const struct view *view, uint32_t trian
     return trust[views_edge(v, view, triangle)];
 }
 
-float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb shown) {
+float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb observed) {
     static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
     int edge = views_edge(v, view, triangle);
     if (edge == 0)
         return 0.0f;
-    float own = fmaxf(rgb_mean(shown), DARKEST * v->median_radiance);
+    float own = fmaxf(rgb_mean(observed), DARK_SHARE * v->median_radiance);
     struct photograph_ring ring =
         photograph_ring(&v->scene->photograph[v->train[view->train]], view->x, view->y, MIXING_PIXELS);
-    float times = fmaxf(fmaxf(ring.brightest, own) / own * (1.0f / MIXING_FREE), 1.0f);
-    return fminf(variance[edge] * times * times, MOST_MIXING);
+    float times = fmaxf(fmaxf(ring.brightest, own) / own * (1.0f / MIXING_FREE_RATIO), 1.0f);
+    return fminf(variance[edge] * times * times, MAX_MIXING);
 }
 
 /* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show

@@ -63,7 +63,7 @@ bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometri
 /* Its two halves: whether the point is in the frustum and faces the camera, which fills `view`; and whether nothing stands
  * between them. */
 bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal, struct view *view);
-bool views_unhidden(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal);
+bool views_unoccluded(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal);
 
 /* Unit direction from a point to where training photograph `train` was taken. */
 vec3 views_direction(const struct views *v, uint32_t train, vec3 point);

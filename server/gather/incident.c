@@ -9,10 +9,17 @@
 #include "server/scene/rgb_half.h"
 
 /* 0 is irradiance.c's, from 8 on highlight.c's. */
-enum { PAIR_PICK = 1, PAIR_LIGHT, PAIR_ON = 32, PAIR_SHINE_PICK = 40, PAIR_SHINE = 48, PAIR_CHANCE = 56 };
-#define BOUNCES 4 /* one after the other from which a ray goes on */
-#define LEAST_COSINE 1e-3f /* to a normal; from farther aside no lobe is followed */
-#define MIRROR_CHANCE 2.0f /* of a ray to go on by the lobe, over the share of what is sent that is mirrored */
+enum {
+    PAIR_PICK = 1,
+    PAIR_LIGHT,
+    PAIR_CONTINUE = 32,
+    PAIR_REFLECTED_PICK = 40,
+    PAIR_REFLECTED_LIGHT = 48,
+    PAIR_ROULETTE = 56
+};
+#define MAX_BOUNCES 4 /* one after the other from which a ray goes on */
+#define MIN_COSINE 1e-3f /* to a normal; from farther aside no lobe is followed */
+#define ROULETTE_FACTOR 2.0f /* of a ray to go on by the lobe, over the share of what is sent that is mirrored */
 #define WIDE_ROUGHNESS 0.5f /* at least, of lobes that mirror lights */
 
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
@@ -48,7 +55,7 @@ static bool is_light(const struct world *world, const struct world_triangle *t) 
 }
 
 /* What a ray finds that meets nothing, or a front, and the density of the light sampler there. */
-static rgb find(const struct light_field *field, const struct accel_ray *ray, const struct accel_hit *hit,
+static rgb incoming_radiance(const struct light_field *field, const struct accel_ray *ray, const struct accel_hit *hit,
                 float *light_pdf) {
     const struct world *world = field->world;
     *light_pdf = 0.0f;
@@ -65,12 +72,12 @@ static rgb find(const struct light_field *field, const struct accel_ray *ray, co
 }
 
 /* By how much what it finds counts, t being NULL where it meets nothing. */
-static rgb weight_of(const struct light_field *field, const struct world_triangle *t, const struct incident_way *way,
+static rgb weight_of(const struct light_field *field, const struct world_triangle *t, const struct incident_path *path,
                      float light_pdf) {
-    if (way->is_mirrored && (!t || is_light(field->world, t)))
-        return rgb_scale(way->light_weight, 1.0f / (way->density + light_pdf));
-    bool is_black = way->is_first && t && field->only_mirrored && field->only_mirrored[t->segment];
-    return is_black ? rgb_gray(0.0f) : way->weight;
+    if (path->is_specular && (!t || is_light(field->world, t)))
+        return rgb_scale(path->light_beta, 1.0f / (path->pdf + light_pdf));
+    bool is_black = path->is_first && t && field->specular_only && field->specular_only[t->segment];
+    return is_black ? rgb_gray(0.0f) : path->beta;
 }
 
 /* --- and on from there --------------------------------------------------------------------------------- */
@@ -80,23 +87,23 @@ static struct accel_ray shadow_ray(vec3 position, vec3 normal, const struct ligh
     vec3 origin = accel_offset(position, normal, light->direction);
     if (light->segment == LIGHT_ENVIRONMENT)
         return (struct accel_ray){origin, 0.0f, light->direction, light->distance_m};
-    vec3 way = vec3_sub(accel_offset(light->point, light->normal, vec3_neg(light->direction)), origin);
-    float far_m = vec3_length(way);
-    return (struct accel_ray){origin, 0.0f, vec3_scale(way, 1.0f / fmaxf(far_m, 1e-20f)), far_m};
+    vec3 to_light = vec3_sub(accel_offset(light->point, light->normal, vec3_neg(light->direction)), origin);
+    float far_m = vec3_length(to_light);
+    return (struct accel_ray){origin, 0.0f, vec3_scale(to_light, 1.0f / fmaxf(far_m, 1e-20f)), far_m};
 }
 
 /* Rays under way, and lights that were sampled where they were mirrored. */
-struct under_way {
+struct wavefront {
     struct incident *in;
     const struct light_field *field;
     uint32_t key, first_sample, bounce;
-    size_t rays, shines;
+    size_t ray_count, light_count;
 };
 
 /* Adds a ray that goes on, from a position whose normal points to its side. */
-static void go_on(struct under_way *u, vec3 position, vec3 normal, vec3 direction, struct incident_way way) {
-    u->in->ray[u->rays] = (struct accel_ray){accel_offset(position, normal, direction), 0.0f, direction, INFINITY};
-    u->in->way[u->rays++] = way;
+static void spawn_ray(struct wavefront *u, vec3 position, vec3 normal, vec3 direction, struct incident_path path) {
+    u->in->ray[u->ray_count] = (struct accel_ray){accel_offset(position, normal, direction), 0.0f, direction, INFINITY};
+    u->in->path[u->ray_count++] = path;
 }
 
 static vec3 position_at(const struct world_triangle *t, const struct accel_ray *ray, const struct accel_hit *hit) {
@@ -105,21 +112,22 @@ static vec3 position_at(const struct world_triangle *t, const struct accel_ray *
 }
 
 /* On from a back, by the cosine. */
-static void pass_back(struct under_way *u, const struct accel_ray *ray, const struct accel_hit *hit,
-                      struct incident_way way) {
+static void spawn_from_back(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
+                      struct incident_path path) {
     const struct world *world = u->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
     vec3 frame[3] = {[2] = vec3_neg(t->normal)};
     vec3_frame(frame[2], &frame[0], &frame[1]);
-    vec2 random = sampler_pair(u->key, u->first_sample + way.index, PAIR_ON + u->bounce);
-    go_on(u, position_at(t, ray, hit), frame[2], incident_cosine_direction(frame, random),
-          (struct incident_way){way.index, rgb_mul(way.weight, rgb_make(base[0], base[1], base[2])), .is_first = false});
+    vec2 random = sampler_pair(u->key, u->first_sample + path.index, PAIR_CONTINUE + u->bounce);
+    spawn_ray(
+        u, position_at(t, ray, hit), frame[2], incident_cosine_direction(frame, random),
+        (struct incident_path){path.index, rgb_mul(path.beta, rgb_make(base[0], base[1], base[2])), .is_first = false});
 }
 
 /* Where a ray is mirrored. Of lights it mirrors a lobe that is widened: found by luck a small one would be a few bright
  * specks (Kaplanyan and Dachsbacher 2013). */
-struct mirror {
+struct reflection {
     vec3 position, normal;
     vec3 frame[3]; /* about the shading normal */
     vec3 wo;       /* where the ray came from, in this frame */
@@ -127,125 +135,126 @@ struct mirror {
 };
 
 /* A direction, in the frame: what the lobes make of light from there, and the density with which it is drawn. */
-struct reflected {
-    float lobe, wide, density;
+struct lobe_values {
+    float lobe, wide, pdf;
 };
 
-static struct reflected reflect(const struct mirror *m, vec3 wi) {
+static struct lobe_values reflect(const struct reflection *m, vec3 wi) {
     struct bsdf_value lobe = bsdf_eval(&m->lobe, m->wo, wi), wide = bsdf_eval(&m->wide, m->wo, wi);
-    return (struct reflected){lobe.specular, wide.specular, 0.5f * (lobe.pdf + wide.pdf)};
+    return (struct lobe_values){lobe.specular, wide.specular, 0.5f * (lobe.pdf + wide.pdf)};
 }
 
-static vec3 draw_reflected(const struct mirror *m, vec2 u) {
+static vec3 sample_reflection(const struct reflection *m, vec2 u) {
     return u.x < 0.5f ? bsdf_sample(&m->lobe, m->wo, 0.0f, 2.0f * u.x, u.y)
                       : bsdf_sample(&m->wide, m->wo, 0.0f, 2.0f * u.x - 1.0f, u.y);
 }
 
 /* Samples a light. */
-static void shine(struct under_way *u, const struct mirror *m, struct incident_way way) {
-    uint32_t sample = u->first_sample + way.index;
-    vec2 pick = sampler_pair(u->key, sample, PAIR_SHINE_PICK + u->bounce);
-    vec2 place = sampler_pair(u->key, sample, PAIR_SHINE + u->bounce);
+static void sample_light(struct wavefront *u, const struct reflection *m, struct incident_path path) {
+    uint32_t sample = u->first_sample + path.index;
+    vec2 pick = sampler_pair(u->key, sample, PAIR_REFLECTED_PICK + u->bounce);
+    vec2 place = sampler_pair(u->key, sample, PAIR_REFLECTED_LIGHT + u->bounce);
     struct light_sample light = {.pdf = 0.0f};
     if (lights_any(u->field->world->lights))
         lights_sample(u->field->world->lights, m->position, pick.x, place.x, place.y, &light);
     if (!(light.pdf > 0.0f) || !(vec3_dot(light.direction, m->normal) > 0.0f))
         return;
-    struct reflected r = reflect(m, vec3_to_frame(m->frame, light.direction));
-    rgb weight = rgb_scale(way.weight, r.wide / (light.pdf + r.density));
-    u->in->shadow[u->shines] = shadow_ray(m->position, m->normal, &light);
-    u->in->shine[u->shines++] = (struct incident_shine){way.index, rgb_mul(weight, light.radiance)};
+    struct lobe_values r = reflect(m, vec3_to_frame(m->frame, light.direction));
+    rgb weight = rgb_scale(path.beta, r.wide / (light.pdf + r.pdf));
+    u->in->shadow[u->light_count] = shadow_ray(m->position, m->normal, &light);
+    u->in->light_sample[u->light_count++] = (struct incident_light_sample){path.index, rgb_mul(weight, light.radiance)};
 }
 
 /* The chance of a ray from such a cosine to go on: small where what it finds adds little to what the texel sends
  * (Russian roulette). */
-static float chance_to_mirror(const struct world *world, const struct incident_lobe *lobe, const struct accel_hit *hit,
-                              float cosine) {
+static float specular_probability(const struct world *world, const struct incident_lobe *lobe,
+                                  const struct accel_hit *hit, float cosine) {
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
-    float matt = (base[0] + base[1] + base[2]) * (1.0f / 3.0f), gloss = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
-    return fminf(1.0f, MIRROR_CHANCE * gloss / (gloss + matt));
+    float diffuse = (base[0] + base[1] + base[2]) * (1.0f / 3.0f),
+          fresnel = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
+    return fminf(1.0f, ROULETTE_FACTOR * fresnel / (fresnel + diffuse));
 }
 
 /* On by the lobe of a front. */
-static void pass_mirror(struct under_way *u, const struct accel_ray *ray, const struct accel_hit *hit,
-                        struct incident_way way) {
+static void spawn_specular(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
+                        struct incident_path path) {
     const struct world *world = u->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const struct incident_lobe *lobe = &u->field->lobe[t->segment];
-    struct mirror m = {position_at(t, ray, hit), t->normal,
+    struct reflection m = {position_at(t, ray, hit), t->normal,
                        .frame[2] = surface_shading(world->mesh, hit->triangle, hit->b1, hit->b2, t->normal),
                        .lobe = bsdf_lobe(lobe->roughness, lobe->specular),
                        .wide = bsdf_lobe(fmaxf(lobe->roughness, WIDE_ROUGHNESS), lobe->specular)};
     vec3_frame(m.frame[2], &m.frame[0], &m.frame[1]);
     m.wo = vec3_to_frame(m.frame, vec3_neg(ray->direction));
-    if (!(m.wo.z > LEAST_COSINE))
+    if (!(m.wo.z > MIN_COSINE))
         return;
-    float chance = chance_to_mirror(world, lobe, hit, m.wo.z);
-    if (!(sampler_pair(u->key, u->first_sample + way.index, PAIR_CHANCE + u->bounce).x < chance))
+    float probability = specular_probability(world, lobe, hit, m.wo.z);
+    if (!(sampler_pair(u->key, u->first_sample + path.index, PAIR_ROULETTE + u->bounce).x < probability))
         return;
-    way.weight = rgb_scale(way.weight, 1.0f / chance);
-    shine(u, &m, way);
-    vec3 wi = draw_reflected(&m, sampler_pair(u->key, u->first_sample + way.index, PAIR_ON + u->bounce));
+    path.beta = rgb_scale(path.beta, 1.0f / probability);
+    sample_light(u, &m, path);
+    vec3 wi = sample_reflection(&m, sampler_pair(u->key, u->first_sample + path.index, PAIR_CONTINUE + u->bounce));
     vec3 direction = vec3_from_frame(m.frame, wi);
-    struct reflected r = reflect(&m, wi);
-    if (r.density > 0.0f && vec3_dot(direction, m.normal) > 0.0f)
-        go_on(u, m.position, m.normal, direction,
-              (struct incident_way){way.index, rgb_scale(way.weight, r.lobe / r.density), false, true,
-                                    rgb_scale(way.weight, r.wide), r.density});
+    struct lobe_values r = reflect(&m, wi);
+    if (r.pdf > 0.0f && vec3_dot(direction, m.normal) > 0.0f)
+        spawn_ray(u, m.position, m.normal, direction,
+              (struct incident_path){path.index, rgb_scale(path.beta, r.lobe / r.pdf), false, true,
+                                    rgb_scale(path.beta, r.wide), r.pdf});
 }
 
 /* Takes what ray `k` found; the densities are those of the light sampler at the first end of each. */
-static void take_hit(struct under_way *u, size_t k) {
+static void shade_hit(struct wavefront *u, size_t k) {
     const struct light_field *field = u->field;
     const struct world *world = field->world;
     struct incident *in = u->in;
     const struct accel_ray ray = in->ray[k];
     const struct accel_hit hit = in->hit[k];
-    const struct incident_way way = in->way[k];
+    const struct incident_path path = in->path[k];
     const struct world_triangle *t = hit.triangle == ACCEL_NONE ? NULL : &world->triangle[hit.triangle];
     if (t && !(vec3_dot(t->normal, ray.direction) < 0.0f)) {
-        pass_back(u, &ray, &hit, way);
+        spawn_from_back(u, &ray, &hit, path);
         return;
     }
     float light_pdf;
-    rgb found = find(field, &ray, &hit, &light_pdf), weight = weight_of(field, t, &way, light_pdf);
-    in->radiance[way.index] = rgb_add(in->radiance[way.index], rgb_mul(weight, found));
-    if (way.is_first) {
-        in->light_pdf[way.index] = light_pdf;
-        in->leaves[way.index] = !t;
+    rgb found = incoming_radiance(field, &ray, &hit, &light_pdf), weight = weight_of(field, t, &path, light_pdf);
+    in->radiance[path.index] = rgb_add(in->radiance[path.index], rgb_mul(weight, found));
+    if (path.is_first) {
+        in->light_pdf[path.index] = light_pdf;
+        in->escapes[path.index] = !t;
     }
     if (t && field->lobe && field->lobe[t->segment].specular > 0.0f)
-        pass_mirror(u, &ray, &hit, way);
+        spawn_specular(u, &ray, &hit, path);
 }
 
 /* Adds the lights that are not occluded. */
-static void take_shines(const struct under_way *u) {
+static void add_unoccluded_lights(const struct wavefront *u) {
     struct incident *in = u->in;
-    accel_occluded_many(u->field->world->accel, u->shines, in->shadow, in->occluded);
-    for (size_t i = 0; i < u->shines; i++) {
-        rgb *to = &in->radiance[in->shine[i].index];
+    accel_occluded_many(u->field->world->accel, u->light_count, in->shadow, in->occluded);
+    for (size_t i = 0; i < u->light_count; i++) {
+        rgb *to = &in->radiance[in->light_sample[i].index];
         if (!in->occluded[i])
-            *to = rgb_add(*to, in->shine[i].radiance);
+            *to = rgb_add(*to, in->light_sample[i].radiance);
     }
 }
 
 void incident_trace(struct incident *in, const struct light_field *field,
                     const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count) {
-    struct under_way u = {in, field, key, first_sample, 0, 0, 0};
+    struct wavefront u = {in, field, key, first_sample, 0, 0, 0};
     for (size_t i = 0; i < count; i++) {
-        go_on(&u, at->position, at->normal, in->direction[i],
-              (struct incident_way){(uint32_t)i, rgb_gray(1.0f), .is_first = true});
+        spawn_ray(&u, at->position, at->normal, in->direction[i],
+              (struct incident_path){(uint32_t)i, rgb_gray(1.0f), .is_first = true});
         in->radiance[i] = rgb_gray(0.0f);
         in->light_pdf[i] = 0.0f;
-        in->leaves[i] = false;
+        in->escapes[i] = false;
     }
-    for (; u.bounce <= BOUNCES && u.rays > 0; u.bounce++) {
-        size_t rays = u.rays;
-        accel_intersect_many(field->world->accel, rays, in->ray, in->hit);
-        u.rays = u.shines = 0;
-        for (size_t k = 0; k < rays; k++)
-            take_hit(&u, k);
-        take_shines(&u);
+    for (; u.bounce <= MAX_BOUNCES && u.ray_count > 0; u.bounce++) {
+        size_t ray_count = u.ray_count;
+        accel_intersect_many(field->world->accel, ray_count, in->ray, in->hit);
+        u.ray_count = u.light_count = 0;
+        for (size_t k = 0; k < ray_count; k++)
+            shade_hit(&u, k);
+        add_unoccluded_lights(&u);
     }
 }
 

@@ -30,7 +30,7 @@ struct light_field {
     const struct world *world;        /* borrowed, all */
     const uint16_t (*radiance)[3];    /* [atlas height][width] half precision: what texels send out */
     const struct incident_lobe *lobe; /* [segment_count] by which they mirror besides, emitters not; NULL: none does */
-    const bool *only_mirrored;        /* [segment_count] black but to those who see them in a mirror; NULL: none */
+    const bool *specular_only;        /* [segment_count] black but to those who see them in a mirror; NULL: none */
 };
 
 /* Directions of arriving light at one point and what comes from there; scratch of one thread. */
@@ -38,21 +38,21 @@ struct incident {
     vec3 direction[INCIDENT_CHUNK]; /* unit, world */
     rgb radiance[INCIDENT_CHUNK];
     float light_pdf[INCIDENT_CHUNK]; /* by solid angle, with which the light sampler picks it */
-    bool leaves[INCIDENT_CHUNK];     /* it meets no surface */
+    bool escapes[INCIDENT_CHUNK];     /* it meets no surface */
     struct accel_ray ray[INCIDENT_CHUNK];
     struct accel_hit hit[INCIDENT_CHUNK];
-    struct incident_way {
+    struct incident_path {
         uint32_t index;   /* of the direction */
-        rgb weight;       /* of what is found on it */
+        rgb beta;         /* of what is found on it */
         bool is_first;    /* straight from the point */
-        bool is_mirrored; /* lights were sampled as such there; these count as follows: */
-        rgb light_weight; /* times the density: */
-        float density;    /* with which this direction was drawn */
-    } way[INCIDENT_CHUNK]; /* of the rays under way */
-    struct incident_shine {
+        bool is_specular; /* lights were sampled as such there; these count as follows: */
+        rgb light_beta;   /* times the density: */
+        float pdf;    /* with which this direction was drawn */
+    } path[INCIDENT_CHUNK]; /* of the rays under way */
+    struct incident_light_sample {
         uint32_t index;
         rgb radiance;
-    } shine[INCIDENT_CHUNK]; /* lights that are mirrored unless they are occluded */
+    } light_sample[INCIDENT_CHUNK]; /* lights that are mirrored unless they are occluded */
     struct accel_ray shadow[INCIDENT_CHUNK]; /* towards them */
     uint8_t occluded[INCIDENT_CHUNK];
 };

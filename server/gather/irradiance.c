@@ -8,10 +8,10 @@
 #include "server/render/light.h"
 #include "server/render/sampler.h"
 
-enum { PAIR_WAY }; /* before those of incident.c */
+enum { PAIR_DIRECTION }; /* before those of incident.c */
 /* A place is inside a body when all of so many rays meet a back, asked a few at a time. */
 #define ENCLOSED_RAYS 32
-#define ENCLOSED_STEP 4
+#define ENCLOSED_BATCH 4
 
 /* The weights of the moments for light from w at cosine c. */
 static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
@@ -27,15 +27,17 @@ static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
 static bool is_enclosed(struct incident *in, const struct light_field *field, const struct surface_point *at,
                         const vec3 frame[3], uint32_t key) {
     const struct world *world = field->world;
-    for (uint32_t first = 0; first < ENCLOSED_RAYS; first += ENCLOSED_STEP) {
-        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
-            vec3 direction = incident_cosine_direction(frame, sampler_pair(key, first + i, PAIR_WAY));
-            in->ray[i] = (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
+    for (uint32_t first = 0; first < ENCLOSED_RAYS; first += ENCLOSED_BATCH) {
+        for (uint32_t i = 0; i < ENCLOSED_BATCH; i++) {
+            vec3 direction = incident_cosine_direction(frame, sampler_pair(key, first + i, PAIR_DIRECTION));
+            in->ray[i] =
+                (struct accel_ray){accel_offset(at->position, at->normal, direction), 0.0f, direction, INFINITY};
         }
-        accel_intersect_many(world->accel, ENCLOSED_STEP, in->ray, in->hit);
-        for (uint32_t i = 0; i < ENCLOSED_STEP; i++) {
-            uint32_t met = in->hit[i].triangle;
-            if (met == ACCEL_NONE || vec3_dot(world->triangle[met].normal, in->ray[i].direction) < 0.0f)
+        accel_intersect_many(world->accel, ENCLOSED_BATCH, in->ray, in->hit);
+        for (uint32_t i = 0; i < ENCLOSED_BATCH; i++) {
+            uint32_t hit_triangle = in->hit[i].triangle;
+            if (hit_triangle == ACCEL_NONE ||
+                vec3_dot(world->triangle[hit_triangle].normal, in->ray[i].direction) < 0.0f)
                 return false;
         }
     }
@@ -45,7 +47,7 @@ static bool is_enclosed(struct incident *in, const struct light_field *field, co
 void irradiance_gather(struct irradiance *irradiance, struct incident *in,
                        const struct light_field *field, const struct surface_point *at, uint32_t key,
                        size_t samples) {
-    const size_t ways_a_chunk = INCIDENT_CHUNK * 2 / 3;
+    const size_t rays_per_chunk = INCIDENT_CHUNK * 2 / 3;
     vec3 frame[3];
     frame[2] = at->shading;
     vec3_frame(at->shading, &frame[0], &frame[1]);
@@ -57,15 +59,16 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
     double sum[IRRADIANCE_MOMENTS][3] = {{0}};
     rgb noise = {0.0f, 0.0f, 0.0f};
     size_t lights_done = 0;
-    for (size_t done = 0; done < samples; done += ways_a_chunk) {
-        size_t ways = samples - done < ways_a_chunk ? samples - done : ways_a_chunk;
-        size_t lit = light_samples * (done + ways) / samples - lights_done;
-        for (size_t i = 0; i < ways; i++)
-            in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_WAY));
-        incident_trace(in, field, at, key, (uint32_t)done, ways);
-        incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ways, lit);
+    for (size_t done = 0; done < samples; done += rays_per_chunk) {
+        size_t ray_count = samples - done < rays_per_chunk ? samples - done : rays_per_chunk;
+        size_t light_count = light_samples * (done + ray_count) / samples - lights_done;
+        for (size_t i = 0; i < ray_count; i++)
+            in->direction[i] =
+                incident_cosine_direction(frame, sampler_pair(key, (uint32_t)(done + i), PAIR_DIRECTION));
+        incident_trace(in, field, at, key, (uint32_t)done, ray_count);
+        incident_sample_lights(in, field, at, key, (uint32_t)lights_done, ray_count, light_count);
         float chunk[IRRADIANCE_MOMENTS][3] = {{0}};
-        for (size_t i = 0; i < ways + lit; i++) {
+        for (size_t i = 0; i < ray_count + light_count; i++) {
             float c = vec3_dot(in->direction[i], at->shading);
             if (!(c > 0.0f))
                 continue;
@@ -73,7 +76,7 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
             float basis[IRRADIANCE_MOMENTS];
             moment_basis(in->direction[i], c, basis);
             rgb l = rgb_scale(in->radiance[i], 1.0f / density);
-            bool early = i < ways ? done + i < samples / 2 : lights_done + i - ways < light_samples / 2;
+            bool early = i < ray_count ? done + i < samples / 2 : lights_done + i - ray_count < light_samples / 2;
             noise = rgb_mad(noise, early ? c : -c, l);
             for (int m = 0; m < IRRADIANCE_MOMENTS; m++) {
                 chunk[m][0] += basis[m] * l.r;
@@ -84,7 +87,7 @@ void irradiance_gather(struct irradiance *irradiance, struct incident *in,
         for (int m = 0; m < IRRADIANCE_MOMENTS; m++)
             for (int c = 0; c < 3; c++)
                 sum[m][c] += (double)chunk[m][c];
-        lights_done += lit;
+        lights_done += light_count;
     }
     irradiance->noise = noise;
     for (int m = 0; m < IRRADIANCE_MOMENTS; m++)

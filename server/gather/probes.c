@@ -8,7 +8,7 @@
 #include "server/render/sampler.h"
 
 /* A probe's reach, in blocks: 1.5 lets four to nine speak for a texel, smoothly. */
-#define REACH 1.5f
+#define FILTER_RADIUS 1.5f
 /* Weight of a probe in the dark for a texel in view. */
 #define UNSEEN_WEIGHT 0.01f
 #define CHUNK 16 /* probes a work item */
@@ -20,7 +20,7 @@ struct places {
     float *distance; /* of the place from the block's centre */
 };
 
-static void offer(struct places *p, uint32_t texel, uint32_t chart, bool seen, float distance) {
+static void offer_place(struct places *p, uint32_t texel, uint32_t chart, bool seen, float distance) {
     size_t i = 0;
     while (i < p->count && p->probe[i].chart != chart)
         i++;
@@ -45,7 +45,7 @@ static void find_places(struct places *places, uint32_t column, uint32_t row, ui
             if (triangle == INVERSE_UV_NONE)
                 continue;
             float dx = (float)(x - x0) - middle, dy = (float)(y - y0) - middle;
-            offer(places, texel, atlas->chart_of_triangle[triangle], fused->count[texel] > 0.0f,
+            offer_place(places, texel, atlas->chart_of_triangle[triangle], fused->count[texel] > 0.0f,
                   dx * dx + dy * dy);
         }
     }
@@ -129,7 +129,7 @@ void probes_gather(struct probes *p, const struct light_field *field, const stru
 }
 
 static float tent(float distance) {
-    return fmaxf(0.0f, 1.0f - fabsf(distance) * (1.0f / REACH));
+    return fmaxf(0.0f, 1.0f - fabsf(distance) * (1.0f / FILTER_RADIUS));
 }
 
 void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,

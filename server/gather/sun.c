@@ -8,11 +8,11 @@
 #include "server/scene/latlong.h"
 
 /* Where the first rays agree no more are asked. */
-#define FIRST_RAYS 5
-#define ALL_RAYS 16
+#define PROBE_RAYS 5
+#define PENUMBRA_RAYS 16
 #define GOLDEN_ANGLE 2.39996323f
 /* Places over a pixel of the map, along each side. */
-#define GRID 8
+#define SUBPIXELS 8
 
 /* In the disc, so far from its middle as a part of its radius. */
 static vec3 disc_direction(const struct sun *sun, float angle, float part) {
@@ -23,7 +23,7 @@ static vec3 disc_direction(const struct sun *sun, float angle, float part) {
     return vec3_normalize(vec3_mad(d, r * sinf(angle), up));
 }
 
-vec3 sun_toward(const struct sun *sun, vec2 u) {
+vec3 sun_sample(const struct sun *sun, vec2 u) {
     return disc_direction(sun, 2.0f * BSDF_PI * u.x, sqrtf(u.y));
 }
 
@@ -42,20 +42,20 @@ static int count_open(const struct sun *sun, const struct accel *accel, const st
     return open;
 }
 
-float sun_visible(const struct sun *sun, const struct accel *accel, const struct surface_point *at, int rays) {
+float sun_visibility(const struct sun *sun, const struct accel *accel, const struct surface_point *at, int rays) {
     if (!(vec3_dot(sun->direction, at->shading) > 0.0f) || !(vec3_dot(sun->direction, at->normal) > 0.0f))
         return 0.0f;
     if (rays > 0)
         return (float)count_open(sun, accel, at, rays) / (float)rays;
-    int open = count_open(sun, accel, at, FIRST_RAYS);
-    if (open == 0 || open == FIRST_RAYS)
+    int open = count_open(sun, accel, at, PROBE_RAYS);
+    if (open == 0 || open == PROBE_RAYS)
         return open > 0 ? 1.0f : 0.0f;
-    return (float)count_open(sun, accel, at, ALL_RAYS) / ALL_RAYS;
+    return (float)count_open(sun, accel, at, PENUMBRA_RAYS) / PENUMBRA_RAYS;
 }
 
 void sun_add_light(const struct sun *sun, const struct accel *accel, const struct surface_point *at,
                    struct irradiance *irradiance) {
-    float visible = sun->is_there ? sun_visible(sun, accel, at, 0) : 0.0f;
+    float visible = sun->is_there ? sun_visibility(sun, accel, at, 0) : 0.0f;
     if (visible > 0.0f)
         irradiance_add(irradiance, at->shading, sun->direction, rgb_scale(sun->irradiance, visible));
 }
@@ -93,11 +93,11 @@ static void refine_image(struct image *image, bool nearest) {
 /* The share of a pixel of the map that is within an angle of the sun's middle. */
 static float covered(const struct image *map, uint32_t column, uint32_t row, vec3 middle, float cosine) {
     int inside = 0;
-    for (int i = 0; i < GRID * GRID; i++) {
-        double x = column + (i % GRID + 0.5) / GRID - 0.5, y = row + (i / GRID + 0.5) / GRID - 0.5;
+    for (int i = 0; i < SUBPIXELS * SUBPIXELS; i++) {
+        double x = column + (i % SUBPIXELS + 0.5) / SUBPIXELS - 0.5, y = row + (i / SUBPIXELS + 0.5) / SUBPIXELS - 0.5;
         inside += vec3_dot(latlong_pixel(map->width, map->height, x, y), middle) > cosine;
     }
-    return (float)inside / (GRID * GRID);
+    return (float)inside / (SUBPIXELS * SUBPIXELS);
 }
 
 /* Of each pixel of a row, the share that the disc covers; those of a pole, which are one direction, have it alike. */

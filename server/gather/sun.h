@@ -20,11 +20,11 @@ struct sun {
 };
 
 /* Unit direction of a place in the disc, evenly for u in [0, 1)^2. */
-vec3 sun_toward(const struct sun *sun, vec2 u);
+vec3 sun_sample(const struct sun *sun, vec2 u);
 
 /* Which part of the disc a point of the surface sees, by `rays` rays or, for 0, as many as it takes to tell lit,
  * unlit and half-lit places apart. 0 where either normal faces away from its middle. */
-float sun_visible(const struct sun *sun, const struct accel *accel, const struct surface_point *at, int rays);
+float sun_visibility(const struct sun *sun, const struct accel *accel, const struct surface_point *at, int rays);
 
 /* Adds what it sends to the light that arrives at a point of the surface. */
 void sun_add_light(const struct sun *sun, const struct accel *accel, const struct surface_point *at,

@@ -38,7 +38,7 @@ static void light_by_sky(void *user, size_t index, int thread) {
     for (uint32_t k = 0; k < SKY_RAYS; k++) {
         vec3 d = incident_cosine_direction(frame, sampler_pair(key, k, 0));
         vec3 from = accel_offset(p->at.position, p->at.normal, d);
-        if (!environment_is_told(&r->environment, d) && !accel_occluded(r->world.accel, from, d, 0.0f, INFINITY))
+        if (!environment_is_measured(&r->environment, d) && !accel_occluded(r->world.accel, from, d, 0.0f, INFINITY))
             p->lit += rgb_mean(lights_environment(r->world.lights, d)) / SKY_RAYS;
     }
 }
@@ -132,7 +132,8 @@ void lamps_add_sky(struct lamps *l) {
     lamp->least = rgb_make(1.0f / by.r, 1.0f / by.g, 1.0f / by.b);
 }
 
-void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field, const struct fused *shown) {
+void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field,
+                  const struct fused *shown) {
     struct survey survey;
     survey_init(&survey, l->r, views, field, l->without, LIGHT_PLACES);
     light_places_init(&l->places, &survey, shown);

@@ -68,8 +68,8 @@ static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, s
 
 /* --- what arrives --------------------------------------------------------------------------------- */
 
-static void trace_ways(const struct shining *s, const struct shining_place *place, uint32_t key, struct accel_ray ray[WAYS],
-                       struct accel_hit hit[WAYS]) {
+static void trace_ways(const struct shining *s, const struct shining_place *place, uint32_t key,
+                       struct accel_ray ray[WAYS], struct accel_hit hit[WAYS]) {
     vec3 frame[3] = {[2] = place->normal};
     vec3_frame(place->normal, &frame[0], &frame[1]);
     for (uint32_t i = 0; i < WAYS; i++) {
@@ -95,7 +95,7 @@ static bool is_seen(const struct shining *s, vec3 direction) {
 static float distant_radiance(const struct shining *s, vec3 direction) {
     float radiance = rgb_mean(lights_environment(s->r->world.lights, direction));
     bool seen = is_seen(s, direction);
-    if (seen && !environment_is_told(&s->r->environment, direction))
+    if (seen && !environment_is_measured(&s->r->environment, direction))
         return PERHAPS_BRIGHTER * radiance;
     if (!s->has_unseen || seen)
         return radiance;
@@ -190,7 +190,7 @@ static void find_unseen_light(struct shining *s) {
     double unseen = 0.0;
     survey->shining = s;
     for (size_t t = 0; t < mesh->triangle_count; t++) {
-        if (s->light->shown[t] >= 0.0f)
+        if (s->light->observed[t] >= 0.0f)
             shown[count++] = (uint32_t)t;
     }
     s->room_count = choose_places(mesh, shown, count, POINTS, s->room);

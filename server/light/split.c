@@ -69,7 +69,7 @@ static uint32_t root_of(uint32_t *parent, uint32_t t) {
 }
 
 static bool is_lit(const struct level *l, uint32_t t) {
-    return !l->job->settled[t] && l->job->light.shown[t] >= l->bright;
+    return !l->job->settled[t] && l->job->light.observed[t] >= l->bright;
 }
 
 static bool is_rest(const struct level *l, uint32_t t) {
@@ -107,7 +107,7 @@ static struct measure measure(const struct level *l, const uint32_t *triangle, s
     struct measure m = {0.0f, 0.0f};
     for (size_t i = 0; i < count; i++) {
         m.pixels += l->job->light.pixels[triangle[i]];
-        l->value[i] = l->job->light.shown[triangle[i]];
+        l->value[i] = l->job->light.observed[triangle[i]];
     }
     m.shown = quantile(l->value, count, 0.5);
     return m;
@@ -116,7 +116,7 @@ static struct measure measure(const struct level *l, const uint32_t *triangle, s
 static size_t collect_unlit(const struct level *l) {
     size_t count = 0;
     for (size_t i = 0; i < l->triangle_count; i++) {
-        float shown = l->job->light.shown[l->triangle[i]];
+        float shown = l->job->light.observed[l->triangle[i]];
         if (!l->job->settled[l->triangle[i]] && shown >= 0.0f && shown < l->bright)
             l->unlit[count++] = l->triangle[i];
     }
@@ -159,7 +159,7 @@ static size_t settle(const struct level *l, size_t lit_count, float shown) {
     for (size_t i = 0; i < lit_count; i++) {
         uint32_t t = l->lit[i];
         l->job->settled[t] = true;
-        if (l->job->light.shown[t] >= PURE * shown)
+        if (l->job->light.observed[t] >= PURE * shown)
             l->lit[kept++] = t;
     }
     return kept;
@@ -225,7 +225,7 @@ static void try_level(const struct level *l) {
 static float brightest(const struct job *job, const uint32_t *triangle, size_t count) {
     float bright = 0.0f;
     for (size_t i = 0; i < count; i++)
-        bright = fmaxf(bright, job->light.shown[triangle[i]]);
+        bright = fmaxf(bright, job->light.observed[triangle[i]]);
     return bright;
 }
 

@@ -64,7 +64,7 @@ static void ask_direction(void *user, size_t index, int thread) {
     double sum = 0.0, weights = 0.0;
     for (size_t i = 0; i < a->count; i++) {
         const struct light_place *p = &a->s->places.place[a->place[i]];
-        double weight = (double)(a->weight[i] * sun_visible(&sun, a->s->r->world.accel, &p->at, 1));
+        double weight = (double)(a->weight[i] * sun_visibility(&sun, a->s->r->world.accel, &p->at, 1));
         sum += weight * ((double)p->odd - a->mean);
         weights += weight;
     }
@@ -130,7 +130,7 @@ static void shine_on(void *user, size_t index, int thread) {
     (void)thread;
     struct search *s = user;
     struct light_place *p = &s->places.place[index];
-    p->open = sun_visible(&s->sun, s->r->world.accel, &p->at, s->rays);
+    p->open = sun_visibility(&s->sun, s->r->world.accel, &p->at, s->rays);
     p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
 }
 
@@ -231,7 +231,8 @@ static void report(const struct search *s, double explains) {
 
 void sun_report(const struct reconstruction *r) {
     cJSON *figures = cJSON_GetObjectItem(r->report, "sun");
-    cJSON *direction = cJSON_AddArrayToObject(figures, "direction"), *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
+    cJSON *direction = cJSON_AddArrayToObject(figures, "direction"),
+          *irradiance = cJSON_AddArrayToObject(figures, "irradiance");
     for (int c = 0; c < 3; c++) {
         cJSON_AddItemToArray(direction, cJSON_CreateNumber((double)(&r->sun.direction.x)[c]));
         cJSON_AddItemToArray(irradiance, cJSON_CreateNumber((double)(&r->sun.irradiance.r)[c]));

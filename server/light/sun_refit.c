@@ -14,7 +14,8 @@
 
 static bool tells(const struct divide *d, uint32_t texel) {
     const struct reconstruction *r = d->r;
-    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && !r->is_emitter[reconstruction_segment(r, texel)];
+    return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] &&
+           !r->is_emitter[reconstruction_segment(r, texel)];
 }
 
 /* Evenly spread; returns their number. */
@@ -56,7 +57,7 @@ static void place_texel(void *user, size_t index, int thread) {
     p->weight = 1.0f;
     p->shown = rgb_clamp(rgb_mul(measured_value(m), white), 0.0f, INFINITY);
     p->white = rgb_clamp(rgb_sub(white, of_sun), 0.0f, INFINITY);
-    p->open = sun_visible(&r->sun, r->world.accel, &p->at, 0);
+    p->open = sun_visibility(&r->sun, r->world.accel, &p->at, 0);
     p->lit = p->open * vec3_dot(r->sun.direction, p->at.shading);
 }
 

@@ -49,7 +49,7 @@ static void light_bright(struct reconstruction *r, const struct views *views, co
 /* Segments of `without` are as bright as they are by now, to those who see them in a mirror. */
 static void leave_out(struct survey *s, const bool *without) {
     const struct reconstruction *r = s->r;
-    s->field.only_mirrored = without;
+    s->field.specular_only = without;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
         if (without[segment])
@@ -82,7 +82,8 @@ void survey_init(struct survey *s, struct reconstruction *r, const struct views 
                  const struct light_field *field, const bool *without, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
-    memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance, texels * sizeof *s->radiance);
+    memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance,
+           texels * sizeof *s->radiance);
     if (!field)
         fill_radiance(s);
     s->field = (struct light_field){.world = &r->world, .radiance = (const uint16_t(*)[3])s->radiance};

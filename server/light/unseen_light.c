@@ -55,7 +55,7 @@ static void look_around(void *user, size_t index, int thread) {
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
     incident_trace(in, field, &at, key, 0, WAYS);
     for (size_t i = 0; i < WAYS; i++) {
-        if (!in->leaves[i])
+        if (!in->escapes[i])
             continue;
         float share = 1.0f / WAYS; /* of the ray, that is unseen */
         if (u->angle)

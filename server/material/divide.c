@@ -115,7 +115,7 @@ static void offer_look(const struct divide *d, uint32_t segment, const struct su
     rgb typical = rgb_scale(c.white, TYPICAL_BASE_COLOR);
     /* Edges and the light of others only lower it: no ray is needed to know that it is too low. */
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
-        !views_unhidden(d->views, train, at->position, at->normal) ||
+        !views_unoccluded(d->views, train, at->position, at->normal) ||
         photograph_has_firefly(photo, c.view.x, c.view.y) ||
         !photograph_sample(photo, c.view.x, c.view.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
         return;
@@ -139,8 +139,9 @@ static struct robust_sample look_of(const struct divide *d, uint32_t texel, cons
     if (m->specular[segment] > 0.0f) {
         struct highlight highlight;
         struct highlight_levels level = {1, 1, {m->roughness[segment]}, {m->specular[segment]}};
-        highlight_gather(&highlight, scratch, d->field, at, views_direction(d->views, c->view.train, at->position), &level,
-                         sampler_key(KEY_DIVIDE, texel, c->view.train), d->highlight_samples, d->highlight_samples / 2);
+        highlight_gather(&highlight, scratch, d->field, at, views_direction(d->views, c->view.train, at->position),
+                         &level, sampler_key(KEY_DIVIDE, texel, c->view.train), d->highlight_samples,
+                         d->highlight_samples / 2);
         gloss = highlight.radiance[0][0];
         float both = fmaxf(d->typical[segment] * rgb_mean(white) + rgb_mean(gloss), 0.01f * median);
         float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
@@ -334,7 +335,7 @@ struct sending {
 
 /* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors aslant
  * and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
- * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_mirrored.h's. */
+ * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_caustics.h's. */
 static void send_out(const void *user, uint32_t texel) {
     const struct sending *job = user;
     const struct divide *d = job->divide;

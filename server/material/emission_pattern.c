@@ -96,7 +96,7 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
         if (!views_faces(views, t, at.position, at.normal, &view) ||
             !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
-            !views_unhidden(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
+            !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
             continue;
         float mixing = views_mixing(views, &view, at.triangle, s.radiance);
         bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];

@@ -100,19 +100,19 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
     update_edges(r, views, found);
     find_light(r, views, claim, light);
     memset(found->shift, 0, views->train_count * sizeof *found->shift);
-    found->moved_count = found->guests_moved = 0;
-    found->shift_px = found->guests_shift_px = 0.0;
+    found->moved_count = found->held_out_moved_count = 0;
+    found->shift_px = found->held_out_shift_px = 0.0;
 }
 
 static void say_places(const struct poses_found *poses, const struct blur_found *blur,
                        const struct reconstruct_hooks *hooks) {
-    char line[240], guests[80] = "";
-    if (poses->guests_moved > 0)
-        snprintf(guests, sizeof guests, "; of %zu that are held out, by %.2f px", poses->guests_moved,
-                 poses->guests_shift_px);
+    char line[240], held_out[80] = "";
+    if (poses->held_out_moved_count > 0)
+        snprintf(held_out, sizeof held_out, "; of %zu that are held out, by %.2f px", poses->held_out_moved_count,
+                 poses->held_out_shift_px);
     if (poses->moved_count > 0) {
         snprintf(line, sizeof line, "calibration: the poses of %zu photographs were wrong, by %.2f px (rms)%s",
-                 poses->moved_count, poses->shift_px, guests);
+                 poses->moved_count, poses->shift_px, held_out);
         hooks->log(hooks->user, line);
     }
     if (blur->blurred_count > 0) {
@@ -156,8 +156,8 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     report_light(r, &light, report);
     json_add_int(report, "poses_moved", (int64_t)poses.moved_count);
     json_add_number(report, "pose_shift_px", poses.shift_px);
-    json_add_int(report, "held_out_poses_moved", (int64_t)poses.guests_moved);
-    json_add_number(report, "held_out_pose_shift_px", poses.guests_shift_px);
+    json_add_int(report, "held_out_poses_moved", (int64_t)poses.held_out_moved_count);
+    json_add_number(report, "held_out_pose_shift_px", poses.held_out_shift_px);
     json_add_int(report, "blurred", (int64_t)blur.blurred_count);
     json_add_number(report, "blur_px", blur.blur_px);
     json_add(report, "photographs", photographs_found(views, poses.shift));

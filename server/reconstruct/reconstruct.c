@@ -8,10 +8,10 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 #include "server/capture/clip.h"
-#include "server/capture/glance.h"
+#include "server/capture/fireflies.h"
 #include "server/capture/orient.h"
-#include "server/capture/shown.h"
-#include "server/capture/sparks.h"
+#include "server/capture/radiance_preview.h"
+#include "server/capture/texel_density.h"
 #include "server/capture/views.h"
 #include "server/light/lamp_find.h"
 #include "server/light/lamps.h"
@@ -185,10 +185,10 @@ static enum status remap_surface(struct run *run, bool has_split, struct error *
         return STATUS_OK;
     float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
     if (density)
-        shown_density(&run->views, &r->atlas, r->pool, density);
+        texel_density_from_views(&run->views, &r->atlas, r->pool, density);
     forget_surface(r);
-    mem_free(r->glance); /* of the former atlas */
-    r->glance = NULL;
+    mem_free(r->radiance_preview); /* of the former atlas */
+    r->radiance_preview = NULL;
     enum status status = map_surface(r, density, err);
     mem_free(density);
     if (status != STATUS_OK)
@@ -227,12 +227,14 @@ static enum status show_glance(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
     if (!run->hooks->preview_due(run->hooks->user))
         return STATUS_OK;
-    r->glance = glance(&run->views, &r->atlas, &r->inverse, r->pool);
+    r->radiance_preview = radiance_preview(&run->views, &r->atlas, &r->inverse, r->pool);
     return preview_if_due(run, err);
 }
 
 /* So much more of prepare is done. */
-static void prepared(struct run *run, double share) { pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share); }
+static void prepared(struct run *run, double share) {
+    pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share);
+}
 
 static enum status prepare(struct run *run, struct error *err) {
     struct reconstruction *r = run->r;
@@ -258,9 +260,9 @@ static enum status prepare(struct run *run, struct error *err) {
         return status;
     calibrate(r, &run->views, run->hooks);
     noise_measure(&r->noise, &run->views);
-    noise_tell_black(&r->noise, r->scene);
+    noise_set_black(&r->noise, r->scene);
     clip_mark(r->scene, &run->views, &r->noise, r->pool);
-    sparks_mark(r->scene, &run->views, &r->noise, r->pool);
+    fireflies_mark(r->scene, &run->views, &r->noise, r->pool);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
     prepared(run, CALIBRATE_SHARE);
@@ -296,8 +298,8 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
         environment_make_unseen(&run->r->environment); /* it is drawn there when solve is done */
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
-    mem_free(run->r->glance);
-    run->r->glance = NULL;
+    mem_free(run->r->radiance_preview);
+    run->r->radiance_preview = NULL;
     pace_advance(run->r, run->hooks, "fuse", PLAN_FUSE, 1.0);
     return preview_if_due(run, err);
 }
@@ -375,7 +377,7 @@ void reconstruct_release(struct reconstruction *r) {
         image_release(&r->held_out[i].render);
     }
     mem_free(r->held_out);
-    mem_free(r->glance);
+    mem_free(r->radiance_preview);
     mem_free(r->is_emitter);
     mem_free(r->evidence);
     environment_release(&r->environment);

@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 #include "server/gather/probes.h"
-#include "server/gather/sun_mirrored.h"
+#include "server/gather/sun_caustics.h"
 #include "server/light/changing_light.h"
 #include "server/light/emitters.h"
 #include "server/light/lamps.h"
@@ -349,7 +349,7 @@ static enum status fit(struct solve *s, int pass, struct error *err) {
         gloss_fit(s->r, s->views, &s->probes, &s->evenly);
         s->divide.stride = 1;
         sun_refit(&s->divide);
-        s->mirrored_share = sun_mirrored_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
+        s->mirrored_share = sun_caustics_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
                                              (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
     return advance(s, PLAN_FIT, 1.0 / (is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES), err);

@@ -79,7 +79,7 @@ struct reconstruction {
     bool exposures_drift, colors_drift; /* told exposures, white balance (calibrate.h) */
     bool sky_is_fitted;              /* what comes from there is told by surfaces (unseen_light.h), not filled in */
     struct noise noise;              /* of the photographs' pixels */
-    uint16_t (*glance)[3];           /* [height][width] a first picture of that (glance.h), or NULL; owned */
+    uint16_t (*radiance_preview)[3]; /* [height][width] a first picture of that (radiance_preview.h), or NULL; owned */
     struct fused fused;              /* what the photographs show of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
     struct emitter_evidence *evidence; /* [segment_count] why; owned */

@@ -13,7 +13,8 @@ struct export_input results_so_far(const struct reconstruction *r, const char *t
         .inverse = &r->inverse,
         .materials = &r->materials,
         .has_materials = r->has_materials,
-        .radiance = r->glance ? (const uint16_t(*)[3])r->glance : (const uint16_t(*)[3])r->fused.radiance,
+        .radiance =
+            r->radiance_preview ? (const uint16_t(*)[3])r->radiance_preview : (const uint16_t(*)[3])r->fused.radiance,
         .confidence_count = r->fused.count,
         .confidence_spread = r->fused.spread,
         .is_emitter = r->is_emitter,

@@ -70,8 +70,8 @@ static void test_held_out(struct painted *room) {
                 CHECK(memcmp(&first[f], &room->scene.photograph[f].camera, sizeof first[f]) == 0);
         }
         printf("held out, %s: %zu moved by %.3f px, then off by %.3f px at most\n", k ? "noise" : "as taken",
-               found.guests_moved, found.guests_shift_px, worst);
-        CHECK(k == 0 ? found.guests_moved == 3 && worst < 0.4 : found.guests_moved == 0);
+               found.held_out_moved_count, found.held_out_shift_px, worst);
+        CHECK(k == 0 ? found.held_out_moved_count == 3 && worst < 0.4 : found.held_out_moved_count == 0);
         poses_found_release(&found);
     }
 }

@@ -38,7 +38,7 @@ static rgb color_of_patch(const struct reconstruction *r) {
         struct surface_point at;
         if (r->segments.id[reconstruction_segment(r, texel)] != FLOOR ||
             !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) ||
-            sun_visible(&r->sun, r->world.accel, &at, 0) < 1.0f)
+            sun_visibility(&r->sun, r->world.accel, &at, 0) < 1.0f)
             continue;
         const float *c = r->materials.base_color.texel[texel];
         sum = rgb_add(sum, rgb_make(c[0], c[1], c[2]));

@@ -25,10 +25,12 @@ static void photograph_sky(struct plane_rig *rig, float short_clip) {
         if (is_short && short_clip > 0.0f)
             photo->is_hdr = false, photo->clip = short_clip;
         for (size_t k = 0; k < PLANE_PIXELS * PLANE_PIXELS; k++) {
-            CHECK(camera_direction(&photo->camera, (float)(k % PLANE_PIXELS) + 0.5f, (float)(k / PLANE_PIXELS) + 0.5f, &d));
+            CHECK(camera_direction(&photo->camera, (float)(k % PLANE_PIXELS) + 0.5f, (float)(k / PLANE_PIXELS) + 0.5f,
+                                   &d));
             float value = times(d) * (is_short ? SHORT * SHORT_SHOWS : LONG_SHOWS);
             for (size_t c = 0; c < 3; c++)
-                photo->pixel[k][c] = image_half_from_float(short_clip > 0.0f && is_short ? fminf(value, short_clip) : value);
+                photo->pixel[k][c] =
+                    image_half_from_float(short_clip > 0.0f && is_short ? fminf(value, short_clip) : value);
         }
     }
     plane_rig_look(rig, 0.02f);
@@ -45,7 +47,7 @@ static void check_map(float short_clip, float wanted) {
     CHECK(environment_make(&e, &rig.views, rig.pool));
     for (int k = 0; k < 4; k++) {
         vec3 d = {k & 1 ? 0.4f : -0.4f, k & 2 ? 0.4f : -0.4f, 1.0f};
-        CHECK(environment_is_told(&e, vec3_normalize(d)));
+        CHECK(environment_is_measured(&e, vec3_normalize(d)));
         CHECK_THAT(fabsf(shown(&e, d) / (wanted * times(d)) - 1.0f) < 2e-3f, "%g %g: %g", (double)d.x, (double)d.y,
                    (double)shown(&e, d));
     }

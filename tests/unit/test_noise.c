@@ -116,7 +116,7 @@ static void test_black(void) {
     }
     photograph[2].is_hdr = photograph[3].is_test = true;
     noise_measure(&noise, &views);
-    noise_tell_black(&noise, &scene);
+    noise_set_black(&noise, &scene);
     CHECK(photograph[0].black == noise.black && photograph[1].black == noise.black && photograph[2].black == 0.0f &&
           photograph[3].black == 0.0f);
     CHECK_NEAR(noise.black / CODE, 0.72, 0.15);

@@ -1,15 +1,15 @@
-/* sparks.c -- see sparks.h. */
-#include "server/capture/sparks.h"
+/* fireflies.c -- see fireflies.h. */
+#include "server/capture/fireflies.h"
 
 #include <math.h>
 
 #include "common/image.h"
 #include "common/mem.h"
 
-#define BRIGHTER 2.0f   /* than the brightest pixel around */
-#define DEVIATIONS 4.0f /* of noise, by which it is brighter */
+#define MIN_RATIO 2.0f   /* than the brightest pixel around */
+#define NOISE_DEVIATIONS 4.0f /* of noise, by which it is brighter */
 
-struct sparks_job {
+struct fireflies_job {
     const struct noise *noise;
     struct photograph *photo;
     uint32_t train;
@@ -22,7 +22,7 @@ static float value_at(const struct photograph *photo, size_t at) {
 }
 
 /* The brightest pixel around one. */
-static float brightest_beside(const struct photograph *photo, long x0, long y0) {
+static float brightest_neighbour(const struct photograph *photo, long x0, long y0) {
     long width = (long)photo->camera.width, height = (long)photo->camera.height;
     float brightest = 0.0f;
     for (long y = y0 > 0 ? y0 - 1 : 0; y <= y0 + 1 && y < height; y++)
@@ -33,30 +33,30 @@ static float brightest_beside(const struct photograph *photo, long x0, long y0) 
 }
 
 /* Standard deviation of a pixel that should show a value; of 8 bits it is no less than that of black. */
-static float deviation_of(const struct sparks_job *job, long x, long y, float value) {
+static float deviation_of(const struct fireflies_job *job, long x, long y, float value) {
     const struct photograph *photo = job->photo;
     float of_value = noise_deviation_of_value(job->noise, job->train, &photo->camera, (float)x, (float)y, value);
     return photo->is_hdr ? of_value : fmaxf(of_value, noise_deviation_of_black(job->noise));
 }
 
-static bool is_spark(const struct sparks_job *job, long x, long y) {
+static bool is_firefly(const struct fireflies_job *job, long x, long y) {
     float value = value_at(job->photo, (size_t)(y * (long)job->photo->camera.width + x));
-    float beside = brightest_beside(job->photo, x, y);
-    return value > BRIGHTER * beside && value - beside > DEVIATIONS * deviation_of(job, x, y, beside);
+    float neighbour = brightest_neighbour(job->photo, x, y);
+    return value > MIN_RATIO * neighbour && value - neighbour > NOISE_DEVIATIONS * deviation_of(job, x, y, neighbour);
 }
 
 static void mark_row(void *user, size_t row, int thread) {
     (void)thread;
-    const struct sparks_job *job = user;
+    const struct fireflies_job *job = user;
     uint32_t width = job->photo->camera.width;
     for (uint32_t x = 0; x < width; x++)
-        job->photo->firefly[row * width + x] = is_spark(job, (long)x, (long)row);
+        job->photo->firefly[row * width + x] = is_firefly(job, (long)x, (long)row);
 }
 
-void sparks_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool) {
+void fireflies_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool) {
     for (uint32_t t = 0; t < views->train_count; t++) {
         struct photograph *photo = &scene->photograph[views->train[t]];
-        struct sparks_job job = {noise, photo, t};
+        struct fireflies_job job = {noise, photo, t};
         if (!photo->firefly)
             photo->firefly = mem_array((size_t)photo->camera.width * photo->camera.height, sizeof *photo->firefly);
         parallel_for(pool, photo->camera.height, mark_row, &job);

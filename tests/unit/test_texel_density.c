@@ -1,5 +1,5 @@
-/* shown.h: what a photograph shows of a chart gives all of it its density, what none shows a quarter. */
-#include "server/capture/shown.h"
+/* texel_density.h: what a photograph shows of a chart gives all of it its density, what none shows a quarter. */
+#include "server/capture/texel_density.h"
 
 #include "tests/check.h"
 
@@ -24,7 +24,8 @@ int main(void) {
             chart[2 * wall + half] = (uint32_t)wall;
         }
     }
-    struct photograph photograph = {.exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY, .is_hdr = true, .pixel = pixel};
+    struct photograph photograph = {
+        .exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY, .is_hdr = true, .pixel = pixel};
     struct camera *c = &photograph.camera;
     *c = (struct camera){.width = SIDE, .height = SIDE, .fx = 16, .fy = 16, .cx = SIDE / 2, .cy = SIDE / 2};
     for (int i = 0; i < 3; i++)
@@ -41,7 +42,7 @@ int main(void) {
     float density[6];
     CHECK(accel_new(&accel, &scene.mesh, pool, &err) == STATUS_OK);
     views_init(&views, &scene, &segments, accel, pool);
-    shown_density(&views, &atlas, pool, density);
+    texel_density_from_views(&views, &atlas, pool, density);
     for (int t = 0; t < 6; t++)
         CHECK_THAT(density[t] == (t < 2 ? 1.0f : 0.25f), "triangle %d: %g", t, (double)density[t]);
     views_release(&views);

@@ -1,7 +1,7 @@
-/* sun_mirrored.h: the sun falls slantwise on a polished floor, and what the floor throws onto the wall behind is by
+/* sun_caustics.h: the sun falls slantwise on a polished floor, and what the floor throws onto the wall behind is by
  * Fresnel's equations, worked out here, a beam as wide as the floor. Nothing of it reaches what it does not meet, nor
  * the wall from a rough floor; it is the same for one thread and for several. */
-#include "server/gather/sun_mirrored.h"
+#include "server/gather/sun_caustics.h"
 #include "server/render/bsdf.h"
 #include "tests/check.h"
 #include "tests/render/small_room.h"
@@ -73,7 +73,7 @@ static struct arrives mirrored(struct yard *y, float roughness, float specular, 
     y->model.materials.roughness[0] = roughness;
     y->model.materials.specular[0] = specular;
     probes_init(&probes, SPACING, &y->mesh, &y->model.atlas, &y->model.inverse, &y->fused);
-    double share = sun_mirrored_add(&probes, &sun, &y->model.world, &y->mesh, &y->model.inverse, 1, pool);
+    double share = sun_caustics_add(&probes, &sun, &y->model.world, &y->mesh, &y->model.inverse, 1, pool);
     struct arrives a = arrives_at(y, &probes, object);
     a.share = share;
     probes_release(&probes);

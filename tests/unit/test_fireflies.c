@@ -1,6 +1,6 @@
-/* sparks.h: single pixels that are far too bright are told from noise, from lines, edges and lamps of two pixels, also
+/* fireflies.h: single pixels that are far too bright are told from noise, from lines, edges and lamps of two pixels, also
  * in corners; no look-up that reads one is used. */
-#include "server/capture/sparks.h"
+#include "server/capture/fireflies.h"
 
 #include "common/image.h"
 #include "common/mem.h"
@@ -95,7 +95,7 @@ static void test_black(struct parallel *pool) {
             dark.pixel[pixel][c] = image_half_from_float(pixel == HOT ? 0.05f : 0.002f);
     }
     faint.black = 0.002f;
-    sparks_mark(&night, &sees, &faint, pool);
+    fireflies_mark(&night, &sees, &faint, pool);
     for (size_t i = 0; i < PIXELS; i++)
         marked += dark.firefly[i];
     CHECK_THAT(marked == 1 && dark.firefly[HOT], "%zu marked", marked);
@@ -105,7 +105,7 @@ static void test_black(struct parallel *pool) {
 int main(void) {
     take();
     struct parallel *pool = parallel_new(2);
-    sparks_mark(&scene, &views, &noise, pool);
+    fireflies_mark(&scene, &views, &noise, pool);
     CHECK(photograph[0].firefly && !photograph[1].firefly && photograph[2].firefly);
     CHECK(count_marked(&photograph[0], 0.0f) == 6);
     test_lookups(&photograph[0]);
@@ -114,7 +114,7 @@ int main(void) {
     bool *first = mem_array(PIXELS, sizeof *first);
     memcpy(first, photograph[0].firefly, PIXELS * sizeof *first);
     struct parallel *alone = parallel_new(1);
-    sparks_mark(&scene, &views, &noise, alone);
+    fireflies_mark(&scene, &views, &noise, alone);
     CHECK(memcmp(first, photograph[0].firefly, PIXELS * sizeof *first) == 0);
     mem_free(first);
     parallel_free(alone);

@@ -1,5 +1,5 @@
-/* glance.c -- see glance.h. */
-#include "server/capture/glance.h"
+/* radiance_preview.c -- see radiance_preview.h. */
+#include "server/capture/radiance_preview.h"
 
 #include "common/mem.h"
 #include "server/scene/photograph.h"
@@ -8,19 +8,19 @@
 
 #define BLOCK 4 /* texels a side: a sixteenth of the work */
 /* Photographs that are asked at most: evenly over all, the first ones would show one end of the room. */
-#define ASKED_MOST 64
+#define MAX_PHOTOGRAPHS 64
 
-struct glance_job {
+struct preview_job {
     uint16_t (*radiance)[3];
     const struct views *views;
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
 };
 
-static rgb mean_shown(const struct views *v, const struct surface_point *p) {
+static rgb mean_observed(const struct views *v, const struct surface_point *p) {
     rgb sum = rgb_gray(0.0f);
     float weights = 0.0f;
-    uint32_t every = (uint32_t)(v->train_count / ASKED_MOST) + 1;
+    uint32_t every = (uint32_t)(v->train_count / MAX_PHOTOGRAPHS) + 1;
     for (uint32_t t = 0; t < v->train_count; t += every) {
         struct view view;
         struct photograph_sample s;
@@ -34,9 +34,9 @@ static rgb mean_shown(const struct views *v, const struct surface_point *p) {
 }
 
 /* The block's first valid texel speaks for all of it. */
-static void glance_block(const struct glance_job *job, uint32_t x0, uint32_t y0) {
+static void preview_block(const struct preview_job *job, uint32_t x0, uint32_t y0) {
     const struct inverse_uv *inverse = job->inverse;
-    uint16_t shown[3];
+    uint16_t value[3];
     bool has_value = false;
     for (uint32_t y = y0; y < y0 + BLOCK && y < inverse->height; y++) {
         for (uint32_t x = x0; x < x0 + BLOCK && x < inverse->width; x++) {
@@ -47,26 +47,26 @@ static void glance_block(const struct glance_job *job, uint32_t x0, uint32_t y0)
             if (!has_value) {
                 if (!surface_at_texel(&job->views->scene->mesh, job->atlas, inverse, texel, &p))
                     continue;
-                rgb_to_half(shown, mean_shown(job->views, &p));
+                rgb_to_half(value, mean_observed(job->views, &p));
                 has_value = true;
             }
             for (int c = 0; c < 3; c++)
-                job->radiance[texel][c] = shown[c];
+                job->radiance[texel][c] = value[c];
         }
     }
 }
 
-static void glance_row(void *user, size_t row, int thread) {
+static void preview_row(void *user, size_t row, int thread) {
     (void)thread;
-    const struct glance_job *job = user;
+    const struct preview_job *job = user;
     for (uint32_t x = 0; x < job->inverse->width; x += BLOCK)
-        glance_block(job, x, (uint32_t)row * BLOCK);
+        preview_block(job, x, (uint32_t)row * BLOCK);
 }
 
-uint16_t (*glance(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
+uint16_t (*radiance_preview(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
                   struct parallel *pool))[3] {
-    struct glance_job job = {.views = views, .atlas = atlas, .inverse = inverse};
+    struct preview_job job = {.views = views, .atlas = atlas, .inverse = inverse};
     job.radiance = mem_calloc_large((size_t)inverse->width * inverse->height, sizeof *job.radiance);
-    parallel_for(pool, (inverse->height + BLOCK - 1) / BLOCK, glance_row, &job);
+    parallel_for(pool, (inverse->height + BLOCK - 1) / BLOCK, preview_row, &job);
     return job.radiance;
 }

@@ -1,4 +1,4 @@
-/* sparks.h, in a whole reconstruction: pixels that shine by chance, in each photograph at other places, leave no spots,
+/* fireflies.h, in a whole reconstruction: pixels that shine by chance, in each photograph at other places, leave no spots,
  * and without its noise taken out no more error than without them. */
 #include "server/reconstruct/reconstruct.h"
 #include "tests/render/shell.h"

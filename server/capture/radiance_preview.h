@@ -1,7 +1,7 @@
-/* glance.h -- a first, coarse picture of the measured light, for the eye alone: one texel of each square block, the
+/* radiance_preview.h -- a first, coarse picture of the measured light, for the eye alone: one texel of each square block, the
  * plain mean of what photographs show there. A small part of the work of fuse.h, before exposures are solved. */
-#ifndef UNBAKE_CAPTURE_GLANCE_H
-#define UNBAKE_CAPTURE_GLANCE_H
+#ifndef UNBAKE_CAPTURE_RADIANCE_PREVIEW_H
+#define UNBAKE_CAPTURE_RADIANCE_PREVIEW_H
 
 #include <stdint.h>
 
@@ -11,7 +11,7 @@
 
 /* radiance[height][width], half precision, of valid texels; 0 where no photograph sees the block's texel. The caller's
  * (mem_free). */
-uint16_t (*glance(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
+uint16_t (*radiance_preview(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
                   struct parallel *pool))[3];
 
 #endif

@@ -1,5 +1,5 @@
-/* sun_mirrored.c -- see sun_mirrored.h. */
-#include "server/gather/sun_mirrored.h"
+/* sun_caustics.c -- see sun_caustics.h. */
+#include "server/gather/sun_caustics.h"
 
 #include <math.h>
 
@@ -9,12 +9,12 @@
 #include "server/scene/surface.h"
 
 /* Rays in all, about; and from one texel at most. */
-#define RAYS 1000000
-#define RAYS_A_TEXEL 64
+#define MAX_PHOTONS 1000000
+#define MAX_PHOTONS_PER_TEXEL 64
 #define CHUNK 1024 /* texels a work item */
-#define KEY_MIRRORED 0x3a11u
+#define KEY_CAUSTICS 0x3a11u
 /* Light that grazes a probe's surface is taken to come from at least so far above it: its amount stays. */
-#define LEAST_COSINE 0.05f
+#define MIN_COSINE 0.05f
 enum { PAIR_DISC, PAIR_LOBE };
 
 /* What a ray brings, and where to; no probe: nowhere. */
@@ -24,7 +24,7 @@ struct photon {
     rgb flux;       /* times square metres */
 };
 
-struct mirrored {
+struct caustics {
     struct probes *probes;
     const struct sun *sun;
     const struct world *world;
@@ -34,12 +34,12 @@ struct mirrored {
     bool *lit;               /* [valid_count] a polished texel in the sun */
     size_t count, rays;      /* lit texels that send rays, and of each */
     uint32_t *texel;         /* [count] */
-    float stands_for;        /* texels, each of them */
+    float texels_per_source;        /* texels, each of them */
     struct photon *photon;   /* [count][rays] */
 };
 
 /* Square metres that a texel of a triangle covers. */
-static float texel_area(const struct mirrored *m, uint32_t triangle) {
+static float texel_area(const struct caustics *m, uint32_t triangle) {
     const vec2 *c = m->world->atlas->corner[triangle];
     float texels = fabsf((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
     return texels > 0.0f ? vec3_length(mesh_cross(m->mesh, triangle)) / texels : 0.0f;
@@ -47,27 +47,27 @@ static float texel_area(const struct mirrored *m, uint32_t triangle) {
 
 /* --- from the sun ---------------------------------------------------------------------------------- */
 
-static bool find_point(const struct mirrored *m, uint32_t texel, struct surface_point *at) {
+static bool find_point(const struct caustics *m, uint32_t texel, struct surface_point *at) {
     return surface_at_texel(m->mesh, m->world->atlas, m->inverse, texel, at);
 }
 
 static void find_lit(void *user, size_t chunk, int thread) {
     (void)thread;
-    const struct mirrored *m = user;
+    const struct caustics *m = user;
     for (size_t i = chunk * CHUNK; i < m->inverse->valid_count && i < (chunk + 1) * CHUNK; i++) {
         uint32_t texel = m->inverse->valid[i], segment = m->world->triangle[m->inverse->triangle[texel]].segment;
         struct surface_point at;
         m->lit[i] = materials_is_polished(m->world->materials, segment) && find_point(m, texel, &at) &&
-                    sun_visible(m->sun, m->world->accel, &at, 1) > 0.0f;
+                    sun_visibility(m->sun, m->world->accel, &at, 1) > 0.0f;
     }
 }
 
 /* Which texels send rays, evenly spread where there are many, and how many each. */
-static void choose_texels(struct mirrored *m) {
+static void choose_texels(struct caustics *m) {
     size_t lit = 0, met = 0;
     for (size_t i = 0; i < m->inverse->valid_count; i++)
         lit += m->lit[i];
-    size_t wanted = lit < RAYS ? lit : RAYS;
+    size_t wanted = lit < MAX_PHOTONS ? lit : MAX_PHOTONS;
     m->texel = mem_array(wanted + 1, sizeof *m->texel);
     for (size_t i = 0; i < m->inverse->valid_count && m->count < wanted; i++) {
         if (m->lit[i] && met++ == m->count * lit / wanted)
@@ -75,17 +75,17 @@ static void choose_texels(struct mirrored *m) {
     }
     if (m->count == 0)
         return;
-    m->rays = RAYS / m->count < RAYS_A_TEXEL ? RAYS / m->count : RAYS_A_TEXEL;
-    m->stands_for = (float)lit / (float)m->count;
+    m->rays = MAX_PHOTONS / m->count < MAX_PHOTONS_PER_TEXEL ? MAX_PHOTONS / m->count : MAX_PHOTONS_PER_TEXEL;
+    m->texels_per_source = (float)lit / (float)m->count;
 }
 
 /* One ray of the lobe: the part of the light that goes with it; 0 where it would go into the surface. */
-static float send(const struct mirrored *m, const struct surface_point *at, uint32_t segment, uint32_t key,
+static float sample_lobe(const struct caustics *m, const struct surface_point *at, uint32_t segment, uint32_t key,
                   uint32_t ray, vec3 *direction) {
     const struct materials *materials = m->world->materials;
     vec3 frame[3] = {[2] = at->shading};
     vec3_frame(at->shading, &frame[0], &frame[1]);
-    vec3 wo = vec3_to_frame(frame, sun_toward(m->sun, sampler_pair(key, ray, PAIR_DISC)));
+    vec3 wo = vec3_to_frame(frame, sun_sample(m->sun, sampler_pair(key, ray, PAIR_DISC)));
     if (!(wo.z > 0.0f))
         return 0.0f;
     struct bsdf b = bsdf_lobe(materials->roughness[segment], materials->specular[segment]);
@@ -97,20 +97,20 @@ static float send(const struct mirrored *m, const struct surface_point *at, uint
     return leaves ? value.specular / value.pdf * wo.z : 0.0f;
 }
 
-static void send_texel(void *user, size_t index, int thread) {
+static void trace_texel(void *user, size_t index, int thread) {
     (void)thread;
-    const struct mirrored *m = user;
+    const struct caustics *m = user;
     const struct world *world = m->world;
-    uint32_t texel = m->texel[index], key = sampler_key(m->seed, texel, KEY_MIRRORED);
+    uint32_t texel = m->texel[index], key = sampler_key(m->seed, texel, KEY_CAUSTICS);
     uint32_t triangle = m->inverse->triangle[texel], segment = world->triangle[triangle].segment;
-    rgb sent = rgb_scale(m->sun->irradiance, texel_area(m, triangle) * m->stands_for / (float)m->rays);
+    rgb sent = rgb_scale(m->sun->irradiance, texel_area(m, triangle) * m->texels_per_source / (float)m->rays);
     struct surface_point at;
     find_point(m, texel, &at);
     for (uint32_t i = 0; i < m->rays; i++) {
         struct photon *photon = &m->photon[index * m->rays + i];
         struct accel_hit hit;
         *photon = (struct photon){.probe = UINT32_MAX};
-        float part = send(m, &at, segment, key, i, &photon->direction);
+        float part = sample_lobe(m, &at, segment, key, i, &photon->direction);
         if (!(part > 0.0f) || !accel_intersect(world->accel, accel_offset(at.position, at.normal, photon->direction),
                                                photon->direction, 0.0f, INFINITY, &hit) ||
             !(vec3_dot(world->triangle[hit.triangle].normal, photon->direction) < 0.0f))
@@ -126,7 +126,7 @@ static void send_texel(void *user, size_t index, int thread) {
 /* --- to the probes ---------------------------------------------------------------------------------- */
 
 /* Square metres that each probe stands for. [probe count]; the caller's. */
-static float *probe_areas(const struct mirrored *m) {
+static float *probe_areas(const struct caustics *m) {
     float *area = mem_calloc(m->probes->count + 1, sizeof *area);
     for (size_t i = 0; i < m->inverse->valid_count; i++) {
         uint32_t texel = m->inverse->valid[i], triangle = m->inverse->triangle[texel];
@@ -137,7 +137,7 @@ static float *probe_areas(const struct mirrored *m) {
 }
 
 /* What arrives at all of the surface, square metres times the mean of the channels. */
-static double all_flux(const struct probes *probes, const float *area) {
+static double total_flux(const struct probes *probes, const float *area) {
     double sum = 0.0;
     for (size_t k = 0; k < probes->count; k++) {
         const float *arrives = probes->probe[k].light.moment[0];
@@ -146,38 +146,38 @@ static double all_flux(const struct probes *probes, const float *area) {
     return sum;
 }
 
-static void bring(struct probe *probe, const struct photon *photon, float area) {
+static void deposit(struct probe *probe, const struct photon *photon, float area) {
     vec3 toward = vec3_neg(photon->direction);
-    float facing = fmaxf(vec3_dot(toward, probe->shading), LEAST_COSINE);
+    float facing = fmaxf(vec3_dot(toward, probe->shading), MIN_COSINE);
     irradiance_add(&probe->light, probe->shading, toward, rgb_scale(photon->flux, 1.0f / (facing * area)));
 }
 
 /* Returns the share that it is. */
-static double share_out(const struct mirrored *m) {
+static double deposit_all(const struct caustics *m) {
     float *area = probe_areas(m);
-    double before = all_flux(m->probes, area);
+    double before = total_flux(m->probes, area);
     for (size_t i = 0; i < m->count * m->rays; i++) {
         const struct photon *photon = &m->photon[i];
         if (photon->probe != UINT32_MAX && area[photon->probe] > 0.0f)
-            bring(&m->probes->probe[photon->probe], photon, area[photon->probe]);
+            deposit(&m->probes->probe[photon->probe], photon, area[photon->probe]);
     }
-    double after = all_flux(m->probes, area);
+    double after = total_flux(m->probes, area);
     mem_free(area);
     return after > 0.0 ? (after - before) / after : 0.0;
 }
 
-double sun_mirrored_add(struct probes *probes, const struct sun *sun, const struct world *world,
+double sun_caustics_add(struct probes *probes, const struct sun *sun, const struct world *world,
                         const struct mesh *mesh, const struct inverse_uv *inverse, uint64_t seed,
                         struct parallel *pool) {
-    struct mirrored m = {.probes = probes, .sun = sun, .world = world, .mesh = mesh, .inverse = inverse, .seed = seed};
+    struct caustics m = {.probes = probes, .sun = sun, .world = world, .mesh = mesh, .inverse = inverse, .seed = seed};
     if (!sun->is_there)
         return 0.0;
     m.lit = mem_calloc(inverse->valid_count, sizeof *m.lit);
     parallel_for(pool, (inverse->valid_count + CHUNK - 1) / CHUNK, find_lit, &m);
     choose_texels(&m);
     m.photon = mem_array(m.count * m.rays + 1, sizeof *m.photon);
-    parallel_for(pool, m.count, send_texel, &m);
-    double share = share_out(&m);
+    parallel_for(pool, m.count, trace_texel, &m);
+    double share = deposit_all(&m);
     mem_free(m.photon);
     mem_free(m.texel);
     mem_free(m.lit);

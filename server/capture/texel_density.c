@@ -1,0 +1,41 @@
+/* texel_density.c -- see shown.h. */
+#include "server/capture/texel_density.h"
+
+#include <math.h>
+#include <stdatomic.h>
+
+#include "common/mem.h"
+
+#define PIXEL_STRIDE 2 /* pixels, of those that are asked */
+/* Texels a metre of what nobody sees: it has to send out light, which takes no detail. */
+#define UNSEEN_DENSITY 0.25f
+
+struct density_job {
+    const struct views *views;
+    const struct atlas *atlas;
+    atomic_bool *is_seen; /* [chart_count] */
+};
+
+static void mark_seen_charts(void *user, size_t train, int thread) {
+    (void)thread;
+    const struct density_job *job = user;
+    const struct camera *camera = &job->views->scene->photograph[job->views->train[train]].camera;
+    for (uint32_t y = PIXEL_STRIDE / 2; y < camera->height; y += PIXEL_STRIDE) {
+        for (uint32_t x = PIXEL_STRIDE / 2; x < camera->width; x += PIXEL_STRIDE) {
+            vec3 direction;
+            struct accel_hit hit;
+            if (camera_direction(camera, (float)x + 0.5f, (float)y + 0.5f, &direction) &&
+                accel_intersect(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY, &hit))
+                atomic_store(&job->is_seen[job->atlas->chart_of_triangle[hit.triangle]], true);
+        }
+    }
+}
+
+void texel_density_from_views(const struct views *views, const struct atlas *atlas, struct parallel *pool,
+                              float *density) {
+    struct density_job job = {views, atlas, mem_calloc(atlas->chart_count, sizeof *job.is_seen)};
+    parallel_for(pool, views->train_count, mark_seen_charts, &job);
+    for (size_t i = 0; i < views->scene->mesh.triangle_count; i++)
+        density[i] = job.is_seen[atlas->chart_of_triangle[i]] ? 1.0f : UNSEEN_DENSITY;
+    mem_free(job.is_seen);
+}

@@ -1,0 +1,14 @@
+/* texel_density.h -- which charts of the surface photographs show: an atlas need not hold the others as finely. */
+#ifndef UNBAKE_CAPTURE_TEXEL_DENSITY_H
+#define UNBAKE_CAPTURE_TEXEL_DENSITY_H
+
+#include "common/parallel.h"
+#include "server/capture/views.h"
+#include "server/scene/atlas.h"
+
+/* Fills density[triangle_count], for atlas_make_uneven: 1 where a photograph shows any of the triangle's chart,
+ * less where none does. */
+void texel_density_from_views(const struct views *views, const struct atlas *atlas, struct parallel *pool,
+                              float *density);
+
+#endif
