@@ -27,7 +27,7 @@ enum client_exit {
 #define CLIENT_RETRY_SEC 3.0
 
 struct client {
-    struct request *request;
+    struct http_request *request;
     struct terminal out; /* stdout: results */
     struct terminal err; /* stderr: progress of transfers, messages */
     bool json, quiet;
@@ -41,14 +41,14 @@ struct command {
     const char *details;   /* for --help; "" if the summary says all */
     const char *examples;  /* lines, each ending in a newline */
     size_t words_min, words_max;
-    const struct option *options; /* ends with a NULL name */
+    const struct client_option *options; /* ends with a NULL name */
     int (*run)(struct client *c, const struct options *o);
 };
 
 /* In the order of the help; *count entries. */
 const struct command *command_table(size_t *count);
 /* The options that every command takes. */
-extern const struct option command_shared_options[];
+extern const struct client_option command_shared_options[];
 const struct command *command_find(const char *name);
 /* What main may return, in the order of the help; ends with a NULL meaning. */
 extern const struct command_exit {

@@ -4,11 +4,11 @@
 #include <ctype.h>
 #include <string.h>
 
-#include "client/keeping.h"
+#include "client/retention.h"
 #include "common/mem.h"
 #include "common/nearest.h"
 
-const struct option collection_options[] = {
+const struct client_option collection_options[] = {
     {"limit", 'n', OPTION_WHOLE, "N", "list at most so many (20); 0: all"},
     {"dry-run", 0, OPTION_FLAG, NULL, "with rm: only say what would be removed"},
     KEEPING_OPTIONS,
@@ -86,7 +86,7 @@ static int one(struct client *c, const struct collection *what, const char *id, 
     else if (verb == VERB_SHOW)
         what->print_one(c, reply.json);
     else if (!c->quiet) {
-        keeping_sentence(kept, reply.json);
+        retention_sentence(kept, reply.json);
         bool is_used = cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
         client_say(c, "%s %.12s is %s", what->one, id, *kept      ? kept
                                                        : is_used ? "in use, and kept at least as long"
@@ -142,7 +142,7 @@ int collection_run(struct client *c, const struct options *o, const struct colle
     int first = CLIENT_OK;
     enum status status = read_verb(o, what, &verb, &err);
     if (status == STATUS_OK)
-        status = keeping_describe(o, body, &err);
+        status = retention_describe(o, body, &err);
     if (status == STATUS_OK)
         status = check_options(o, what, verb, body->child != NULL, &err);
     if (status != STATUS_OK)

@@ -12,7 +12,7 @@ struct collection {
     void (*print_one)(struct client *c, const cJSON *thing);
 };
 
-extern const struct option collection_options[];
+extern const struct client_option collection_options[];
 
 /* The whole of such a command. */
 int collection_run(struct client *c, const struct options *o, const struct collection *what);

@@ -10,9 +10,9 @@
 
 #define ANY_NUMBER ((size_t)-1)
 
-static const struct option no_options[] = {{0}};
+static const struct client_option no_options[] = {{0}};
 
-const struct option command_shared_options[] = {
+const struct client_option command_shared_options[] = {
     {"server", 0, OPTION_TEXT, "URL",
      "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
     {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
@@ -38,7 +38,7 @@ static const struct command table[] = {
     {"show", "JOB", "show one job: state, settings, outputs", "",
      "  unbake show 17\n  unbake show last --json | jq .settings\n", 1, 1, no_options, show_run},
     {"watch", "JOB", "follow a job until it ends",
-     "On a terminal one line shows stage, progress, figures and time left; on a pipe a line is\n"
+     "On a terminal one line shows stage, progress, numbers and time left; on a pipe a line is\n"
      "printed when something changes, and every 10 s. When the server restarts, watching goes\n"
      "on where it was. Ends with 0 when the job succeeded and 1 when it failed or was cancelled.\n"
      "--exec runs a command then; it finds UNBAKE_JOB, UNBAKE_NAME, UNBAKE_STATE and UNBAKE_REASON in\n"
@@ -116,7 +116,7 @@ const struct command *command_find(const char *name) {
     return NULL;
 }
 
-static void print_options(const struct option *option, FILE *out) {
+static void print_options(const struct client_option *option, FILE *out) {
     for (; option->name; option++) {
         char left[64], letter[5] = "    ";
         if (option->letter)

@@ -5,20 +5,20 @@
 #include "client/client.h"
 
 /* submit.c */
-extern const struct option submit_options[];
+extern const struct client_option submit_options[];
 int submit_run(struct client *c, const struct options *o);
 /* Adds "key=value" to an object of labels. */
 enum status label_add(cJSON *labels, const char *text, struct error *err);
 
 /* watch.c */
-extern const struct option watch_options[], logs_options[];
+extern const struct client_option watch_options[], logs_options[];
 int watch_run(struct client *c, const struct options *o);
 int logs_run(struct client *c, const struct options *o);
 /* Follows a job to its end. `all`: from its first event on, not from now. */
 int watch_job(struct client *c, int64_t job, bool all);
 
 /* jobs.c */
-extern const struct option list_options[], retry_options[], rm_options[];
+extern const struct client_option list_options[], retry_options[], rm_options[];
 int list_run(struct client *c, const struct options *o);
 int show_run(struct client *c, const struct options *o);
 int cancel_run(struct client *c, const struct options *o);
@@ -29,12 +29,12 @@ int retry_run(struct client *c, const struct options *o);
 int rm_run(struct client *c, const struct options *o);
 
 /* edit.c */
-extern const struct option edit_options[], extend_options[];
+extern const struct client_option edit_options[], extend_options[];
 int edit_run(struct client *c, const struct options *o);
 int extend_run(struct client *c, const struct options *o);
 
 /* get.c */
-extern const struct option get_options[];
+extern const struct client_option get_options[];
 int get_run(struct client *c, const struct options *o);
 /* Whether a name from the server may become a file below the folder asked for. */
 bool get_name_is_safe(const char *name);
@@ -45,7 +45,7 @@ int scenes_run(struct client *c, const struct options *o);
 void scenes_print_problems(struct client *c, const cJSON *scene, FILE *out);
 
 /* uploads.c */
-extern const struct option collect_options[];
+extern const struct client_option collect_options[];
 int uploads_run(struct client *c, const struct options *o);
 int collect_run(struct client *c, const struct options *o);
 

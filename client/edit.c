@@ -3,10 +3,10 @@
 #include <string.h>
 
 #include "client/commands.h"
-#include "client/keeping.h"
+#include "client/retention.h"
 #include "common/mem.h"
 
-const struct option edit_options[] = {
+const struct client_option edit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job"},
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first"},
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own; they replace all that were there"},
@@ -18,7 +18,7 @@ const struct option edit_options[] = {
     {"before", 0, OPTION_TEXT, "JOB", "before that job, and with its priority"},
     {0},
 };
-const struct option extend_options[] = {
+const struct client_option extend_options[] = {
     {"iterations", 'i', OPTION_WHOLE, "N", "so many more, for a job with that limit"},
     {"looks", 0, OPTION_WHOLE, "N", "so many more observations at each part of the texture"},
     {"time", 't', OPTION_SECONDS, "SEC", "so much more working time, for all others"},
@@ -42,7 +42,7 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
     else if (c->json)
         client_print_json(c, reply.json);
     else if (!c->quiet) {
-        keeping_sentence(kept, reply.json);
+        retention_sentence(kept, reply.json);
         client_say(c, "job %lld is %s, priority %.0f%s%s: %s", (long long)id, member_text(reply.json, "state"),
                    member_number(reply.json, "priority", 0.0), *kept ? ", " : "", kept,
                    member_text(reply.json, "name"));
@@ -89,7 +89,7 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
         status = label_add(labels, o->given[i].text, err);
     }
     if (status == STATUS_OK)
-        status = keeping_describe(o, body, err);
+        status = retention_describe(o, body, err);
     if (status == STATUS_OK)
         status = describe_order(c, o, body, reply, err);
     if (status == STATUS_OK && !body->child) {

@@ -27,7 +27,7 @@
 #define PATIENCE_SEC 60.0
 #define VERSIONS_MAX 5 /* a file that changes more often while it is fetched is given up */
 
-const struct option get_options[] = {
+const struct client_option get_options[] = {
     {"output", 'o', OPTION_TEXT, "DIR", "where the files go; it is made if need be (job-JOB)"},
     {0},
 };

@@ -3,24 +3,24 @@
 #include <string.h>
 
 #include "client/commands.h"
-#include "client/keeping.h"
+#include "client/retention.h"
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
 #include "common/nearest.h"
 #include "common/protocol.h"
 
-const struct option list_options[] = {
+const struct client_option list_options[] = {
     {"state", 's', OPTION_TEXT, "STATE", "only jobs that are queued, running, paused, succeeded, ..."},
     {"limit", 'n', OPTION_WHOLE, "N", "at most so many (20); 0: all"},
     {0},
 };
 
-const struct option retry_options[] = {
+const struct client_option retry_options[] = {
     {"from", 0, OPTION_TEXT, "STAGE", "do that stage and all after it anew"},
     {0},
 };
-const struct option rm_options[] = {
+const struct client_option rm_options[] = {
     {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
     {0},
 };
@@ -67,7 +67,7 @@ static void print_jobs(struct client *c, const cJSON *items) {
         }
         format_duration(age, time_since(member_text(job, "created_at")));
         table_set(&t, 5, COLOUR_NONE, "%s", age);
-        keeping_text(expires, job);
+        retention_text(expires, job);
         table_set(&t, 6, COLOUR_NONE, "%s", expires);
         table_set(&t, 7, COLOUR_NONE, "%s", member_text(job, "owner"));
         table_set(&t, 8, COLOUR_NONE, "%s", member_text(job, "name"));
@@ -193,8 +193,8 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     field_print(c, "created", member_text(job, "created_at"));
     field_print(c, "started", member_text(job, "started_at"));
     field_print(c, "finished", member_text(job, "finished_at"));
-    field_print(c, "expires", keeping_time(job));
-    keeping_disk(left, job);
+    field_print(c, "expires", retention_time(job));
+    retention_disk(left, job);
     field_print(c, "on disk", left);
     print_outputs(c, outputs);
 }

@@ -7,7 +7,7 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 
-static void option_list(const struct option *option) {
+static void option_list(const struct client_option *option) {
     for (; option->name; option++) {
         char word[64];
         if (option->letter)
@@ -72,7 +72,7 @@ static void page_1(void) {
     manual_text(stdout, "unbaked(8), unbaked.conf(5)\n");
 }
 
-static void option_words(const struct option *option) {
+static void option_words(const struct client_option *option) {
     for (; option->name; option++)
         completion_word(stdout, "--", option->name);
 }

@@ -9,27 +9,27 @@
 #include "common/mem.h"
 #include "common/nearest.h"
 
-static const struct option *find(const struct option *table, const char *name, size_t length) {
+static const struct client_option *find(const struct client_option *table, const char *name, size_t length) {
     for (; table && table->name; table++)
         if (strlen(table->name) == length && memcmp(table->name, name, length) == 0)
             return table;
     return NULL;
 }
 
-static const struct option *find_letter(const struct option *table, char letter) {
+static const struct client_option *find_letter(const struct client_option *table, char letter) {
     for (; table && table->name; table++)
         if (table->letter == letter)
             return table;
     return NULL;
 }
 
-static void offer(struct nearest *nearest, const struct option *table) {
+static void offer(struct nearest *nearest, const struct client_option *table) {
     for (; table && table->name; table++)
         nearest_offer(nearest, table->name);
 }
 
-static enum status unknown(const char *argument, const struct option *own,
-                           const struct option *shared, struct error *err) {
+static enum status unknown(const char *argument, const struct client_option *own,
+                           const struct client_option *shared, struct error *err) {
     if (argument[1] != '-')
         return error_set(err, STATUS_INPUT, "there is no option -%c", argument[1]);
     char *name = mem_strndup(argument + 2, strcspn(argument + 2, "="));
@@ -44,7 +44,7 @@ static enum status unknown(const char *argument, const struct option *own,
     return status;
 }
 
-static enum status check_value(const struct option *option, const char *text, struct error *err) {
+static enum status check_value(const struct client_option *option, const char *text, struct error *err) {
     char *end;
     if (option->kind == OPTION_WHOLE) {
         long value = strtol(text, &end, 10);
@@ -62,9 +62,9 @@ static enum status check_value(const struct option *option, const char *text, st
 }
 
 /* The option that begins with `argument`; *text is the value in the same word, if there is one. */
-static const struct option *read_option(const char *argument, const struct option *own, const struct option *shared,
+static const struct client_option *read_option(const char *argument, const struct client_option *own, const struct client_option *shared,
                                         const char **text) {
-    const struct option *option;
+    const struct client_option *option;
     *text = NULL;
     if (argument[1] == '-') {
         size_t length = strcspn(argument + 2, "=");
@@ -79,14 +79,14 @@ static const struct option *read_option(const char *argument, const struct optio
     return option ? option : find_letter(shared, argument[1]);
 }
 
-int options_length(const char *word, const struct option *table) {
+int options_length(const char *word, const struct client_option *table) {
     const char *text;
-    const struct option *option = word[0] == '-' && word[1] ? read_option(word, NULL, table, &text) : NULL;
+    const struct client_option *option = word[0] == '-' && word[1] ? read_option(word, NULL, table, &text) : NULL;
     return !option ? 0 : option->kind == OPTION_FLAG || text ? 1 : 2;
 }
 
 enum status options_parse(struct options *o, int count, char *const *argv,
-                          const struct option *own, const struct option *shared,
+                          const struct client_option *own, const struct client_option *shared,
                           struct error *err) {
     size_t room = count > 0 ? (size_t)count : 1;
     *o = (struct options){
@@ -105,7 +105,7 @@ enum status options_parse(struct options *o, int count, char *const *argv,
             continue;
         }
         const char *text;
-        const struct option *option = read_option(argument, own, shared, &text);
+        const struct client_option *option = read_option(argument, own, shared, &text);
         if (!option)
             return unknown(argument, own, shared, err);
         if (option->kind == OPTION_FLAG && text)

@@ -18,7 +18,7 @@ enum option_kind {
     OPTION_SECONDS /* a number of seconds (or what the help says), 0 or more */
 };
 
-struct option {
+struct client_option {
     const char *name;  /* without the dashes; NULL ends a table */
     char letter;       /* 0: no short form */
     enum option_kind kind;
@@ -27,7 +27,7 @@ struct option {
 };
 
 struct options_given {
-    const struct option *option;
+    const struct client_option *option;
     const char *text; /* NULL for a flag */
 };
 
@@ -41,12 +41,12 @@ struct options {
 /* Parses argv[count] by two tables (a command's own, then the ones that all commands share).
  * STATUS_INPUT, with the nearest valid name as the hint, when it does not fit them. */
 enum status options_parse(struct options *o, int count, char *const *argv,
-                          const struct option *own, const struct option *shared,
+                          const struct client_option *own, const struct client_option *shared,
                           struct error *err);
 void options_release(struct options *o);
 /* How many words the option that begins with `word` takes of a command line, by that table; 0 where it is
  * none of them. */
-int options_length(const char *word, const struct option *table);
+int options_length(const char *word, const struct client_option *table);
 
 bool options_flag(const struct options *o, const char *name);
 /* The last value given, or `fallback`. */

@@ -21,7 +21,7 @@
 #define CHUNK 65536
 #define DEEPEST 32 /* folders within folders; more is a loop of links */
 
-struct entry {
+struct pack_entry {
     char *name; /* inside the archive; owned */
     uint64_t bytes;
 };
@@ -29,7 +29,7 @@ struct entry {
 struct pack {
     char *path; /* owned */
     bool is_folder;
-    struct entry *entry; /* [count] sorted by name; the file itself where path is no folder */
+    struct pack_entry *entry; /* [count] sorted by name; the file itself where path is no folder */
     size_t count, capacity;
     uint64_t content_bytes;
 
@@ -48,12 +48,12 @@ static void add_entry(struct pack *p, const char *name, uint64_t bytes) {
         p->capacity = p->capacity ? 2 * p->capacity : 256;
         p->entry = mem_realloc_array(p->entry, p->capacity, sizeof *p->entry);
     }
-    p->entry[p->count++] = (struct entry){.name = mem_strdup(name), .bytes = bytes};
+    p->entry[p->count++] = (struct pack_entry){.name = mem_strdup(name), .bytes = bytes};
     p->content_bytes += bytes;
 }
 
 static int by_name(const void *a, const void *b) {
-    return strcmp(((const struct entry *)a)->name, ((const struct entry *)b)->name);
+    return strcmp(((const struct pack_entry *)a)->name, ((const struct pack_entry *)b)->name);
 }
 
 /* Adds the files under `folder`, whose names in the archive begin with `prefix`. */
@@ -183,7 +183,7 @@ enum status pack_rewind(struct pack *p, struct error *err) {
     return STATUS_OK;
 }
 
-static enum status write_header(struct pack *p, const struct entry *e, struct error *err) {
+static enum status write_header(struct pack *p, const struct pack_entry *e, struct error *err) {
     struct archive_entry *header = archive_entry_new();
     archive_entry_set_pathname(header, e->name);
     archive_entry_set_filetype(header, AE_IFREG);
@@ -198,7 +198,7 @@ static enum status write_header(struct pack *p, const struct entry *e, struct er
 }
 
 static enum status open_next(struct pack *p, struct error *err) {
-    const struct entry *e = &p->entry[p->next];
+    const struct pack_entry *e = &p->entry[p->next];
     char *path = p->is_folder ? file_join(p->path, e->name) : mem_strdup(p->path);
     enum status status = STATUS_OK;
     p->fd = open(path, O_RDONLY | O_CLOEXEC);
@@ -213,7 +213,7 @@ static enum status open_next(struct pack *p, struct error *err) {
 }
 
 static enum status read_chunk(struct pack *p, struct error *err) {
-    const struct entry *e = &p->entry[p->next - 1];
+    const struct pack_entry *e = &p->entry[p->next - 1];
     size_t wanted = p->left < CHUNK ? (size_t)p->left : CHUNK;
     ssize_t got = wanted ? read(p->fd, p->chunk, wanted) : 0;
     if (got < 0 && errno == EINTR)

@@ -22,7 +22,7 @@
 #define PAUSE_FIRST_SEC 0.1
 #define PAUSE_MAX_SEC 5.0
 
-struct request {
+struct http_request {
     char *server; /* owned */
     char *authorization; /* the header; owned; NULL: none */
     char *ca_file;       /* owned; NULL: the system's */
@@ -34,8 +34,8 @@ struct request {
 };
 
 /* One try of a call, as curl's callbacks see it. */
-struct attempt {
-    struct request *request;
+struct request_try {
+    struct http_request *request;
     const struct request_call *call;
     struct reply *reply;
     struct error *err;
@@ -44,8 +44,8 @@ struct attempt {
     bool too_long;
 };
 
-struct request *request_new(const char *server_url, double retry_sec, int signal_fd) {
-    struct request *r = mem_calloc(1, sizeof *r);
+struct http_request *request_new(const char *server_url, double retry_sec, int signal_fd) {
+    struct http_request *r = mem_calloc(1, sizeof *r);
     size_t length = strlen(server_url);
     while (length > 0 && server_url[length - 1] == '/')
         length--;
@@ -58,17 +58,17 @@ struct request *request_new(const char *server_url, double retry_sec, int signal
     return r;
 }
 
-void request_set_token(struct request *r, const char *token) {
+void request_set_token(struct http_request *r, const char *token) {
     mem_free(r->authorization);
     r->authorization = token ? mem_printf("Authorization: Bearer %s", token) : NULL;
 }
 
-void request_set_ca(struct request *r, const char *path) {
+void request_set_ca(struct http_request *r, const char *path) {
     mem_free(r->ca_file);
     r->ca_file = mem_strdup(path);
 }
 
-void request_free(struct request *r) {
+void request_free(struct http_request *r) {
     if (!r)
         return;
     curl_easy_cleanup(r->easy);
@@ -80,7 +80,7 @@ void request_free(struct request *r) {
     mem_free(r);
 }
 
-const char *request_server(const struct request *r) {
+const char *request_server(const struct http_request *r) {
     return r->server;
 }
 
@@ -90,7 +90,7 @@ const char *request_library_version(void) {
 
 /* --- interruption and pauses --------------------------------------------------------------- */
 
-static bool wait_for_signal(struct request *r, int milliseconds) {
+static bool wait_for_signal(struct http_request *r, int milliseconds) {
     struct pollfd wait = {.fd = r->signal_fd, .events = POLLIN};
     struct signalfd_siginfo info;
     if (!r->interrupted && poll(&wait, 1, milliseconds) == 1 &&
@@ -99,7 +99,7 @@ static bool wait_for_signal(struct request *r, int milliseconds) {
     return r->interrupted;
 }
 
-bool request_interrupted(struct request *r) {
+bool request_interrupted(struct http_request *r) {
     return wait_for_signal(r, 0);
 }
 
@@ -108,7 +108,7 @@ static double pause_length(int tries, double asked_sec) {
     return asked_sec >= 0.0 ? fmin(fmax(asked_sec, PAUSE_FIRST_SEC), 60.0) : pause;
 }
 
-bool request_pause(struct request *r, int tries, double asked_sec) {
+bool request_pause(struct http_request *r, int tries, double asked_sec) {
     return !wait_for_signal(r, (int)lround(1000.0 * pause_length(tries, asked_sec)));
 }
 
@@ -138,7 +138,7 @@ static const char *header_value(const char *line, const char *name) {
 }
 
 static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
-    struct reply *reply = ((struct attempt *)user)->reply;
+    struct reply *reply = ((struct request_try *)user)->reply;
     size_t length = size * count;
     char line[512];
     snprintf(line, sizeof line, "%.*s", (int)(length < sizeof line ? length : sizeof line - 1), bytes);
@@ -168,7 +168,7 @@ static size_t on_header(char *bytes, size_t size, size_t count, void *user) {
 }
 
 static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
-    struct attempt *a = user;
+    struct request_try *a = user;
     size_t length = size * count;
     if (a->call->sink && (a->reply->code == 200 || a->reply->code == 206)) {
         a->stopped = !a->call->sink(a->call->user, a->reply, bytes, length);
@@ -179,7 +179,7 @@ static size_t on_body(char *bytes, size_t size, size_t count, void *user) {
 }
 
 static size_t on_read(char *bytes, size_t size, size_t count, void *user) {
-    struct attempt *a = user;
+    struct request_try *a = user;
     size_t got = 0;
     a->read_status = a->call->read(a->call->user, bytes, size * count, &got, a->err);
     return a->read_status == STATUS_OK ? got : CURL_READFUNC_ABORT;
@@ -194,12 +194,12 @@ static bool is_loopback(const char *server) {
            strncmp(host, "[::1]", 5) == 0;
 }
 
-bool request_is_loopback(const struct request *r) {
+bool request_is_loopback(const struct http_request *r) {
     return is_loopback(r->server);
 }
 
 /* Sets up the handle; the returned list of headers and the texts must live until the end. */
-static struct curl_slist *set_up(struct attempt *a, const char *url, const char *body) {
+static struct curl_slist *set_up(struct request_try *a, const char *url, const char *body) {
     const struct request_call *call = a->call;
     CURL *easy = a->request->easy;
     curl_easy_reset(easy);
@@ -248,8 +248,8 @@ static struct curl_slist *set_up(struct attempt *a, const char *url, const char 
 }
 
 /* Drives the transfer to its end; false when interrupted. */
-static bool drive(struct attempt *a, CURLcode *result) {
-    struct request *r = a->request;
+static bool drive(struct request_try *a, CURLcode *result) {
+    struct http_request *r = a->request;
     int running = 1;
     *result = CURLE_FAILED_INIT;
     while (running) {
@@ -273,7 +273,7 @@ static bool drive(struct attempt *a, CURLcode *result) {
     return true;
 }
 
-static enum status transport_failed(struct attempt *a, CURLcode code, const char *detail) {
+static enum status transport_failed(struct request_try *a, CURLcode code, const char *detail) {
     struct error *err = a->err;
     const char *why = *detail ? detail : curl_easy_strerror(code);
     long number = 0; /* of the operating system: "Connection refused" says more than curl does */
@@ -295,8 +295,8 @@ static enum status transport_failed(struct attempt *a, CURLcode code, const char
 }
 
 /* One try. *unsent: the server cannot have got the request. */
-static enum status transfer(struct attempt *a, const char *url, const char *body, bool *unsent) {
-    struct request *r = a->request;
+static enum status transfer(struct request_try *a, const char *url, const char *body, bool *unsent) {
+    struct http_request *r = a->request;
     char detail[CURL_ERROR_SIZE] = "";
     struct curl_slist *headers = set_up(a, url, body);
     curl_easy_setopt(r->easy, CURLOPT_ERRORBUFFER, detail);
@@ -319,7 +319,7 @@ static enum status transfer(struct attempt *a, const char *url, const char *body
     return transport_failed(a, code, detail);
 }
 
-static enum status try_once(struct attempt *a, const char *url, const char *body, bool *unsent) {
+static enum status try_once(struct request_try *a, const char *url, const char *body, bool *unsent) {
     enum status status = STATUS_OK;
     *unsent = false;
     if (a->call->rewind)
@@ -348,7 +348,7 @@ static enum status status_of(long code) {
     }
 }
 
-static enum status judge(struct attempt *a) {
+static enum status judge(struct request_try *a) {
     struct reply *reply = a->reply;
     if (strstr(reply->content_type, "json") && reply->body.length > 0) {
         enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the reply",
@@ -371,7 +371,7 @@ static enum status judge(struct attempt *a) {
     return hint ? error_hint(a->err, "%s", hint) : status;
 }
 
-enum status request_run(struct request *r, const struct request_call *call, struct reply *reply,
+enum status request_run(struct http_request *r, const struct request_call *call, struct reply *reply,
                         struct error *err) {
     char *url = mem_printf("%s%s", r->server, call->path);
     char *body = call->body ? json_text(call->body) : NULL;
@@ -382,7 +382,7 @@ enum status request_run(struct request *r, const struct request_call *call, stru
         bool unsent;
         reply_release(reply);
         reply_init(reply);
-        struct attempt a = {.request = r, .call = call, .reply = reply, .err = err};
+        struct request_try a = {.request = r, .call = call, .reply = reply, .err = err};
         status = try_once(&a, url, body, &unsent);
         if (status == STATUS_OK)
             status = judge(&a);
@@ -400,7 +400,7 @@ enum status request_run(struct request *r, const struct request_call *call, stru
     return status;
 }
 
-enum status request_get(struct request *r, const char *path, struct reply *reply, struct error *err) {
+enum status request_get(struct http_request *r, const char *path, struct reply *reply, struct error *err) {
     enum status status = request_run(r, &(struct request_call){.path = path}, reply, err);
     if (status != STATUS_OK || reply->json)
         return status;

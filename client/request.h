@@ -18,23 +18,23 @@
 #include "common/error.h"
 #include "common/json.h"
 
-struct request; /* a server and the connection to it; opaque */
+struct http_request; /* a server and the connection to it; opaque */
 
-struct request *request_new(const char *server_url, double retry_sec, int signal_fd);
+struct http_request *request_new(const char *server_url, double retry_sec, int signal_fd);
 /* Sent with every request from now on; NULL: none. Never shown anywhere. */
-void request_set_token(struct request *r, const char *token);
+void request_set_token(struct http_request *r, const char *token);
 /* A file of certificates to trust in place of the system's. */
-void request_set_ca(struct request *r, const char *path);
-bool request_is_loopback(const struct request *r); /* the server's address */
-void request_free(struct request *r);
-const char *request_server(const struct request *r); /* the URL, without a slash at its end */
+void request_set_ca(struct http_request *r, const char *path);
+bool request_is_loopback(const struct http_request *r); /* the server's address */
+void request_free(struct http_request *r);
+const char *request_server(const struct http_request *r); /* the URL, without a slash at its end */
 const char *request_library_version(void);           /* libcurl's */
 
 /* True once SIGINT or SIGTERM has come. */
-bool request_interrupted(struct request *r);
+bool request_interrupted(struct http_request *r);
 /* Waits before a further try (0, 1, ...): 0.1 s, doubled each time, at most 5 s, or what the
  * server asked for (`asked_sec`, negative: nothing). False when interrupted. */
-bool request_pause(struct request *r, int tries, double asked_sec);
+bool request_pause(struct http_request *r, int tries, double asked_sec);
 
 /* What came back. */
 struct reply {
@@ -77,11 +77,11 @@ struct request_call {
  * hint: 404 STATUS_NOT_FOUND, 409 and 412 STATUS_CONFLICT, 502 to 504 STATUS_UNAVAILABLE, 507
  * STATUS_NO_SPACE, 413 and 429 STATUS_LIMIT, other 5xx STATUS_INTERNAL, else STATUS_INPUT.
  * reply->code tells them from errors of our own (0). *reply is emptied first. */
-enum status request_run(struct request *r, const struct request_call *call, struct reply *reply,
+enum status request_run(struct http_request *r, const struct request_call *call, struct reply *reply,
                         struct error *err);
 
 /* GET of a JSON document. */
-enum status request_get(struct request *r, const char *path, struct reply *reply, struct error *err);
+enum status request_get(struct http_request *r, const char *path, struct reply *reply, struct error *err);
 
 /* Appends `text` percent-encoded; slashes stay if `keep_slash`. */
 void request_escape(struct buf *out, const char *text, bool keep_slash);

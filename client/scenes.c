@@ -3,7 +3,7 @@
 
 #include "client/collection.h"
 #include "client/commands.h"
-#include "client/keeping.h"
+#include "client/retention.h"
 #include "client/table.h"
 #include "client/view.h"
 #include "common/mem.h"
@@ -24,7 +24,7 @@ static void print_scenes(struct client *c, const cJSON *items) {
         table_set(&t, 1, state_colour(state), "%s", state);
         table_set(&t, 2, COLOUR_NONE, "%s", size);
         table_set(&t, 3, COLOUR_NONE, "%s", age);
-        keeping_text(expires, scene);
+        retention_text(expires, scene);
         table_set(&t, 4, COLOUR_NONE, "%s", expires);
         table_set(&t, 5, COLOUR_NONE, "%s", member_text(scene, "owner"));
         table_set(&t, 6, COLOUR_NONE, "%s", member_text(scene, "name"));
@@ -57,10 +57,10 @@ static void print_scene(struct client *c, const cJSON *scene) {
     field_print(c, "owner", member_text(scene, "owner"));
     field_print(c, "state", member_text(scene, "state"));
     field_print(c, "size", size);
-    keeping_disk(size, scene);
+    retention_disk(size, scene);
     field_print(c, "on disk", size);
     field_print(c, "created", member_text(scene, "created_at"));
-    field_print(c, "expires", keeping_time(scene));
+    field_print(c, "expires", retention_time(scene));
     cJSON_ArrayForEach(fact, cJSON_GetObjectItemCaseSensitive(scene, "facts")) {
         char *text = cJSON_IsString(fact) ? mem_strdup(fact->valuestring) : json_text(fact);
         field_print(c, member_name(fact), text);

@@ -20,7 +20,7 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 
-const struct option submit_options[] = {
+const struct client_option submit_options[] = {
     {"name", 'n', OPTION_TEXT, "NAME", "what people will call the job; else the room's name"},
     {"set", 's', OPTION_LIST, "KEY=VALUE", "a setting; `unbake settings` lists them"},
     {"priority", 'p', OPTION_WHOLE, "N", "-100 to 100, larger goes first (0)"},
@@ -152,7 +152,7 @@ static enum status ask_for_scene(struct submission *s, struct reply *reply, stru
 }
 
 static enum status upload(struct submission *s, struct reply *reply, struct error *err) {
-    struct upload u = {.client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene,
+    struct client_upload u = {.client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene,
                        .length = s->length};
     char size[16];
     enum status status = upload_send(&u, reply, err);

@@ -1,4 +1,4 @@
-/* terminal.h -- what a person sees: lines drawn in place, colour, figures in short form.
+/* terminal.h -- what a person sees: lines drawn in place, colour, numbers in short form.
  *
  * A terminal is "live" when its stream is a screen that can redraw a line; on a pipe, a file or
  * TERM=dumb nothing is drawn in place and no escape sequence is written. Colour also needs

@@ -18,8 +18,8 @@
 #define SILENCE_SEC 60.0 /* nothing moves for so long: the connection is dead */
 #define VERSION_FIELD "Tus-Resumable: " TUS_VERSION
 
-struct sending {
-    const struct upload *u;
+struct upload_sending {
+    const struct client_upload *u;
     char *path;       /* of the upload; NULL: not found or made yet; owned */
     uint64_t offset;  /* what the server has */
     uint64_t pack_at; /* where the stream is read next */
@@ -43,7 +43,7 @@ static void put_base64(struct buf *out, const char *text) {
     }
 }
 
-static enum status find(struct sending *s, struct reply *reply, struct error *err) {
+static enum status find(struct upload_sending *s, struct reply *reply, struct error *err) {
     char *path = mem_printf("/v1/uploads?sha256=%s", s->u->sha256);
     struct request_call call = {.path = path, .once = true};
     enum status status = request_run(s->u->client->request, &call, reply, err);
@@ -60,7 +60,7 @@ static enum status find(struct sending *s, struct reply *reply, struct error *er
     return status;
 }
 
-static enum status create(struct sending *s, struct reply *reply, struct error *err) {
+static enum status create(struct upload_sending *s, struct reply *reply, struct error *err) {
     struct buf metadata;
     char length[64];
     buf_init(&metadata, 4096);
@@ -81,7 +81,7 @@ static enum status create(struct sending *s, struct reply *reply, struct error *
 }
 
 /* Takes the offset that a reply tells. */
-static enum status take_offset(struct sending *s, const struct reply *reply, struct error *err) {
+static enum status take_offset(struct upload_sending *s, const struct reply *reply, struct error *err) {
     if (reply->upload_offset < 0 || (uint64_t)reply->upload_offset > s->u->length)
         return error_set(err, STATUS_UNAVAILABLE, "the server does not say where the upload stands");
     if ((uint64_t)reply->upload_offset > s->offset)
@@ -90,7 +90,7 @@ static enum status take_offset(struct sending *s, const struct reply *reply, str
     return STATUS_OK;
 }
 
-static enum status ask(struct sending *s, struct reply *reply, struct error *err) {
+static enum status ask(struct upload_sending *s, struct reply *reply, struct error *err) {
     struct request_call call = {.method = "HEAD", .path = s->path, .header = {VERSION_FIELD}, .once = true,
                                 .silence_sec = SILENCE_SEC};
     enum status status = request_run(s->u->client->request, &call, reply, err);
@@ -100,7 +100,7 @@ static enum status ask(struct sending *s, struct reply *reply, struct error *err
 /* --- the rest of the bytes ----------------------------------------------------------------- */
 
 static enum status read_pack(void *user, void *bytes, size_t room, size_t *got, struct error *err) {
-    struct sending *s = user;
+    struct upload_sending *s = user;
     enum status status = pack_read(s->u->pack, bytes, room, got, err);
     s->pack_at += *got;
     return status;
@@ -108,7 +108,7 @@ static enum status read_pack(void *user, void *bytes, size_t room, size_t *got, 
 
 /* Brings the stream to where the upload stands. */
 static enum status seek_pack(void *user, struct error *err) {
-    struct sending *s = user;
+    struct upload_sending *s = user;
     enum status status = STATUS_OK;
     if (s->pack_at > s->offset || s->pack_at == 0) {
         status = pack_rewind(s->u->pack, err);
@@ -129,14 +129,14 @@ static enum status seek_pack(void *user, struct error *err) {
 }
 
 static void on_sent(void *user, double sent) {
-    struct sending *s = user;
+    struct upload_sending *s = user;
     double done = (double)s->offset + sent;
     if (done > s->meter.done)
         s->moved_at = clock_sec();
     meter_update(&s->meter, done);
 }
 
-static enum status send_rest(struct sending *s, struct reply *reply, struct error *err) {
+static enum status send_rest(struct upload_sending *s, struct reply *reply, struct error *err) {
     struct client *c = s->u->client;
     char offset[64];
     snprintf(offset, sizeof offset, "Upload-Offset: %llu", (unsigned long long)s->offset);
@@ -163,7 +163,7 @@ static enum status send_rest(struct sending *s, struct reply *reply, struct erro
 /* --- the loop ------------------------------------------------------------------------------ */
 
 /* One round; STATUS_OK also where more rounds are needed. */
-static enum status advance(struct sending *s, struct reply *reply, struct error *err) {
+static enum status advance(struct upload_sending *s, struct reply *reply, struct error *err) {
     enum status status = STATUS_OK;
     if (!s->path) {
         status = find(s, reply, err);
@@ -185,7 +185,7 @@ static enum status advance(struct sending *s, struct reply *reply, struct error 
 }
 
 /* Whether a failure may pass. Forgets an upload that is gone. */
-static bool is_passing(struct sending *s, const struct reply *reply, enum status status) {
+static bool is_passing(struct upload_sending *s, const struct reply *reply, enum status status) {
     if (status == STATUS_NOT_FOUND && reply->code == 404 && s->path) {
         mem_free(s->path);
         s->path = NULL;
@@ -196,10 +196,10 @@ static bool is_passing(struct sending *s, const struct reply *reply, enum status
     return status == STATUS_UNAVAILABLE || (status == STATUS_CONFLICT && reply->code == 409);
 }
 
-enum status upload_send(const struct upload *u, struct reply *reply, struct error *err) {
+enum status upload_send(const struct client_upload *u, struct reply *reply, struct error *err) {
     struct client *c = u->client;
     double patience = c->retry_sec >= 0.0 ? c->retry_sec : PATIENCE_SEC;
-    struct sending s = {.u = u, .moved_at = clock_sec()};
+    struct upload_sending s = {.u = u, .moved_at = clock_sec()};
     enum status status;
     for (int tries = 0;; tries++) {
         uint64_t before = s.offset;

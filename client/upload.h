@@ -8,7 +8,7 @@
 #include "client/client.h"
 #include "client/pack.h"
 
-struct upload {
+struct client_upload {
     struct client *client;
     struct pack *pack;
     const char *name, *sha256; /* of the room; of the whole stream */
@@ -17,6 +17,6 @@ struct upload {
 
 /* Returns when the server has all of it and the scene exists. Tries for --retry seconds (600)
  * after the last byte went through. */
-enum status upload_send(const struct upload *u, struct reply *reply, struct error *err);
+enum status upload_send(const struct client_upload *u, struct reply *reply, struct error *err);
 
 #endif

@@ -1,10 +1,10 @@
 /* uploads.c -- `uploads` and `collect`: what is under way to the server, and what it removes. */
 #include "client/collection.h"
 #include "client/commands.h"
-#include "client/keeping.h"
+#include "client/retention.h"
 #include "client/table.h"
 
-const struct option collect_options[] = {
+const struct client_option collect_options[] = {
     {"dry-run", 0, OPTION_FLAG, NULL, "only say what would be removed"},
     {0},
 };
@@ -19,7 +19,7 @@ static void print_uploads(struct client *c, const cJSON *items) {
         double length = member_number(item, "length", 1.0);
         format_bytes(size, length);
         format_duration(age, time_since(member_text(item, "created_at")));
-        keeping_text(expires, item);
+        retention_text(expires, item);
         table_row(&t);
         table_set(&t, 0, COLOUR_NONE, "%s", member_text(item, "id"));
         table_set(&t, 1, COLOUR_NONE, "%.0f%%", 100.0 * member_number(item, "offset", 0.0) / length);
@@ -46,7 +46,7 @@ static void print_upload(struct client *c, const cJSON *upload) {
     field_print(c, "scene", member_text(upload, "scene"));
     field_print(c, "created", member_text(upload, "created_at"));
     field_print(c, "updated", member_text(upload, "updated_at"));
-    field_print(c, "expires", keeping_time(upload));
+    field_print(c, "expires", retention_time(upload));
 }
 
 int uploads_run(struct client *c, const struct options *o) {

@@ -7,8 +7,8 @@
 #include "client/client.h"
 #include "common/protocol.h"
 
-void view_init(struct view *v, int64_t job) {
-    *v = (struct view){.job = job, .eta_sec = -1.0};
+void view_init(struct client_view *v, int64_t job) {
+    *v = (struct client_view){.job = job, .eta_sec = -1.0};
 }
 
 static void copy(char *to, size_t size, const cJSON *data, const char *key) {
@@ -16,8 +16,8 @@ static void copy(char *to, size_t size, const cJSON *data, const char *key) {
         snprintf(to, size, "%s", member_text(data, key));
 }
 
-static void take_state(struct view *v, const cJSON *data) {
-    /* An event of a change leaves out a reason and a wish that there is not. */
+static void take_state(struct client_view *v, const cJSON *data) {
+    /* An event of a change leaves out a reason and a request that are absent. */
     v->wanted[0] = v->reason[0] = '\0';
     copy(v->state, sizeof v->state, data, "state");
     copy(v->wanted, sizeof v->wanted, data, "wanted");
@@ -33,14 +33,14 @@ static void take_state(struct view *v, const cJSON *data) {
     v->eta_sec = member_number(data, "eta_sec", -1.0);
 }
 
-static void take_progress(struct view *v, const cJSON *data) {
+static void take_progress(struct client_view *v, const cJSON *data) {
     copy(v->stage, sizeof v->stage, data, "stage");
     v->done = member_number(data, "done", 0.0);
     v->total = member_number(data, "total", 0.0);
     v->eta_sec = member_number(data, "eta_sec", -1.0);
 }
 
-static void take_metric(struct view *v, const cJSON *data) {
+static void take_metric(struct client_view *v, const cJSON *data) {
     const char *series = member_text(data, "series");
     double value = member_number(data, "value", (double)NAN);
     if (!*series || !isfinite(value))
@@ -63,7 +63,7 @@ static void take_metric(struct view *v, const cJSON *data) {
     v->metric[at].order = ++v->reports;
 }
 
-void view_event(struct view *v, const char *type, const cJSON *data) {
+void view_event(struct client_view *v, const char *type, const cJSON *data) {
     v->attempt = (int)member_whole(data, "attempt", v->attempt);
     if (strcmp(type, EVENT_STATE) == 0)
         take_state(v, data);
@@ -73,12 +73,12 @@ void view_event(struct view *v, const char *type, const cJSON *data) {
         take_metric(v, data);
 }
 
-bool view_is_over(const struct view *v) {
+bool view_is_over(const struct client_view *v) {
     return strcmp(v->state, JOB_STATE_SUCCEEDED) == 0 || strcmp(v->state, JOB_STATE_FAILED) == 0 ||
            strcmp(v->state, JOB_STATE_CANCELLED) == 0;
 }
 
-double view_fraction(const struct view *v) {
+double view_fraction(const struct client_view *v) {
     return v->total > 0.0 ? fmin(fmax(v->done / v->total, 0.0), 1.0) : 0.0;
 }
 
@@ -90,7 +90,7 @@ enum colour state_colour(const char *state) {
     return strcmp(state, JOB_STATE_PAUSED) == 0 ? COLOUR_YELLOW : COLOUR_NONE;
 }
 
-static void put_figures(const struct view *v, double age_sec, struct buf *out) {
+static void put_numbers(const struct client_view *v, double age_sec, struct buf *out) {
     for (size_t i = 0; i < v->metric_count; i++) {
         char figure[24];
         format_figure(figure, v->metric[i].value);
@@ -105,7 +105,7 @@ static void put_figures(const struct view *v, double age_sec, struct buf *out) {
     }
 }
 
-void view_line(const struct view *v, const struct terminal *t, size_t columns, bool with_bar,
+void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar,
                double age_sec, struct buf *out) {
     bool running = strcmp(v->state, JOB_STATE_RUNNING) == 0;
     buf_printf(out, "job %lld  ", (long long)v->job);
@@ -114,14 +114,14 @@ void view_line(const struct view *v, const struct terminal *t, size_t columns, b
     terminal_clean(out, running && *v->stage ? v->stage : v->state);
     buf_puts(out, colour ? terminal_colour(t, COLOUR_NONE) : "");
     if (running) {
-        struct buf figures;
-        buf_init(&figures, 1024);
-        put_figures(v, age_sec, &figures);
+        struct buf numbers;
+        buf_init(&numbers, 1024);
+        put_numbers(v, age_sec, &numbers);
         if (strcmp(v->wanted, "pause") == 0)
-            buf_puts(&figures, "  (pausing)");
+            buf_puts(&numbers, "  (pausing)");
         else if (strcmp(v->wanted, "cancel") == 0)
-            buf_puts(&figures, "  (being cancelled)");
-        size_t used = text_columns(buf_text(out)) + text_columns(buf_text(&figures)) + 8;
+            buf_puts(&numbers, "  (being cancelled)");
+        size_t used = text_columns(buf_text(out)) + text_columns(buf_text(&numbers)) + 8;
         size_t bar = columns > used + 10 ? columns - used : 0;
         buf_puts(out, "  ");
         if (with_bar && bar) {
@@ -129,8 +129,8 @@ void view_line(const struct view *v, const struct terminal *t, size_t columns, b
             buf_puts(out, " ");
         }
         buf_printf(out, "%3.0f%%", floor(100.0 * view_fraction(v) + 1e-9));
-        buf_puts(out, buf_text(&figures));
-        buf_release(&figures);
+        buf_puts(out, buf_text(&numbers));
+        buf_release(&numbers);
     } else if (*v->reason) {
         buf_puts(out, ": ");
         terminal_clean(out, v->reason);

@@ -16,7 +16,7 @@ struct view_metric {
     uint64_t order; /* of its last report; the oldest gives way to a new series */
 };
 
-struct view {
+struct client_view {
     int64_t job;
     char state[16];
     char wanted[16];     /* "pause" or "cancel" while that is asked for and not done; else "" */
@@ -30,16 +30,16 @@ struct view {
     uint64_t reports;
 };
 
-void view_init(struct view *v, int64_t job);
+void view_init(struct client_view *v, int64_t job);
 /* Takes an event in (common/protocol.h names the types; others are ignored). */
-void view_event(struct view *v, const char *type, const cJSON *data);
-bool view_is_over(const struct view *v);
+void view_event(struct client_view *v, const char *type, const cJSON *data);
+bool view_is_over(const struct client_view *v);
 
 /* 0..1. */
-double view_fraction(const struct view *v);
-/* The line: state or stage, bar if `columns` leave room for one, figures, time left.
+double view_fraction(const struct client_view *v);
+/* The line: state or stage, bar if `columns` leave room for one, numbers, time left.
  * `age_sec` is how long ago the last progress came. */
-void view_line(const struct view *v, const struct terminal *t, size_t columns, bool with_bar,
+void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar,
                double age_sec, struct buf *out);
 
 enum colour state_colour(const char *state);

@@ -24,19 +24,19 @@
 #define REDRAW_SEC 0.2
 #define PLAIN_SEC 10.0
 
-const struct option watch_options[] = {
+const struct client_option watch_options[] = {
     {"all", 'a', OPTION_FLAG, NULL, "begin with what happened before, not with the present"},
     {"exec", 0, OPTION_TEXT, "CMD", "when the job has ended, run that by sh with $UNBAKE_JOB and $UNBAKE_STATE"},
     {0},
 };
-const struct option logs_options[] = {
+const struct client_option logs_options[] = {
     {"follow", 'f', OPTION_FLAG, NULL, "print the log's events until the job ends"},
     {0},
 };
 
 struct watch {
     struct client *client;
-    struct view view;
+    struct client_view view;
     struct sse sse;
     bool only_log;      /* `logs` */
     bool only_past;     /* ends with what is stored by now: `logs` without --follow */
@@ -66,7 +66,7 @@ static void show_line(struct watch *w) {
     buf_release(&line);
 }
 
-/* On a terminal: as often as eyes want. Else: what is new at once, and figures now and then
+/* On a terminal: as often as eyes want. Else: what is new at once, and numbers now and then
  * while there are new ones. */
 static void show(struct watch *w, bool urgent) {
     struct client *c = w->client;

@@ -80,7 +80,7 @@ static void print_flags(const struct flag *flags, FILE *out) {
 
 static void print_commands_and_options(FILE *out) {
     size_t count;
-    const struct option *options = config_table(&count);
+    const struct config_option *options = config_table(&count);
     fputs("\ncommands:\n", out);
     for (size_t i = 1; i < COMMAND_COUNT; i++)
         fprintf(out, "  unbaked %s%s%s: %s\n", table[i].name, *table[i].arguments ? " " : "", table[i].arguments,

@@ -22,7 +22,7 @@
     {#name, OPTION_REAL, unit, low, high, value, help, offsetof(struct config, name)}
 #define BOOL(name, value, help) {#name, OPTION_BOOL, "", 0, 1, value, help, offsetof(struct config, name)}
 
-static const struct option table[] = {
+static const struct config_option table[] = {
     TEXT(data_dir, "/var/lib/unbaked",
          "Folder of everything that the daemon keeps. One daemon a folder; a local disk."),
     TEXT(listen, "127.0.0.1:7117",
@@ -100,16 +100,16 @@ static const struct option table[] = {
 };
 #define TABLE_COUNT (sizeof table / sizeof *table)
 
-const struct option *config_table(size_t *count) {
+const struct config_option *config_table(size_t *count) {
     *count = TABLE_COUNT;
     return table;
 }
 
-static void *member(struct config *c, const struct option *option) {
+static void *member(struct config *c, const struct config_option *option) {
     return (char *)c + option->offset;
 }
 
-static const struct option *find(const char *name) {
+static const struct config_option *find(const char *name) {
     for (size_t i = 0; i < TABLE_COUNT; i++)
         if (strcmp(table[i].name, name) == 0)
             return &table[i];
@@ -123,7 +123,7 @@ static double read_number(const char *text) {
     return *text && *end == '\0' && isfinite(value) ? value : NAN;
 }
 
-static void set_number(struct config *c, const struct option *option, const char *value,
+static void set_number(struct config *c, const struct config_option *option, const char *value,
                        const char *where, struct buf *problems) {
     double number = read_number(value);
     bool is_whole = option->type == OPTION_INT;
@@ -137,7 +137,7 @@ static void set_number(struct config *c, const struct option *option, const char
         *(double *)member(c, option) = number;
 }
 
-static void set_bool(struct config *c, const struct option *option, const char *value, const char *where,
+static void set_bool(struct config *c, const struct config_option *option, const char *value, const char *where,
                      struct buf *problems) {
     if (strcmp(value, "yes") == 0 || strcmp(value, "no") == 0)
         *(bool *)member(c, option) = value[0] == 'y';
@@ -147,7 +147,7 @@ static void set_bool(struct config *c, const struct option *option, const char *
 
 void config_set(struct config *c, const char *name, const char *value, const char *where,
                 struct buf *problems) {
-    const struct option *option = find(name);
+    const struct config_option *option = find(name);
     if (!option) {
         struct nearest nearest;
         nearest_init(&nearest, name);
@@ -213,7 +213,7 @@ static void read_line(struct config *c, char *line, const char *where, bool *see
     }
     *equals = '\0';
     char *name = trim(line), *value = trim(equals + 1);
-    const struct option *option = find(name);
+    const struct config_option *option = find(name);
     if (option && seen[option - table])
         buf_printf(problems, "%s: %s is given twice\n", where, name);
     else

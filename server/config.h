@@ -14,7 +14,7 @@
 
 enum option_type { OPTION_TEXT, OPTION_INT, OPTION_REAL, OPTION_BOOL };
 
-struct option {
+struct config_option {
     const char *name;
     enum option_type type;
     const char *unit;         /* "s", "MiB", ...; "" where there is none */
@@ -45,7 +45,7 @@ struct config {
     bool sandbox;
 };
 
-const struct option *config_table(size_t *count); /* in the order of config/unbaked.conf */
+const struct config_option *config_table(size_t *count); /* in the order of config/unbaked.conf */
 
 void config_init(struct config *c); /* all defaults */
 void config_release(struct config *c);

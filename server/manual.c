@@ -46,7 +46,7 @@ static void page_8(void) {
 
 static void page_5(void) {
     size_t count;
-    const struct option *table = config_table(&count);
+    const struct config_option *table = config_table(&count);
     manual_head(stdout, "UNBAKED.CONF", 5, "unbaked.conf", "configuration of unbaked");
     manual_section(stdout, "DESCRIPTION");
     manual_text(stdout, "Lines read \"name = value\"; # begins a comment. The same options are taken by --set on "
@@ -79,7 +79,7 @@ static void completion(bool zsh) {
     static const char *const roles[] = {"viewer", "user", "admin", NULL};
     size_t count, option_count;
     const struct server_command *table = commands_table(&count);
-    const struct option *options = config_table(&option_count);
+    const struct config_option *options = config_table(&option_count);
     completion_begin(stdout, "unbaked", zsh);
     for (size_t i = count; i-- > 0;) { /* the daemon, whose pattern is *, comes last */
         completion_words(stdout, i > 0 ? table[i].name : "*");

@@ -134,7 +134,7 @@ static void *run(void *user) {
         struct error err;
         struct timespec until;
         pthread_mutex_unlock(&c->mutex);
-        c->config->tend_uploads(c->config->uploads);
+        c->config->maintain_uploads(c->config->uploads);
         if (collector_run(c->config, false, NULL, NULL, &err) != STATUS_OK)
             log_warning("cannot look for what has expired: %s", err.message);
         store_reserve_renew(c->config->store);

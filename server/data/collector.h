@@ -14,7 +14,7 @@ struct collector_config { /* pointers are borrowed */
     struct store *store;
     struct folder *folder;
     /* Called with `uploads`: puts uploads that were cut off in order; removes one whose row is gone. */
-    void (*tend_uploads)(void *uploads);
+    void (*maintain_uploads)(void *uploads);
     enum status (*forget_upload)(void *uploads, const char *id, struct error *err);
     void *uploads;
 };

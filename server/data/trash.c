@@ -55,7 +55,7 @@ static void empty(struct trash *t) {
 }
 
 /* What others made for a moment, in an earlier life: little. */
-static enum status drop_scraps(const char *data_dir, struct error *err) {
+static enum status drop_temporary(const char *data_dir, struct error *err) {
     char **names;
     size_t count;
     char *folder = layout_trash(data_dir);
@@ -96,7 +96,7 @@ enum status trash_new(struct trash **out, const char *data_dir, void (*emptied)(
                       struct error *err) {
     struct timespec now;
     *out = NULL;
-    enum status status = drop_scraps(data_dir, err);
+    enum status status = drop_temporary(data_dir, err);
     if (status != STATUS_OK)
         return status;
     clock_gettime(CLOCK_REALTIME, &now);

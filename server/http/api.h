@@ -1,4 +1,4 @@
-/* api.h -- what every handler works with: the daemon's parts and limits, and figures. */
+/* api.h -- what every handler works with: the daemon's parts, limits and counters. */
 #ifndef UNBAKE_HTTP_API_H
 #define UNBAKE_HTTP_API_H
 
@@ -51,8 +51,8 @@ struct hub;      /* hub.h */
 struct digests;  /* uploads/digests.h */
 struct resumables; /* uploads/resumable.h */
 struct listener; /* listener.h */
-struct tally;    /* tally.h */
-struct brake;    /* brake.h */
+struct request_counts;    /* request_counts.h */
+struct auth_throttle;    /* auth_throttle.h */
 struct readiness; /* readiness.h */
 
 struct api {
@@ -65,9 +65,9 @@ struct api {
     struct digests *digests;
     struct resumables *resumables;
     struct readiness *readiness;
-    struct listener *listener; /* NULL before it listens; for figures */
-    struct tally *tally; /* of requests */
-    struct brake *brake; /* on wrong tokens */
+    struct listener *listener; /* NULL before it listens; for metrics */
+    struct request_counts *request_counts; /* of requests */
+    struct auth_throttle *auth_throttle; /* on wrong tokens */
     atomic_ullong uploaded_bytes;
 };
 

@@ -10,7 +10,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/address.h"
-#include "server/http/brake.h"
+#include "server/http/auth_throttle.h"
 #include "server/http/field.h"
 #include "server/http/problem.h"
 #include "server/http/route.h"
@@ -65,7 +65,7 @@ static void log_failure(const struct request *r, const char *more) {
 
 struct response *auth_reject(struct api *api, struct request *r) {
     bool is_first;
-    double wait_sec = brake_fail(api->brake, &r->address, clock_sec(), &is_first);
+    double wait_sec = auth_throttle_fail(api->auth_throttle, &r->address, clock_sec(), &is_first);
     if (wait_sec <= 0.0 || is_first)
         log_failure(r, is_first ? "; more of them from this address are refused with 429 and not logged" : "");
     if (wait_sec <= 0.0)
@@ -77,7 +77,7 @@ struct response *auth_reject(struct api *api, struct request *r) {
                                           "a valid token is let in at any time", members);
     response_field(reply, "Retry-After", "%.0f", ceil(wait_sec));
     reply->must_close = true; /* the next try is to cost a connection */
-    r->is_braked = true;
+    r->is_throttled = true;
     return reply;
 }
 

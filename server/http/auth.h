@@ -17,7 +17,7 @@ bool auth_is_open(const struct api *api);
  * not use the route at all. */
 struct response *auth_check(struct api *api, struct request *r);
 
-/* To a caller whose token is not valid: 401, or 429 where its address has presented too many (brake.h). Logged, with
+/* To a caller whose token is not valid: 401, or 429 where its address has presented too many (auth_throttle.h). Logged, with
  * the address and without the token. */
 struct response *auth_reject(struct api *api, struct request *r);
 

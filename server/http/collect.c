@@ -1,7 +1,7 @@
 /* collect.c -- /v1/collect: removes what has expired now, or says what would go. */
 #include "server/data/collector.h"
 #include "server/http/handlers.h"
-#include "server/http/keeping.h"
+#include "server/http/retention.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
 
@@ -28,7 +28,7 @@ static void add_item(void *user, const struct expired *e, uint64_t files, uint64
 struct response *collect_now(struct api *api, struct request *r) {
     bool dry_run;
     struct error err;
-    struct response *refusal = keeping_dry_run(r, &dry_run);
+    struct response *refusal = retention_dry_run(r, &dry_run);
     if (refusal)
         return refusal;
     struct found found = {.items = cJSON_CreateArray()};

@@ -16,7 +16,7 @@
 #include "server/http/head.h"
 #include "server/http/problem.h"
 #include "server/http/routes.h"
-#include "server/http/tally.h"
+#include "server/http/request_counts.h"
 #include "server/http/tls.h"
 
 #define PIECE_BYTES ((size_t)256 << 10) /* of a body that is stored: so much goes to the disk at once, at most */
@@ -55,8 +55,8 @@ static void give_back(struct exchange *x) {
 static void done(struct exchange *x) {
     struct listener *l = x->listener;
     pthread_mutex_lock(&l->mutex);
-    x->is_owed = x->reply && x->reply->fd < 0 && !x->reply->stream;
-    l->owed_count += x->is_owed;
+    x->reply_pending = x->reply && x->reply->fd < 0 && !x->reply->stream;
+    l->pending_reply_count += x->reply_pending;
     give_back(x);
     pthread_mutex_unlock(&l->mutex);
 }
@@ -452,7 +452,7 @@ static void log_request(const struct exchange *x, int status, bool is_whole) {
         {"ms", duration, true},            {"user", *r->caller.name ? r->caller.name : NULL, false},
         {"end", is_whole ? NULL : "cut short", false},
     };
-    log_fields(r->method == METHOD_GET || r->is_braked ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
+    log_fields(r->method == METHOD_GET || r->is_throttled ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
                "answered");
 }
 
@@ -465,14 +465,14 @@ void exchange_on_completed(void *user, struct MHD_Connection *connection, void *
         return;
     *context = NULL;
     pthread_mutex_lock(&l->mutex);
-    l->owed_count -= x->is_owed;
+    l->pending_reply_count -= x->reply_pending;
     pthread_cond_broadcast(&l->changed);
     pthread_mutex_unlock(&l->mutex);
     int status = x->reply ? x->reply->status : 0;
-    tally_add(l->api->tally, &x->request, status);
+    request_counts_add(l->api->request_counts, &x->request, status);
     log_request(x, status, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
     if (code == MHD_REQUEST_TERMINATED_TIMEOUT_REACHED)
-        guard_forsake(x->guarded);
+        guard_discard_unsent(x->guarded);
     guard_enter(l->guard, x->guarded, GUARD_IDLE);
     bool has_files = x->request.upload || x->request.patch || (x->reply && (x->reply->fd >= 0 || x->reply->stream));
     x->task.run = end_task;

@@ -46,7 +46,7 @@ struct exchange {
     /* Under listener->mutex: */
     enum exchange_place place;
     bool is_woken;              /* while it was not waiting */
-    bool is_owed;               /* a pool's reply, a short one, is on its way */
+    bool reply_pending;               /* a pool's reply, a short one, is on its way */
     struct exchange *next, *previous; /* among the waiting streams */
 };
 
@@ -56,7 +56,7 @@ struct listener {
     struct guard *guard;
     struct tls *tls; /* NULL: plain HTTP */
     struct acceptor *acceptor; /* has the listening socket */
-    struct crowd *crowd;
+    struct connection_counts *connection_counts;
     uint16_t port;
     struct pool *quick, *slow; /* see route.h */
     pthread_mutex_t mutex; /* guards what follows; nobody waits for anything else while he has it */
@@ -65,7 +65,7 @@ struct listener {
     struct exchange *waiting;  /* streams, doubly linked */
     size_t working_count;      /* exchanges with a pool */
     size_t stream_count;       /* event streams that are open */
-    size_t owed_count;         /* exchanges that are owed a reply */
+    size_t pending_reply_count;         /* exchanges that are owed a reply */
 };
 
 /* The library's callbacks: a request's line is there; its head, body or end; it is over. */

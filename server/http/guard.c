@@ -85,7 +85,7 @@ static bool is_late(const struct guard *g, struct guarded *c, double now_sec) {
     return late;
 }
 
-void guard_forsake(struct guarded *c) {
+void guard_discard_unsent(struct guarded *c) {
     struct linger none = {.l_onoff = 1};
     setsockopt(c->fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
 }
@@ -96,7 +96,7 @@ void guard_look(struct guard *g, double now_sec) {
         if (c->is_shut || c->held_sec > 0.0 || !is_late(g, c, now_sec))
             continue;
         if (c->phase == GUARD_REPLY)
-            guard_forsake(c);
+            guard_discard_unsent(c);
         c->is_shut = true;
         g->shut_count++;
         shutdown(c->fd, SHUT_RDWR);

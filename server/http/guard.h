@@ -47,7 +47,7 @@ void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* arrived ju
 
 /* What the other side has not taken of a reply is not kept in the kernel for minutes after the
  * connection is closed. By the thread that serves it. */
-void guard_forsake(struct guarded *c);
+void guard_discard_unsent(struct guarded *c);
 
 size_t guard_count(struct guard *g);         /* connections */
 uint64_t guard_shut_count(struct guard *g);  /* shut down for being late, ever */

@@ -13,11 +13,11 @@
 #include "server/http/auth.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/http/keeping.h"
+#include "server/http/retention.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
-#include "server/http/wish.h"
+#include "server/http/job_request.h"
 
 /* The reply that shows a job as it is now; takes it. */
 static struct response *show_job(const struct request *r, struct job *job, int status) {
@@ -92,7 +92,7 @@ struct response *jobs_list(struct api *api, struct request *r) {
 
 /* --- submitting -------------------------------------------------------------------------- */
 
-/* The scene that the wish names, if a job may use it; else an entry in params, or *refusal where the
+/* The scene that the request names, if a job may use it; else an entry in params, or *refusal where the
  * database is at fault. */
 static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
                        cJSON *params, struct response **refusal) {
@@ -125,7 +125,7 @@ static struct response *dry_run_reply(const struct scene_row *scene, const struc
     return response_json(200, value);
 }
 
-static struct response *add_job(struct api *api, const struct request *r, const struct wish *w,
+static struct response *add_job(struct api *api, const struct request *r, const struct job_request *w,
                                 const struct scene_row *scene) {
     struct error err;
     char *settings = w->settings ? json_text(w->settings) : mem_strdup("{}");
@@ -167,7 +167,7 @@ static struct response *add_job(struct api *api, const struct request *r, const 
 
 static struct response *check_submission(const struct request *r, bool *dry_run) {
     const char *key = request_field(r, "Idempotency-Key");
-    struct response *refusal = keeping_dry_run(r, dry_run);
+    struct response *refusal = retention_dry_run(r, dry_run);
     if (refusal)
         return refusal;
     size_t length = key ? strlen(key) : 1;
@@ -185,14 +185,14 @@ struct response *jobs_add(struct api *api, struct request *r) {
     if (reply)
         return reply;
     cJSON *params = cJSON_CreateArray();
-    struct wish w;
+    struct job_request w;
     struct scene_row scene;
     struct settings settings;
     bool has_scene = false;
     settings_init(&settings);
-    reply = wish_read(r, &w, true, params);
+    reply = job_request_read(r, &w, true, params);
     if (!reply)
-        wish_settings(&w, &settings, params);
+        job_request_settings(&w, &settings, params);
     if (!reply && w.scene)
         has_scene = find_scene(api, r, w.scene, &scene, params, &reply);
     if (!reply && cJSON_GetArraySize(params) > 0) {
@@ -209,7 +209,7 @@ struct response *jobs_add(struct api *api, struct request *r) {
         scene_row_release(&scene);
     settings_release(&settings);
     cJSON_Delete(params);
-    wish_release(&w);
+    job_request_release(&w);
     return reply;
 }
 
@@ -238,9 +238,9 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     if (reply)
         return reply;
     cJSON *params = cJSON_CreateArray();
-    struct wish w;
+    struct job_request w;
     struct error err;
-    reply = wish_read(r, &w, false, params);
+    reply = job_request_read(r, &w, false, params);
     if (!reply && cJSON_GetArraySize(params) > 0) {
         reply = problem_invalid(r, "the change cannot be made", params);
         params = NULL;
@@ -248,7 +248,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     if (!reply) {
         struct job_patch patch = {.name = w.name, .labels = w.labels, .priority = w.priority,
                                   .shared = w.shared, .place = w.place, .before_id = w.before,
-                                  .keeping = w.keeping};
+                                  .retention = w.retention};
         enum status status = store_job_patch(api->store, id, revision, &patch, &err);
         if (status == STATUS_CONFLICT)
             reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
@@ -259,7 +259,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     }
     scheduler_wake(api->scheduler);
     cJSON_Delete(params);
-    wish_release(&w);
+    job_request_release(&w);
     return reply;
 }
 
@@ -274,14 +274,14 @@ static struct response *measure_job(struct api *api, const struct request *r, in
     if (is_running)
         return problem_full(r, 409, "the job is running", "Cancel it first.", NULL);
     char *path = layout_job(NULL, id);
-    struct response *reply = keeping_would_free(api, r, path);
+    struct response *reply = retention_would_free(api, r, path);
     mem_free(path);
     return reply;
 }
 
 struct response *jobs_delete(struct api *api, struct request *r) {
     bool dry_run;
-    struct response *refusal = keeping_dry_run(r, &dry_run);
+    struct response *refusal = retention_dry_run(r, &dry_run);
     int64_t id = refusal ? 0 : auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (refusal)
         return refusal;

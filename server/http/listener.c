@@ -14,7 +14,7 @@
 #include "common/mem.h"
 #include "server/http/acceptor.h"
 #include "server/http/address.h"
-#include "server/http/crowd.h"
+#include "server/http/connection_counts.h"
 #include "server/http/exchange.h"
 #include "server/http/hub.h"
 #include "server/http/tls.h"
@@ -57,7 +57,7 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
         *socket_context = NULL;
         struct address from =
             address_of_socket(MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
-        crowd_leave(l->crowd, &from);
+        connection_counts_leave(l->connection_counts, &from);
         acceptor_ended(l->acceptor);
     }
 }
@@ -65,12 +65,12 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 /* --- starting and stopping --------------------------------------------------------------- */
 
 /* Says why, to who understands it, and closes. */
-static bool turn_away(const struct listener *l, int fd, enum crowd_answer answer) {
+static bool turn_away(const struct listener *l, int fd, enum connection_answer answer) {
     static const char *const reply[] = {
-        [CROWD_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
+        [CONNECTION_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
                                "Connection: close\r\n\r\nthis address has as many connections as one may have; an"
                                " administrator can raise the option address_max_connections\n",
-        [CROWD_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
+        [CONNECTION_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
                        "Connection: close\r\n\r\nthere are as many connections as there may be; an administrator can"
                        " raise the option max_connections\n"};
     if (!l->tls) /* whoever is not there to read it has not waited for it */
@@ -83,12 +83,12 @@ static bool turn_away(const struct listener *l, int fd, enum crowd_answer answer
 static bool on_accepted(void *user, int fd, const struct sockaddr *address, socklen_t size) {
     struct listener *l = user;
     struct address from = address_of_socket(address);
-    enum crowd_answer answer = crowd_enter(l->crowd, &from);
-    if (answer != CROWD_OK)
+    enum connection_answer answer = connection_counts_enter(l->connection_counts, &from);
+    if (answer != CONNECTION_OK)
         return turn_away(l, fd, answer);
     if (MHD_add_connection(l->daemon, fd, address, size) == MHD_YES)
         return true;
-    crowd_leave(l->crowd, &from);
+    connection_counts_leave(l->connection_counts, &from);
     return false;
 }
 
@@ -141,7 +141,8 @@ enum status listener_start(struct listener **out, const struct listener_config *
     pthread_mutex_init(&l->mutex, NULL);
     pthread_cond_init(&l->changed, NULL);
     l->port = config->port;
-    l->crowd = crowd_new(config->connection_max, config->address_connection_max, api->config.proxies);
+    l->connection_counts =
+        connection_counts_new(config->connection_max, config->address_connection_max, api->config.proxies);
     enum status status =
         acceptor_new(&l->acceptor, config->address, &l->port, config->connection_max, on_accepted, l, err);
     if (status == STATUS_OK && config->certificate_file)
@@ -190,7 +191,7 @@ static void settle(struct listener *l) {
     wait_for_none(l, &l->stream_count);
     while (l->working_count > 0)
         pthread_cond_wait(&l->changed, &l->mutex);
-    wait_for_none(l, &l->owed_count);
+    wait_for_none(l, &l->pending_reply_count);
     pthread_mutex_unlock(&l->mutex);
 }
 
@@ -205,7 +206,7 @@ void listener_stop(struct listener *l) {
     pool_free(l->quick);
     pool_free(l->slow); /* with what was left to do after exchanges that have just ended */
     acceptor_free(l->acceptor);
-    crowd_free(l->crowd);
+    connection_counts_free(l->connection_counts);
     if (l->guard)
         guard_free(l->guard);
     tls_free(l->tls);

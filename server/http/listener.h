@@ -24,7 +24,7 @@ struct listener_config {
     uint16_t port;       /* 0: any free one */
     const char *certificate_file, *key_file; /* HTTPS; certificate_file NULL: plain HTTP */
     unsigned connection_max;
-    unsigned address_connection_max; /* of one address; 0: no limit. See crowd.h */
+    unsigned address_connection_max; /* of one address; 0: no limit. See connection_counts.h */
     struct guard_limits limits;
 };
 

@@ -1,4 +1,4 @@
-/* metrics.c -- GET /metrics: figures in the text format of Prometheus, version 0.0.4. Counters are
+/* metrics.c -- GET /metrics: values in the text format of Prometheus, version 0.0.4. Counters are
  * those since the daemon started; labels have few values, whatever users do. */
 #include <stdio.h>
 #include <time.h>
@@ -11,7 +11,7 @@
 #include "server/http/hub.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
-#include "server/http/tally.h"
+#include "server/http/request_counts.h"
 
 static void metric(struct buf *b, const char *name, const char *type, const char *help, double value) {
     buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\nunbaked_%s %.17g\n", name, help, name, type,
@@ -51,7 +51,7 @@ static void store_metrics(struct buf *b, const struct store_counts *counts) {
     metric(b, "wal_bytes", "gauge", "Size of the database's write-ahead log.", (double)counts->wal_bytes);
 }
 
-static void work_metrics(struct buf *b, const struct figures *f) {
+static void work_metrics(struct buf *b, const struct counters *f) {
     static const char *const ends[END_COUNT] = {
         [END_SUCCEEDED] = "succeeded", [END_INPUT] = "input",     [END_CRASHED] = "crashed",
         [END_MEMORY] = "memory",       [END_STOPPED] = "stopped", [END_DISK] = "disk"};
@@ -87,9 +87,9 @@ struct response *system_metrics(struct api *api, struct request *r) {
     buf_printf(&b, "unbaked_build_info{version=\"%s\"} 1\n", UNBAKE_VERSION);
     store_metrics(&b, &counts);
     metric(&b, "workers", "gauge", "Worker processes alive.", scheduler_running(api->scheduler));
-    work_metrics(&b, scheduler_figures(api->scheduler));
+    work_metrics(&b, scheduler_counters(api->scheduler));
     metric_head(&b, "http_requests_total", "counter", "Requests, by route and status; 0: cut off before a reply.");
-    tally_print(api->tally, "unbaked_http_requests_total", &b);
+    request_counts_print(api->request_counts, "unbaked_http_requests_total", &b);
     metric(&b, "uploaded_bytes_total", "counter", "Bytes of bundles received.",
            (double)atomic_load(&api->uploaded_bytes));
     metric(&b, "hashed_bytes_total", "counter", "Bytes of outputs read for their digests.",

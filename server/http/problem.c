@@ -9,7 +9,7 @@
 #include "common/mem.h"
 #include "common/protocol.h"
 
-static const struct kind {
+static const struct problem_kind {
     int status;
     const char *word, *title;
 } kinds[] = {
@@ -33,7 +33,7 @@ static const struct kind {
     {507, "disk-full", "The server has no room"},
 };
 
-static const struct kind *kind_of(int status) {
+static const struct problem_kind *kind_of(int status) {
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
         if (kinds[i].status == status)
             return &kinds[i];
@@ -42,7 +42,7 @@ static const struct kind *kind_of(int status) {
 
 struct response *problem_full(const struct request *r, int status, const char *detail,
                               const char *hint, cJSON *members) {
-    const struct kind *kind = kind_of(status);
+    const struct problem_kind *kind = kind_of(status);
     cJSON *body = members ? members : cJSON_CreateObject();
     char type[64];
     snprintf(type, sizeof type, "urn:unbake:%s", kind->word);

@@ -11,7 +11,7 @@
 #include "server/http/body.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/http/keeping.h"
+#include "server/http/retention.h"
 #include "server/http/problem.h"
 #include "server/http/scene_body.h"
 #include "server/http/space.h"
@@ -100,7 +100,7 @@ struct response *scenes_add(struct api *api, struct request *r) {
 }
 
 /* What a PATCH asks for, checked; or *refusal. `body` keeps the name. */
-static void read_patch(const struct request *r, cJSON **body, const char **name, struct keeping *keeping,
+static void read_patch(const struct request *r, cJSON **body, const char **name, struct retention *retention,
                        struct response **refusal) {
     *name = NULL;
     *body = body_object(r, refusal);
@@ -113,7 +113,7 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
             if (!*name || !**name || strlen(*name) > API_NAME_MAX_BYTES || !utf8_is_name(*name))
                 problem_param(params, "name", NULL, "must be text of 1 to %d bytes without control characters",
                               API_NAME_MAX_BYTES);
-        } else if (!keeping_read(keeping, member, params)) {
+        } else if (!retention_read(retention, member, params)) {
             problem_param(params, member->string, "there are name, pinned, expires_at", "is not known here");
         }
     }
@@ -131,7 +131,7 @@ static int64_t owner_of(const struct request *r) {
 struct response *scenes_patch(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
-    struct keeping keeping = {0};
+    struct retention retention = {0};
     struct response *reply = NULL;
     cJSON *body = NULL;
     const char *name, *match = request_field(r, "If-Match");
@@ -142,8 +142,8 @@ struct response *scenes_patch(struct api *api, struct request *r) {
     if (match && !field_etag_listed(match, tag, false))
         reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and look again", NULL);
     if (!reply)
-        read_patch(r, &body, &name, &keeping, &reply);
-    if (!reply && store_scene_patch(api->store, &r->caller, row.id, name, &keeping, &err) != STATUS_OK)
+        read_patch(r, &body, &name, &retention, &reply);
+    if (!reply && store_scene_patch(api->store, &r->caller, row.id, name, &retention, &err) != STATUS_OK)
         reply = problem_from(r, &err);
     char id[SCENE_ID_SIZE];
     memcpy(id, row.id, sizeof id);
@@ -164,7 +164,7 @@ struct response *scenes_delete(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
     bool is_gone, dry_run;
-    struct response *reply = keeping_dry_run(r, &dry_run);
+    struct response *reply = retention_dry_run(r, &dry_run);
     if (reply || !auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
         return reply;
     char *path = layout_scene(NULL, row.id);
@@ -174,7 +174,7 @@ struct response *scenes_delete(struct api *api, struct request *r) {
         status = trash_take(api->folder.trash, path, &err);
     pthread_mutex_unlock(&api->folder.scene_mutex);
     if (status == STATUS_OK && dry_run) /* others may own it, too: then nothing is freed */
-        reply = keeping_would_free(api, r, is_gone ? path : NULL);
+        reply = retention_would_free(api, r, is_gone ? path : NULL);
     mem_free(path);
     scene_row_release(&row);
     return reply ? reply : status == STATUS_OK ? response_new(204) : problem_from(r, &err);

@@ -2,10 +2,10 @@
 #include "server/http/service.h"
 
 #include "common/mem.h"
-#include "server/http/brake.h"
+#include "server/http/auth_throttle.h"
 #include "server/http/hub.h"
 #include "server/http/readiness.h"
-#include "server/http/tally.h"
+#include "server/http/request_counts.h"
 #include "server/uploads/digests.h"
 #include "server/uploads/resumable.h"
 
@@ -18,8 +18,8 @@ static void scene_added(void *scheduler) {
     scheduler_wake(scheduler);
 }
 
-static void tend_uploads(void *resumables) {
-    resumables_tend(resumables);
+static void maintain_uploads(void *resumables) {
+    resumables_maintain(resumables);
 }
 
 static enum status forget_upload(void *resumables, const char *id, struct error *err) {
@@ -33,7 +33,7 @@ static enum status open_folder(struct api *api, struct error *err) {
     api->resumables = resumables_new(&(struct resumables_config){store, &api->folder, api->config.empty_upload_ms,
                                                                  scene_added, api->scheduler});
     api->collector_config =
-        (struct collector_config){store, &api->folder, tend_uploads, forget_upload, api->resumables};
+        (struct collector_config){store, &api->folder, maintain_uploads, forget_upload, api->resumables};
     if (status == STATUS_OK)
         status = resumables_recover(api->resumables, err);
     return status == STATUS_OK ? collector_sweep(store, &api->folder, err) : status;
@@ -47,8 +47,8 @@ enum status service_new(struct api **out, const struct api_config *config, struc
         api->config.empty_upload_ms = config->upload_keep_ms;
     api->store = store;
     api->scheduler = scheduler;
-    api->tally = tally_new();
-    api->brake = brake_new();
+    api->request_counts = request_counts_new();
+    api->auth_throttle = auth_throttle_new();
     api->hub = hub_new(config->keepalive_sec);
     *out = api;
     enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
@@ -79,8 +79,8 @@ void service_free(struct api *api) {
     store_on_digest_wanted(api->store, NULL, NULL);
     resumables_free(api->resumables);
     hub_free(api->hub);
-    tally_free(api->tally);
-    brake_free(api->brake);
+    request_counts_free(api->request_counts);
+    auth_throttle_free(api->auth_throttle);
     digests_free(api->digests);
     readiness_free(api->readiness);
     folder_close(&api->folder);

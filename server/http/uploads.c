@@ -19,7 +19,7 @@
 #include "server/http/body.h"
 #include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/http/keeping.h"
+#include "server/http/retention.h"
 #include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
@@ -31,7 +31,7 @@
 
 enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
 
-struct patch {
+struct upload_patch {
     struct upload_writer *writer;
     enum checksum checksum;
     uint8_t wanted[32];
@@ -224,7 +224,7 @@ struct response *uploads_get(struct api *api, struct request *r) {
     const char *id = reply ? NULL : find_upload(api, r, &reply);
     if (reply)
         return reply;
-    if (resumable_look(api->resumables, id, &row, &err) != STATUS_OK)
+    if (resumable_status(api->resumables, id, &row, &err) != STATUS_OK)
         return refuse(r, &err);
     reply = response_json(200, view_upload(&row));
     response_field(reply, "Cache-Control", "no-store");
@@ -263,7 +263,7 @@ struct response *uploads_list(struct api *api, struct request *r) {
 
 /* --- going on ------------------------------------------------------------------------------- */
 
-static struct response *read_checksum(const struct request *r, struct patch *p) {
+static struct response *read_checksum(const struct request *r, struct upload_patch *p) {
     const char *text = request_field(r, "Upload-Checksum");
     if (!text)
         return NULL;
@@ -292,7 +292,7 @@ struct response *uploads_begin(struct api *api, struct request *r) {
         refusal = problem(r, 400, "Upload-Offset must be a number of bytes");
     if (refusal)
         return refusal;
-    struct patch *p = r->patch = mem_calloc(1, sizeof *p);
+    struct upload_patch *p = r->patch = mem_calloc(1, sizeof *p);
     refusal = read_checksum(r, p);
     if (refusal)
         return refusal;
@@ -307,7 +307,7 @@ struct response *uploads_begin(struct api *api, struct request *r) {
 }
 
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length) {
-    struct patch *p = r->patch;
+    struct upload_patch *p = r->patch;
     struct error err;
     if (upload_writer_write(p->writer, data, length, &err) != STATUS_OK)
         return refuse(r, &err);
@@ -321,14 +321,14 @@ struct response *uploads_data(struct api *api, struct request *r, const void *da
     return NULL;
 }
 
-void uploads_drop(struct patch *p) {
+void uploads_drop(struct upload_patch *p) {
     if (!p)
         return;
     upload_writer_release(p->writer);
     mem_free(p);
 }
 
-static bool is_as_sent(struct patch *p) {
+static bool is_as_sent(struct upload_patch *p) {
     uint8_t found[32] = {0};
     if (p->checksum == CHECKSUM_NONE)
         return true;
@@ -348,7 +348,7 @@ static bool is_as_sent(struct patch *p) {
 
 /* A PATCH with a JSON body. */
 static struct response *change(struct api *api, const struct request *r) {
-    struct keeping keeping = {0};
+    struct retention retention = {0};
     struct upload_row row;
     struct error err;
     struct response *reply = check_version(r, false);
@@ -360,13 +360,13 @@ static struct response *change(struct api *api, const struct request *r) {
         return reply;
     cJSON *params = cJSON_CreateArray();
     for (const cJSON *member = body->child; member; member = member->next)
-        if (!keeping_read(&keeping, member, params))
+        if (!retention_read(&retention, member, params))
             problem_param(params, member->string, "there are pinned, expires_at", "is not known here");
     cJSON_Delete(body);
     if (cJSON_GetArraySize(params) > 0)
         return problem_invalid(r, "the change cannot be made", params);
     cJSON_Delete(params);
-    if (store_upload_keep(api->store, id, &keeping, &err) != STATUS_OK ||
+    if (store_upload_keep(api->store, id, &retention, &err) != STATUS_OK ||
         store_upload_get(api->store, id, &row, NULL, 0, &err) != STATUS_OK)
         return problem_from(r, &err);
     reply = response_json(200, view_upload(&row));
@@ -375,7 +375,7 @@ static struct response *change(struct api *api, const struct request *r) {
 }
 
 struct response *uploads_patch(struct api *api, struct request *r) {
-    struct patch *p = r->patch;
+    struct upload_patch *p = r->patch;
     if (!p)
         return change(api, r);
     struct error err;
@@ -400,13 +400,13 @@ struct response *uploads_delete(struct api *api, struct request *r) {
     struct response *reply = check_version(r, false);
     struct error err;
     if (!reply)
-        reply = keeping_dry_run(r, &dry_run);
+        reply = retention_dry_run(r, &dry_run);
     const char *id = reply ? NULL : find_upload(api, r, &reply);
     if (reply)
         return reply;
     if (dry_run) {
         char *path = layout_upload(NULL, id);
-        reply = keeping_would_free(api, r, path);
+        reply = retention_would_free(api, r, path);
         mem_free(path);
         return reply;
     }

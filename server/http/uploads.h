@@ -5,12 +5,12 @@
 #include "server/http/api.h"
 #include "server/http/message.h"
 
-struct patch; /* opaque */
+struct upload_patch; /* opaque */
 
 /* Start of request r's body: sets r->patch, or refuses with a reply. */
 struct response *uploads_begin(struct api *api, struct request *r);
 /* The next bytes; NULL, or the reply that ends it. */
 struct response *uploads_data(struct api *api, struct request *r, const void *data, size_t length);
-void uploads_drop(struct patch *p); /* NULL is fine; what has come stays with the upload */
+void uploads_drop(struct upload_patch *p); /* NULL is fine; what has come stays with the upload */
 
 #endif

@@ -134,7 +134,7 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
 }
 
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
-                              struct store *store, struct figures *figures, int64_t job_id,
+                              struct store *store, struct counters *counters, int64_t job_id,
                               int thread_count, struct error *err) {
     struct job job;
     struct error why = {0};
@@ -153,8 +153,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         memcpy(a->scene_id, job.scene_id, sizeof a->scene_id);
         a->owner_id = job.owner_id;
         if (number == 1 && job.started_ms > job.created_ms)
-            atomic_fetch_add(&figures->first_wait_ms, (unsigned long long)(job.started_ms - job.created_ms));
-        atomic_fetch_add(&figures->first_start_count, number == 1);
+            atomic_fetch_add(&counters->first_wait_ms, (unsigned long long)(job.started_ms - job.created_ms));
+        atomic_fetch_add(&counters->first_start_count, number == 1);
         a->settings = mem_strdup(job.settings);
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
@@ -191,7 +191,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);
     enum status status = file_make_dirs(a->dir, &why);
-    housekeeping_drop_scraps(a->dir); /* the daemon may have been killed in the middle of an earlier check */
+    housekeeping_drop_temporary(a->dir); /* the daemon may have been killed in the middle of an earlier check */
     if (status == STATUS_OK)
         status = write_order(a->dir, order, &why);
     if (status == STATUS_OK)
@@ -210,11 +210,11 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     return status;
 }
 
-void attempt_charge(struct attempt *a, struct store *store, struct figures *figures) {
+void attempt_charge(struct attempt *a, struct store *store, struct counters *counters) {
     double used = supervisor_cpu_sec(&a->worker), more = used - a->charged_sec;
     if (!a->job_id || !(more > 0.0))
         return;
     (void)store_usage_add(store, a->owner_id, more, NULL); /* keeps what it cannot enter */
-    atomic_fetch_add(&figures->cpu_ms, (unsigned long long)(more * 1e3));
+    atomic_fetch_add(&counters->cpu_ms, (unsigned long long)(more * 1e3));
     a->charged_sec = used;
 }

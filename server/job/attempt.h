@@ -1,18 +1,18 @@
 /* attempt.h -- one worker's work, from its folder to the entry of its outcome in the store: what is known of
- * it, and its start. What it says is heard by hearing.h, how it ends is judged by outcome.h.
+ * it, and its start. What it says is heard by worker_messages.h, how it ends is judged by outcome.h.
  *
  *      empty ──start──> alive ──(process ends)──> ended ──settle──> empty
  *
  * 1. A job's attempt is in the store before its process exists, and its outcome is entered after
- *    the process is buried: of one job there is never more than one process.
- * 2. What a worker says is not believed where it can be checked: it has read a stranger's files.
+ *    the process is reaped: of one job there is never more than one process.
+ * 2. What a worker says is checked where it can be: it has read a stranger's files.
  * 3. settle can fail (the disk of state.db is full): the attempt stays ended and is settled
  *    again later; nothing of the outcome is lost. */
 #ifndef UNBAKE_JOB_ATTEMPT_H
 #define UNBAKE_JOB_ATTEMPT_H
 
 #include "common/json.h"
-#include "server/job/figures.h"
+#include "server/job/counters.h"
 #include "server/job/scheduler_config.h"
 #include "server/job/supervisor.h"
 #include "server/store/store.h"
@@ -55,7 +55,7 @@ struct attempt {
  * is alive or (the input is at fault, the disk is full, the user was faster) still empty. Else
  * the job is in the queue again and it is of no use to try at once. */
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
-                              struct store *store, struct figures *figures, int64_t job_id,
+                              struct store *store, struct counters *counters, int64_t job_id,
                               int thread_count, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
 enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
@@ -63,7 +63,7 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
 
 /* Enters the CPU time since the last call for the job's owner. Where the store fails, it keeps it and enters
  * it later. */
-void attempt_charge(struct attempt *a, struct store *store, struct figures *figures);
+void attempt_charge(struct attempt *a, struct store *store, struct counters *counters);
 
 void attempt_empty(struct attempt *a); /* forgets all of it */
 

@@ -65,7 +65,7 @@ enum status delivery_start(struct delivery *d, const struct scheduler_config *co
 }
 
 /* The lines that say what was answered, and how it ended. */
-static void hear(void *user, const char *text, size_t length) {
+static void take_line(void *user, const char *text, size_t length) {
     struct delivery *d = user;
     const char *type, *message, *word;
     double code;
@@ -107,10 +107,10 @@ bool delivery_listen(struct delivery *d, struct store *store) {
     if (d->id == 0)
         return true;
     if (!d->has_ended) {
-        supervisor_read(&d->worker, hear, d);
+        supervisor_read(&d->worker, take_line, d);
         if (clock_sec() >= d->kill_at_sec)
             supervisor_signal(&d->worker, SIGKILL);
-        if (!supervisor_bury(&d->worker, &wait_status, hear, d))
+        if (!supervisor_reap(&d->worker, &wait_status, take_line, d))
             return false;
         d->has_ended = true;
         d->delivered = WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == PROGRESS_EXIT_OK;

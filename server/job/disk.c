@@ -13,7 +13,7 @@ void disk_init(struct disk_watch *w, uint64_t low_bytes) {
              (unsigned long long)(low_bytes >> 20));
 }
 
-bool disk_look(struct disk_watch *w, const char *dir) {
+bool disk_check(struct disk_watch *w, const char *dir) {
     struct error err;
     uint64_t room;
     bool was_low = w->is_low, first = !w->was_seen;

@@ -23,6 +23,6 @@ struct disk_watch {
 
 void disk_init(struct disk_watch *w, uint64_t low_bytes);
 /* Looks at most every DISK_LOOK_SEC. True when is_low has changed, and the first time. */
-bool disk_look(struct disk_watch *w, const char *dir);
+bool disk_check(struct disk_watch *w, const char *dir);
 
 #endif

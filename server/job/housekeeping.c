@@ -27,7 +27,7 @@ enum status housekeeping_drop_checkpoint(const char *dir, struct error *err) {
 }
 
 /* As file_replace calls a file until it is whole, and whoever uses file_put_in_place. */
-static bool is_scrap(const char *name) {
+static bool is_temporary(const char *name) {
     static const char part[] = ".part", temporary[] = ".tmp-";
     size_t length = strlen(name), random = 6;
     return (length > sizeof part - 1 && strcmp(name + length - (sizeof part - 1), part) == 0) ||
@@ -35,7 +35,7 @@ static bool is_scrap(const char *name) {
             memcmp(name + length - random - (sizeof temporary - 1), temporary, sizeof temporary - 1) == 0);
 }
 
-static void drop_scraps(const char *dir, bool and_below) {
+static void drop_temporary(const char *dir, bool and_below) {
     struct error err;
     char **names;
     size_t count;
@@ -46,18 +46,18 @@ static void drop_scraps(const char *dir, bool and_below) {
         struct stat info;
         bool is_there = lstat(path, &info) == 0;
         if (is_there && S_ISDIR(info.st_mode) && and_below)
-            drop_scraps(path, true);
-        else if (is_there && S_ISREG(info.st_mode) && is_scrap(names[i]) && unlink(path) != 0)
+            drop_temporary(path, true);
+        else if (is_there && S_ISREG(info.st_mode) && is_temporary(names[i]) && unlink(path) != 0)
             log_warning("cannot remove %s: %s", path, strerror(errno));
         mem_free(path);
     }
     file_free_names(names, count);
 }
 
-void housekeeping_drop_scraps(const char *dir) {
+void housekeeping_drop_temporary(const char *dir) {
     char *out = layout_out(dir);
-    drop_scraps(dir, false);
-    drop_scraps(out, true);
+    drop_temporary(dir, false);
+    drop_temporary(out, true);
     mem_free(out);
 }
 
@@ -72,7 +72,7 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
         }
         for (size_t i = 0; i < count; i++) {
             char *dir = layout_job(config->data_dir, jobs[i].id);
-            housekeeping_drop_scraps(dir);
+            housekeeping_drop_temporary(dir);
             before = jobs[i].id;
             mem_free(dir);
             job_release(&jobs[i]);

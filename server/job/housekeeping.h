@@ -13,7 +13,7 @@ void housekeeping_run(const struct scheduler_config *config, struct store *store
 
 /* Removes what a killed process was writing in the folder of a job or scene, and in its outputs: files that
  * had not got their names yet (common/file.h). Nobody works there any more. Failures are logged. */
-void housekeeping_drop_scraps(const char *dir);
+void housekeeping_drop_temporary(const char *dir);
 /* The same for all jobs that the store says run, though none does: after the daemon was killed. */
 void housekeeping_after_kill(const struct scheduler_config *config, struct store *store);
 

@@ -10,7 +10,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/memory.h"
@@ -239,7 +239,7 @@ bool outcome_lacks_room(const struct attempt *a) {
 /* Files that were announced must be entered before a job ends, but a full disk does not hold up who stops it: they are
  * announced again by the next attempt, if there is one. */
 static enum status make_up(struct attempt *a, struct store *store, struct error *err) {
-    enum status status = hearing_make_up(a, store, err);
+    enum status status = worker_messages_retry(a, store, err);
     struct job job = {0};
     bool is_unwanted = status == STATUS_NO_SPACE && a->job_id && store_job_get(store, a->job_id, &job, NULL) == STATUS_OK &&
                        job.wanted != JOB_WANT_RUN;
@@ -250,10 +250,10 @@ static enum status make_up(struct attempt *a, struct store *store, struct error 
     return is_unwanted ? STATUS_OK : status;
 }
 
-enum status outcome_settle(struct attempt *a, struct store *store, struct figures *figures, struct error *err) {
+enum status outcome_settle(struct attempt *a, struct store *store, struct counters *counters, struct error *err) {
     struct verdict verdict;
-    attempt_charge(a, store, figures);
-    housekeeping_drop_scraps(a->dir);
+    attempt_charge(a, store, counters);
+    housekeeping_drop_temporary(a->dir);
     judge(a, &verdict);
     enum status status = make_up(a, store, err);
     if (status == STATUS_OK && a->job_id)
@@ -263,11 +263,11 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct figure
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
-    static const enum figures_end ends[] = {
+    static const enum attempt_end ends[] = {
         [OUTCOME_OK] = END_SUCCEEDED,   [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
         [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK};
     if (a->job_id)
-        atomic_fetch_add(&figures->ends[ends[verdict.outcome]], 1);
+        atomic_fetch_add(&counters->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
         [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
         [OUTCOME_MEMORY] = "broke off",

@@ -10,6 +10,6 @@ bool outcome_lacks_room(const struct attempt *a);
 
 /* Enters the outcome of an ended attempt and empties it. Where that fails (the disk of state.db is full) the
  * attempt stays ended and is settled again later: nothing of the outcome is lost. */
-enum status outcome_settle(struct attempt *a, struct store *store, struct figures *figures, struct error *err);
+enum status outcome_settle(struct attempt *a, struct store *store, struct counters *counters, struct error *err);
 
 #endif

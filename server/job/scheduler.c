@@ -1,6 +1,6 @@
 /* scheduler.c -- see scheduler.h.
  *
- * One loop: give free slots to what waits, tell workers what is wished of them, sleep in poll
+ * One loop: give free slots to what waits, tell workers what is requested of them, sleep in poll
  * until a worker says something, ends, must be killed, or somebody calls. While nothing happens
  * it does not wake up.
  *
@@ -25,7 +25,7 @@
 #include "server/job/checks.h"
 #include "server/job/delivery.h"
 #include "server/job/disk.h"
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/outcome.h"
@@ -42,7 +42,7 @@ struct scheduler {
     int wake_fd; /* an eventfd: survives any number of calls before it is read */
     atomic_bool stopping;
     atomic_int running;
-    struct figures figures;
+    struct counters counters;
     atomic_ulong rounds;
     size_t job_slots, slot_count;
     struct attempt *slot; /* [slot_count]; the first job_slots are of jobs */
@@ -103,8 +103,8 @@ void scheduler_stop(struct scheduler *s) {
     scheduler_wake(s);
 }
 
-const struct figures *scheduler_figures(const struct scheduler *s) {
-    return &s->figures;
+const struct counters *scheduler_counters(const struct scheduler *s) {
+    return &s->counters;
 }
 
 int scheduler_running(const struct scheduler *s) {
@@ -141,7 +141,7 @@ static void charge_all(struct scheduler *s) {
         return;
     for (size_t i = 0; i < s->slot_count; i++)
         if (s->slot[i].phase == ATTEMPT_ALIVE)
-            attempt_charge(&s->slot[i], s->store, &s->figures);
+            attempt_charge(&s->slot[i], s->store, &s->counters);
     (void)store_usage_pay(s->store, NULL); /* what attempts that have ended could not enter */
 }
 
@@ -158,7 +158,7 @@ static void start_jobs(struct scheduler *s) {
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
-                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->figures, id, thread_share(s),
+                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id, thread_share(s),
                                            &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
@@ -249,7 +249,7 @@ static void follow_wishes(struct scheduler *s) {
     enum job_wanted *wanted = mem_array(limit, sizeof *wanted);
     struct error err;
     if (store_job_running(s->store, limit, ids, wanted, &count, &err) != STATUS_OK) {
-        retry_later(s, "cannot read the users' wishes", &err);
+        retry_later(s, "cannot read the users' requests", &err);
         count = 0;
     }
     for (size_t i = 0; i < count; i++) {
@@ -276,7 +276,7 @@ static bool any_alive(const struct scheduler *s) {
 /* While the disk is nearly full, jobs are stopped at a checkpoint, and those that wait say why. */
 static void watch_disk(struct scheduler *s) {
     struct error err;
-    bool changed = disk_look(&s->disk, s->config.data_dir);
+    bool changed = disk_check(&s->disk, s->config.data_dir);
     atomic_store(&s->waits_for_disk, s->disk.is_low);
     if (!changed && !s->disk.is_low)
         return;
@@ -348,9 +348,9 @@ static void listen_and_settle(struct scheduler *s) {
     for (size_t i = 0; i < s->slot_count; i++) {
         struct attempt *a = &s->slot[i];
         struct error err;
-        hearing_listen(a, s->store, &s->figures);
+        worker_messages_read(a, s->store, &s->counters);
         bool is_postponed = i >= s->job_slots && outcome_lacks_room(a);
-        if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, &s->figures, &err) != STATUS_OK)
+        if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, &s->counters, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)
             postpone_check(s);

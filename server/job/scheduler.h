@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "common/error.h"
-#include "server/job/figures.h"
+#include "server/job/counters.h"
 #include "server/job/scheduler_config.h"
 #include "server/store/store.h"
 
@@ -26,7 +26,7 @@ enum status scheduler_run(struct scheduler *s, struct error *err);
 void scheduler_wake(struct scheduler *s); /* from any thread: look at the store again */
 void scheduler_stop(struct scheduler *s); /* from any thread or a signal handler */
 bool scheduler_waits_for_disk(const struct scheduler *s); /* any thread */
-const struct figures *scheduler_figures(const struct scheduler *s); /* any thread */
+const struct counters *scheduler_counters(const struct scheduler *s); /* any thread */
 int scheduler_running(const struct scheduler *s); /* workers alive; any thread */
 /* How often it has looked at the store; any thread. After scheduler_wake it grows, or it hangs. */
 unsigned long scheduler_rounds(const struct scheduler *s);

@@ -217,7 +217,7 @@ void supervisor_signal(struct worker *w, int signal_number) {
         kill(w->pid, signal_number);
 }
 
-bool supervisor_bury(struct worker *w, int *wait_status,
+bool supervisor_reap(struct worker *w, int *wait_status,
                      void (*each)(void *user, const char *line, size_t length), void *user) {
     siginfo_t info = {0};
     if (w->pid <= 0 || waitid(P_PID, (id_t)w->pid, &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||

@@ -75,8 +75,8 @@ int64_t store_now_ms(void); /* Unix time */
     "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                         \
     " ELSE updated_ms + (SELECT iif(received = 0 AND scene_id = '', min(empty_upload_ms, upload_ms), upload_ms)"            \
     " FROM retention) END)"
-/* What a struct keeping changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
-#define KEEPING_SET                                                                            \
+/* What a struct retention changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
+#define RETENTION_SET                                                                            \
     "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                            \
     " expires_ms = iif(?2, ?3, expires_ms)"
 

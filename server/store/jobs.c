@@ -268,12 +268,12 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
                            (long long)id, (long long)revision, (long long)expected_revision);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
-                         "UPDATE jobs SET " KEEPING_SET ", revision = revision + 1,"
+                         "UPDATE jobs SET " RETENTION_SET ", revision = revision + 1,"
                          " name = ifnull(?4, name), labels = ifnull(?5, labels),"
                          " priority = CASE WHEN ?6 = ?7 THEN priority ELSE ?6 END,"
                          " shared = CASE WHEN ?8 < 0 THEN shared ELSE ?8 END WHERE id = ?9",
-                         "nnittnnni", (int)patch->keeping.pin, (int)patch->keeping.sets_expiry,
-                         patch->keeping.expires_ms, patch->name, patch->labels, patch->priority,
+                         "nnittnnni", (int)patch->retention.pin, (int)patch->retention.sets_expiry,
+                         patch->retention.expires_ms, patch->name, patch->labels, patch->priority,
                          INT_MIN, patch->shared, id);
     if (status == STATUS_OK)
         status = place(store, id, patch, err);

@@ -29,7 +29,7 @@ enum status store_keep_empty(struct store *store, int64_t upload_ms, struct erro
 
 enum keep_pin { KEEP_PIN_AS_IS, KEEP_PIN_ON, KEEP_PIN_OFF };
 /* A change for one thing; all zeros change nothing. */
-struct keeping {
+struct retention {
     enum keep_pin pin;
     bool sets_expiry;
     int64_t expires_ms; /* with sets_expiry: Unix time; 0: as the configuration says */

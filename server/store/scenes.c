@@ -259,20 +259,20 @@ static enum status is_others_too(struct store *store, const char *id, int64_t ow
 }
 
 enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
-                              const struct keeping *keeping, struct error *err) {
+                              const struct retention *retention, struct error *err) {
     int64_t others = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    if (keeping->pin == KEEP_PIN_OFF || keeping->sets_expiry)
+    if (retention->pin == KEEP_PIN_OFF || retention->sets_expiry)
         status = is_others_too(store, id, sees_all(who) ? NOT_A_USER : who->user_id, &others, err);
     if (others) {
         error_set(err, STATUS_CONFLICT, "others keep scene %s, too: its end is not one user's to set", id);
         status = error_hint(err, "It can be pinned; DELETE gives up your share of it alone.");
     }
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE scenes SET " KEEPING_SET " WHERE id = ?4", "nnit", (int)keeping->pin,
-                         (int)keeping->sets_expiry, keeping->expires_ms, id);
+        status = sql_run(&store->sql, err, "UPDATE scenes SET " RETENTION_SET " WHERE id = ?4", "nnit", (int)retention->pin,
+                         (int)retention->sets_expiry, retention->expires_ms, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
     if (status == STATUS_OK && name)

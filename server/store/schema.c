@@ -39,7 +39,7 @@ static const char step_1[] =
     "  hint TEXT NOT NULL DEFAULT '',"
     "  idempotency_key TEXT UNIQUE,"
     "  request_sha256 TEXT,"
-    "  CHECK (wanted = 0 OR state = 1)" /* only a running job has a wish pending */
+    "  CHECK (wanted = 0 OR state = 1)" /* only a running job has a request pending */
     ") STRICT;"
     "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, id);"
     "CREATE INDEX jobs_by_scene ON jobs (scene_id, state);"
@@ -95,7 +95,7 @@ static const char step_2[] =
     "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
 
 /* Uploads in parts. `received` bytes are on disk; `hash` is the state of their SHA-256; `boot` names
- * the run of the machine in which what lies in the file beyond them can be believed, if any. */
+ * the run of the machine in which what lies in the file beyond them can be counted, if any. */
 static const char step_3[] =
     "CREATE TABLE uploads ("
     "  id TEXT PRIMARY KEY,"

@@ -1,4 +1,4 @@
-/* store.c -- opening, migrating and closing state.db, and figures of all of it; see store.h. */
+/* store.c -- opening, migrating and closing state.db, and counts of all of it; see store.h. */
 #include "server/store/store.h"
 
 #include <sys/stat.h>

@@ -101,7 +101,7 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
 /* NULL leaves the name, which is changed for the owner that `who` sees. STATUS_CONFLICT when others own it, too, and
  * could lose it by this; not for an admin. */
 enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
-                              const struct keeping *keeping, struct error *err);
+                              const struct retention *retention, struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
  * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A
@@ -152,7 +152,7 @@ struct job_patch {
     int priority;              /* INT_MIN: as it is */
     int shared;                /* 0, 1; -1: as it is */
     enum job_place place;      /* among the jobs of its priority */
-    struct keeping keeping;
+    struct retention retention;
     int64_t before_id;         /* with JOB_PLACE_BEFORE, which takes over that job's priority */
 };
 /* expected_revision -1: any; else STATUS_CONFLICT if it differs. STATUS_INPUT when the job to go
@@ -171,12 +171,12 @@ enum status store_job_next(struct store *store, int user_max_running, int64_t *i
 enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_sec,
                             struct error *err);
 enum status store_usage_pay(struct store *store, struct error *err);
-/* Running jobs and their wishes, for the scheduler. ids[limit], wanted[limit] out. */
+/* Running jobs and what is requested of them, for the scheduler. ids[limit], wanted[limit] out. */
 enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
                               enum job_wanted *wanted, size_t *count, struct error *err);
 
-/* What users ask. A running job only gets its wish recorded; the scheduler fulfils it (wake it).
- * Asking again for what is so already is STATUS_OK and changes nothing. Resume takes back a wish
+/* What users ask. A running job only gets the request recorded; the scheduler fulfils it (wake it).
+ * Asking again for what is so already is STATUS_OK and changes nothing. Resume takes back a request
  * to pause. Retry is for failed and cancelled jobs; with `from`, a stage that job_stage_parse
  * knows (else NULL), also for succeeded ones. Extend gives a job that has ended new settings.
  * Those that put a job into the queue keep `limits` (NULL: none). */
@@ -188,7 +188,7 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
                              const struct count_limits *limits, struct error *err);
 
-/* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A wish
+/* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A request
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
 enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
@@ -203,7 +203,7 @@ enum status store_job_restarted(struct store *store, int64_t id, int attempt, st
  * the next attempt gets. */
 enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
                             const char *hint, int memory_step, struct error *err);
-/* The attempt was stopped by us (a wish, shutdown): back to the queue, or as was wished. */
+/* The attempt was stopped by us (a request, shutdown): back to the queue, or as was requested. */
 enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason,
                            struct error *err);
 /* The attempt cannot go on until somebody acts (disk full): paused. */
@@ -213,7 +213,7 @@ enum status store_job_block(struct store *store, int64_t id, int attempt, const 
  * away that begin with `prefix`. Each change is a state event. */
 enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
                               const char *hint, struct error *err);
-/* At start: whatever claims to run is queued again (or paused, cancelled, as was wished). It does
+/* At start: whatever claims to run is queued again (or paused, cancelled, as was requested). It does
  * not count as a failed attempt: the job is not at fault when the daemon or the machine dies. What such a job takes
  * of the disk is not known then. */
 enum status store_reconcile(struct store *store, size_t *requeued, struct error *err);
@@ -226,7 +226,7 @@ enum status store_reconcile(struct store *store, size_t *requeued, struct error 
 enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, int64_t but_job,
                              uint64_t *bytes, struct error *err);
 /* What is still to come of the user's uploads of which something has arrived (or which were made) since since_ms: older
- * ones hold no space (resumables_tend). And how many of the user's scenes wait to be checked or are being checked. */
+ * ones hold no space (resumables_maintain). And how many of the user's scenes wait to be checked or are being checked. */
 enum status store_user_pledged(struct store *store, int64_t user_id, int64_t since_ms, uint64_t *bytes,
                                struct error *err);
 enum status store_user_checks(struct store *store, int64_t user_id, size_t *count, struct error *err);
@@ -399,7 +399,7 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
                               const char *cursor, size_t limit, struct upload_row *rows, size_t *count,
                               char next_cursor[128], struct error *err);
 /* The file may now hold bytes beyond `received` that are good while the machine runs on (`boot` is
- * its boot id), or that are not to be believed ("" ). */
+ * its boot id), or that are not to be counted ("" ). */
 enum status store_upload_begin(struct store *store, const char *id, const char *boot,
                                struct error *err);
 /* So many bytes are on disk, with the state of their hash. Never goes back: less than is known is
@@ -408,11 +408,11 @@ enum status store_upload_advance(struct store *store, const char *id, uint64_t r
                                  const void *hash, size_t hash_size, struct error *err);
 enum status store_upload_finish(struct store *store, const char *id, const char *scene_id,
                                 struct error *err);
-enum status store_upload_keep(struct store *store, const char *id, const struct keeping *keeping,
+enum status store_upload_keep(struct store *store, const char *id, const struct retention *retention,
                               struct error *err);
 enum status store_upload_delete(struct store *store, const char *id, struct error *err);
 
-/* --- figures ----------------------------------------------------------------------------- */
+/* --- counts ------------------------------------------------------------------------------ */
 
 struct store_counts {
     int64_t jobs_by_state[JOB_STATE_COUNT], scenes_by_state[SCENE_STATE_COUNT];

@@ -18,7 +18,7 @@
  *                   store_job_block     running          paused
  *      at start     store_reconcile     running          queued
  *
- * 1. Leaving `running`, a recorded wish decides first: cancel turns every end into cancelled,
+ * 1. Leaving `running`, a recorded request decides first: cancel turns every end into cancelled,
  *    pause turns queued into paused. (A cancelled job that had just succeeded is cancelled: its
  *    user was told so.)
  * 2. `wanted` is "run" in every state but running.
@@ -134,8 +134,8 @@ static enum status move(struct store *store, struct present *now, enum job_state
                                : status;
 }
 
-static enum status wish(struct store *store, struct present *now, enum job_wanted wanted,
-                        struct error *err) {
+static enum status record_request(struct store *store, struct present *now, enum job_wanted wanted,
+                                  struct error *err) {
     now->wanted = wanted;
     enum status status =
         sql_run(&store->sql, err,
@@ -154,7 +154,7 @@ static enum status cancel_job(struct store *store, int64_t id, struct error *err
     if (now.state == JOB_CANCELLED || now.wanted == JOB_WANT_CANCEL)
         return store_end(store, STATUS_OK, STORE_NOTHING_CHANGED, err);
     if (now.state == JOB_RUNNING)
-        status = wish(store, &now, JOB_WANT_CANCEL, err);
+        status = record_request(store, &now, JOB_WANT_CANCEL, err);
     else if (job_is_terminal(now.state))
         status = forbidden(&now, "cancelled", err);
     else
@@ -172,7 +172,7 @@ static enum status pause_job(struct store *store, int64_t id, struct error *err)
     if (now.wanted == JOB_WANT_CANCEL)
         status = error_set(err, STATUS_CONFLICT, "job %lld is being cancelled", (long long)id);
     else if (now.state == JOB_RUNNING)
-        status = wish(store, &now, JOB_WANT_PAUSE, err);
+        status = record_request(store, &now, JOB_WANT_PAUSE, err);
     else if (now.state == JOB_QUEUED)
         status = move(store, &now, JOB_PAUSED, "", "", err);
     else
@@ -196,7 +196,7 @@ enum status store_job_pause(struct store *store, int64_t id, struct error *err) 
     return status;
 }
 
-/* Into the queue by its user's wish, where there is room for one more. */
+/* Into the queue by its user's request, where there is room for one more. */
 static enum status enqueue(struct store *store, struct present *now, const struct count_limits *limits,
                            struct error *err) {
     int64_t owner = 0;
@@ -214,7 +214,7 @@ enum status store_job_resume(struct store *store, int64_t id, const struct count
     if (now.wanted == JOB_WANT_CANCEL)
         status = error_set(err, STATUS_CONFLICT, "job %lld is being cancelled", (long long)id);
     else if (now.wanted == JOB_WANT_PAUSE)
-        status = wish(store, &now, JOB_WANT_RUN, err);
+        status = record_request(store, &now, JOB_WANT_RUN, err);
     else if (now.state == JOB_PAUSED)
         status = enqueue(store, &now, limits, err);
     else if (job_is_terminal(now.state))

@@ -168,13 +168,13 @@ enum status store_upload_finish(struct store *store, const char *id, const char 
     return end_change(store, status, id, err);
 }
 
-enum status store_upload_keep(struct store *store, const char *id, const struct keeping *keeping,
+enum status store_upload_keep(struct store *store, const char *id, const struct retention *retention,
                               struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err, "UPDATE uploads SET " KEEPING_SET " WHERE id = ?4", "nnit",
-                     (int)keeping->pin, (int)keeping->sets_expiry, keeping->expires_ms, id);
+    status = sql_run(&store->sql, err, "UPDATE uploads SET " RETENTION_SET " WHERE id = ?4", "nnit",
+                     (int)retention->pin, (int)retention->sets_expiry, retention->expires_ms, id);
     return end_change(store, status, id, err);
 }
 

@@ -136,7 +136,7 @@ static enum status give_idle_space_back(struct resumables *p, struct error *err)
     return status;
 }
 
-void resumables_tend(struct resumables *p) {
+void resumables_maintain(struct resumables *p) {
     struct upload_session *e;
     pthread_mutex_lock(&p->mutex);
     unsigned long round = ++p->round;
@@ -155,7 +155,7 @@ void resumables_tend(struct resumables *p) {
 void resumables_free(struct resumables *p) {
     if (!p)
         return;
-    resumables_tend(p);
+    resumables_maintain(p);
     while (p->first)
         upload_session_drop(p->first);
     pthread_mutex_destroy(&p->finishing);
@@ -224,7 +224,7 @@ enum status resumable_create(struct resumables *p, struct upload_row *row, size_
     return status;
 }
 
-enum status resumable_look(struct resumables *p, const char *id, struct upload_row *row, struct error *err) {
+enum status resumable_status(struct resumables *p, const char *id, struct upload_row *row, struct error *err) {
     struct upload_session *e;
     enum status status = store_upload_get(p->config.store, id, row, NULL, 0, err);
     if (status != STATUS_OK || *row->scene_id)

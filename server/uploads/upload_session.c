@@ -36,7 +36,7 @@ static enum status open_file(struct upload_session *e, struct error *err) {
 }
 
 /* Hashes what lies in the file from e->received to its end: written, but never counted. */
-static enum status believe_tail(struct upload_session *e, struct error *err) {
+static enum status count_tail(struct upload_session *e, struct error *err) {
     char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
     ssize_t got = 1;
@@ -76,12 +76,12 @@ static enum status load(struct upload_session *e, struct error *err) {
     bool is_same_boot = strcmp(row.boot, p->boot) == 0;
     e->length = row.length;
     e->received = e->counted = e->hinted = row.received;
-    e->is_believed = *row.boot != '\0';
+    e->tail_is_trusted = *row.boot != '\0';
     status = *row.scene_id ? error_set(err, STATUS_CONFLICT, "upload %s is finished", e->id) : open_file(e, err);
-    if (status == STATUS_OK && e->fd >= 0 && e->is_believed)
-        status = is_same_boot && !e->is_spoiled ? believe_tail(e, err) : cut_tail(e, err);
+    if (status == STATUS_OK && e->fd >= 0 && e->tail_is_trusted)
+        status = is_same_boot && !e->needs_truncation ? count_tail(e, err) : cut_tail(e, err);
     if (status == STATUS_OK) {
-        e->is_spoiled = false;
+        e->needs_truncation = false;
         e->is_loaded = true;
     }
     upload_row_release(&row);
@@ -104,7 +104,7 @@ void upload_session_drop(struct upload_session *e) {
 
 static bool is_clean(struct upload_session *e) {
     pthread_mutex_lock(&e->mutex);
-    bool clean = e->is_gone || (!e->is_spoiled && (!e->is_loaded || e->received == e->counted));
+    bool clean = e->is_gone || (!e->needs_truncation && (!e->is_loaded || e->received == e->counted));
     pthread_mutex_unlock(&e->mutex);
     return clean;
 }
@@ -159,11 +159,11 @@ enum status upload_session_get(struct resumables *p, const char *id, struct uplo
 struct upload_session *upload_session_next(struct resumables *p, unsigned long round) {
     pthread_mutex_lock(&p->mutex);
     struct upload_session *e = p->first;
-    while (e && (e->users > 0 || e->tended == round))
+    while (e && (e->users > 0 || e->visited == round))
         e = e->next;
     if (e) {
         e->users++;
-        e->tended = round;
+        e->visited = round;
     }
     pthread_mutex_unlock(&p->mutex);
     return e;
@@ -217,9 +217,9 @@ static void forget_tail(struct upload_session *e) {
     e->received = e->counted;
     e->is_loaded = false; /* the next to come reads row and hash again */
     e->holder = NULL;
-    e->is_spoiled = ftruncate(e->fd, (off_t)e->counted) != 0 &&
+    e->needs_truncation = ftruncate(e->fd, (off_t)e->counted) != 0 &&
                     store_upload_begin(e->resumables->config.store, e->id, "", &err) != STATUS_OK;
-    if (e->is_spoiled)
+    if (e->needs_truncation)
         log_warning("upload %s: %s", e->id, err.message);
     pthread_mutex_unlock(&e->mutex);
 }
@@ -229,11 +229,11 @@ static enum status commit_alone(struct upload_session *e, struct error *err) {
     pthread_mutex_lock(&e->mutex);
     uint64_t received = e->received;
     struct sha256 hash = e->hash;
-    bool is_spoiled = e->is_spoiled && !e->is_gone, has_news = !e->is_gone && received > e->counted;
+    bool needs_truncation = e->needs_truncation && !e->is_gone, has_news = !e->is_gone && received > e->counted;
     pthread_mutex_unlock(&e->mutex);
-    if (is_spoiled)
+    if (needs_truncation)
         forget_tail(e);
-    if (is_spoiled || !has_news)
+    if (needs_truncation || !has_news)
         return STATUS_OK;
     if (fdatasync(e->fd) != 0) {
         enum status failed = error_set_errno(err, errno, "cannot sync upload %s", e->id);
@@ -255,13 +255,13 @@ enum status upload_session_commit(struct upload_session *e, struct error *err) {
     return status;
 }
 
-enum status upload_session_disbelieve(struct upload_session *e, struct error *err) {
+enum status upload_session_distrust_tail(struct upload_session *e, struct error *err) {
     enum status status = upload_session_commit(e, err);
     if (status == STATUS_OK)
         status = store_upload_begin(e->resumables->config.store, e->id, "", err);
     pthread_mutex_lock(&e->mutex);
     if (status == STATUS_OK)
-        e->is_believed = false;
+        e->tail_is_trusted = false;
     pthread_mutex_unlock(&e->mutex);
     return status;
 }

@@ -20,18 +20,18 @@ struct upload_session {
     char id[UPLOAD_ID_SIZE];
     struct resumables *resumables;
     unsigned users;       /* under resumables->mutex, and so are: */
-    unsigned long tended; /* the round of upload_session_next that last gave it */
+    unsigned long visited; /* the round of upload_session_next that last gave it */
     struct upload_session *next;
     pthread_mutex_t syncing; /* held by a commit */
     pthread_mutex_t mutex;   /* guards what follows */
     bool is_loaded, is_gone;
-    bool is_spoiled; /* what the file has beyond `counted` must be cut off and could not be yet */
+    bool needs_truncation; /* what the file has beyond `counted` must be cut off and could not be yet */
     int fd;          /* -1 before it is loaded; then the same until the session is dropped */
     uint64_t length;
     uint64_t received, counted; /* in the file; in the store */
     uint64_t hinted;            /* writing out has begun up to here */
     struct sha256 hash;         /* of what was received */
-    bool is_believed;           /* see resumable.h, invariant 3 */
+    bool tail_is_trusted;           /* see resumable.h, invariant 3 */
     const struct upload_writer *holder; /* NULL: nobody writes */
 };
 
@@ -62,7 +62,7 @@ bool upload_session_is_whole(struct upload_session *e); /* and counted */
 enum status upload_session_shrink(struct upload_session *e, struct error *err);
 /* It has become a scene: the next to come finds it so. */
 void upload_session_close(struct upload_session *e);
-/* From now on the file's tail is not to be believed, since unchecked bytes come. */
-enum status upload_session_disbelieve(struct upload_session *e, struct error *err);
+/* From now on what the file holds beyond the counted bytes does not count after a restart: unchecked bytes come. */
+enum status upload_session_distrust_tail(struct upload_session *e, struct error *err);
 
 #endif

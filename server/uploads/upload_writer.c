@@ -44,10 +44,10 @@ enum status upload_writer_take(struct resumables *p, const char *id, uint64_t of
     if (status != STATUS_OK)
         return status;
     pthread_mutex_lock(&e->mutex);
-    bool must_disbelieve = is_checked && e->is_believed;
+    bool must_distrust = is_checked && e->tail_is_trusted;
     pthread_mutex_unlock(&e->mutex);
-    if (must_disbelieve)
-        status = upload_session_disbelieve(e, err);
+    if (must_distrust)
+        status = upload_session_distrust_tail(e, err);
     pthread_mutex_lock(&e->mutex);
     if (status == STATUS_OK)
         status = check_offset(e, offset, err);
@@ -171,7 +171,7 @@ enum status upload_writer_commit(struct upload_writer *c, struct error *err) {
 
 enum status upload_writer_finish(struct upload_writer *c, struct upload_row *row, struct error *err) {
     struct upload_session *e = c->session;
-    enum status status = resumable_look(e->resumables, e->id, row, err);
+    enum status status = resumable_status(e->resumables, e->id, row, err);
     if (status != STATUS_OK || row->received >= c->at)
         return status;
     upload_row_release(row); /* another thread's sync has failed */

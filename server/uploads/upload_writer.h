@@ -21,7 +21,7 @@ bool upload_writer_is_due(const struct upload_writer *c);         /* much was wr
 enum status upload_writer_accept(struct upload_writer *c, struct error *err);
 /* What was written is on disk and counted. */
 enum status upload_writer_commit(struct upload_writer *c, struct error *err);
-/* The same, and the row as resumable_look gives it. STATUS_CONFLICT: some of it was lost, and is to be sent again. */
+/* The same, and the row as resumable_status gives it. STATUS_CONFLICT: some of it was lost, and is to be sent again. */
 enum status upload_writer_finish(struct upload_writer *c, struct upload_row *row, struct error *err);
 void upload_writer_release(struct upload_writer *c); /* NULL is fine; frees it */
 

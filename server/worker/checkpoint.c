@@ -20,7 +20,7 @@
 /* The largest page there is: a tile is then a chain of 16, not of 256. */
 #define PAGE_SIZE 65536
 
-struct tile {
+struct checkpoint_tile {
     int64_t row; /* 0: none */
     uint64_t hash;
 };
@@ -28,7 +28,7 @@ struct tile {
 struct stored_array {
     char *name;
     size_t bytes, tile_count;
-    struct tile *tile;
+    struct checkpoint_tile *tile;
 };
 
 struct checkpoint {
@@ -127,7 +127,7 @@ static enum status read_arrays(struct checkpoint *c, struct error *err) {
             .name = sql_dup(stmt, 1),
             .bytes = (size_t)bytes,
             .tile_count = tiles,
-            .tile = mem_calloc(tiles ? tiles : 1, sizeof(struct tile)),
+            .tile = mem_calloc(tiles ? tiles : 1, sizeof(struct checkpoint_tile)),
         };
     }
     return status;
@@ -145,7 +145,7 @@ static enum status read_tiles(struct checkpoint *c, struct error *err) {
             break;
         uint64_t a = (uint64_t)sqlite3_column_int64(stmt, 1);
         uint64_t t = (uint64_t)sqlite3_column_int64(stmt, 2);
-        struct tile found = {.row = sqlite3_column_int64(stmt, 0),
+        struct checkpoint_tile found = {.row = sqlite3_column_int64(stmt, 0),
                              .hash = (uint64_t)sqlite3_column_int64(stmt, 3)};
         bool fits = a < c->array_count && t < c->array[a].tile_count && c->array[a].tile[t].row == 0;
         if (fits) {
@@ -314,10 +314,10 @@ static struct stored_array *next_index(const struct checkpoint *c, const struct 
             .name = mem_strdup(array[i].name),
             .bytes = array[i].bytes,
             .tile_count = tiles,
-            .tile = mem_calloc(tiles ? tiles : 1, sizeof(struct tile)),
+            .tile = mem_calloc(tiles ? tiles : 1, sizeof(struct checkpoint_tile)),
         };
         if (same && tiles)
-            memcpy(next[i].tile, c->array[i].tile, tiles * sizeof(struct tile));
+            memcpy(next[i].tile, c->array[i].tile, tiles * sizeof(struct checkpoint_tile));
     }
     return next;
 }
@@ -334,7 +334,7 @@ static enum status insert_tiles(struct checkpoint *c, const struct state_array *
         cost->tile_count++;
         if (next->tile[t].row != 0 && next->tile[t].hash == hash)
             continue;
-        next->tile[t] = (struct tile){.row = (*row)++, .hash = hash};
+        next->tile[t] = (struct checkpoint_tile){.row = (*row)++, .hash = hash};
         cost->written_tile_count++;
         cost->written_bytes += bytes;
         status = sql_run(&c->sql, err,
@@ -411,7 +411,7 @@ enum status checkpoint_save(struct checkpoint *c, long iteration, const struct s
 
 /* --- loading ---------------------------------------------------------------------------------- */
 
-static enum status load_tile(struct checkpoint *c, const struct tile *tile, void *to, size_t bytes,
+static enum status load_tile(struct checkpoint *c, const struct checkpoint_tile *tile, void *to, size_t bytes,
                              struct error *err) {
     sqlite3_stmt *stmt;
     bool row;

@@ -43,7 +43,7 @@
 #define HANG_UP_INTERVAL_SEC 1.0
 #define SERIES_MAX 16
 
-struct run {
+struct worker_run {
     const struct order *order;
     struct progress *progress;
     struct checkpoint *checkpoint;
@@ -73,7 +73,7 @@ static void signals_of_ours(sigset_t *set) {
 }
 
 /* Whether nobody reads the pipe any more: the daemon has died without taking us with it. */
-static bool hung_up(struct run *run) {
+static bool hung_up(struct worker_run *run) {
     double now = clock_sec();
     if (run->progress->fd < 0 || now < run->next_hang_up_test)
         return false;
@@ -83,7 +83,7 @@ static bool hung_up(struct run *run) {
 }
 
 static bool stop_requested(void *user) {
-    struct run *run = user;
+    struct worker_run *run = user;
     static const struct timespec at_once = {0, 0};
     sigset_t set;
     int number;
@@ -100,18 +100,18 @@ static bool stop_requested(void *user) {
 }
 
 static bool checkpoint_due(void *user) {
-    const struct run *run = user;
+    const struct worker_run *run = user;
     return clock_sec() >= run->next_checkpoint;
 }
 
 static bool preview_due(void *user) {
-    const struct run *run = user;
+    const struct worker_run *run = user;
     return run->preview_asked || clock_sec() >= run->next_preview;
 }
 
 /* --- what it tells --------------------------------------------------------------------------- */
 
-static void tell_held_metrics(struct run *run) {
+static void tell_held_metrics(struct worker_run *run) {
     for (size_t i = 0; i < run->series_count; i++) {
         if (run->series[i].is_held)
             progress_metric(run->progress, run->series[i].name, run->series[i].step,
@@ -121,7 +121,7 @@ static void tell_held_metrics(struct run *run) {
 }
 
 static void tell_stage(void *user, const char *stage) {
-    struct run *run = user;
+    struct worker_run *run = user;
     tell_held_metrics(run);
     progress_stage(run->progress, stage);
     run->next_progress = 0.0; /* the stage's own time left, at once */
@@ -129,7 +129,7 @@ static void tell_stage(void *user, const char *stage) {
 
 static void tell_progress(void *user, const char *stage, double done, double total,
                           double eta_sec) {
-    struct run *run = user;
+    struct worker_run *run = user;
     double now = clock_sec();
     if (now < run->next_progress && done < total)
         return;
@@ -138,7 +138,7 @@ static void tell_progress(void *user, const char *stage, double done, double tot
 }
 
 static void tell_metric(void *user, const char *series, long step, double value) {
-    struct run *run = user;
+    struct worker_run *run = user;
     double now = clock_sec();
     size_t i = 0;
     while (i < run->series_count && strcmp(run->series[i].name, series) != 0)
@@ -159,17 +159,17 @@ static void tell_metric(void *user, const char *series, long step, double value)
 }
 
 static void tell_log(void *user, const char *message) {
-    const struct run *run = user;
+    const struct worker_run *run = user;
     progress_log(run->progress, "info", message);
 }
 
 static void tell_warning(void *user, const char *message) {
-    const struct run *run = user;
+    const struct worker_run *run = user;
     progress_log(run->progress, "warning", message);
 }
 
 static double worked_sec(void *user) {
-    struct run *run = user;
+    struct worker_run *run = user;
     return working_time_sec(&run->worked);
 }
 
@@ -177,7 +177,7 @@ static double worked_sec(void *user) {
 
 static enum status save_checkpoint(void *user, long iteration, const struct state_array *array,
                                    size_t count, struct error *err) {
-    struct run *run = user;
+    struct worker_run *run = user;
     struct checkpoint_cost cost;
     enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
     if (status != STATUS_OK)
@@ -194,7 +194,7 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
  * not. */
 static enum status load_checkpoint(void *user, struct state_array *array, size_t count,
                                    bool *found, struct error *err) {
-    struct run *run = user;
+    struct worker_run *run = user;
     long iteration;
     char note[512];
     enum status status = checkpoint_load(run->checkpoint, array, count, found, &iteration, err);
@@ -228,7 +228,7 @@ static char *fingerprint_of(const struct order *order) {
 
 static enum status announce(void *user, const char *type, const char *name,
                             const char *content_type, struct error *err) {
-    struct run *run = user;
+    struct worker_run *run = user;
     char *path = file_join(run->out_dir, name);
     char hex[SHA256_HEX_SIZE];
     struct stat info;
@@ -243,12 +243,12 @@ static enum status announce(void *user, const char *type, const char *name,
     return status;
 }
 
-static const char *title_of(const struct run *run) {
+static const char *title_of(const struct worker_run *run) {
     return *run->order->name ? run->order->name : "unbake";
 }
 
 static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
-    struct run *run = user;
+    struct worker_run *run = user;
     double start = clock_sec();
     struct export_input input = results_so_far(r, title_of(run));
     run->mesh = input.mesh;
@@ -261,7 +261,7 @@ static enum status write_preview(void *user, const struct reconstruction *r, str
     return status;
 }
 
-static enum status write_outputs(struct run *run, const struct reconstruction *r,
+static enum status write_outputs(struct worker_run *run, const struct reconstruction *r,
                                  struct error *err) {
     struct export_input input;
     results_make(&input, r, title_of(run));
@@ -275,7 +275,7 @@ static enum status write_outputs(struct run *run, const struct reconstruction *r
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-static enum status load_scene(struct run *run, const struct settings *settings,
+static enum status load_scene(struct worker_run *run, const struct settings *settings,
                               struct parallel *pool, struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     cJSON *problems = cJSON_CreateArray();
@@ -302,7 +302,7 @@ static enum status load_scene(struct run *run, const struct settings *settings,
     return status;
 }
 
-static enum status open_checkpoint(struct run *run, struct error *err) {
+static enum status open_checkpoint(struct worker_run *run, struct error *err) {
     char note[512];
     char *path = layout_checkpoint(run->order->dir);
     char *fingerprint = fingerprint_of(run->order);
@@ -314,7 +314,7 @@ static enum status open_checkpoint(struct run *run, struct error *err) {
     return status;
 }
 
-static enum status reconstruct(struct run *run, const struct settings *settings,
+static enum status reconstruct(struct worker_run *run, const struct settings *settings,
                                struct parallel *pool, struct error *err) {
     struct scene scene;
     struct reconstruction r = {0};
@@ -356,7 +356,7 @@ static enum status reconstruct(struct run *run, const struct settings *settings,
 
 enum status task_reconstruct(const struct order *order, struct progress *progress,
                              struct error *err) {
-    struct run run = {.order = order, .progress = progress};
+    struct worker_run run = {.order = order, .progress = progress};
     struct settings settings;
     sigset_t set;
     signals_of_ours(&set);

@@ -133,13 +133,13 @@ static void test_idle(void) {
         buf_release(&reply);
         mem_free(text);
         rig.api->config.empty_upload_ms = rig.api->resumables->config.idle_ms = 3600000;
-        resumables_tend(rig.api->resumables);
+        resumables_maintain(rig.api->resumables);
         rig_must(store_user_pledged(rig.store, user, 0, &pledged, &err), &err, "store_user_pledged");
         CHECK_THAT(pledged >= length - 2000, "%llu bytes are pledged", (unsigned long long)pledged);
         CHECK(part == 1 || held_bytes(id) >= length); /* it has just grown */
         usleep(5000);
         rig.api->config.empty_upload_ms = rig.api->resumables->config.idle_ms = 1;
-        resumables_tend(rig.api->resumables);
+        resumables_maintain(rig.api->resumables);
         CHECK_THAT(held_bytes(id) < 2 << 20, "it holds %llu bytes", (unsigned long long)held_bytes(id));
         rig_must(store_user_pledged(rig.store, user, clock_unix_ms() - 1, &pledged, &err), &err, "store_user_pledged");
         CHECK_THAT(pledged < length - 2000, "%llu bytes are pledged", (unsigned long long)pledged);

@@ -60,7 +60,7 @@ static void *look(void *user) {
     struct look *l = user;
     struct upload_row row = {0};
     struct error err;
-    l->status = resumable_look(l->resumables, l->id, &row, &err);
+    l->status = resumable_status(l->resumables, l->id, &row, &err);
     upload_row_release(&row);
     return NULL;
 }
@@ -109,7 +109,7 @@ static void test_two(struct rig *rig, enum rival rival) {
     while (atomic_load(&begun) == 0)
         nap();
     atomic_store(&is_asked, true);
-    enum status status = rival == RIVAL_LOOK     ? resumable_look(p, row.id, &found, &err)
+    enum status status = rival == RIVAL_LOOK     ? resumable_status(p, row.id, &found, &err)
                          : rival == RIVAL_FINISH ? upload_writer_finish(writer, &found, &err)
                                                  : upload_writer_take(p, row.id, 0, true, &late, &err);
     pthread_join(thread, NULL);

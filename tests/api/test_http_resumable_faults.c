@@ -55,7 +55,7 @@ static void send_part(uint64_t from, uint64_t to) {
 
 static enum status look(void) {
     struct upload_row row;
-    enum status status = resumable_look(rig.api->resumables, id, &row, &err);
+    enum status status = resumable_status(rig.api->resumables, id, &row, &err);
     upload_row_release(&row);
     return status;
 }
@@ -82,7 +82,7 @@ static void check_scene(void) {
     struct buf archive;
     char *path = mem_printf("%s/scenes/%s/archive", rig.dir, sha256);
     buf_init(&archive, BYTES);
-    OK(resumable_look(rig.api->resumables, id, &row, &err));
+    OK(resumable_status(rig.api->resumables, id, &row, &err));
     CHECK_STRING(row.scene_id, sha256);
     CHECK(row.received == BYTES);
     OK(file_read(path, &archive, &err));
@@ -125,11 +125,11 @@ static void check_spoiled(void) {
     spoil(); /* the collector comes first */
     system_break(" ftruncate ", EIO);
     sql_break();
-    resumables_tend(rig.api->resumables);
+    resumables_maintain(rig.api->resumables);
     sql_mend();
     CHECK(counted() == HALF && file_size() == BYTES);
     system_mend();
-    resumables_tend(rig.api->resumables);
+    resumables_maintain(rig.api->resumables);
     CHECK(counted() == HALF && file_size() == HALF);
     send_part(HALF, BYTES);
     check_scene();
@@ -152,10 +152,10 @@ static void check_tending(void) {
     create("");
     send_part(0, BYTES);
     sql_break();
-    resumables_tend(rig.api->resumables);
+    resumables_maintain(rig.api->resumables);
     sql_mend();
     CHECK(counted() == 0);
-    resumables_tend(rig.api->resumables);
+    resumables_maintain(rig.api->resumables);
     CHECK(counted() == BYTES);
     check_scene();
 }

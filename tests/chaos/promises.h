@@ -186,7 +186,7 @@ static inline void promise_check_job(const struct promise *p, struct api *api, s
 static inline void promise_check_upload(const struct promise *p, struct api *api, struct broken *b) {
     struct upload_row row = {0};
     struct error err = {0};
-    enum status status = resumable_look(api->resumables, p->id, &row, &err);
+    enum status status = resumable_status(api->resumables, p->id, &row, &err);
     if (status != STATUS_OK || row.received < (uint64_t)p->number) {
         if (!p->is_gone && !p->is_unsure)
             promise_lost(b, &b->lost, "upload %.12s has lost bytes: %s", p->id, err.message);

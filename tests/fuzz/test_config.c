@@ -18,7 +18,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct config c;
     struct buf problems;
     size_t count;
-    const struct option *table = config_table(&count);
+    const struct config_option *table = config_table(&count);
     char path[256];
     snprintf(path, sizeof path, "%s/unbaked.conf", fuzz_folder());
     fuzz_write(path, data, size);

@@ -8,9 +8,9 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/http/views.h"
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 #include "server/job/outcome.h"
-#include "server/job/figures.h"
+#include "server/job/counters.h"
 #include "server/worker/progress.h"
 #include "tests/fuzz/fuzz.h"
 
@@ -103,7 +103,7 @@ static void check_scene(void) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static struct figures figures;
+    static struct counters counters;
     struct attempt a = {.phase = ATTEMPT_ALIVE, .iteration = -1.0, .dir = mem_strdup(fuzz_folder()),
                         .worker = {.pid_fd = -1}, .scene_id = CHECKED, .settings = mem_strdup("{}"), .number = 1};
     int64_t job_id = 0;
@@ -122,11 +122,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     buf_init(&a.worker.line, PROGRESS_LINE_MAX);
     a.worker.log_path = mem_strdup("/dev/null");
     a.worker.pipe_fd = pipe_of(data + 1, size - 1);
-    hearing_listen(&a, store, &figures);
+    worker_messages_read(&a, store, &counters);
     a.phase = ATTEMPT_ENDED;
     a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
     struct error err;
-    enum status status = outcome_settle(&a, store, &figures, &err);
+    enum status status = outcome_settle(&a, store, &counters, &err);
     if (status != STATUS_OK)
         fprintf(stderr, "%s\n", err.message);
     MUST(status == STATUS_OK && a.phase == ATTEMPT_EMPTY);

@@ -9,7 +9,7 @@
 #define COLUMNS 60
 
 struct listener {
-    struct view view;
+    struct client_view view;
     struct terminal terminal;
     struct buf heard; /* what came, in words that can be compared */
 };

@@ -102,7 +102,7 @@ static inline int worker(const char *dir) {
     return play(role, dir, (int)attempt);
 }
 
-#define RIG_EVENTS_MAX 100 /* of one attempt; see hearing.c */
+#define RIG_EVENTS_MAX 100 /* of one attempt; see worker_messages.c */
 
 /* --- the daemon's side ------------------------------------------------------------------------ */
 

@@ -6,7 +6,7 @@
 #include <netinet/in.h>
 
 #include "common/mem.h"
-#include "server/http/brake.h"
+#include "server/http/auth_throttle.h"
 #include "tests/check.h"
 
 static struct address at(const char *text) {
@@ -118,46 +118,46 @@ static void check_requests(void) {
 /* --- the brake --------------------------------------------------------------------------- */
 
 static void check_brake(void) {
-    struct brake *b = brake_new();
+    struct auth_throttle *b = auth_throttle_new();
     struct address one = at("192.0.2.1"), other = at("192.0.2.2"), six = at("2001:db8::1"), near = at("2001:db8::2:1"),
                    far = at("2001:db8:0:1::1");
     bool is_first;
-    int burst = (int)BRAKE_BURST;
+    int burst = (int)AUTH_THROTTLE_BURST;
     for (int i = 0; i < burst; i++)
-        CHECK(brake_fail(b, &one, 100.0, &is_first) == 0.0 && !is_first);
-    double wait_sec = brake_fail(b, &one, 100.0, &is_first);
-    CHECK_NEAR(wait_sec, 1.0 / BRAKE_PER_SEC, 1e-9);
+        CHECK(auth_throttle_fail(b, &one, 100.0, &is_first) == 0.0 && !is_first);
+    double wait_sec = auth_throttle_fail(b, &one, 100.0, &is_first);
+    CHECK_NEAR(wait_sec, 1.0 / AUTH_THROTTLE_PER_SEC, 1e-9);
     CHECK(is_first);
-    CHECK(brake_fail(b, &one, 100.1, &is_first) > 0.0 && !is_first);
-    CHECK(brake_fail(b, &other, 100.0, &is_first) == 0.0);
+    CHECK(auth_throttle_fail(b, &one, 100.1, &is_first) > 0.0 && !is_first);
+    CHECK(auth_throttle_fail(b, &other, 100.0, &is_first) == 0.0);
     /* Refused ones take no room: it comes back for one, and is told once more. */
-    CHECK(brake_fail(b, &one, 100.0 + 1.0 / BRAKE_PER_SEC, &is_first) == 0.0 && !is_first);
-    CHECK(brake_fail(b, &one, 100.0 + 1.0 / BRAKE_PER_SEC, &is_first) > 0.0 && is_first);
+    CHECK(auth_throttle_fail(b, &one, 100.0 + 1.0 / AUTH_THROTTLE_PER_SEC, &is_first) == 0.0 && !is_first);
+    CHECK(auth_throttle_fail(b, &one, 100.0 + 1.0 / AUTH_THROTTLE_PER_SEC, &is_first) > 0.0 && is_first);
     /* A clock that stands or goes back gives no room. */
-    CHECK(brake_fail(b, &one, 50.0, &is_first) > 0.0);
+    CHECK(auth_throttle_fail(b, &one, 50.0, &is_first) > 0.0);
     for (int i = 0; i < burst; i++)
-        brake_fail(b, i % 2 ? &six : &near, 100.0, &is_first);
-    CHECK(brake_fail(b, &near, 100.0, &is_first) > 0.0); /* one /64 */
-    CHECK(brake_fail(b, &far, 100.0, &is_first) == 0.0);
+        auth_throttle_fail(b, i % 2 ? &six : &near, 100.0, &is_first);
+    CHECK(auth_throttle_fail(b, &near, 100.0, &is_first) > 0.0); /* one /64 */
+    CHECK(auth_throttle_fail(b, &far, 100.0, &is_first) == 0.0);
     /* After a long time all is forgotten. */
     for (int i = 0; i < burst; i++)
-        CHECK(brake_fail(b, &one, 10000.0, &is_first) == 0.0);
-    brake_free(b);
+        CHECK(auth_throttle_fail(b, &one, 10000.0, &is_first) == 0.0);
+    auth_throttle_free(b);
 }
 
 /* Whoever has very many addresses does not free one that is braked by using the others once each. */
 static void check_flood(void) {
-    struct brake *b = brake_new();
+    struct auth_throttle *b = auth_throttle_new();
     struct address one = at("192.0.2.1"), many = at("2001:db8::");
     bool is_first;
-    for (int i = 0; i <= (int)BRAKE_BURST; i++)
-        brake_fail(b, &one, 1.0, &is_first);
+    for (int i = 0; i <= (int)AUTH_THROTTLE_BURST; i++)
+        auth_throttle_fail(b, &one, 1.0, &is_first);
     for (uint32_t i = 0; i < 100000; i++) {
         memcpy(many.bytes + 4, &i, sizeof i);
-        CHECK(brake_fail(b, &many, 1.0, &is_first) == 0.0);
+        CHECK(auth_throttle_fail(b, &many, 1.0, &is_first) == 0.0);
     }
-    CHECK(brake_fail(b, &one, 1.0, &is_first) > 0.0);
-    brake_free(b);
+    CHECK(auth_throttle_fail(b, &one, 1.0, &is_first) > 0.0);
+    auth_throttle_free(b);
 }
 
 int main(void) {

@@ -4,7 +4,7 @@
  * `test_attempt_faults worker DIR`. */
 #include "server/job/attempt.h"
 
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 #include "server/job/outcome.h"
 #include "server/store/internal.h"
 #include "server/worker/progress.h"
@@ -40,12 +40,12 @@ static int worker(const char *folder) {
 
 /* --- the daemon's side ------------------------------------------------------------------------------ */
 
-static struct figures figures;
+static struct counters figures;
 static long strikes;
 
 static void hear_to_the_end(struct attempt *a) {
     for (; a->phase == ATTEMPT_ALIVE; usleep(1000))
-        hearing_listen(a, store, &figures);
+        worker_messages_read(a, store, &figures);
 }
 
 static void settle(struct attempt *a) {

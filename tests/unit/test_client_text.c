@@ -73,12 +73,12 @@ static void test_sse(void) {
 
 /* --- options.c, nearest.c ------------------------------------------------------------------ */
 
-static const struct option own[] = {
+static const struct client_option own[] = {
     {"watch", 'w', OPTION_FLAG, NULL, ""},       {"name", 'n', OPTION_TEXT, "NAME", ""},
     {"set", 's', OPTION_LIST, "KEY=VALUE", ""},  {"priority", 'p', OPTION_WHOLE, "N", ""},
     {"retry", 0, OPTION_SECONDS, "SEC", ""},     {0},
 };
-static const struct option shared[] = {{"json", 0, OPTION_FLAG, NULL, ""}, {0}};
+static const struct client_option shared[] = {{"json", 0, OPTION_FLAG, NULL, ""}, {0}};
 
 static enum status parse(struct options *o, struct error *err, int count, const char *const *words) {
     char *argv[16];
@@ -156,12 +156,12 @@ static void test_commands(void) {
         CHECK(c->run && *c->summary && c->words_min <= c->words_max);
         CHECK((c->words_max > 0) == (*c->arguments != '\0'));
         CHECK(command_find(c->name) == c);
-        for (const struct option *a = c->options; a->name; a++) {
+        for (const struct client_option *a = c->options; a->name; a++) {
             CHECK((a->kind == OPTION_FLAG) == (a->value == NULL));
-            for (const struct option *b = command_shared_options; b->name; b++)
+            for (const struct client_option *b = command_shared_options; b->name; b++)
                 CHECK_THAT(strcmp(a->name, b->name) != 0 && (!a->letter || a->letter != b->letter),
                            "%s: --%s is given twice", c->name, a->name);
-            for (const struct option *b = a + 1; b->name; b++)
+            for (const struct client_option *b = a + 1; b->name; b++)
                 CHECK_THAT(strcmp(a->name, b->name) != 0 && (!a->letter || a->letter != b->letter),
                            "%s: --%s is given twice", c->name, a->name);
         }
@@ -262,13 +262,13 @@ static void test_meter(void) {
 
 /* --- view.c -------------------------------------------------------------------------------- */
 
-static void event(struct view *v, const char *type, const char *data) {
+static void event(struct client_view *v, const char *type, const char *data) {
     cJSON *value = cJSON_Parse(data);
     view_event(v, type, value);
     cJSON_Delete(value);
 }
 
-static void check_line(const struct view *v, size_t columns, bool bar, double age, const char *wanted) {
+static void check_line(const struct client_view *v, size_t columns, bool bar, double age, const char *wanted) {
     struct terminal t = {.out = stdout};
     struct buf b;
     buf_init(&b, 1024);
@@ -279,7 +279,7 @@ static void check_line(const struct view *v, size_t columns, bool bar, double ag
 }
 
 static void test_view(void) {
-    struct view v;
+    struct client_view v;
     view_init(&v, 17);
     event(&v, "state", "{\"state\":\"queued\",\"snapshot\":true,\"progress\":0,\"eta_sec\":null,"
                        "\"stage\":null,\"reason\":null,\"wanted\":\"run\"}");

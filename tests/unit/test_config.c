@@ -41,7 +41,7 @@ static char *problems_of(struct config *c, const char *text) {
 /* Defaults lie in their ranges: setting each again gives no problem. */
 static void check_defaults(void) {
     size_t count;
-    const struct option *table = config_table(&count);
+    const struct config_option *table = config_table(&count);
     struct config c;
     struct buf problems;
     buf_init(&problems, 65536);
@@ -59,7 +59,7 @@ static void check_defaults(void) {
  * comment above it gives unit and range. */
 static void check_documented(void) {
     size_t count;
-    const struct option *table = config_table(&count);
+    const struct config_option *table = config_table(&count);
     FILE *file = fopen("config/unbaked.conf", "r");
     char line[256], comment[4096] = "", wanted[256], value[128];
     size_t next = 0;
@@ -71,7 +71,7 @@ static void check_documented(void) {
             continue;
         }
         if (line[0] != '\0') {
-            const struct option *o = &table[next < count ? next : 0];
+            const struct config_option *o = &table[next < count ? next : 0];
             snprintf(wanted, sizeof wanted, "%s =%s%s", o->name, *o->default_text ? " " : "", o->default_text);
             CHECK_STRING(line, wanted);
             if (o->type == OPTION_INT || o->type == OPTION_REAL) {

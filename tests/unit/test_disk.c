@@ -28,7 +28,7 @@ static struct disk_watch watch;
 static bool look(uint64_t bytes) {
     room = bytes;
     watch.looked_at = -1e9;
-    return disk_look(&watch, "/");
+    return disk_check(&watch, "/");
 }
 
 int main(void) {
@@ -48,7 +48,7 @@ int main(void) {
     CHECK(look(0) && watch.is_low);
     /* Not before its time. */
     room = 2 * LOW;
-    CHECK(!disk_look(&watch, "/") && watch.is_low);
+    CHECK(!disk_check(&watch, "/") && watch.is_low);
 
     disk_init(&watch, 0);
     CHECK(look(0) && !watch.is_low); /* 0: never */

@@ -122,9 +122,9 @@ static void check_words(void) {
     log_forget();
     write_file(running.scrap);
     strike_system("unlink", 1, false);
-    housekeeping_drop_scraps(running.dir);
+    housekeeping_drop_temporary(running.dir);
     CHECK(lift() && is_there(running.scrap) && log_count(running.scrap) == 1);
-    housekeeping_drop_scraps(running.dir);
+    housekeeping_drop_temporary(running.dir);
     CHECK(!is_there(running.scrap));
     strike_system("unlinkat", 1, false);
     err = (struct error){0};

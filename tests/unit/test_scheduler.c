@@ -201,13 +201,13 @@ static int play_check(const char *role, const char *dir) {
 
 /* --- the daemon's side ------------------------------------------------------------------------ */
 
-struct tally {
+struct request_counts {
     int progress, metric, log, output, state;
 };
 
 static void tally_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
                       const char *data) {
-    struct tally *t = user;
+    struct request_counts *t = user;
     (void)id, (void)at_ms, (void)attempt;
     t->progress += strcmp(type, EVENT_PROGRESS) == 0 && strstr(data, "\"done\":3") != NULL;
     t->metric += strcmp(type, EVENT_METRIC) == 0 && strstr(data, "0.25") != NULL;
@@ -220,7 +220,7 @@ static void tally_one(void *user, int64_t id, int64_t at_ms, int attempt, const 
 }
 
 static void tally_talk(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
-    struct tally *t = user;
+    struct request_counts *t = user;
     (void)id, (void)at_ms, (void)attempt;
     t->metric += strcmp(type, EVENT_METRIC) == 0;
     t->log += strcmp(type, EVENT_LOG) == 0 && strstr(data, "has reported 100 events: from here on") != NULL;
@@ -229,7 +229,7 @@ static void tally_talk(void *user, int64_t id, int64_t at_ms, int attempt, const
 
 /* What is too much is left out, and one event says so; outputs and the newest progress are not. */
 static void check_talker(struct daemon *d) {
-    struct tally t = {0};
+    struct request_counts t = {0};
     struct output_row *rows;
     struct job job;
     size_t count;
@@ -260,7 +260,7 @@ static void check_ruin(struct daemon *d) {
 }
 
 static void check_whole_life(struct daemon *d, int64_t id, int states) {
-    struct tally t = {0};
+    struct request_counts t = {0};
     OK(store_event_list(d->store, id, 0, 1000, tally_one, &t, &err));
     CHECK_THAT(t.progress == 1 && t.metric == 1 && t.log == 2 && t.output == 1 && t.state == states,
                "%d %d %d %d %d", t.progress, t.metric, t.log, t.output, t.state);

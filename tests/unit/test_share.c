@@ -3,7 +3,7 @@
  * daemon was killed. As worker stands in this program itself: `test_share worker DIR`. */
 #include "server/job/attempt.h"
 
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
 #include "server/job/outcome.h"
@@ -16,7 +16,7 @@
 #define ALICE 7
 #define BOB 8
 
-static struct figures figures;
+static struct counters figures;
 
 /* A file of so many KiB, none of which compresses to nothing. */
 static void write_file(const char *folder, const char *name, size_t kib) {
@@ -99,7 +99,7 @@ static struct scheduler_config limited(uint64_t bytes) {
 
 static void settle(struct attempt *a) {
     for (; a->phase == ATTEMPT_ALIVE; usleep(1000))
-        hearing_listen(a, store, &figures);
+        worker_messages_read(a, store, &figures);
     OK(outcome_settle(a, store, &figures, &err));
 }
 

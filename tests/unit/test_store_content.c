@@ -367,8 +367,8 @@ static void test_expired_no_more(void) {
     OK(store_upload_add(store, &row, "0000", 4, &(struct count_limits){9, 9}, &err));
     OK(store_expired_list(store, later, 9, &list, &count, &err));
     CHECK_THAT(count == 4, "%zu", count);
-    const struct keeping pinned = {.pin = KEEP_PIN_ON};
-    const struct job_patch patch = {.priority = INT_MIN, .shared = -1, .keeping = pinned};
+    const struct retention pinned = {.pin = KEEP_PIN_ON};
+    const struct job_patch patch = {.priority = INT_MIN, .shared = -1, .retention = pinned};
     OK(store_job_patch(store, id, -1, &patch, &err));
     OK(store_upload_keep(store, row.id, &pinned, &err));
     OK(store_scene_patch(store, NULL, SCENE_A, NULL, &pinned, &err));

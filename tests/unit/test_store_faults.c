@@ -65,7 +65,7 @@ static enum status list_scenes(void) {
     return status;
 }
 static enum status patch_scene(void) {
-    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct keeping){.sets_expiry = true, .expires_ms = 1}, &err);
+    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct retention){.sets_expiry = true, .expires_ms = 1}, &err);
 }
 static enum status access_scene(void) {
     enum access access;
@@ -331,7 +331,7 @@ static enum status list_uploads(void) {
 static enum status begin_upload(void) { return store_upload_begin(store, UPLOAD, "boot", &err); }
 static enum status advance_upload(void) { return store_upload_advance(store, UPLOAD, 7, "mesh", 4, &err); }
 static enum status finish_upload(void) { return store_upload_finish(store, UPLOAD, SCENE_A, &err); }
-static enum status keep_upload(void) { return store_upload_keep(store, UPLOAD, &(struct keeping){.pin = KEEP_PIN_ON}, &err); }
+static enum status keep_upload(void) { return store_upload_keep(store, UPLOAD, &(struct retention){.pin = KEEP_PIN_ON}, &err); }
 static enum status delete_upload(void) { return store_upload_delete(store, UPLOAD, &err); }
 
 static enum status keep(void) { return store_keep(store, 1, 1, 1, &err); }
@@ -483,7 +483,7 @@ static void check_refusals(void) {
     IS(store_event_add(store, 77, 1, EVENT_LOG, "{}", &err), STATUS_NOT_FOUND);
     IS(store_event_list(store, 77, 0, 9, no_event, NULL, &err), STATUS_OK);
     IS(store_scene_ready(store, SCENE_C, "{}", &err), STATUS_NOT_FOUND);
-    IS(store_scene_patch(store, NULL, SCENE_C, "x", &(struct keeping){0}, &err), STATUS_NOT_FOUND);
+    IS(store_scene_patch(store, NULL, SCENE_C, "x", &(struct retention){0}, &err), STATUS_NOT_FOUND);
     IS(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err), STATUS_NOT_FOUND);
     IS(store_scene_list(store, NULL, "yesterday", 1, scenes, &count, cursor, &err), STATUS_INPUT);
     IS(store_upload_list(store, NULL, "", "yesterday", 1, &row, &count, cursor, &err), STATUS_INPUT);

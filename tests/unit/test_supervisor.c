@@ -48,7 +48,7 @@ static int run(struct worker *w, const char *lines, struct heard *heard) {
     int wait_status = -1;
     *heard = (struct heard){0};
     OK(supervisor_start(w, path, dir, &err));
-    while (!supervisor_bury(w, &wait_status, hear, heard)) {
+    while (!supervisor_reap(w, &wait_status, hear, heard)) {
         supervisor_read(w, hear, heard);
         poll(NULL, 0, 5);
     }
@@ -130,7 +130,7 @@ static void test_refusals(void) {
     int wait_status = 0;
     struct heard heard = {0};
     CHECK(supervisor_start(&w, "/bin/true", "/nonexistent/folder", &err) == STATUS_NOT_FOUND);
-    CHECK(w.pid == 0 && !supervisor_bury(&w, &wait_status, hear, &heard));
+    CHECK(w.pid == 0 && !supervisor_reap(&w, &wait_status, hear, &heard));
     supervisor_signal(&w, SIGKILL); /* nobody */
     supervisor_release(&w);
     /* A log that is a link leads elsewhere. */
@@ -143,7 +143,7 @@ static void test_refusals(void) {
     mem_free(log);
     /* A program that is not there: the child says so. */
     OK(supervisor_start(&w, "/nonexistent/unbaked", dir, &err));
-    while (!supervisor_bury(&w, &wait_status, hear, &heard))
+    while (!supervisor_reap(&w, &wait_status, hear, &heard))
         poll(NULL, 0, 5);
     CHECK(WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == 127);
     char *words = supervisor_last_words(&w, 400);

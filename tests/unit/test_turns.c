@@ -114,7 +114,7 @@ static void test_kept(void) {
     CHECK_STRING(err.hint, "delete jobs that you do not need");
     for (int i = 0; i < 3; i++)
         OK(store_job_cancel(store, ids[i], &err));
-    OK(store_job_patch(store, ids[0], -1, &(struct job_patch){.priority = INT_MIN, .shared = -1, .keeping.pin = KEEP_PIN_ON},
+    OK(store_job_patch(store, ids[0], -1, &(struct job_patch){.priority = INT_MIN, .shared = -1, .retention.pin = KEEP_PIN_ON},
                        &err));
     IS(store_job_add(store, &new, 1000, &id, &replayed, &err), STATUS_NO_SPACE);
     snprintf(hint, sizeof hint, "the oldest that has ended is %lld", (long long)ids[1]);

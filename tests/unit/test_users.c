@@ -158,7 +158,7 @@ static void test_names(void) {
     char *dir = fresh_dir();
     struct caller who[4], *alice = &who[0], *bob = &who[1], *carol = &who[2], *dora = &who[3];
     const struct caller admin = {.role = ROLE_ADMIN};
-    const struct keeping as_is = {0};
+    const struct retention as_is = {0};
     struct store *store;
     bool existed, is_gone;
     OK(store_open(&store, dir, &err));
@@ -285,7 +285,7 @@ static void test_lists(void) {
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
     CHECK(!existed && scenes_seen(store, &bob) == 2);
-    const struct keeping past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
+    const struct retention past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
     OK(store_scene_patch(store, &alice, SCENE_A, "mine", &pin, &err));
     IS(store_scene_patch(store, &bob, SCENE_A, NULL, &loose, &err), STATUS_CONFLICT);
     IS(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err), STATUS_CONFLICT);

@@ -1,5 +1,5 @@
-/* keeping.c -- see keeping.h. */
-#include "server/http/keeping.h"
+/* retention.c -- see retention.h. */
+#include "server/http/retention.h"
 
 #include <string.h>
 #include <time.h>
@@ -18,7 +18,7 @@ static int64_t read_time(const char *text) {
     return seconds > 0 ? (int64_t)seconds * 1000 : 0;
 }
 
-bool keeping_read(struct keeping *k, const cJSON *member, cJSON *params) {
+bool retention_read(struct retention *k, const cJSON *member, cJSON *params) {
     if (strcmp(member->string, "pinned") == 0) {
         k->pin = cJSON_IsTrue(member) ? KEEP_PIN_ON : KEEP_PIN_OFF;
         if (!cJSON_IsBool(member))
@@ -35,13 +35,13 @@ bool keeping_read(struct keeping *k, const cJSON *member, cJSON *params) {
     return true;
 }
 
-struct response *keeping_dry_run(const struct request *r, bool *dry_run) {
+struct response *retention_dry_run(const struct request *r, bool *dry_run) {
     const char *text = target_query(&r->target, "dry_run");
     *dry_run = text && strcmp(text, "1") == 0;
     return text && !*dry_run && strcmp(text, "0") != 0 ? problem(r, 400, "dry_run must be 0 or 1") : NULL;
 }
 
-struct response *keeping_would_free(struct api *api, const struct request *r, const char *path) {
+struct response *retention_would_free(struct api *api, const struct request *r, const char *path) {
     struct error err;
     uint64_t files = 0, bytes = 0;
     char *full = path ? file_join(api->config.data_dir, path) : NULL;

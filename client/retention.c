@@ -1,11 +1,11 @@
-/* keeping.c -- see keeping.h. */
-#include "client/keeping.h"
+/* retention.c -- see retention.h. */
+#include "client/retention.h"
 
 #include <math.h>
 #include <string.h>
 #include <time.h>
 
-enum status keeping_describe(const struct options *o, cJSON *body, struct error *err) {
+enum status retention_describe(const struct options *o, cJSON *body, struct error *err) {
     bool pin = options_flag(o, "pin"), unpin = options_flag(o, "unpin");
     if (pin && unpin)
         return error_set(err, STATUS_INPUT, "only one of --pin and --unpin can be so");
@@ -29,11 +29,11 @@ static bool is_pinned(const cJSON *thing) {
     return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned"));
 }
 
-const char *keeping_time(const cJSON *thing) {
+const char *retention_time(const cJSON *thing) {
     return is_pinned(thing) ? "never: pinned" : member_text(thing, "expires_at");
 }
 
-void keeping_text(char out[16], const cJSON *thing) {
+void retention_text(char out[16], const cJSON *thing) {
     double at = time_parse(member_text(thing, "expires_at"));
     out[0] = '\0';
     if (is_pinned(thing))
@@ -42,16 +42,16 @@ void keeping_text(char out[16], const cJSON *thing) {
         format_duration(out, fmax(at - (double)time(NULL), 0.0));
 }
 
-void keeping_disk(char out[16], const cJSON *thing) {
+void retention_disk(char out[16], const cJSON *thing) {
     double bytes = member_number(thing, "disk_bytes", -1.0);
     *out = '\0';
     if (bytes >= 0.0)
         format_bytes(out, bytes);
 }
 
-void keeping_sentence(char out[40], const cJSON *thing) {
+void retention_sentence(char out[40], const cJSON *thing) {
     char left[16];
-    keeping_text(left, thing);
+    retention_text(left, thing);
     snprintf(out, 40, "%s%s", !*left ? "" : is_pinned(thing) ? "kept for good" : "removed in ",
              is_pinned(thing) ? "" : left);
 }

@@ -1,4 +1,4 @@
-/* hearing.c -- see hearing.h.
+/* worker_messages.c -- see worker_messages.h.
  *
  * A worker that says too much must not keep the daemon from its other work. Beyond event_max reports an attempt is
  * heard once a second: what it reports more often is then
@@ -7,7 +7,7 @@
  *      progress    the newest is entered
  *      the rest    left out, and one event says so
  */
-#include "server/job/hearing.h"
+#include "server/job/worker_messages.h"
 
 #include <errno.h>
 #include <string.h>
@@ -23,10 +23,10 @@
 #define UNTAKEN_MAX 2000  /* files; an honest job has some hundred */
 #define PROBLEMS_MAX 1000 /* of one scene */
 
-struct listener {
+struct message_listener {
     struct attempt *attempt;
     struct store *store;
-    struct figures *figures;
+    struct counters *counters;
 };
 
 static void complain(struct attempt *a, const char *type, const struct error *err) {
@@ -73,7 +73,7 @@ static bool is_thinned(struct attempt *a, struct store *store) {
     return true;
 }
 
-static void enter_event(const struct listener *l, const char *type, cJSON *data) {
+static void enter_event(const struct message_listener *l, const char *type, cJSON *data) {
     struct attempt *a = l->attempt;
     if (a->job_id == 0)
         return;
@@ -140,7 +140,7 @@ static void keep_file(struct attempt *a, const char *type, const cJSON *line) {
     cJSON_AddItemToArray(a->untaken, kept);
 }
 
-static void enter_file(const struct listener *l, const char *type, const cJSON *line) {
+static void enter_file(const struct message_listener *l, const char *type, const cJSON *line) {
     struct attempt *a = l->attempt;
     struct error err;
     if (a->job_id == 0)
@@ -170,7 +170,7 @@ static enum status take_files(struct attempt *a, struct store *store, bool is_la
     return STATUS_OK;
 }
 
-enum status hearing_make_up(struct attempt *a, struct store *store, struct error *err) {
+enum status worker_messages_retry(struct attempt *a, struct store *store, struct error *err) {
     if (a->late_progress)
         put_event(a, store, EVENT_PROGRESS, a->late_progress);
     cJSON_Delete(a->late_progress);
@@ -210,16 +210,16 @@ static void note_end(struct attempt *a, const cJSON *line) {
     a->end_hint = mem_strdup(hint);
 }
 
-static void note_checkpoint(const struct listener *l, const cJSON *line) {
+static void note_checkpoint(const struct message_listener *l, const cJSON *line) {
     double iteration, bytes, seconds;
     if (json_number(line, "iteration", "checkpoint", 0, &iteration, NULL) != STATUS_OK ||
         json_number(line, "bytes", "checkpoint", 0, &bytes, NULL) != STATUS_OK ||
         json_number(line, "seconds", "checkpoint", 0, &seconds, NULL) != STATUS_OK)
         return;
     if (bytes >= 0.0 && seconds >= 0.0 && bytes < 1e15 && seconds < 1e6) {
-        atomic_fetch_add(&l->figures->checkpoint_count, 1);
-        atomic_fetch_add(&l->figures->checkpoint_bytes, (unsigned long long)bytes);
-        atomic_fetch_add(&l->figures->checkpoint_us, (unsigned long long)(seconds * 1e6));
+        atomic_fetch_add(&l->counters->checkpoint_count, 1);
+        atomic_fetch_add(&l->counters->checkpoint_bytes, (unsigned long long)bytes);
+        atomic_fetch_add(&l->counters->checkpoint_us, (unsigned long long)(seconds * 1e6));
     }
     cJSON *data = cJSON_CreateObject();
     char *message = mem_printf("checkpoint at iteration %.0f: %.1f MB in %.2f s", iteration,
@@ -231,9 +231,9 @@ static void note_checkpoint(const struct listener *l, const cJSON *line) {
     cJSON_Delete(data);
 }
 
-/* How far the optimiser is: the loss comes with its iteration, `rays` is only for the figures.
+/* How far the optimiser is: the loss comes with its iteration, `rays` is only counted.
  * True when the metric is none of the job's curves. */
-static bool note_figures(const struct listener *l, const cJSON *line) {
+static bool note_counters(const struct message_listener *l, const cJSON *line) {
     struct attempt *a = l->attempt;
     const char *series;
     double step, value;
@@ -245,11 +245,11 @@ static bool note_figures(const struct listener *l, const cJSON *line) {
     /* The first iteration that is heard of may be a resumed one: only what follows is new. */
     if (strcmp(series, "loss") == 0 && step < 1e15) {
         if (a->iteration >= 0.0 && step > a->iteration)
-            atomic_fetch_add(&l->figures->iteration_count, (unsigned long long)(step - a->iteration));
+            atomic_fetch_add(&l->counters->iteration_count, (unsigned long long)(step - a->iteration));
         a->iteration = step;
     }
     if (is_rays && value > a->rays && value < 1e18) {
-        atomic_fetch_add(&l->figures->ray_count, (unsigned long long)(value - a->rays));
+        atomic_fetch_add(&l->counters->ray_count, (unsigned long long)(value - a->rays));
         a->rays = value;
     }
     return is_rays;
@@ -264,8 +264,8 @@ static void say_unread(struct attempt *a, const char *what) {
     a->said_unread = true;
 }
 
-static void hear(void *user, const char *text, size_t length) {
-    const struct listener *l = user;
+static void take_line(void *user, const char *text, size_t length) {
+    const struct message_listener *l = user;
     struct attempt *a = l->attempt;
     cJSON *line;
     if (json_parse(text, length, "a worker's line", &line, NULL) != STATUS_OK) {
@@ -283,7 +283,7 @@ static void hear(void *user, const char *text, size_t length) {
     if (strcmp(type, "progress") == 0 || strcmp(type, "stage") == 0)
         enter_event(l, EVENT_PROGRESS, line);
     else if (strcmp(type, "metric") == 0) {
-        if (!note_figures(l, line))
+        if (!note_counters(l, line))
             enter_event(l, EVENT_METRIC, line);
     }
     else if (strcmp(type, "log") == 0)
@@ -311,12 +311,12 @@ static void hear(void *user, const char *text, size_t length) {
     cJSON_Delete(line);
 }
 
-void hearing_listen(struct attempt *a, struct store *store, struct figures *figures) {
-    struct listener listener = {.attempt = a, .store = store, .figures = figures};
+void worker_messages_read(struct attempt *a, struct store *store, struct counters *counters) {
+    struct message_listener listener = {.attempt = a, .store = store, .counters = counters};
     if (a->phase != ATTEMPT_ALIVE)
         return;
-    supervisor_read(&a->worker, hear, &listener);
-    if (supervisor_bury(&a->worker, &a->wait_status, hear, &listener))
+    supervisor_read(&a->worker, take_line, &listener);
+    if (supervisor_reap(&a->worker, &a->wait_status, take_line, &listener))
         a->phase = ATTEMPT_ENDED;
     else
         enter_late(a, store);

@@ -1,5 +1,5 @@
-/* brake.c -- see brake.h. A table of sets, as a processor's cache has it: an address can only be in one set. */
-#include "server/http/brake.h"
+/* auth_throttle.c -- see auth_throttle.h. A table of sets, as a processor's cache has it: an address can only be in one set. */
+#include "server/http/auth_throttle.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -11,30 +11,30 @@
 #define SET_COUNT 1024 /* a power of 2 */
 #define WAY_COUNT 4    /* 4,096 addresses: 160 KiB */
 
-struct slot {
+struct throttle_slot {
     uint8_t key[16]; /* all zero, "::": the unknown address, or not in use, which is the same */
     double room;     /* failures, at since_sec */
     double since_sec;
-    bool is_braked;
+    bool is_throttled;
 };
 
-struct brake {
+struct auth_throttle {
     pthread_mutex_t mutex;
     uint64_t seed; /* so that nobody can aim at another's set */
-    struct slot slots[SET_COUNT][WAY_COUNT];
+    struct throttle_slot slots[SET_COUNT][WAY_COUNT];
 };
 
-struct brake *brake_new(void) {
-    struct brake *b = mem_calloc(1, sizeof *b);
+struct auth_throttle *auth_throttle_new(void) {
+    struct auth_throttle *b = mem_calloc(1, sizeof *b);
     pthread_mutex_init(&b->mutex, NULL);
     if (getrandom(&b->seed, sizeof b->seed, 0) != sizeof b->seed)
         b->seed = 1;
     for (size_t i = 0; i < SET_COUNT * WAY_COUNT; i++)
-        b->slots[i / WAY_COUNT][i % WAY_COUNT].room = BRAKE_BURST;
+        b->slots[i / WAY_COUNT][i % WAY_COUNT].room = AUTH_THROTTLE_BURST;
     return b;
 }
 
-void brake_free(struct brake *b) {
+void auth_throttle_free(struct auth_throttle *b) {
     if (b)
         pthread_mutex_destroy(&b->mutex);
     mem_free(b);
@@ -54,17 +54,17 @@ static void make_key(const struct address *from, uint8_t key[16]) {
         memset(key + 8, 0, 8);
 }
 
-static void refill(struct slot *s, double now_sec) {
-    s->room = fmin(BRAKE_BURST, s->room + BRAKE_PER_SEC * fmax(now_sec - s->since_sec, 0.0));
+static void refill(struct throttle_slot *s, double now_sec) {
+    s->room = fmin(AUTH_THROTTLE_BURST, s->room + AUTH_THROTTLE_PER_SEC * fmax(now_sec - s->since_sec, 0.0));
     s->since_sec = now_sec;
 }
 
-static struct slot *find(struct brake *b, const struct address *from, double now_sec) {
+static struct throttle_slot *find(struct auth_throttle *b, const struct address *from, double now_sec) {
     uint8_t key[16];
     uint64_t halves[2];
     make_key(from, key);
     memcpy(halves, key, sizeof halves);
-    struct slot *set = b->slots[mix(mix(b->seed ^ halves[0]) ^ halves[1]) % SET_COUNT], *best = set;
+    struct throttle_slot *set = b->slots[mix(mix(b->seed ^ halves[0]) ^ halves[1]) % SET_COUNT], *best = set;
     for (size_t i = 0; i < WAY_COUNT; i++) {
         refill(&set[i], now_sec);
         if (memcmp(set[i].key, key, sizeof key) == 0)
@@ -73,18 +73,18 @@ static struct slot *find(struct brake *b, const struct address *from, double now
             best = &set[i];
     }
     memcpy(best->key, key, sizeof key);
-    best->room = BRAKE_BURST;
-    best->is_braked = false;
+    best->room = AUTH_THROTTLE_BURST;
+    best->is_throttled = false;
     return best;
 }
 
-double brake_fail(struct brake *b, const struct address *from, double now_sec, bool *is_first) {
+double auth_throttle_fail(struct auth_throttle *b, const struct address *from, double now_sec, bool *is_first) {
     pthread_mutex_lock(&b->mutex);
-    struct slot *s = find(b, from, now_sec);
+    struct throttle_slot *s = find(b, from, now_sec);
     bool has_room = s->room >= 1.0;
-    double wait_sec = has_room ? 0.0 : (1.0 - s->room) / BRAKE_PER_SEC;
-    *is_first = !has_room && !s->is_braked;
-    s->is_braked = !has_room;
+    double wait_sec = has_room ? 0.0 : (1.0 - s->room) / AUTH_THROTTLE_PER_SEC;
+    *is_first = !has_room && !s->is_throttled;
+    s->is_throttled = !has_room;
     s->room -= has_room ? 1.0 : 0.0;
     pthread_mutex_unlock(&b->mutex);
     return wait_sec;

@@ -1,6 +1,6 @@
-/* tally.c -- see tally.h. The labels are few, whatever clients ask for: what no route takes is one
+/* request_counts.c -- see request_counts.h. The labels are few, whatever clients ask for: what no route takes is one
  * row, and a status that is none of ours is 0. */
-#include "server/http/tally.h"
+#include "server/http/request_counts.h"
 
 #include <stdatomic.h>
 
@@ -11,25 +11,25 @@ static const int codes[] = {0,   200, 201, 202, 204, 206, 304, 400, 401, 403, 40
                             412, 413, 414, 415, 416, 417, 422, 423, 428, 429, 431, 460, 500, 503, 507};
 #define CODES (sizeof codes / sizeof *codes)
 
-struct tally {
+struct request_counts {
     size_t route_count; /* the last row is for requests without a route */
     atomic_ullong (*count)[CODES]; /* [route_count + 1]; owned */
 };
 
-struct tally *tally_new(void) {
-    struct tally *t = mem_calloc(1, sizeof *t);
+struct request_counts *request_counts_new(void) {
+    struct request_counts *t = mem_calloc(1, sizeof *t);
     routes_table(&t->route_count);
     t->count = mem_calloc(t->route_count + 1, sizeof *t->count);
     return t;
 }
 
-void tally_free(struct tally *t) {
+void request_counts_free(struct request_counts *t) {
     if (t)
         mem_free(t->count);
     mem_free(t);
 }
 
-void tally_add(struct tally *t, const struct request *r, int status) {
+void request_counts_add(struct request_counts *t, const struct request *r, int status) {
     size_t row = r->route ? (size_t)(r->route - routes_table(&(size_t){0})) : t->route_count, code = 0;
     for (size_t i = 0; i < CODES; i++)
         if (codes[i] == status)
@@ -37,7 +37,7 @@ void tally_add(struct tally *t, const struct request *r, int status) {
     atomic_fetch_add(&t->count[row][code], 1);
 }
 
-void tally_print(struct tally *t, const char *name, struct buf *b) {
+void request_counts_print(struct request_counts *t, const char *name, struct buf *b) {
     static const char *const methods[] = {[METHOD_GET] = "GET", [METHOD_POST] = "POST",
                                           [METHOD_PATCH] = "PATCH", [METHOD_DELETE] = "DELETE",
                                           [METHOD_OPTIONS] = "OPTIONS"};

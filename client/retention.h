@@ -1,6 +1,6 @@
-/* keeping.h -- how long the server keeps things and what they take, as options and columns. */
-#ifndef UNBAKE_CLIENT_KEEPING_H
-#define UNBAKE_CLIENT_KEEPING_H
+/* retention.h -- how long the server keeps things and what they take, as options and columns. */
+#ifndef UNBAKE_CLIENT_RETENTION_H
+#define UNBAKE_CLIENT_RETENTION_H
 
 #include "client/client.h"
 
@@ -11,15 +11,15 @@
     {"keep-days", 0, OPTION_SECONDS, "N", "remove it N days from now; 0: as the server's rules say"}
 
 /* Adds what those options ask for to the body of a PATCH. */
-enum status keeping_describe(const struct options *o, cJSON *body, struct error *err);
+enum status retention_describe(const struct options *o, cJSON *body, struct error *err);
 
 /* "pinned", the time that is left ("3d 4h"), or "" where a job, scene or upload is kept for ever. */
-void keeping_text(char out[16], const cJSON *thing);
+void retention_text(char out[16], const cJSON *thing);
 /* The same in full: "never: pinned", or the time; borrowed. */
-const char *keeping_time(const cJSON *thing);
+const char *retention_time(const cJSON *thing);
 /* What a job or scene takes of the server's disk ("1.5 GiB"), or "" where that is not known. */
-void keeping_disk(char out[16], const cJSON *thing);
+void retention_disk(char out[16], const cJSON *thing);
 /* "kept for good", "removed in 3d04h", or "". */
-void keeping_sentence(char out[40], const cJSON *thing);
+void retention_sentence(char out[40], const cJSON *thing);
 
 #endif

@@ -1,13 +1,13 @@
-/* figures.h -- what has been done since the daemon started: counters that only grow, for /metrics.
+/* counters.h -- what has been done since the daemon started: counters that only grow, for /metrics.
  *
  * Written by the scheduler's thread, read by any. */
-#ifndef UNBAKE_JOB_FIGURES_H
-#define UNBAKE_JOB_FIGURES_H
+#ifndef UNBAKE_JOB_COUNTERS_H
+#define UNBAKE_JOB_COUNTERS_H
 
 #include <stdatomic.h>
 
 /* How attempts end. */
-enum figures_end {
+enum attempt_end {
     END_SUCCEEDED,
     END_INPUT,   /* the input was at fault */
     END_CRASHED,
@@ -17,7 +17,7 @@ enum figures_end {
     END_COUNT
 };
 
-struct figures {
+struct counters {
     atomic_ullong ends[END_COUNT];
     atomic_ullong first_start_count, first_wait_ms; /* jobs' first attempts, and how long they waited */
     atomic_ullong iteration_count, ray_count;

@@ -1,5 +1,5 @@
-/* crowd.c -- see crowd.h. */
-#include "server/http/crowd.h"
+/* connection_counts.c -- see connection_counts.h. */
+#include "server/http/connection_counts.h"
 
 #include <pthread.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #define KEPT_SHARE 20 /* one connection in so many is kept for loopback */
 #define KEPT_MIN 2
 
-struct crowd {
+struct connection_counts {
     size_t most, of_one; /* of all but loopback; of one address */
     const struct proxies *proxies;
     pthread_mutex_t mutex; /* guards what follows */
@@ -21,8 +21,8 @@ struct crowd {
     } *place; /* [room], count in use: not more than there are connections, so they are looked through */
 };
 
-struct crowd *crowd_new(size_t connection_max, size_t of_one, const struct proxies *proxies) {
-    struct crowd *c = mem_calloc(1, sizeof *c);
+struct connection_counts *connection_counts_new(size_t connection_max, size_t of_one, const struct proxies *proxies) {
+    struct connection_counts *c = mem_calloc(1, sizeof *c);
     size_t kept = connection_max / KEPT_SHARE > KEPT_MIN ? connection_max / KEPT_SHARE : KEPT_MIN;
     c->most = connection_max > kept ? connection_max - kept : 1;
     c->of_one = of_one;
@@ -31,7 +31,7 @@ struct crowd *crowd_new(size_t connection_max, size_t of_one, const struct proxi
     return c;
 }
 
-void crowd_free(struct crowd *c) {
+void connection_counts_free(struct connection_counts *c) {
     if (!c)
         return;
     pthread_mutex_destroy(&c->mutex);
@@ -56,27 +56,27 @@ static struct address key_of(const struct address *from) {
     return key;
 }
 
-static struct place *find(struct crowd *c, const struct address *key) {
+static struct place *find(struct connection_counts *c, const struct address *key) {
     for (size_t i = 0; i < c->count; i++)
         if (memcmp(&c->place[i].from, key, sizeof *key) == 0)
             return &c->place[i];
     return NULL;
 }
 
-static bool is_bound(const struct crowd *c, const struct address *from) {
+static bool is_bound(const struct connection_counts *c, const struct address *from) {
     return !is_loopback(from) && !(c->proxies && proxies_trust(c->proxies, from));
 }
 
-enum crowd_answer crowd_enter(struct crowd *c, const struct address *from) {
+enum connection_answer connection_counts_enter(struct connection_counts *c, const struct address *from) {
     struct address key = key_of(from);
-    enum crowd_answer answer = CROWD_OK;
+    enum connection_answer answer = CONNECTION_OK;
     pthread_mutex_lock(&c->mutex);
     struct place *p = find(c, &key);
     if (is_bound(c, from) && c->all >= c->most)
-        answer = CROWD_FULL;
+        answer = CONNECTION_FULL;
     else if (is_bound(c, from) && p && c->of_one > 0 && p->connections >= c->of_one)
-        answer = CROWD_ADDRESS_FULL;
-    if (answer == CROWD_OK && !p) {
+        answer = CONNECTION_ADDRESS_FULL;
+    if (answer == CONNECTION_OK && !p) {
         if (c->count == c->room) {
             c->room = c->room ? 2 * c->room : 64;
             c->place = mem_realloc_array(c->place, c->room, sizeof *c->place);
@@ -84,7 +84,7 @@ enum crowd_answer crowd_enter(struct crowd *c, const struct address *from) {
         p = &c->place[c->count++];
         *p = (struct place){.from = key};
     }
-    if (answer == CROWD_OK) {
+    if (answer == CONNECTION_OK) {
         p->connections++;
         c->all++;
     }
@@ -92,7 +92,7 @@ enum crowd_answer crowd_enter(struct crowd *c, const struct address *from) {
     return answer;
 }
 
-void crowd_leave(struct crowd *c, const struct address *from) {
+void connection_counts_leave(struct connection_counts *c, const struct address *from) {
     struct address key = key_of(from);
     pthread_mutex_lock(&c->mutex);
     struct place *p = find(c, &key);

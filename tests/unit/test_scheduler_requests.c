@@ -1,4 +1,4 @@
-/* test_scheduler_wishes.c -- what users ask of the scheduler while jobs run, and what the machine does to it: workers that
+/* test_scheduler_requests.c -- what users ask of the scheduler while jobs run, and what the machine does to it: workers that
  * do not start, a daemon that is killed (scheduler_rig.h). */
 #include <dirent.h>
 #include <sys/wait.h>

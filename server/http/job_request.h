@@ -1,6 +1,6 @@
-/* wish.h -- what the body of POST /v1/jobs or of PATCH /v1/jobs/ID asks for. */
-#ifndef UNBAKE_HTTP_WISH_H
-#define UNBAKE_HTTP_WISH_H
+/* job_request.h -- what the body of POST /v1/jobs or of PATCH /v1/jobs/ID asks for. */
+#ifndef UNBAKE_HTTP_JOB_REQUEST_H
+#define UNBAKE_HTTP_JOB_REQUEST_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -11,7 +11,7 @@
 #include "server/store/store.h"
 
 /* Pointers lie in `body`. */
-struct wish {
+struct job_request {
     cJSON *body; /* owned */
     const char *scene, *name;
     const cJSON *settings;
@@ -21,16 +21,16 @@ struct wish {
     int shared;   /* -1: not given */
     enum job_place place;
     int64_t before; /* with JOB_PLACE_BEFORE */
-    struct keeping keeping;
+    struct retention retention;
 };
 
 /* Reads and checks the request's body; all faults go into the array `params`, as problem_param puts them.
- * NULL, or a reply where the body is no JSON object at all. *w needs wish_release in any case. */
-struct response *wish_read(const struct request *r, struct wish *w, bool is_new, cJSON *params);
-void wish_release(struct wish *w);
+ * NULL, or a reply where the body is no JSON object at all. *w needs job_request_release in any case. */
+struct response *job_request_read(const struct request *r, struct job_request *w, bool is_new, cJSON *params);
+void job_request_release(struct job_request *w);
 
 /* Applies the settings that it asks for, if any, over *settings; faults as above, their names with
  * "settings." before them. */
-void wish_settings(const struct wish *w, struct settings *settings, cJSON *params);
+void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params);
 
 #endif

@@ -1,5 +1,5 @@
-/* wish.c -- see wish.h. */
-#include "server/http/wish.h"
+/* job_request.c -- see job_request.h. */
+#include "server/http/job_request.h"
 
 #include <limits.h>
 #include <math.h>
@@ -12,7 +12,7 @@
 #include "common/utf8.h"
 #include "server/http/api.h"
 #include "server/http/body.h"
-#include "server/http/keeping.h"
+#include "server/http/retention.h"
 #include "server/http/problem.h"
 
 #define PRIORITY_MAX 100
@@ -21,7 +21,7 @@
 #define WEBHOOK_SECRET_LEAST 16
 #define WEBHOOK_SECRET_MOST 200
 
-void wish_release(struct wish *w) {
+void job_request_release(struct job_request *w) {
     cJSON_Delete(w->body);
     mem_free(w->labels);
 }
@@ -34,7 +34,7 @@ static bool check_string(const cJSON *member, size_t max, cJSON *params) {
     return false;
 }
 
-static void read_labels(struct wish *w, const cJSON *member, cJSON *params) {
+static void read_labels(struct job_request *w, const cJSON *member, cJSON *params) {
     size_t count = 0;
     bool good = cJSON_IsObject(member);
     for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
@@ -48,7 +48,7 @@ static void read_labels(struct wish *w, const cJSON *member, cJSON *params) {
                       "text of at most %d bytes without control characters", LABELS_MAX, LABEL_MAX_BYTES);
 }
 
-static void read_priority(struct wish *w, const cJSON *member, cJSON *params) {
+static void read_priority(struct job_request *w, const cJSON *member, cJSON *params) {
     double value = cJSON_IsNumber(member) ? member->valuedouble : NAN;
     if (fabs(value) <= PRIORITY_MAX && value == floor(value))
         w->priority = (int)value;
@@ -64,7 +64,7 @@ static bool is_key(const char *base64) {
 }
 
 /* {"url", "secret"}: both, and nothing else. */
-static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
+static void read_webhook(struct job_request *w, const cJSON *member, cJSON *params) {
     const char *url = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "url"));
     const char *secret = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(member, "secret"));
     struct url parts;
@@ -88,7 +88,7 @@ static void read_webhook(struct wish *w, const cJSON *member, cJSON *params) {
 }
 
 /* "first", "last" or the number of a job. */
-static void read_order(struct wish *w, const cJSON *member, cJSON *params) {
+static void read_order(struct job_request *w, const cJSON *member, cJSON *params) {
     double before = cJSON_IsNumber(member) ? member->valuedouble : 0.0;
     const char *word = cJSON_IsString(member) ? member->valuestring : "";
     w->place = JOB_PLACE_KEEP;
@@ -103,7 +103,7 @@ static void read_order(struct wish *w, const cJSON *member, cJSON *params) {
     w->before = (int64_t)before;
 }
 
-struct response *wish_read(const struct request *r, struct wish *w, bool is_new, cJSON *params) {
+struct response *job_request_read(const struct request *r, struct job_request *w, bool is_new, cJSON *params) {
     memset(w, 0, sizeof *w);
     w->priority = INT_MIN;
     w->shared = -1;
@@ -125,7 +125,7 @@ struct response *wish_read(const struct request *r, struct wish *w, bool is_new,
             problem_param(params, name, NULL, "must be true or false");
         else if (!is_new && strcmp(name, "order") == 0)
             read_order(w, member, params);
-        else if (!is_new && keeping_read(&w->keeping, member, params))
+        else if (!is_new && retention_read(&w->retention, member, params))
             continue;
         else if (is_new && strcmp(name, "scene") == 0)
             w->scene = check_string(member, SCENE_ID_SIZE - 1, params) ? member->valuestring : NULL;
@@ -144,7 +144,7 @@ struct response *wish_read(const struct request *r, struct wish *w, bool is_new,
     return NULL;
 }
 
-void wish_settings(const struct wish *w, struct settings *settings, cJSON *params) {
+void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params) {
     cJSON *problems = cJSON_CreateArray();
     if (w->settings && settings_apply(settings, w->settings, problems, NULL) != STATUS_OK) {
         const cJSON *problem;

@@ -1,0 +1,27 @@
+/* auth_throttle.h -- how often an address may present wrong tokens.
+ *
+ * Each address has room for AUTH_THROTTLE_BURST failures, which comes back at AUTH_THROTTLE_PER_SEC; without room, a failure is told
+ * apart from the others, answered with 429 and the end of the connection, and no line in the log. Tokens are 192 random
+ * bits, which nobody guesses at any rate: the limit keeps such attempts from filling the log and loading the store. A good token is always
+ * let in, so that nobody behind the same address (a proxy that is not trusted, a lab's gateway) can lock the others out.
+ *
+ * An IPv6 address stands for its /64, which is one customer's. Memory is bounded: the address with most room left makes
+ * place for a new one. Thread-safe. */
+#ifndef UNBAKE_HTTP_AUTH_THROTTLE_H
+#define UNBAKE_HTTP_AUTH_THROTTLE_H
+
+#include "server/http/message.h"
+
+#define AUTH_THROTTLE_BURST 20.0
+#define AUTH_THROTTLE_PER_SEC 0.5 /* a page that is left open with an old token comes back every 3 s */
+
+struct auth_throttle; /* opaque */
+
+struct auth_throttle *auth_throttle_new(void);
+void auth_throttle_free(struct auth_throttle *b);
+
+/* A failure from `from` at `now_sec` (CLOCK_MONOTONIC). 0: there was room; else in how many seconds there is. *is_first:
+ * it is the first one without room since there last was some. */
+double auth_throttle_fail(struct auth_throttle *b, const struct address *from, double now_sec, bool *is_first);
+
+#endif
