@@ -11,7 +11,7 @@ shift
 # Too slow under a sanitizer for every day, or with nothing for it to find; `make asan` and
 # `make tsan` run them all the same.
 slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/test_demo_room
-render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_gloss
+render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
 render/test_held_out_light render/test_saturated_light render/test_short render/test_sky_room
 render/test_fireflies_left_out render/test_sun render/test_split api/test_resume api/test_readme
 api/test_backup api/test_axe api/test_webhook_library

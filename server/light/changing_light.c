@@ -83,7 +83,7 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
     struct best_item item[LOOKS_ASKED];
     size_t black_count = 0, own = 0;
     best_init(&drawn, item, LOOKS_ASKED);
-    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) || !divide_white(d, texel, &white))
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) || !divide_lambert(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         struct view view;

@@ -49,7 +49,7 @@ static void place_texel(void *user, size_t index, int thread) {
     struct irradiance light = {0};
     rgb white;
     *p = (struct light_place){.segment = reconstruction_segment(r, job->texel[index])};
-    if (!(m->weight > 0.0f) || !divide_white(job->divide, job->texel[index], &white) ||
+    if (!(m->weight > 0.0f) || !divide_lambert(job->divide, job->texel[index], &white) ||
         !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, job->texel[index], &p->at))
         return;
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);

@@ -7,30 +7,28 @@
 #include "common/mem.h"
 #include "server/scene/surface.h"
 
-/* Variance by light of others (struct measured, mixing) at which a texel counts half: of a black frame before a
- * window a few clean texels must outweigh many that shine with it. */
+/* Variance by light of other surfaces (measured.mixing) at which a texel has half its weight. Small: a few clean texels
+ * of a black window frame must outweigh many that are mixed with the bright window. */
 #define MIXING_FLOOR 0.001
-#define LEAST_VARIANCE 1e-4f /* of the texels of a segment, as far as is known */
-/* Share of a segment's texels that must be measured cleanly for its own mean to count as much as its
- * surroundings; it counts with the square of that share. */
+#define MIN_VARIANCE 1e-4f /* lower bound of a prior's variance, summed over the channels */
+/* Cleanly measured share of a segment's texels at which its own mean and its surroundings count alike. */
 #define SHARE_KNOWN 0.003
-/* A cube tells when so many clean texels were measured in it. */
-#define LEAST_WEIGHT 8.0
-#define STRIDE 3 /* valid texels from one that is asked to the next */
-#define LEVELS 7 /* of grids; 2^(LEVELS - 1) cubes along each side of the room's bounds at the finest */
+#define MIN_WEIGHT 8.0 /* clean texels in a cube from which it is used */
+#define STRIDE 3         /* every third valid texel is used, for time */
+#define LEVELS 7         /* grids; the finest has 2^(LEVELS - 1) cubes along the longest side of the room */
 
-/* Sums over measured texels. */
-struct evidence {
+/* Weighted sums over measured texels. */
+struct chart_evidence {
     double color[3], squares, weight;
 };
 
 struct grids {
     vec3 lower;
     float scale; /* cubes of the finest grid per metre */
-    struct evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
+    struct chart_evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
 };
 
-static void evidence_add(struct evidence *e, const struct measured *m) {
+static void evidence_add(struct chart_evidence *e, const struct measured *m) {
     rgb v = measured_value(m);
     double weight = MIXING_FLOOR / (MIXING_FLOOR + (double)image_float_from_half(m->mixing));
     e->color[0] += weight * (double)v.r;
@@ -40,13 +38,13 @@ static void evidence_add(struct evidence *e, const struct measured *m) {
     e->weight += weight;
 }
 
-static struct color_prior prior_of(const struct evidence *e) {
+static struct color_prior prior_of(const struct chart_evidence *e) {
     if (!(e->weight > 0.0))
         return (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f};
     rgb mean = rgb_make((float)(e->color[0] / e->weight), (float)(e->color[1] / e->weight),
                         (float)(e->color[2] / e->weight));
     float variance = (float)(e->squares / e->weight) - rgb_dot(mean, mean);
-    return (struct color_prior){mean, fmaxf(variance, LEAST_VARIANCE)};
+    return (struct color_prior){mean, fmaxf(variance, MIN_VARIANCE)};
 }
 
 /* --- surroundings -------------------------------------------------------------------------------- */
@@ -66,7 +64,7 @@ static void grids_release(struct grids *g) {
         mem_free(g->cell[k]);
 }
 
-static struct evidence *grids_cell(const struct grids *g, int level, vec3 point) {
+static struct chart_evidence *grids_cell(const struct grids *g, int level, vec3 point) {
     uint32_t last = (1u << (LEVELS - 1)) - 1u;
     vec3 at = vec3_scale(vec3_sub(point, g->lower), g->scale);
     const float place[3] = {at.x, at.y, at.z};
@@ -94,21 +92,21 @@ static void grids_fill(struct grids *g, const struct reconstruction *r, const st
     }
 }
 
-/* What is measured around each chart, texel by texel of it from the finest grid that tells. */
-static struct evidence *around_charts(const struct reconstruction *r, const struct grids *g) {
-    struct evidence *around = mem_calloc(r->atlas.chart_count, sizeof *around);
+/* Means over the surroundings of each chart's texels, each from the finest grid that has enough measurements there. */
+static struct chart_evidence *around_charts(const struct reconstruction *r, const struct grids *g) {
+    struct chart_evidence *around = mem_calloc(r->atlas.chart_count, sizeof *around);
     for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
         uint32_t texel = r->inverse.valid[i];
         struct surface_point at;
         if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
             continue;
         int level = LEVELS - 1;
-        while (level > 0 && !(grids_cell(g, level, at.position)->weight > LEAST_WEIGHT))
+        while (level > 0 && !(grids_cell(g, level, at.position)->weight > MIN_WEIGHT))
             level--;
-        const struct evidence *cell = grids_cell(g, level, at.position);
+        const struct chart_evidence *cell = grids_cell(g, level, at.position);
         if (!(cell->weight > 0.0))
             continue;
-        struct evidence *to = &around[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]];
+        struct chart_evidence *to = &around[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]];
         for (int c = 0; c < 3; c++)
             to->color[c] += cell->color[c] / cell->weight;
         to->squares += cell->squares / cell->weight;
@@ -119,10 +117,10 @@ static struct evidence *around_charts(const struct reconstruction *r, const stru
 
 /* --- segments ------------------------------------------------------------------------------------ */
 
-/* What is known of each segment, and how many texels it has. */
-static struct evidence *of_segments(const struct reconstruction *r, const struct measured *measured,
+/* Sums over each segment, and its number of texels. */
+static struct chart_evidence *of_segments(const struct reconstruction *r, const struct measured *measured,
                                     size_t *texels) {
-    struct evidence *own = mem_calloc(r->segments.count, sizeof *own);
+    struct chart_evidence *own = mem_calloc(r->segments.count, sizeof *own);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
         texels[reconstruction_segment(r, texel)]++;
@@ -140,10 +138,10 @@ static struct color_prior mix(struct color_prior a, struct color_prior b, float 
 struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured) {
     struct grids grids;
     size_t *texels = mem_calloc(r->segments.count, sizeof *texels);
-    struct evidence *own = of_segments(r, measured, texels);
+    struct chart_evidence *own = of_segments(r, measured, texels);
     grids_init(&grids, &r->scene->mesh);
     grids_fill(&grids, r, measured);
-    struct evidence *around = around_charts(r, &grids);
+    struct chart_evidence *around = around_charts(r, &grids);
     struct color_prior *prior = mem_array(r->atlas.chart_count, sizeof *prior);
     for (size_t i = 0; i < r->scene->mesh.triangle_count; i++) {
         size_t chart = r->atlas.chart_of_triangle[i], segment = r->segments.of_triangle[i];

@@ -1,16 +1,15 @@
-/* color_prior.h -- what base colour is to be expected of each chart before its texels are looked at.
+/* color_prior.h -- prior mean and variance of base colour for each chart.
  *
- * Of a segment that photographs show well: its mean and how its texels vary about it. Of one that they
- * hardly show, or only in pixels that mix surfaces: what is measured of the surfaces around it, since a
- * window's reveal is more like the wall beside it than like the mean of the room. Surroundings are
- * the finest of nested grids of cubes in which something was measured. */
+ * For a segment that photographs show well: mean and variance of its texels. For one that they hardly show, or only in
+ * mixed pixels: those of the surfaces around it, since a window's reveal resembles the wall beside it more than the
+ * mean of the room. The surroundings of a texel are its cube in the finest of nested grids that has measurements. */
 #ifndef UNBAKE_MATERIAL_COLOR_PRIOR_H
 #define UNBAKE_MATERIAL_COLOR_PRIOR_H
 
 #include "server/material/denoise.h"
 #include "server/state/reconstruction.h"
 
-/* [chart_count] from measured[height][width]; the caller's. Emitters' are neutral. */
+/* [chart_count] from measured[height][width]; the caller's. Emitters get NEUTRAL_BASE_COLOR. */
 struct color_prior *color_priors(const struct reconstruction *r, const struct measured *measured);
 
 #endif

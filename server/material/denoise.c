@@ -1,7 +1,7 @@
 /* denoise.c -- see denoise.h.
  *
- * The fine scales of a chart are filtered in tiles, each with a margin from which its filters read. What they leave
- * is smooth: every GRID-th texel a side tells it all, and a chart's coarse scales are filtered at once on that grid. */
+ * The fine scales of a chart are filtered in tiles with a margin for the filters. The low-pass that they leave is
+ * sampled at every GRID-th texel a side, and the coarse scales of the whole chart are filtered on that grid. */
 #include "server/material/denoise.h"
 
 #include <math.h>
@@ -10,11 +10,11 @@
 #include "common/mem.h"
 #include "server/material/wiener.h"
 
-#define TILE 512
+#define TILE 512          /* texels a side; does not change results */
 #define FINE_LEVELS 5
-#define FINE_WINDOW 80    /* texels to either side over which power is averaged, at most */
-#define GRID 8            /* texels; a quarter of what the finest of the coarse scales differs over */
-#define COARSE_WINDOW 24  /* of the grid */
+#define FINE_WINDOW 80    /* largest radius of the window over which power is averaged, texels */
+#define GRID 8            /* texels between samples of the coarse scales: a quarter of the finest one's step */
+#define COARSE_WINDOW 24  /* the same radius on the coarse scales, samples of the grid */
 #define COARSE_STEP ((1 << FINE_LEVELS) / GRID)
 
 struct box {
@@ -23,16 +23,16 @@ struct box {
 
 /* The coarse scales of a chart: at texels x0 + GRID * i, y0 + GRID * j of the atlas. */
 struct layer {
-    struct box box;              /* whole steps of the grid, one more than the chart covers; empty: not wanted */
+    struct box box;              /* a whole number of grid steps, one more than the chart covers; empty: not wanted */
     size_t width, height;        /* of the grid */
-    float *plane[WIENER_PLANES]; /* [height][width] what the fine scales leave; owned */
-    float (*smooth)[3];          /* [height][width] the same without noise; owned */
+    float *plane[WIENER_PLANES]; /* [height][width] low-pass of the fine scales; owned */
+    float (*smooth)[3];          /* [height][width] the same, denoised; owned */
 };
 
 /* A part of a chart. */
 struct item {
     uint32_t chart;
-    struct box core, around; /* what is written; what is read */
+    struct box core, around; /* texels written; texels read */
 };
 
 struct denoise_job {
@@ -79,7 +79,7 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
     }
 }
 
-/* To the texture what was kept of the fine scales, to the layer what they leave. */
+/* Writes the fine scales to the texture, and their low-pass to the layer. */
 static void tile_write(const struct wiener *t, const struct denoise_job *job, const struct item *item) {
     const struct layer *layer = &job->layer[item->chart];
     for (long y = item->core.y0; y < item->core.y1; y++) {
@@ -129,8 +129,8 @@ static int coarse_levels(const struct layer *l) {
     return levels;
 }
 
-/* What was kept of a sample and what no level's detail tells: the smoothest of the levels, drawn to the prior where
- * it may be light of other surfaces. */
+/* Sum of the scales kept and of the final low-pass, which is shrunk to the prior by the variance from light of other
+ * surfaces. */
 static void add_mean(float smooth[3], const struct wiener *w, size_t at, const struct color_prior *prior) {
     const float mean[3] = {prior->mean.r, prior->mean.g, prior->mean.b};
     float weight = w->plane[WIENER_WEIGHT][at];
@@ -164,7 +164,7 @@ static void filter_coarse(void *user, size_t chart, int thread) {
     wiener_release(&w);
 }
 
-/* Between the samples of a layer, of which there is one beyond each texel. */
+/* Bilinear; a layer has one sample beyond the last texel. */
 static float smooth_at(const struct layer *l, long x, long y, int channel) {
     long i = (x - l->box.x0) / GRID, j = (y - l->box.y0) / GRID;
     float tx = (float)((x - l->box.x0) % GRID) / GRID, ty = (float)((y - l->box.y0) % GRID) / GRID;
@@ -191,7 +191,7 @@ static void add_coarse(void *user, size_t index, int thread) {
 
 /* --- which tiles there are ---------------------------------------------------------------------- */
 
-/* The texels that each chart covers, and one more all around. */
+/* Bounding box of each chart, with a margin of one texel. */
 static struct box *chart_boxes(const struct atlas *atlas, size_t triangle_count) {
     struct box *box = mem_array(atlas->chart_count, sizeof *box);
     for (size_t i = 0; i < atlas->chart_count; i++)
@@ -212,7 +212,7 @@ static struct box common(struct box a, struct box b) {
                         a.y1 < b.y1 ? a.y1 : b.y1};
 }
 
-/* Of the texels that a chart covers, the box of its layer: whole steps of the grid, and one more. */
+/* Box of the layer of a chart with bounding box b: whole grid steps, and one more. */
 static struct box layer_box(const struct box *b) {
     return (struct box){b->x0, b->y0, b->x0 + ((b->x1 - 1 - b->x0) / GRID + 1) * GRID + 1,
                         b->y0 + ((b->y1 - 1 - b->y0) / GRID + 1) * GRID + 1};

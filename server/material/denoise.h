@@ -1,13 +1,11 @@
-/* denoise.h -- base colour without the photographs' noise, and in-fill where nothing was measured.
+/* denoise.h -- removes the photographs' noise from base colour, and fills in texels that were not measured.
  *
- * Each chart is filtered scale by scale (wiener.h), from one texel up to the whole chart: a wall that differs over a
- * metre by no more than noise does is flat. What noise alone gives is known by a draw of it: half of the photographs
- * of a texel held against the others (halves.h), so that what they do not agree on is noise, and what correlates that
- * of neighbouring texels is accounted for. Where one photograph alone tells, the same look-up is made in a picture of
- * pure noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain.
- * The weight of a texel tells how noisy it is beside its neighbours; one of weight 0 is filled in
- * from them, and a chart of which nothing is known from its prior. Nothing crosses the border of a
- * chart, so nothing crosses that of a segment. */
+ * Each chart is filtered scale by scale (wiener.h), from one texel up to the whole chart. The power of noise is known
+ * from a sample of it: half of a texel's photographs less the other half (halves.h), which preserves the correlation of
+ * noise between neighbouring texels. Where there is a single photograph, the sample is read from a picture of pure
+ * noise (noise.h). Detail is kept by its share of texture: walls become flat, wood keeps its grain.
+ * A texel's weight is its inverse noise variance; texels of weight 0 are filled in from their neighbours, and charts
+ * without measurements from their prior. Nothing crosses the border of a chart, hence none of a segment. */
 #ifndef UNBAKE_MATERIAL_DENOISE_H
 #define UNBAKE_MATERIAL_DENOISE_H
 
@@ -21,7 +19,7 @@
 #include "server/scene/inverse_uv.h"
 #include "server/scene/texture.h"
 
-/* What is known of a chart's colour before its texels are looked at. */
+/* Prior of a chart's base colour. */
 struct color_prior {
     rgb mean;
     float variance; /* of texels about the mean, summed over the channels */

@@ -1,7 +1,7 @@
 /* detail.c -- see detail.h.
  *
- * Photographs are gone through pixel by pixel, on all threads; what each tells of the texels beneath it is added to sums
- * of whole numbers, which come out the same in any order. */
+ * Pixels are processed on all threads. Their contributions to texels are summed in integers, whose result does not
+ * depend on the order. */
 #include "server/material/detail.h"
 
 #include <math.h>
@@ -13,39 +13,39 @@
 #include "server/scene/rgb_half.h"
 
 #define CHUNK 4096 /* texels a work item */
-#define STRIDE 16  /* pixels, when it is asked how large they are */
+#define STRIDE 16  /* pixels between those of which the footprint's size is taken */
 #define NONE UINT32_MAX
-/* A pixel is asked only where most of what it covers is known. */
-#define KNOWN_LEAST 0.75f
-/* What differs over more than this many pixels to either side is not texture; told from at least so many of them. */
+/* Least part of a pixel's footprint that must be known. */
+#define MIN_KNOWN 0.75f
+/* Radius of the high-pass filter, pixels, and least number of pixels in its window. */
 #define WINDOW 5
-#define WINDOW_LEAST 12.0f
-/* Of base colour, by one pixel. */
-#define OFF_MOST 0.2f
-/* Noise of a pixel, as a share of what it shows, is told from base colour and so much more: highlights are noisy, too. */
-#define SHEEN 0.1f
-/* Ways in which photographs are parted in halves; in those that count the lesser has this part of a texel's weight. */
-#define WAYS 4
-#define HALF_LEAST 0.15f
-/* Texels to either side over which it is averaged how far the halves agree, and what disagreement counts: it is in part
- * that one half is sharper than the other. */
-#define AROUND 4
+#define MIN_WINDOW 12.0f
+/* Bound of one pixel's residual, base colour. */
+#define MAX_RESIDUAL 0.2f
+/* Added to base colour where a pixel's noise is estimated from it: highlights are noisy, too. */
+#define SPECULAR_FLOOR 0.1f
+/* Splits of the photographs into halves; a split counts for a texel if the lesser half has this part of its weight. */
+#define SPLITS 4
+#define MIN_HALF 0.15f
+/* Radius over which the halves' agreement is averaged, texels, and the weight of their disagreement as noise: it is low
+ * because part of it is a difference of sharpness. */
+#define AGREEMENT_RADIUS 4
 #define DISAGREEMENT 0.04f
-#define SHARE_LEAST 0.05f /* texels of which the photographs tell less stay as they are */
-/* Of whole numbers in sums: coarse, until the most pixels of a texel are known; then so that these have room. The
- * worth of pixels differs by orders of magnitude: counted coarsely the least would be lost, and steps be too long. */
+#define MIN_SHARE 0.05f /* a lower share counts as 0 */
+/* Scales of the integer sums: COUNT_SCALE until the greatest sum of weights is known, then the largest that cannot
+ * overflow. Weights differ by orders of magnitude: with a coarse scale the least are lost, and steps are too long. */
 #define COUNT_SCALE 4096.0f
-#define SUM_MOST 1e9f
+#define MAX_SUM 1e9f
 
 enum { RED, GREEN, BLUE, SUMS };
-enum { COUNT, OFF };            /* sums of another kind: pixels, and what they are off by */
-#define ALL_PHOTOGRAPHS (-1)    /* in place of a way to part them */
+enum { WEIGHT, RESIDUAL };   /* the sums while shares are measured: weights, and weighted residuals */
+#define ALL_PHOTOGRAPHS (-1) /* in place of a split */
 
-/* One photograph that is gone through. */
+/* One photograph being processed. */
 struct picture_job {
     struct detail *detail;
     uint32_t train;
-    rgb *raw; /* [pixels] what is off before the mean is taken away */
+    rgb *raw; /* [pixels] residual before the high-pass filter */
 };
 
 static const struct photograph *photograph_of(const struct detail *d, uint32_t train) {
@@ -65,29 +65,29 @@ static void for_rows(struct detail *d, uint32_t train, void (*body)(void *user, 
 
 static size_t chunks_of(const struct detail *d) { return (d->r->inverse.valid_count + CHUNK - 1) / CHUNK; }
 
-/* The texels beneath a pixel that shows a triangle; false where too few of them are known. */
-static bool texels_beneath(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
+/* The texels in the footprint of a pixel that shows a triangle; false where too few of them are known. */
+static bool pixel_footprint(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
                            struct footprint_texels *t) {
     const struct reconstruction *r = d->r;
     struct footprint f;
     return triangle != NONE &&
            footprint_of_triangle(&f, &r->scene->mesh, &r->atlas, &photograph_of(d, train)->camera, x, y, triangle) &&
            footprint_texels(t, &f, r->atlas.chart_of_triangle[triangle], d->chart_of_texel, r->inverse.width,
-                            r->inverse.height) >= KNOWN_LEAST;
+                            r->inverse.height) >= MIN_KNOWN;
 }
 
 static void add_to(_Atomic int32_t *sum, float what) {
     atomic_fetch_add_explicit(sum, (int32_t)lrintf(what), memory_order_relaxed);
 }
 
-/* --- what pixels should show -------------------------------------------------------------------- */
+/* --- residuals ---------------------------------------------------------------------------------- */
 
 static rgb divided(rgb over, rgb under) {
     return rgb_make(over.r / under.r, over.g / under.g, over.b / under.b);
 }
 
-/* The triangle that a pixel shows; NONE where that is an emitter, or not all that it shows, or more than it can tell. */
-static uint32_t triangle_shown(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, rgb *shown) {
+/* The triangle that a pixel shows; NONE for emitters, mixed pixels, fireflies and saturated pixels. */
+static uint32_t pixel_triangle(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, rgb *observed) {
     const struct photograph *photo = photograph_of(d, train);
     const struct reconstruction *r = d->r;
     struct photograph_sample s;
@@ -98,21 +98,20 @@ static uint32_t triangle_shown(const struct detail *d, uint32_t train, uint32_t 
         !footprint_find(&f, &r->scene->mesh, &r->atlas, d->views->accel, &photo->camera, x, y) ||
         r->is_emitter[r->segments.of_triangle[f.triangle]])
         return NONE;
-    *shown = s.radiance;
+    *observed = s.radiance;
     return f.triangle;
 }
 
-/* What of a pixel's noise is that of its brightness: as a share of white its variance is that of a share of what it
- * shows. */
-static float worth_of(const struct detail *d, const struct photograph *photo, rgb told, rgb white) {
-    rgb bright = rgb_mad(rgb_clamp(told, 0.0f, INFINITY), SHEEN, white);
-    float dark = SHEEN * rgb_mean(white) / rgb_mean(bright);
+/* Inverse noise variance of a pixel's residual in units of base colour. */
+static float weight_of(const struct detail *d, const struct photograph *photo, rgb predicted, rgb lambert) {
+    rgb bright = rgb_mad(rgb_clamp(predicted, 0.0f, INFINITY), SPECULAR_FLOOR, lambert);
+    float dark = SPECULAR_FLOOR * rgb_mean(lambert) / rgb_mean(bright);
     return noise_weight_of_brightness(&d->r->noise, photo, bright) * dark * dark;
 }
 
-/* What each pixel shows beyond what the texture tells, as base colour. A single pixel that is far too bright, as a
- * renderer's samples may leave it, would darken all around it when the mean is taken away. */
-static void find_row(void *user, size_t row, int thread) {
+/* Residual of each pixel as base colour. It is clamped: a single far too bright pixel, as path tracers leave, would
+ * darken its surroundings through the high-pass filter. */
+static void residual_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct picture_job *job = user;
     struct detail *d = job->detail;
@@ -120,24 +119,24 @@ static void find_row(void *user, size_t row, int thread) {
     struct footprint_texels t;
     for (uint32_t x = 0; x < photo->camera.width; x++) {
         size_t at = row * photo->camera.width + x;
-        rgb shown = rgb_gray(0.0f), told = shown, white = shown;
-        uint32_t triangle = triangle_shown(d, job->train, x, (uint32_t)row, &shown);
+        rgb observed = rgb_gray(0.0f), predicted = observed, lambert = observed;
+        uint32_t triangle = pixel_triangle(d, job->train, x, (uint32_t)row, &observed);
         d->triangle[job->train][at] = NONE;
-        if (!texels_beneath(d, job->train, x, (uint32_t)row, triangle, &t))
+        if (!pixel_footprint(d, job->train, x, (uint32_t)row, triangle, &t))
             continue;
         for (size_t i = 0; i < t.count; i++) {
-            rgb part = rgb_scale(rgb_from_half(d->white[t.texel[i]]), t.share[i]);
-            white = rgb_add(white, part);
-            told = rgb_add(told, rgb_mul(part, rgb_from_half(d->measured[t.texel[i]].value)));
+            rgb part = rgb_scale(rgb_from_half(d->lambert[t.texel[i]]), t.share[i]);
+            lambert = rgb_add(lambert, part);
+            predicted = rgb_add(predicted, rgb_mul(part, rgb_from_half(d->measured[t.texel[i]].value)));
         }
         d->triangle[job->train][at] = triangle;
-        d->worth[job->train][at] = worth_of(d, photo, told, white);
-        job->raw[at] = rgb_clamp(divided(rgb_sub(shown, told), white), -OFF_MOST, OFF_MOST);
+        d->weight[job->train][at] = weight_of(d, photo, predicted, lambert);
+        job->raw[at] = rgb_clamp(divided(rgb_sub(observed, predicted), lambert), -MAX_RESIDUAL, MAX_RESIDUAL);
     }
 }
 
-/* Takes away the mean of the same segment's pixels around each. */
-static void flatten_row(void *user, size_t row, int thread) {
+/* High-pass filter: subtracts the mean over the same segment's pixels around each. */
+static void filter_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct picture_job *job = user;
     const struct camera *camera = &photograph_of(job->detail, job->train)->camera;
@@ -146,24 +145,24 @@ static void flatten_row(void *user, size_t row, int thread) {
     long width = (long)camera->width, height = (long)camera->height, y0 = (long)row;
     for (long x0 = 0; x0 < width; x0++) {
         size_t at = (size_t)(y0 * width + x0);
-        rgb sum = rgb_gray(0.0f), off = rgb_gray(NAN);
+        rgb sum = rgb_gray(0.0f), residual = rgb_gray(NAN);
         float count = 0.0f;
         for (long y = y0 > WINDOW ? y0 - WINDOW : 0; triangle[at] != NONE && y <= y0 + WINDOW && y < height; y++) {
             for (long x = x0 > WINDOW ? x0 - WINDOW : 0; x <= x0 + WINDOW && x < width; x++) {
-                size_t beside = (size_t)(y * width + x);
-                if (triangle[beside] == NONE || owner[beside] != owner[at])
+                size_t near = (size_t)(y * width + x);
+                if (triangle[near] == NONE || owner[near] != owner[at])
                     continue;
-                sum = rgb_add(sum, job->raw[beside]);
+                sum = rgb_add(sum, job->raw[near]);
                 count += 1.0f;
             }
         }
-        if (count >= WINDOW_LEAST)
-            off = rgb_mad(job->raw[at], -1.0f / count, sum);
-        rgb_to_half(job->detail->off[job->train][at], off);
+        if (count >= MIN_WINDOW)
+            residual = rgb_mad(job->raw[at], -1.0f / count, sum);
+        rgb_to_half(job->detail->residual[job->train][at], residual);
     }
 }
 
-/* --- how far photographs agree ------------------------------------------------------------------ */
+/* --- agreement of photographs ------------------------------------------------------------------- */
 
 static void clear_sums(struct detail *d) {
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
@@ -171,7 +170,7 @@ static void clear_sums(struct detail *d) {
             d->sum[d->r->inverse.valid[i]][k] = 0;
 }
 
-/* Adds to the texels beneath each pixel its worth, and what it is off by, times that. */
+/* Adds each pixel's weight and weighted residual to the texels of its footprint. */
 static void weigh_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct picture_job *job = user;
@@ -180,34 +179,33 @@ static void weigh_row(void *user, size_t row, int thread) {
     struct footprint_texels t;
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
-        if (!texels_beneath(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
+        if (!pixel_footprint(d, train, x, (uint32_t)row, d->triangle[train][at], &t))
             continue;
-        float off = rgb_mean(rgb_from_half(d->off[train][at])), worth = d->sum_scale * d->worth[train][at];
+        float residual = rgb_mean(rgb_from_half(d->residual[train][at])), weight = d->sum_scale * d->weight[train][at];
         for (size_t i = 0; i < t.count; i++) {
-            add_to(&d->sum[t.texel[i]][COUNT], worth * t.share[i]);
-            add_to(&d->sum[t.texel[i]][OFF], worth * t.share[i] * off);
+            add_to(&d->sum[t.texel[i]][WEIGHT], weight * t.share[i]);
+            add_to(&d->sum[t.texel[i]][RESIDUAL], weight * t.share[i] * residual);
         }
     }
 }
 
-/* Sums over all photographs, or those of the first half of a way to part them. */
-static void weigh(struct detail *d, int way, float scale) {
+/* Sums over all photographs, or over those of the first half of a split. */
+static void sum_weighted(struct detail *d, int split, float scale) {
     clear_sums(d);
     d->sum_scale = scale;
     for (uint32_t t = 0; t < d->views->train_count; t++)
-        if (way == ALL_PHOTOGRAPHS || halves_of(t, way) == 0)
+        if (split == ALL_PHOTOGRAPHS || halves_of(t, split) == 0)
             for_rows(d, t, weigh_row);
 }
 
-/* What the halves tell of a texel, over the ways to part them: squares of the mean of what it is off by, and what both
- * have in common of it. */
+/* Sums over the splits: the square of a texel's mean residual, and the product of the halves' mean residuals. */
 struct agreement {
     float square, common;
 };
 
-struct agreeing {
+struct agreement_job {
     struct detail *detail;
-    float *off;                  /* [height][width] the sum over all photographs */
+    float *residual;             /* [height][width] the sum over all photographs */
     struct agreement *agreement; /* [height][width] */
 };
 
@@ -215,35 +213,36 @@ static double scaled(const struct detail *d, size_t texel, int sum) {
     return (double)d->sum[texel][sum] / (double)d->sum_scale;
 }
 
-/* Adds what the halves of one way tell; nothing where one tells next to nothing. */
+/* Adds one split, where both halves have enough weight. */
 static void agree_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
-    const struct agreeing *a = user;
+    const struct agreement_job *a = user;
     const struct detail *d = a->detail;
     const struct inverse_uv *inverse = &d->r->inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++) {
         uint32_t texel = inverse->valid[i];
-        double all = (double)d->count[texel], count[2] = {scaled(d, texel, COUNT)}, off[2] = {scaled(d, texel, OFF)};
-        count[1] = all - count[0];
-        off[1] = (double)a->off[texel] - off[0];
-        if (!(all > 0.0) || fmin(count[0], count[1]) < HALF_LEAST * all)
+        double all = (double)d->weight_sum[texel];
+        double weight[2] = {scaled(d, texel, WEIGHT)}, residual[2] = {scaled(d, texel, RESIDUAL)};
+        weight[1] = all - weight[0];
+        residual[1] = (double)a->residual[texel] - residual[0];
+        if (!(all > 0.0) || fmin(weight[0], weight[1]) < MIN_HALF * all)
             continue;
-        double mean = (double)a->off[texel] / all;
+        double mean = (double)a->residual[texel] / all;
         a->agreement[texel].square += (float)(mean * mean);
-        a->agreement[texel].common += (float)(off[0] / count[0] * (off[1] / count[1]));
+        a->agreement[texel].common += (float)(residual[0] / weight[0] * (residual[1] / weight[1]));
     }
 }
 
-/* Of what a texel is off by, the share that is not noise. */
-static float share_told(const struct agreeing *a, uint32_t texel) {
+/* Share of a texel's residual that is not noise. */
+static float signal_share_of(const struct agreement_job *a, uint32_t texel) {
     const struct detail *d = a->detail;
     long width = (long)d->r->inverse.width, height = (long)d->r->inverse.height;
     long x0 = (long)texel % width, y0 = (long)texel / width;
     double square = 0.0, common = 0.0;
     if (!(a->agreement[texel].square > 0.0f))
         return 0.0f;
-    for (long y = y0 - AROUND; y <= y0 + AROUND; y++) {
-        for (long x = x0 - AROUND; x <= x0 + AROUND; x++) {
+    for (long y = y0 - AGREEMENT_RADIUS; y <= y0 + AGREEMENT_RADIUS; y++) {
+        for (long x = x0 - AGREEMENT_RADIUS; x <= x0 + AGREEMENT_RADIUS; x++) {
             size_t at = (size_t)(y * width + x);
             if (x < 0 || y < 0 || x >= width || y >= height || d->chart_of_texel[at] != d->chart_of_texel[texel])
                 continue;
@@ -253,51 +252,52 @@ static float share_told(const struct agreeing *a, uint32_t texel) {
     }
     double noise = DISAGREEMENT * fmax(square - common, 0.0);
     float share = common > 0.0 ? (float)(common / (common + noise)) : 0.0f;
-    return share < SHARE_LEAST ? 0.0f : share;
+    return share < MIN_SHARE ? 0.0f : share;
 }
 
 static void share_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
-    const struct agreeing *a = user;
+    const struct agreement_job *a = user;
     struct detail *d = a->detail;
     const struct inverse_uv *inverse = &d->r->inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
         if (d->chart_of_texel[inverse->valid[i]] != NONE)
-            d->told[inverse->valid[i]] = share_told(a, inverse->valid[i]);
+            d->signal_share[inverse->valid[i]] = signal_share_of(a, inverse->valid[i]);
 }
 
-/* Counts the pixels of each texel, and chooses the scale of sums for the most of one. */
-static void count_pixels(struct detail *d) {
+/* Sums the weights of each texel, and chooses the scale of sums by the greatest. */
+static void sum_weights(struct detail *d) {
     float most = 0.0f;
-    weigh(d, ALL_PHOTOGRAPHS, COUNT_SCALE);
+    sum_weighted(d, ALL_PHOTOGRAPHS, COUNT_SCALE);
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        most = fmaxf(most, (float)scaled(d, d->r->inverse.valid[i], COUNT));
-    weigh(d, ALL_PHOTOGRAPHS, SUM_MOST / fmaxf(most, 1.0f));
+        most = fmaxf(most, (float)scaled(d, d->r->inverse.valid[i], WEIGHT));
+    sum_weighted(d, ALL_PHOTOGRAPHS, MAX_SUM / fmaxf(most, 1.0f));
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        d->count[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], COUNT);
+        d->weight_sum[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], WEIGHT);
 }
 
-/* Finds what share of what each texel is off by the photographs agree on. The sums are those of all photographs, as
- * count_pixels leaves them. */
+/* Finds the share of each texel's residual on which the photographs agree. Expects the sums over all photographs, as
+ * sum_weights leaves them. */
 static void find_shares(struct detail *d, size_t texels) {
-    struct agreeing a = {d, mem_calloc_large(texels, sizeof *a.off), mem_calloc_large(texels, sizeof *a.agreement)};
+    struct agreement_job a = {.detail = d, .residual = mem_calloc_large(texels, sizeof *a.residual),
+                              .agreement = mem_calloc_large(texels, sizeof *a.agreement)};
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
-        a.off[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], OFF);
-    for (int way = 0; way < WAYS; way++) {
-        weigh(d, way, d->sum_scale);
+        a.residual[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], RESIDUAL);
+    for (int split = 0; split < SPLITS; split++) {
+        sum_weighted(d, split, d->sum_scale);
         parallel_for(d->r->pool, chunks_of(d), agree_chunk, &a);
     }
     parallel_for(d->r->pool, chunks_of(d), share_chunk, &a);
     mem_free(a.agreement);
-    mem_free(a.off);
+    mem_free(a.residual);
 }
 
 /* --- steps -------------------------------------------------------------------------------------- */
 
-/* By how much a texel's base colour is taken to be off: as it was moved, and further the same way. */
-static rgb reached(const struct detail *d, uint32_t texel) {
-    rgb now = rgb_from_half(d->moved[texel][0]), before = rgb_from_half(d->moved[texel][1]);
-    return rgb_mad(now, d->onward, rgb_sub(now, before));
+/* FISTA's extrapolated point. */
+static rgb extrapolated(const struct detail *d, uint32_t texel) {
+    rgb now = rgb_from_half(d->change[texel][0]), before = rgb_from_half(d->change[texel][1]);
+    return rgb_mad(now, d->momentum, rgb_sub(now, before));
 }
 
 static void step_row(void *user, size_t row, int thread) {
@@ -308,76 +308,76 @@ static void step_row(void *user, size_t row, int thread) {
     struct footprint_texels t;
     for (uint32_t x = 0; x < width; x++) {
         size_t at = row * width + x;
-        if (!texels_beneath(d, job->train, x, (uint32_t)row, d->triangle[job->train][at], &t))
+        if (!pixel_footprint(d, job->train, x, (uint32_t)row, d->triangle[job->train][at], &t))
             continue;
-        rgb off = rgb_from_half(d->off[job->train][at]);
-        bool moves = false;
+        rgb residual = rgb_from_half(d->residual[job->train][at]);
+        bool changes = false;
         for (size_t i = 0; i < t.count; i++) {
-            moves |= d->told[t.texel[i]] > 0.0f;
-            off = rgb_mad(off, -t.share[i], reached(d, t.texel[i]));
+            changes |= d->signal_share[t.texel[i]] > 0.0f;
+            residual = rgb_mad(residual, -t.share[i], extrapolated(d, t.texel[i]));
         }
-        if (!moves) {
+        if (!changes) {
             d->triangle[job->train][at] = NONE;
             continue;
         }
         for (size_t i = 0; i < t.count; i++) {
-            float scale = d->sum_scale * d->worth[job->train][at] * t.share[i];
-            const float part[SUMS] = {off.r * scale, off.g * scale, off.b * scale};
+            float scale = d->sum_scale * d->weight[job->train][at] * t.share[i];
+            const float part[SUMS] = {residual.r * scale, residual.g * scale, residual.b * scale};
             for (int k = 0; k < SUMS; k++)
                 add_to(&d->sum[t.texel[i]][k], part[k]);
         }
     }
 }
 
-/* No darker than black, unless it was. */
-static float bounded(float moved, float start) {
-    return fmaxf(moved, fminf(-start, 0.0f));
+/* Base colour stays at least 0, or at its start if that is less. */
+static float bounded(float change, float start) {
+    return fmaxf(change, fminf(-start, 0.0f));
 }
 
-static void move_texel(struct detail *d, uint32_t texel) {
-    float scale = 1.0f / (d->sum_scale * d->count[texel]);
+static void step_texel(struct detail *d, uint32_t texel) {
+    float scale = 1.0f / (d->sum_scale * d->weight_sum[texel]);
     const _Atomic int32_t *sum = d->sum[texel];
-    rgb by = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
-    rgb moved = rgb_scale(rgb_add(reached(d, texel), by), d->told[texel]);
+    rgb step = rgb_scale(rgb_make((float)sum[RED], (float)sum[GREEN], (float)sum[BLUE]), scale);
+    rgb change = rgb_scale(rgb_add(extrapolated(d, texel), step), d->signal_share[texel]);
     rgb start = measured_value(&d->measured[texel]);
-    memcpy(d->moved[texel][1], d->moved[texel][0], sizeof d->moved[texel][0]);
-    rgb_to_half(d->moved[texel][0], rgb_make(bounded(moved.r, start.r), bounded(moved.g, start.g),
-                                             bounded(moved.b, start.b)));
+    memcpy(d->change[texel][1], d->change[texel][0], sizeof d->change[texel][0]);
+    rgb_to_half(d->change[texel][0], rgb_make(bounded(change.r, start.r), bounded(change.g, start.g),
+                                              bounded(change.b, start.b)));
 }
 
-static void move_chunk(void *user, size_t chunk, int thread) {
+static void step_chunk(void *user, size_t chunk, int thread) {
     (void)thread;
     struct detail *d = user;
     const struct inverse_uv *inverse = &d->r->inverse;
     for (size_t i = chunk * CHUNK; i < (chunk + 1) * CHUNK && i < inverse->valid_count; i++)
-        if (d->told[inverse->valid[i]] > 0.0f)
-            move_texel(d, inverse->valid[i]);
+        if (d->signal_share[inverse->valid[i]] > 0.0f)
+            step_texel(d, inverse->valid[i]);
 }
 
 void detail_step(struct detail *d) {
     clear_sums(d);
     for (uint32_t t = 0; t < d->views->train_count; t++)
         for_rows(d, t, step_row);
-    parallel_for(d->r->pool, chunks_of(d), move_chunk, d);
-    float before = d->pace;
-    d->pace = 0.5f * (1.0f + sqrtf(1.0f + 4.0f * before * before));
-    d->onward = (before - 1.0f) / d->pace;
+    parallel_for(d->r->pool, chunks_of(d), step_chunk, d);
+    float before = d->t;
+    d->t = 0.5f * (1.0f + sqrtf(1.0f + 4.0f * before * before));
+    d->momentum = (before - 1.0f) / d->t;
 }
 
 void detail_finish(struct detail *d) {
     for (size_t i = 0; i < d->r->inverse.valid_count; i++) {
         uint32_t texel = d->r->inverse.valid[i];
         struct measured *m = &d->measured[texel];
-        if (!(d->told[texel] > 0.0f))
+        if (!(d->signal_share[texel] > 0.0f))
             continue;
-        rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->moved[texel][0])));
-        rgb_to_half(m->noise, rgb_scale(rgb_from_half(m->noise), 1.0f - d->told[texel]));
+        rgb_to_half(m->value, rgb_add(measured_value(m), rgb_from_half(d->change[texel][0])));
+        rgb_to_half(m->noise, rgb_scale(rgb_from_half(m->noise), 1.0f - d->signal_share[texel]));
     }
 }
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-double detail_texels_a_pixel(const struct reconstruction *r, const struct views *views) {
+double detail_texels_per_pixel(const struct reconstruction *r, const struct views *views) {
     double area = 0.0, count = 0.0;
     for (uint32_t t = 0; t < views->train_count; t++) {
         const struct camera *camera = &r->scene->photograph[views->train[t]].camera;
@@ -398,70 +398,70 @@ static void make_picture(struct detail *d, uint32_t train) {
     size_t pixels = pixels_of(d, train);
     struct picture_job job = {.detail = d, .train = train, .raw = mem_array(pixels, sizeof *job.raw)};
     d->triangle[train] = mem_array(pixels, sizeof **d->triangle);
-    d->worth[train] = mem_array(pixels, sizeof **d->worth);
-    d->off[train] = mem_array(pixels, sizeof **d->off);
-    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, find_row, &job);
-    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, flatten_row, &job);
+    d->weight[train] = mem_array(pixels, sizeof **d->weight);
+    d->residual[train] = mem_array(pixels, sizeof **d->residual);
+    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, residual_row, &job);
+    parallel_for(d->r->pool, photograph_of(d, train)->camera.height, filter_row, &job);
     mem_free(job.raw);
 }
 
-/* Forgets the pixels that too few others are around of, and makes the most that one is worth 1. */
+/* Drops pixels whose high-pass filter had too few neighbours, and scales the greatest weight to 1. */
 static void choose_pixels(struct detail *d) {
     float most = 0.0f;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         for (size_t i = 0; i < pixels_of(d, t); i++) {
-            if (isnan(image_float_from_half(d->off[t][i][0])))
+            if (isnan(image_float_from_half(d->residual[t][i][0])))
                 d->triangle[t][i] = NONE;
-            most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->worth[t][i]);
+            most = d->triangle[t][i] == NONE ? most : fmaxf(most, d->weight[t][i]);
         }
     }
     for (uint32_t t = 0; t < d->views->train_count; t++)
         for (size_t i = 0; i < pixels_of(d, t); i++)
-            d->worth[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->worth[t][i] / most;
+            d->weight[t][i] = d->triangle[t][i] == NONE ? 0.0f : d->weight[t][i] / most;
 }
 
-/* The texels that may be moved: those that were measured, where there is light to tell them by. */
+/* Marks the texels that may change: measured ones with enough light. */
 static void mark_known(struct detail *d, size_t texels) {
     const struct reconstruction *r = d->r;
     d->chart_of_texel = mem_array(texels, sizeof *d->chart_of_texel);
     for (size_t i = 0; i < texels; i++) {
-        bool known = r->inverse.triangle[i] != INVERSE_UV_NONE && d->measured[i].weight > 0.0f && d->white[i][0] != 0;
+        bool known = r->inverse.triangle[i] != INVERSE_UV_NONE && d->measured[i].weight > 0.0f && d->lambert[i][0] != 0;
         d->chart_of_texel[i] = known ? r->atlas.chart_of_triangle[r->inverse.triangle[i]] : NONE;
     }
 }
 
 void detail_init(struct detail *d, const struct reconstruction *r, const struct views *views,
-                 const uint16_t (*white)[3], struct measured *measured) {
+                 const uint16_t (*lambert)[3], struct measured *measured) {
     size_t texels = (size_t)r->inverse.width * r->inverse.height;
-    *d = (struct detail){.r = r, .views = views, .white = white, .measured = measured, .pace = 1.0f};
+    *d = (struct detail){.r = r, .views = views, .lambert = lambert, .measured = measured, .t = 1.0f};
     d->triangle = mem_array(views->train_count, sizeof *d->triangle);
-    d->worth = mem_array(views->train_count, sizeof *d->worth);
-    d->off = mem_array(views->train_count, sizeof *d->off);
+    d->weight = mem_array(views->train_count, sizeof *d->weight);
+    d->residual = mem_array(views->train_count, sizeof *d->residual);
     d->sum = mem_calloc_large(texels, sizeof *d->sum);
-    d->count = mem_calloc_large(texels, sizeof *d->count);
-    d->told = mem_calloc_large(texels, sizeof *d->told);
+    d->weight_sum = mem_calloc_large(texels, sizeof *d->weight_sum);
+    d->signal_share = mem_calloc_large(texels, sizeof *d->signal_share);
     mark_known(d, texels);
     for (uint32_t t = 0; t < views->train_count; t++)
         make_picture(d, t);
     choose_pixels(d);
-    count_pixels(d);
+    sum_weights(d);
     find_shares(d, texels);
-    d->moved = mem_calloc_large(texels, sizeof *d->moved);
+    d->change = mem_calloc_large(texels, sizeof *d->change);
 }
 
 void detail_release(struct detail *d) {
     for (uint32_t t = 0; t < d->views->train_count; t++) {
         mem_free(d->triangle[t]);
-        mem_free(d->worth[t]);
-        mem_free(d->off[t]);
+        mem_free(d->weight[t]);
+        mem_free(d->residual[t]);
     }
     mem_free(d->triangle);
-    mem_free(d->worth);
-    mem_free(d->off);
+    mem_free(d->weight);
+    mem_free(d->residual);
     mem_free(d->chart_of_texel);
     mem_free(d->sum);
-    mem_free(d->count);
-    mem_free(d->told);
-    mem_free(d->moved);
+    mem_free(d->weight_sum);
+    mem_free(d->signal_share);
+    mem_free(d->change);
     *d = (struct detail){0};
 }

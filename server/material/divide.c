@@ -15,38 +15,38 @@
 #include "server/scene/surface.h"
 
 #define CHUNK 256 /* texels a work item */
-/* Directions for one highlight, at most and at least, and half as many samples of lights. Each texel sees several
- * photographs, and its neighbours as many; those that share a pixel need so many together. */
-#define SAMPLES_MOST 16
-#define SAMPLES_LEAST 4
-#define SAMPLES_A_PIXEL 128.0
-#define KEY_DIVIDE 5 /* keeps these random numbers apart from others of the texel */
-/* Base colours differ by this much in their logarithm before one counts half; dark ones by this
- * much in themselves. */
+/* Directions of one highlight, at most and at least, and half as many samples of lights. Highlights of all texels under
+ * one pixel are averaged, so these need SAMPLES_PER_PIXEL together. */
+#define MAX_SAMPLES 16
+#define MIN_SAMPLES 4
+#define SAMPLES_PER_PIXEL 128.0
+#define KEY_DIVIDE 5 /* random-number key, distinct from others of the texel */
+/* Deviation from the median, in the logarithm of base colour, at which an observation has half its weight; dark base
+ * colours have OUTLIER_FLOOR added first. */
 #define OUTLIER_SCALE 0.3f
 #define OUTLIER_FLOOR 0.03f
-/* A look has half its weight where this part of it is highlight, if the base colour is what is typical of its segment;
- * no segment is taken for darker than this. */
+/* Part of the expected radiance that is highlight at which an observation has half its weight; least base colour that
+ * the expectation assumes. */
 #define HIGHLIGHT_PART 0.2f
-#define DARKEST_TYPICAL 0.02f
-/* Base colour by which looks are weighed. Were it a texel's own, bright texels would count for more than
- * dark ones wherever neighbours are averaged, and dark tiles between white joints turn grey. */
+#define MIN_TYPICAL 0.02f
+/* Base colour assumed for the noise weights. With a texel's own, bright texels would outweigh dark ones wherever
+ * neighbours are averaged, and dark tiles between white joints would turn grey. */
 #define TYPICAL_BASE_COLOR 0.5f
-/* Less white light than this share of the median radiance tells nothing of base colour. */
-#define DARKEST 1e-4f
-#define DARK 1e-3f /* as much less tells nothing of detail */
-/* A base colour of which a look says more than this is not one. */
-#define MOST 4.0f
-/* Variance of base colour by light of others at which what photographs show of a texel counts as much as
- * what is to be expected there. */
-#define MIXING_TOLD 0.01f
+/* Lower bounds of Lambert radiance, parts of the median radiance: of the divisor, and for use by detail.h. */
+#define MIN_LAMBERT 1e-4f
+#define MIN_LAMBERT_DETAIL 1e-3f
+/* Bound of one observation's base colour, against division by almost nothing. */
+#define MAX_ALBEDO 4.0f
+/* Variance by light of other surfaces at which a measured base colour and the denoised one count alike in outgoing
+ * radiance. */
+#define MIXING_HALF 0.01f
 
-size_t divide_highlight_samples(double texels_a_pixel) {
-    double samples = SAMPLES_A_PIXEL / fmax(texels_a_pixel, 1.0);
-    return (size_t)fmin(fmax(samples, SAMPLES_LEAST), SAMPLES_MOST);
+size_t divide_highlight_samples(double texels_per_pixel) {
+    double samples = SAMPLES_PER_PIXEL / fmax(texels_per_pixel, 1.0);
+    return (size_t)fmin(fmax(samples, MIN_SAMPLES), MAX_SAMPLES);
 }
 
-/* All but the sun's. */
+/* Irradiance without the sun's. */
 static bool light_without_sun(const struct divide *d, uint32_t texel, struct surface_point *at,
                               struct irradiance *light) {
     const struct reconstruction *r = d->r;
@@ -66,12 +66,12 @@ static bool light_at(const struct divide *d, uint32_t texel, struct surface_poin
     return true;
 }
 
-bool divide_white(const struct divide *d, uint32_t texel, rgb *white) {
+bool divide_lambert(const struct divide *d, uint32_t texel, rgb *lambert) {
     struct surface_point at;
     struct irradiance light;
     if (!light_at(d, texel, &at, &light))
         return false;
-    *white = irradiance_diffuse(&light, at.shading, 1.0f, at.shading);
+    *lambert = irradiance_diffuse(&light, at.shading, 1.0f, at.shading);
     return true;
 }
 
@@ -80,49 +80,49 @@ static rgb divide_channels(rgb over, rgb under, float least) {
                     over.b / fmaxf(under.b, least));
 }
 
-/* Reads a photograph more sharply where all that this takes is of one surface; else `shown` stays. Tells
- * whether it did. */
-static bool sharpen(const struct divide *d, const struct view *view, uint32_t triangle, rgb *shown) {
+/* Reads a photograph with a bicubic filter where all of its support shows one surface; else leaves `shown` and returns
+ * false. */
+static bool sharpen(const struct divide *d, const struct view *view, uint32_t triangle, rgb *observed) {
     return views_edge(d->views, view, triangle) < VIEWS_EDGE - 1 &&
-           photograph_sample_cubic(&d->r->scene->photograph[d->views->train[view->train]], view->x, view->y, shown);
+           photograph_sample_cubic(&d->r->scene->photograph[d->views->train[view->train]], view->x, view->y, observed);
 }
 
-/* A look before its highlight is known. */
+/* An observation whose highlight is not gathered yet. */
 struct candidate {
     struct view view;
-    rgb shown, white;
+    rgb observed, unit_diffuse;
     float weight, mixing;
     bool sharp;
 };
 
-/* The best of a texel's photographs, by weight. */
+/* The photographs of a texel with the greatest weights. */
 struct candidates {
     struct best best;
-    struct best_item item[MEASURED_LOOKS];
-    struct candidate candidate[MEASURED_LOOKS];
+    struct best_item item[MEASURED_OBSERVATIONS];
+    struct candidate candidate[MEASURED_OBSERVATIONS];
 };
 
-/* Photograph `train` of the texel, unless it shows nothing of it or there are enough that weigh more. */
-static void offer_look(const struct divide *d, uint32_t segment, const struct surface_point *at,
+/* Adds photograph `train` of the texel if it has a valid sample there and is among the best. */
+static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
                        const struct irradiance *light, uint32_t train, struct candidates *of) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[train]];
     struct candidate c;
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
-    c.white = irradiance_diffuse(light, at->shading, d->r->materials.roughness[segment],
+    c.unit_diffuse = irradiance_diffuse(light, at->shading, d->r->materials.roughness[segment],
                                  views_direction(d->views, train, at->position));
-    rgb typical = rgb_scale(c.white, TYPICAL_BASE_COLOR);
-    /* Edges and the light of others only lower it: no ray is needed to know that it is too low. */
+    rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
+    /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
         photograph_has_firefly(photo, c.view.x, c.view.y) ||
         !photograph_sample(photo, c.view.x, c.view.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
         return;
-    c.shown = s.radiance;
-    c.mixing = views_mixing(d->views, &c.view, at->triangle, c.shown);
-    c.sharp = sharpen(d, &c.view, at->triangle, &c.shown);
-    float times_typical = rgb_mean(c.shown) / fmaxf(rgb_mean(typical), DARKEST * d->views->median_radiance);
+    c.observed = s.radiance;
+    c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);
+    c.sharp = sharpen(d, &c.view, at->triangle, &c.observed);
+    float times_typical = rgb_mean(c.observed) / fmaxf(rgb_mean(typical), MIN_LAMBERT * d->views->median_radiance);
     c.weight = c.view.weight * views_trust(d->views, &c.view, at->triangle) *
                noise_weight(d->noise, d->views, &c.view, typical, c.mixing * times_typical * times_typical);
     size_t slot = best_put(&of->best, c.weight, train);
@@ -130,27 +130,28 @@ static void offer_look(const struct divide *d, uint32_t segment, const struct su
         of->candidate[slot] = c;
 }
 
-static struct robust_sample look_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
+static struct robust_sample observation_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
                                     const struct candidate *c, struct incident *scratch) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = reconstruction_segment(d->r, texel);
     float median = d->views->median_radiance, weight = c->weight;
-    rgb white = c->white, gloss = rgb_gray(0.0f);
+    rgb unit_diffuse = c->unit_diffuse, specular = rgb_gray(0.0f);
     if (m->specular[segment] > 0.0f) {
         struct highlight highlight;
         struct highlight_levels level = {1, 1, {m->roughness[segment]}, {m->specular[segment]}};
-        highlight_gather(&highlight, scratch, d->field, at, views_direction(d->views, c->view.train, at->position),
-                         &level, sampler_key(KEY_DIVIDE, texel, c->view.train), d->highlight_samples,
-                         d->highlight_samples / 2);
-        gloss = highlight.radiance[0][0];
-        float both = fmaxf(d->typical[segment] * rgb_mean(white) + rgb_mean(gloss), 0.01f * median);
-        float part = rgb_mean(gloss) / both * (1.0f / HIGHLIGHT_PART);
+        vec3 wo = views_direction(d->views, c->view.train, at->position);
+        highlight_gather(&highlight, scratch, d->field, at, wo, &level, sampler_key(KEY_DIVIDE, texel, c->view.train),
+                         d->highlight_samples, d->highlight_samples / 2);
+        specular = highlight.radiance[0][0];
+        float both = fmaxf(d->typical[segment] * rgb_mean(unit_diffuse) + rgb_mean(specular), 0.01f * median);
+        float part = rgb_mean(specular) / both * (1.0f / HIGHLIGHT_PART);
         weight /= 1.0f + part * part;
     }
     rgb fused = fused_radiance(&d->r->fused, texel), deviation = noise_deviation(d->noise, d->views, &c->view, fused);
-    rgb usual = rgb_clamp(divide_channels(fused, white, DARKEST * median), 0.0f, MOST);
-    rgb base = rgb_clamp(divide_channels(rgb_sub(c->shown, gloss), white, DARKEST * median), -MOST, MOST);
-    rgb noise = rgb_clamp(divide_channels(deviation, white, DARKEST * median), 0.0f, MOST);
+    rgb usual = rgb_clamp(divide_channels(fused, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
+    rgb base = rgb_clamp(divide_channels(rgb_sub(c->observed, specular), unit_diffuse, MIN_LAMBERT * median),
+                         -MAX_ALBEDO, MAX_ALBEDO);
+    rgb noise = rgb_clamp(divide_channels(deviation, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
     return (struct robust_sample){
         .value = base,
         .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
@@ -162,18 +163,19 @@ static struct robust_sample look_of(const struct divide *d, uint32_t texel, cons
         .mixing = c->mixing * rgb_dot(base, base)};
 }
 
-static void look_all(const struct divide *d, uint32_t texel, struct incident *scratch,
-                     struct irradiance *light, struct measured_looks *looks) {
+static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch,
+                        struct irradiance *light, struct measured_observations *observations) {
     struct surface_point at;
     struct candidates candidates;
-    looks->count = 0;
+    observations->count = 0;
     if (!light_at(d, texel, &at, light))
         return;
-    best_init(&candidates.best, candidates.item, MEASURED_LOOKS);
+    best_init(&candidates.best, candidates.item, MEASURED_OBSERVATIONS);
     for (uint32_t t = 0; t < d->views->train_count; t++)
-        offer_look(d, reconstruction_segment(d->r, texel), &at, light, t, &candidates);
-    for (; looks->count < candidates.best.count; looks->count++)
-        looks->look[looks->count] = look_of(d, texel, &at, &candidates.candidate[looks->count], scratch);
+        add_candidate(d, reconstruction_segment(d->r, texel), &at, light, t, &candidates);
+    for (; observations->count < candidates.best.count; observations->count++)
+        observations->observation[observations->count] =
+            observation_of(d, texel, &at, &candidates.candidate[observations->count], scratch);
 }
 
 static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
@@ -181,18 +183,18 @@ static rgb texel_color(const struct reconstruction *r, uint32_t texel) {
     return rgb_make(from[0], from[1], from[2]);
 }
 
-/* What arrives, from everywhere. */
-static rgb irradiance_sum(const struct irradiance *light) {
+/* Irradiance over the whole sphere, without a cosine. */
+static rgb fluence_of(const struct irradiance *light) {
     const float *sum = light->moment[0];
     return rgb_make(sum[0], sum[1], sum[2]);
 }
 
-static struct measured mean_of(struct measured_looks *looks, const struct irradiance *light) {
-    return measured_mean(looks, OUTLIER_SCALE, divide_channels(light->noise, irradiance_sum(light), FLT_MIN));
+static struct measured mean_of(struct measured_observations *observations, const struct irradiance *light) {
+    return measured_mean(observations, OUTLIER_SCALE, divide_channels(light->noise, fluence_of(light), FLT_MIN));
 }
 
-/* The texel that is measured in place of this one. */
-static uint32_t stand_in(const struct divide *d, uint32_t texel) {
+/* The texel whose measurement this one takes: its own, or that of its stride x stride block. */
+static uint32_t source_texel(const struct divide *d, uint32_t texel) {
     const struct reconstruction *r = d->r;
     uint32_t width = r->atlas.width, x = texel % width, y = texel / width;
     uint32_t other = (y - y % d->stride) * width + x - x % d->stride;
@@ -203,12 +205,12 @@ static uint32_t stand_in(const struct divide *d, uint32_t texel) {
 }
 
 static void divide_texel(struct divide *d, uint32_t texel, struct incident *scratch) {
-    struct measured_looks looks;
+    struct measured_observations observations;
     struct irradiance light;
-    look_all(d, texel, scratch, &light, &looks);
+    observe_all(d, texel, scratch, &light, &observations);
     d->measured[texel] = (struct measured){0};
-    if (looks.count > 0 && !d->r->is_emitter[reconstruction_segment(d->r, texel)])
-        d->measured[texel] = mean_of(&looks, &light);
+    if (observations.count > 0 && !d->r->is_emitter[reconstruction_segment(d->r, texel)])
+        d->measured[texel] = mean_of(&observations, &light);
 }
 
 struct divide_list {
@@ -222,7 +224,7 @@ static void divide_chunk(void *user, size_t chunk, int thread) {
     struct divide *d = list->divide;
     size_t begin = chunk * CHUNK, end = begin + CHUNK < list->count ? begin + CHUNK : list->count;
     for (size_t i = begin; i < end; i++) {
-        if (stand_in(d, list->texel[i]) == list->texel[i])
+        if (source_texel(d, list->texel[i]) == list->texel[i])
             divide_texel(d, list->texel[i], &d->scratch[thread]);
     }
 }
@@ -232,7 +234,7 @@ void divide_texels(struct divide *d, const uint32_t *texel, size_t count) {
     parallel_for(d->r->pool, (count + CHUNK - 1) / CHUNK, divide_chunk, &list);
 }
 
-/* What is done for each valid texel, in any order. */
+/* A function to be called for each valid texel, in any order. */
 struct each {
     const struct divide *divide;
     void (*of)(const void *job, uint32_t texel);
@@ -253,49 +255,50 @@ static void each_valid(const struct divide *d, void (*of)(const void *job, uint3
     parallel_for(d->r->pool, (d->r->inverse.valid_count + CHUNK - 1) / CHUNK, each_chunk, &each);
 }
 
-struct matt_job {
+struct diffuse_job {
     const struct divide *divide;
-    struct fused *matt;
+    struct fused *diffuse;
 };
 
-static void matt_texel(const void *user, uint32_t texel) {
-    const struct matt_job *job = user;
+static void diffuse_texel(const void *user, uint32_t texel) {
+    const struct diffuse_job *job = user;
     const struct measured *m = &job->divide->measured[texel];
-    rgb white;
-    if (stand_in(job->divide, texel) != texel || !(m->weight > 0.0f) || !divide_white(job->divide, texel, &white))
+    rgb lambert;
+    if (source_texel(job->divide, texel) != texel || !(m->weight > 0.0f) ||
+        !divide_lambert(job->divide, texel, &lambert))
         return;
-    job->matt->count[texel] = m->weight;
-    rgb_to_half(job->matt->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MOST), white));
+    job->diffuse->count[texel] = m->weight;
+    rgb_to_half(job->diffuse->radiance[texel], rgb_mul(rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), lambert));
 }
 
-void divide_matt(const struct divide *d, struct fused *matt) {
+void divide_diffuse(const struct divide *d, struct fused *diffuse) {
     size_t texels = (size_t)d->r->atlas.width * d->r->atlas.height;
-    *matt = (struct fused){.width = d->r->atlas.width, .height = d->r->atlas.height};
-    matt->radiance = mem_calloc_large(texels, sizeof *matt->radiance);
-    matt->count = mem_calloc_large(texels, sizeof *matt->count);
-    matt->is_bound = mem_calloc_large(texels, sizeof *matt->is_bound);
-    each_valid(d, matt_texel, &(struct matt_job){d, matt});
+    *diffuse = (struct fused){.width = d->r->atlas.width, .height = d->r->atlas.height};
+    diffuse->radiance = mem_calloc_large(texels, sizeof *diffuse->radiance);
+    diffuse->count = mem_calloc_large(texels, sizeof *diffuse->count);
+    diffuse->is_bound = mem_calloc_large(texels, sizeof *diffuse->is_bound);
+    each_valid(d, diffuse_texel, &(struct diffuse_job){d, diffuse});
 }
 
-struct white_job {
+struct lambert_job {
     const struct divide *divide;
-    uint16_t (*white)[3];
+    uint16_t (*lambert)[3];
 };
 
-static void white_texel(const void *user, uint32_t texel) {
-    const struct white_job *job = user;
+static void lambert_texel(const void *user, uint32_t texel) {
+    const struct lambert_job *job = user;
     const struct divide *d = job->divide;
-    rgb white;
-    bool known = d->measured[texel].weight > 0.0f && divide_white(d, texel, &white) &&
-                 fminf(white.r, fminf(white.g, white.b)) > DARK * d->views->median_radiance;
-    rgb_to_half(job->white[texel], known ? white : rgb_gray(0.0f));
+    rgb lambert;
+    bool known = d->measured[texel].weight > 0.0f && divide_lambert(d, texel, &lambert) &&
+                 fminf(lambert.r, fminf(lambert.g, lambert.b)) > MIN_LAMBERT_DETAIL * d->views->median_radiance;
+    rgb_to_half(job->lambert[texel], known ? lambert : rgb_gray(0.0f));
 }
 
-void divide_white_all(const struct divide *d, uint16_t (*white)[3]) {
-    each_valid(d, white_texel, &(struct white_job){d, white});
+void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]) {
+    each_valid(d, lambert_texel, &(struct lambert_job){d, lambert});
 }
 
-/* Means over what photographs show of each segment. */
+/* Mean base colour over the observed texels of each segment. */
 static void find_typical(struct divide *d) {
     const struct reconstruction *r = d->r;
     double(*sum)[2] = mem_calloc(r->segments.count, sizeof *sum);
@@ -308,12 +311,12 @@ static void find_typical(struct divide *d) {
     }
     for (size_t i = 0; i < r->segments.count; i++)
         if (sum[i][1] > 0.0)
-            d->typical[i] = fmaxf((float)(sum[i][0] / sum[i][1]), DARKEST_TYPICAL);
+            d->typical[i] = fmaxf((float)(sum[i][0] / sum[i][1]), MIN_TYPICAL);
     mem_free(sum);
 }
 
-/* What was measured as it is, and the priors where nothing was. */
-static void keep_noise(struct divide *d, const struct color_prior *prior) {
+/* Base colour as measured, and the prior where it was not. */
+static void keep_measured(struct divide *d, const struct color_prior *prior) {
     struct reconstruction *r = d->r;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
@@ -327,17 +330,18 @@ static void keep_noise(struct divide *d, const struct color_prior *prior) {
     }
 }
 
-struct sending {
+struct outgoing_job {
     const struct divide *divide;
-    const float *gloss_albedo; /* [segment_count] */
-    const struct divide_sent *sent;
+    const float *specular_albedo; /* [segment_count] */
+    const struct divide_outgoing *outgoing;
 };
 
-/* What a texel sends out, in the mean over viewers. (What photographs show of it is brighter: they look at floors aslant
- * and at walls towards the light.) As far as they may have told of other surfaces its base colour is what is to be
- * expected there: beside a window a thin frame would else shine like it. The sun that it mirrors is sun_caustics.h's. */
-static void send_out(const void *user, uint32_t texel) {
-    const struct sending *job = user;
+/* Outgoing radiance of a texel, mean over directions. (Photographs show more: they observe floors at grazing angles and
+ * walls towards the light.) The more a measurement may be light of other surfaces, the more the denoised base colour
+ * replaces it: a thin window frame would otherwise be as bright as the window. Mirrored sun is left to
+ * sun_caustics.h. */
+static void find_outgoing(const void *user, uint32_t texel) {
+    const struct outgoing_job *job = user;
     const struct divide *d = job->divide;
     const struct measured *m = &d->measured[texel];
     uint32_t segment = reconstruction_segment(d->r, texel);
@@ -345,45 +349,45 @@ static void send_out(const void *user, uint32_t texel) {
     struct irradiance light;
     if (d->r->is_emitter[segment] || !light_without_sun(d, texel, &at, &light))
         return;
-    bool mirrors = job->sent->lobe[segment].specular > 0.0f;
-    rgb evenly = irradiance_sum(&light);
+    bool mirrors = job->outgoing->lobe[segment].specular > 0.0f;
+    rgb fluence = fluence_of(&light);
     sun_add_light(&d->r->sun, d->r->world.accel, &at, &light);
     if (!mirrors)
-        evenly = irradiance_sum(&light);
-    float known = m->weight > 0.0f ? MIXING_TOLD / (MIXING_TOLD + image_float_from_half(m->mixing)) : 0.0f;
-    rgb measured = rgb_clamp(measured_value(m), 0.0f, MOST), expected = texel_color(d->r, texel);
+        fluence = fluence_of(&light);
+    float known = m->weight > 0.0f ? MIXING_HALF / (MIXING_HALF + image_float_from_half(m->mixing)) : 0.0f;
+    rgb measured = rgb_clamp(measured_value(m), 0.0f, MAX_ALBEDO), expected = texel_color(d->r, texel);
     rgb base = rgb_mad(rgb_scale(expected, 1.0f - known), known, measured);
-    rgb white = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
-    rgb matt = rgb_mul(base, white);
-    rgb all = rgb_mad(matt, job->gloss_albedo[segment] * (1.0f / BSDF_PI), evenly);
-    rgb_to_half(job->sent->all[texel], all);
-    rgb_to_half(job->sent->unmirrored[texel], mirrors ? matt : all);
+    rgb unit_diffuse = irradiance_diffuse_mean(&light, at.shading, d->r->materials.roughness[segment]);
+    rgb diffuse = rgb_mul(base, unit_diffuse);
+    rgb total = rgb_mad(diffuse, job->specular_albedo[segment] * (1.0f / BSDF_PI), fluence);
+    rgb_to_half(job->outgoing->total[texel], total);
+    rgb_to_half(job->outgoing->unmirrored[texel], mirrors ? diffuse : total);
 }
 
-static void send_all(const struct divide *d, const struct divide_sent *sent) {
+static void find_all_outgoing(const struct divide *d, const struct divide_outgoing *outgoing) {
     const struct reconstruction *r = d->r;
-    float *gloss_albedo = mem_array(r->segments.count, sizeof *gloss_albedo);
+    float *specular_albedo = mem_array(r->segments.count, sizeof *specular_albedo);
     for (uint32_t i = 0; i < r->segments.count; i++) {
         float roughness = r->materials.roughness[i], specular = r->materials.specular[i];
         bool mirrors = materials_is_polished(&r->materials, i) && !r->is_emitter[i];
-        gloss_albedo[i] = highlight_albedo(roughness, specular);
-        sent->lobe[i] = (struct incident_lobe){roughness, mirrors ? specular : 0.0f};
+        specular_albedo[i] = highlight_albedo(roughness, specular);
+        outgoing->lobe[i] = (struct incident_lobe){roughness, mirrors ? specular : 0.0f};
     }
-    each_valid(d, send_out, &(struct sending){d, gloss_albedo, sent});
-    mem_free(gloss_albedo);
+    each_valid(d, find_outgoing, &(struct outgoing_job){d, specular_albedo, outgoing});
+    mem_free(specular_albedo);
 }
 
-void divide_finish(struct divide *d, const struct divide_sent *sent) {
+void divide_finish(struct divide *d, const struct divide_outgoing *outgoing) {
     struct reconstruction *r = d->r;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
-        d->measured[r->inverse.valid[i]] = d->measured[stand_in(d, r->inverse.valid[i])];
+        d->measured[r->inverse.valid[i]] = d->measured[source_texel(d, r->inverse.valid[i])];
     struct color_prior *prior = color_priors(r, d->measured);
     if (d->denoises)
         denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, d->measured, prior, NULL,
                 &r->materials.base_color, r->pool);
     else
-        keep_noise(d, prior);
+        keep_measured(d, prior);
     mem_free(prior);
     find_typical(d);
-    send_all(d, sent);
+    find_all_outgoing(d, outgoing);
 }

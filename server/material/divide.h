@@ -1,9 +1,10 @@
-/* divide.h -- base colour in closed form: what a texel sends out over what arrives there.
+/* divide.h -- base colour in closed form: reflected radiance over that of a Lambertian surface of albedo 1.
  *
- * For each photograph of a texel, (shown - gloss) / white is its base colour; the robust mean over the
- * photographs is taken, weighted as in fuse.h and less where the highlight is a large part of what
- * is shown. Of more than MEASURED_LOOKS photographs the best are taken, by their weights before highlights are known. Then the noise of the photographs is taken out (denoise.h). Texels that no photograph
- * measured get what is beside them, or what is to be expected of them (color_prior.h). */
+ * Each observation of a texel gives a base colour, (observed - highlight) / lambert. Their robust mean is taken,
+ * weighted as in fuse.h, and lower where the highlight is a large part of the observation. Of more than
+ * MEASURED_OBSERVATIONS photographs those of the greatest weights are used, without regard to highlights. The result is
+ * denoised (denoise.h); texels that were not measured are filled in from their neighbours or their prior
+ * (color_prior.h). */
 #ifndef UNBAKE_MATERIAL_DIVIDE_H
 #define UNBAKE_MATERIAL_DIVIDE_H
 
@@ -24,38 +25,38 @@ struct divide {
     const struct probes *probes;
     const struct light_field *field;  /* for highlights */
     const struct noise *noise;
-    bool denoises;                    /* else base colour is as measured */
-    size_t highlight_samples;         /* directions for one highlight (divide_highlight_samples) */
-    uint32_t stride;                  /* one texel is measured for its chart in every stride x stride */
-    float *typical;                   /* [segment_count] base colour, by the last divide_finish; .5 before */
-    struct incident *scratch;         /* [threads] */
-    struct measured *measured;        /* [height][width] what the photographs tell of each texel */
+    bool denoises;             /* else base colour is as measured */
+    size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */
+    uint32_t stride;           /* one texel of each chart is measured in every stride x stride */
+    float *typical;            /* [segment_count] mean base colour, by the last divide_finish; .5 before */
+    struct incident *scratch;  /* [threads] */
+    struct measured *measured; /* [height][width] base colour by the photographs */
 };
 
-/* How many directions are enough for the highlights of texels of which a pixel covers so many. */
-size_t divide_highlight_samples(double texels_a_pixel);
+/* Directions of one highlight where a pixel covers so many texels. */
+size_t divide_highlight_samples(double texels_per_pixel);
 
 /* Measures so many valid texels. Emitters, whose own light hides it, get a neutral base colour. */
 void divide_texels(struct divide *d, const uint32_t *texel, size_t count);
 
-/* *matt: what all texels that were measured show towards their normals without their highlights; of all others count is
- * 0. Its spread is NULL. To be released by the caller. */
-void divide_matt(const struct divide *d, struct fused *matt);
+/* *diffuse: radiance of the measured texels towards their normals, without highlights; count is 0 for all others. Its
+ * spread is NULL. To be released by the caller. */
+void divide_diffuse(const struct divide *d, struct fused *diffuse);
 
-/* What a white diffuse surface at the texel sends towards its normal; false where it is not valid. */
-bool divide_white(const struct divide *d, uint32_t texel, rgb *white);
+/* Radiance of a Lambertian surface of albedo 1 at the texel; false where the texel is not valid. */
+bool divide_lambert(const struct divide *d, uint32_t texel, rgb *lambert);
 
-/* The same for all texels that were measured, to white, [height][width]; 0 where it is too dark to divide by. */
-void divide_white_all(const struct divide *d, uint16_t (*white)[3]);
+/* The same for all measured texels, [height][width]; 0 where it is too dark to divide by. */
+void divide_lambert_all(const struct divide *d, uint16_t (*lambert)[3]);
 
-/* What texels send out, half precision: in the mean over viewers; and, as a light_field has it, without what polished
- * segments mirror, and the lobes by which they do. */
-struct divide_sent {
-    uint16_t (*all)[3], (*unmirrored)[3]; /* [height][width] */
-    struct incident_lobe *lobe;           /* [segment_count] */
+/* Outgoing radiance of texels, half precision: the mean over directions, and the same without the specular part of
+ * polished segments, whose lobes follow it in a light_field. */
+struct divide_outgoing {
+    uint16_t (*total)[3], (*unmirrored)[3]; /* [height][width] */
+    struct incident_lobe *lobe;             /* [segment_count] specular 0: not polished */
 };
 
-/* After all texels: writes r->materials.base_color, and to `sent` what texels of all but emitters send out. */
-void divide_finish(struct divide *d, const struct divide_sent *sent);
+/* After all texels: writes r->materials.base_color, and to `outgoing` all texels but those of emitters. */
+void divide_finish(struct divide *d, const struct divide_outgoing *outgoing);
 
 #endif

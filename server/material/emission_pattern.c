@@ -11,19 +11,20 @@
 #include "server/scene/surface.h"
 #include "server/state/evidence.h"
 
-/* An emitter of fewer texels, or of which less was measured, has no pattern that could be told. */
-#define LEAST_TEXELS 64
-#define LEAST_MEASURED 0.3
-/* Deviation over the mean from which on an emitter has a pattern. Lamps and windows that are equally bright all over come
- * to .001 to .017 in six rooms, noise and all; the eye sees no less in a picture that is smooth. */
-#define LEAST_CONTRAST 0.1
-/* The part of an emitter's surface that may show less than it is thought to reflect. */
-#define DARKEST_PART 0.02
-/* Looks differ by this much in their logarithm before one counts half. */
+/* Least texels, and least measured share of them, for a pattern. By hand. */
+#define MIN_TEXELS 64
+#define MIN_MEASURED 0.3
+/* Standard deviation over mean from which an emitter has a pattern. Evenly bright lamps and windows have .001 to .017
+ * in six rooms, noise included. */
+#define MIN_CONTRAST 0.1
+/* Part of an emitter's surface that may show less than its base colour reflects: outliers. */
+#define DARK_OUTLIERS 0.02
+/* Deviation from the median, in the logarithm of radiance, at which an observation has half its weight. */
 #define OUTLIER_SCALE 0.3f
-#define SAME_PICTURE 0.7f /* and no more, of what most looks at a changing screen show */
-#define LOG_FLOOR 0.01f /* of what the segment shows, where a logarithm is taken */
-#define CHUNK 64 /* texels a work item */
+/* Of a screen whose picture changes, observations further from the median than this are dropped. */
+#define MAX_SCREEN_DEVIATION 0.7f
+#define LOG_FLOOR 0.01f /* added before a logarithm is taken; part of the segment's radiance */
+#define CHUNK 64        /* texels a work item */
 
 struct finder;
 
@@ -32,8 +33,8 @@ struct emitter {
     const struct finder *finder;
     size_t segment, count;
     const uint32_t *texel; /* [count] of the finder's list */
-    float scale;           /* measured = scale * radiance; first that makes what it is known to show 1 in the mean */
-    bool is_asked;         /* enough of it was measured */
+    float scale;           /* measured = scale * radiance; at first 1 / mean of evidence.least */
+    bool is_measured;      /* enough of it was measured */
 };
 
 struct finder {
@@ -42,25 +43,25 @@ struct finder {
     struct texels_by_segment texels; /* owned, as all below */
     struct emitter *emitter;         /* [emitter_count] */
     size_t emitter_count;
-    struct measured *measured;       /* [height][width] what photographs show, by the emitter's scale */
-    struct color_prior *prior;       /* [chart_count] of what is asked, as the next */
-    bool *is_asked;                  /* [chart_count] */
-    struct texture found;            /* the measured without noise */
+    struct measured *measured; /* [height][width] observed radiance, times the emitter's scale */
+    struct color_prior *prior; /* [chart_count] where has_emitter */
+    bool *has_emitter;         /* [chart_count] charts of emitters that may have a pattern */
+    struct texture denoised;   /* `measured`, denoised */
 };
 
-/* --- what is shown --------------------------------------------------------------------------------- */
+/* --- observations ---------------------------------------------------------------------------------- */
 
-/* By the noise of what the segment shows in the mean: by its own a bright place would outweigh dark ones beside
- * it, of which a larger share is noise, wherever neighbours are averaged. */
+/* Inverse noise variance, for the mean radiance of the segment: with a place's own radiance bright places would
+ * outweigh dark ones, whose relative noise is larger, wherever neighbours are averaged. */
 static float weight_of(const struct emitter *e, const struct view *view, float mixing) {
     const struct finder *f = e->finder;
     return view->weight * noise_weight(&f->r->noise, f->views, view, f->r->evidence[e->segment].least, mixing);
 }
 
-static struct robust_sample look_of(const struct emitter *e, const struct view *view, float mixing, rgb shown,
+static struct robust_sample observation_of(const struct emitter *e, const struct view *view, float mixing, rgb observed,
                                     bool sharp, rgb fused) {
     const struct finder *f = e->finder;
-    rgb value = rgb_scale(shown, e->scale);
+    rgb value = rgb_scale(observed, e->scale);
     float times_typical = rgb_mean(value);
     rgb noise = rgb_scale(noise_deviation(&f->r->noise, f->views, view, fused), e->scale);
     return (struct robust_sample){
@@ -74,21 +75,21 @@ static struct robust_sample look_of(const struct emitter *e, const struct view *
         .mixing = mixing * rgb_dot(value, value)};
 }
 
-/* What the photographs show of a texel, clear of all edges; the best of them where there are many. Saturated, they tell how bright it is at least: the greatest
- * of that is taken where nothing else is told, unless it is less than the segment is known to show: then it may be as
- * bright as the rest of it. */
-static void look_all(const struct emitter *e, uint32_t texel, struct measured_looks *looks) {
+/* Observations of a texel away from edges, those of the greatest weights. Saturated ones are lower bounds: the greatest
+ * is used where there is no other observation, and only if it exceeds the segment's radiance; else the texel may be as
+ * bright as the rest of the segment. */
+static void observe_all(const struct emitter *e, uint32_t texel, struct measured_observations *observations) {
     const struct reconstruction *r = e->finder->r;
     const struct views *views = e->finder->views;
     rgb fused = fused_radiance(&r->fused, texel);
     struct robust_sample bound = {.weight = 0.0f};
     struct surface_point at;
     struct best best;
-    struct best_item item[MEASURED_LOOKS];
-    looks->count = 0;
+    struct best_item item[MEASURED_OBSERVATIONS];
+    observations->count = 0;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
         return;
-    best_init(&best, item, MEASURED_LOOKS);
+    best_init(&best, item, MEASURED_OBSERVATIONS);
     for (uint32_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &r->scene->photograph[views->train[t]];
         struct view view;
@@ -101,26 +102,26 @@ static void look_all(const struct emitter *e, uint32_t texel, struct measured_lo
         float mixing = views_mixing(views, &view, at.triangle, s.radiance);
         bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
         bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &s.radiance);
-        struct robust_sample look = look_of(e, &view, mixing, s.radiance, sharp, fused);
-        size_t slot = saturated ? BEST_NONE : best_put(&best, look.weight, t);
+        struct robust_sample observation = observation_of(e, &view, mixing, s.radiance, sharp, fused);
+        size_t slot = saturated ? BEST_NONE : best_put(&best, observation.weight, t);
         if (slot != BEST_NONE)
-            looks->look[slot] = look;
-        else if (saturated && (bound.weight == 0.0f || look.gray > bound.gray))
-            bound = look;
+            observations->observation[slot] = observation;
+        else if (saturated && (bound.weight == 0.0f || observation.gray > bound.gray))
+            bound = observation;
     }
-    looks->count = best.count;
-    if (looks->count == 0 && bound.weight > 0.0f && rgb_mean(bound.value) > 1.0f)
-        looks->look[looks->count++] = bound;
+    observations->count = best.count;
+    if (observations->count == 0 && bound.weight > 0.0f && rgb_mean(bound.value) > 1.0f)
+        observations->observation[observations->count++] = bound;
 }
 
 static void measure_texel(const struct emitter *e, uint32_t texel) {
-    struct measured_looks looks;
-    look_all(e, texel, &looks);
-    /* Of a screen whose picture changed what most looks show: what the others do is no noise of it. */
-    if (looks.count > 0 && e->finder->r->evidence[e->segment].changes > 0.0f)
-        looks.count = robust_keep(looks.look, looks.count, SAME_PICTURE);
-    if (looks.count > 0)
-        e->finder->measured[texel] = measured_mean(&looks, OUTLIER_SCALE, rgb_gray(0.0f));
+    struct measured_observations observations;
+    observe_all(e, texel, &observations);
+    /* Of a screen whose picture changed, keep the majority: the rest is another picture, not noise. */
+    if (observations.count > 0 && e->finder->r->evidence[e->segment].changes > 0.0f)
+        observations.count = robust_keep(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
+    if (observations.count > 0)
+        e->finder->measured[texel] = measured_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
 }
 
 static void measure_chunk(void *user, size_t chunk, int thread) {
@@ -130,7 +131,7 @@ static void measure_chunk(void *user, size_t chunk, int thread) {
         measure_texel(e, e->texel[i]);
 }
 
-/* Makes the greatest value of an emitter 1, which is what denoise keeps. */
+/* Scales the greatest value of an emitter to 1: denoise clamps to [0, 1]. */
 static void fit_range(struct emitter *e) {
     struct measured *measured = e->finder->measured;
     float greatest = 0.0f;
@@ -146,12 +147,12 @@ static void fit_range(struct emitter *e) {
     e->scale *= factor;
 }
 
-/* What texels of an emitter have in the mean, by weight, and how far they are from it, all channels together. */
-struct spread {
+/* Weighted mean and variance (summed over the channels) of an emitter's texels. */
+struct moments {
     double sum[3], squares, weight;
 };
 
-static void spread_add(struct spread *s, double weight, rgb value) {
+static void moments_add(struct moments *s, double weight, rgb value) {
     s->sum[0] += weight * (double)value.r;
     s->sum[1] += weight * (double)value.g;
     s->sum[2] += weight * (double)value.b;
@@ -159,37 +160,37 @@ static void spread_add(struct spread *s, double weight, rgb value) {
     s->weight += weight;
 }
 
-static rgb spread_mean(const struct spread *s) {
+static rgb moments_mean(const struct moments *s) {
     double w = s->weight > 0.0 ? s->weight : 1.0;
     return rgb_make((float)(s->sum[0] / w), (float)(s->sum[1] / w), (float)(s->sum[2] / w));
 }
 
-static double spread_variance(const struct spread *s) {
-    rgb mean = spread_mean(s);
+static double moments_variance(const struct moments *s) {
+    rgb mean = moments_mean(s);
     return s->weight > 0.0 ? fmax(s->squares / s->weight - (double)rgb_dot(mean, mean), 0.0) : 0.0;
 }
 
-/* Has the charts of an emitter asked, if enough of it was measured. */
-static void ask(struct emitter *e) {
+/* Marks the charts of an emitter for denoising, if enough of it was measured. */
+static void mark_charts(struct emitter *e) {
     const struct finder *f = e->finder;
-    struct spread known = {.weight = 0.0};
+    struct moments known = {.weight = 0.0};
     for (size_t i = 0; i < e->count; i++) {
         const struct measured *m = &f->measured[e->texel[i]];
         if (m->weight > 0.0f)
-            spread_add(&known, 1.0, measured_value(m));
+            moments_add(&known, 1.0, measured_value(m));
     }
-    e->is_asked = known.weight >= LEAST_MEASURED * (double)e->count;
-    struct color_prior prior = {spread_mean(&known), (float)spread_variance(&known)};
-    for (size_t i = 0; i < e->count && e->is_asked; i++) {
+    e->is_measured = known.weight >= MIN_MEASURED * (double)e->count;
+    struct color_prior prior = {moments_mean(&known), (float)moments_variance(&known)};
+    for (size_t i = 0; i < e->count && e->is_measured; i++) {
         uint32_t chart = f->r->atlas.chart_of_triangle[f->r->inverse.triangle[e->texel[i]]];
-        f->is_asked[chart] = true;
+        f->has_emitter[chart] = true;
         f->prior[chart] = prior;
     }
 }
 
 /* --- patterns -------------------------------------------------------------------------------------- */
 
-/* Area of surface under a texel, in units that are the same all over the texture. */
+/* Surface area under a texel, m^2. */
 static double texel_area(const struct reconstruction *r, uint32_t texel) {
     uint32_t triangle = r->inverse.triangle[texel];
     const vec2 *c = r->atlas.corner[triangle];
@@ -198,31 +199,31 @@ static double texel_area(const struct reconstruction *r, uint32_t texel) {
     return charted > 0.0 ? (double)vec3_length(mesh_cross(&r->scene->mesh, triangle)) / charted : 0.0;
 }
 
-static rgb found_at(const struct finder *f, uint32_t texel) {
-    const float *c = f->found.texel[texel];
+static rgb denoised_at(const struct finder *f, uint32_t texel) {
+    const float *c = f->denoised.texel[texel];
     return rgb_make(c[0], c[1], c[2]);
 }
 
-/* Gives an emitter the pattern that was found, if it is not equally bright all over. */
-static void keep(const struct emitter *e) {
+/* Sets an emitter's pattern, if its contrast is high enough. */
+static void set_pattern(const struct emitter *e) {
     const struct finder *f = e->finder;
     struct materials *m = &f->r->materials;
-    struct spread spread = {.weight = 0.0};
+    struct moments moments = {.weight = 0.0};
     for (size_t i = 0; i < e->count; i++)
-        spread_add(&spread, texel_area(f->r, e->texel[i]), found_at(f, e->texel[i]));
-    rgb mean = spread_mean(&spread);
-    if (!(sqrt(spread_variance(&spread)) > LEAST_CONTRAST * sqrt((double)rgb_dot(mean, mean))))
+        moments_add(&moments, texel_area(f->r, e->texel[i]), denoised_at(f, e->texel[i]));
+    rgb mean = moments_mean(&moments);
+    if (!(sqrt(moments_variance(&moments)) > MIN_CONTRAST * sqrt((double)rgb_dot(mean, mean))))
         return;
     if (!m->emission_pattern)
         materials_start_emission_pattern(m);
     for (size_t i = 0; i < e->count; i++)
-        materials_set_emission_pattern(m, e->texel[i], found_at(f, e->texel[i]), mean);
+        materials_set_emission_pattern(m, e->texel[i], denoised_at(f, e->texel[i]), mean);
     f->r->evidence[e->segment].shown = rgb_scale(mean, 1.0f / e->scale);
 }
 
 /* --- the whole ------------------------------------------------------------------------------------- */
 
-/* Lists the emitters that photographs tell enough of. */
+/* Lists the emitters that may have a pattern. */
 static void finder_init(struct finder *f, struct reconstruction *r, const struct views *views) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     *f = (struct finder){.r = r, .views = views};
@@ -231,22 +232,22 @@ static void finder_init(struct finder *f, struct reconstruction *r, const struct
     for (size_t s = 0; s < r->segments.count; s++) {
         const struct emitter_evidence *e = &r->evidence[s];
         size_t first = f->texels.first[s], count = f->texels.first[s + 1] - first;
-        if (r->is_emitter[s] && !e->hidden && !e->unbound && count >= LEAST_TEXELS && rgb_mean(e->least) > 0.0f)
+        if (r->is_emitter[s] && !e->hidden && !e->unbound && count >= MIN_TEXELS && rgb_mean(e->least) > 0.0f)
             f->emitter[f->emitter_count++] = (struct emitter){
                 .finder = f, .segment = s, .count = count, .texel = f->texels.texel + first,
                 .scale = 1.0f / rgb_mean(e->least)};
     }
-    /* Of few charts: pages that are not written take no memory. */
+    /* Only few charts are written; untouched pages take no memory. */
     f->measured = mem_calloc(texels, sizeof *f->measured);
-    f->found = (struct texture){r->atlas.width, r->atlas.height, mem_calloc(texels, sizeof *f->found.texel)};
+    f->denoised = (struct texture){r->atlas.width, r->atlas.height, mem_calloc(texels, sizeof *f->denoised.texel)};
     f->prior = mem_calloc(r->atlas.chart_count, sizeof *f->prior);
-    f->is_asked = mem_calloc(r->atlas.chart_count, sizeof *f->is_asked);
+    f->has_emitter = mem_calloc(r->atlas.chart_count, sizeof *f->has_emitter);
 }
 
 static void finder_release(struct finder *f) {
-    mem_free(f->is_asked);
+    mem_free(f->has_emitter);
     mem_free(f->prior);
-    texture_release(&f->found);
+    texture_release(&f->denoised);
     mem_free(f->measured);
     mem_free(f->emitter);
     by_segment_release(&f->texels);
@@ -260,48 +261,50 @@ void emission_pattern_find(struct reconstruction *r, const struct views *views) 
         struct emitter *e = &f.emitter[i];
         parallel_for(r->pool, (e->count + CHUNK - 1) / CHUNK, measure_chunk, e);
         fit_range(e);
-        ask(e);
+        mark_charts(e);
     }
-    denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, f.measured, f.prior, f.is_asked, &f.found, r->pool);
+    denoise(&r->atlas, &r->inverse, r->scene->mesh.triangle_count, f.measured, f.prior, f.has_emitter, &f.denoised,
+            r->pool);
     for (size_t i = 0; i < f.emitter_count; i++) {
-        if (f.emitter[i].is_asked)
-            keep(&f.emitter[i]);
+        if (f.emitter[i].is_measured)
+            set_pattern(&f.emitter[i]);
     }
     finder_release(&f);
 }
 
-/* --- their own light ------------------------------------------------------------------------------- */
+/* --- emitted light --------------------------------------------------------------------------------- */
 
-/* The least base colour, of all channels, with which a texel would show no more than it does. */
-static float most_reflected(const struct materials *m, const struct emitter_evidence *e, uint32_t texel) {
-    rgb shown = rgb_mul(rgb_from_half(m->emission_pattern[texel]), e->shown);
-    const float value[3] = {shown.r, shown.g, shown.b}, arrived[3] = {e->arrived.r, e->arrived.g, e->arrived.b};
+/* Greatest base colour (same in all channels) whose reflected light does not exceed a texel's radiance. */
+static float max_base_color(const struct materials *m, const struct emitter_evidence *e, uint32_t texel) {
+    rgb observed = rgb_mul(rgb_from_half(m->emission_pattern[texel]), e->shown);
+    const float value[3] = {observed.r, observed.g, observed.b};
+    const float arrived[3] = {e->arrived.r, e->arrived.g, e->arrived.b};
     float most = INFINITY;
     for (int c = 0; c < 3; c++)
         most = arrived[c] > 0.0f ? fminf(most, value[c] / arrived[c]) : most;
     return most;
 }
 
-/* What nearly all of the texels could reflect; INFINITY where there is no pattern. */
-static float darkest_reflected(const struct materials *m, const struct emitter_evidence *e, const uint32_t *texel,
+/* DARK_OUTLIERS quantile of max_base_color; INFINITY where there is no pattern. */
+static float max_segment_base_color(const struct materials *m, const struct emitter_evidence *e, const uint32_t *texel,
                                size_t count) {
     if (!m->emission_pattern || count == 0 || rgb_is_black(rgb_from_half(m->emission_pattern[texel[0]])))
         return INFINITY;
     float *most = mem_array(count, sizeof *most);
     for (size_t i = 0; i < count; i++)
-        most[i] = most_reflected(m, e, texel[i]);
-    float darkest = quantile(most, count, DARKEST_PART);
+        most[i] = max_base_color(m, e, texel[i]);
+    float darkest = quantile(most, count, DARK_OUTLIERS);
     mem_free(most);
     return darkest;
 }
 
-/* Makes the pattern of all that a texel shows, in the mean `shown`, that of its own light, in the mean `own`. */
-static void take_out(struct materials *m, uint32_t texel, rgb shown, rgb own) {
-    rgb all = rgb_mul(rgb_from_half(m->emission_pattern[texel]), shown);
-    materials_set_emission_pattern(m, texel, rgb_sub(all, rgb_sub(shown, own)), own);
+/* Turns the pattern of outgoing radiance (mean `shown`) into that of emitted radiance (mean `own`). */
+static void subtract_reflected(struct materials *m, uint32_t texel, rgb observed, rgb own) {
+    rgb all = rgb_mul(rgb_from_half(m->emission_pattern[texel]), observed);
+    materials_set_emission_pattern(m, texel, rgb_sub(all, rgb_sub(observed, own)), own);
 }
 
-void emission_pattern_own(struct reconstruction *r, struct emission_own *own) {
+void emission_pattern_separate(struct reconstruction *r, struct emitter_fit *own) {
     struct materials *m = &r->materials;
     struct texels_by_segment texels;
     by_segment_sort(&texels, &r->segments, &r->inverse);
@@ -309,22 +312,22 @@ void emission_pattern_own(struct reconstruction *r, struct emission_own *own) {
         const struct emitter_evidence *e = &r->evidence[s];
         const uint32_t *texel = texels.texel + texels.first[s];
         size_t count = texels.first[s + 1] - texels.first[s];
-        own[s] = (struct emission_own){{0.0f, 0.0f, 0.0f}, NEUTRAL_BASE_COLOR};
+        own[s] = (struct emitter_fit){{0.0f, 0.0f, 0.0f}, NEUTRAL_BASE_COLOR};
         if (!r->is_emitter[s])
             continue;
-        float darkest = darkest_reflected(m, e, texel, count);
+        float darkest = max_segment_base_color(m, e, texel, count);
         own[s].base_color = fminf(NEUTRAL_BASE_COLOR, darkest);
-        rgb shown = rgb_mad(e->shown, e->hidden ? 0.0f : -own[s].base_color, e->arrived);
-        own[s].radiance = rgb_make(fmaxf(shown.r, 0.0f), fmaxf(shown.g, 0.0f), fmaxf(shown.b, 0.0f));
+        rgb observed = rgb_mad(e->shown, e->hidden ? 0.0f : -own[s].base_color, e->arrived);
+        own[s].radiance = rgb_make(fmaxf(observed.r, 0.0f), fmaxf(observed.g, 0.0f), fmaxf(observed.b, 0.0f));
         for (size_t i = 0; i < count && darkest < INFINITY; i++)
-            take_out(m, texel[i], e->shown, own[s].radiance);
+            subtract_reflected(m, texel[i], e->shown, own[s].radiance);
     }
     by_segment_release(&texels);
 }
 
 void emission_pattern_restore(struct reconstruction *r, const struct views *views) {
-    struct emission_own *own = mem_array(r->segments.count, sizeof *own);
+    struct emitter_fit *own = mem_array(r->segments.count, sizeof *own);
     emission_pattern_find(r, views);
-    emission_pattern_own(r, own);
+    emission_pattern_separate(r, own);
     mem_free(own);
 }

@@ -3,12 +3,12 @@
 
 #include <math.h>
 
-#define MIN_COSINE 0.05f
-#define REMEMBERED 16 /* entries among which one of the same texel is looked for: most are */
-#define SIDE_LEAST 2.0f /* look-ups along an edge of a footprint */
-#define FAR 1e6f /* texels: of a triangle hardly wider than a line */
+#define MIN_COSINE 0.05f /* towards the camera; below, the surface counts as edge-on */
+#define REMEMBERED 16    /* last entries searched for the same texel; a longer search finds few more */
+#define MIN_SIDE 2.0f  /* look-ups along an edge of a footprint */
+#define FAR 1e6f         /* texels; results beyond are of degenerate triangles */
 
-/* A triangle, and the plane that it lies in. */
+/* A triangle and its plane. */
 struct plane {
     vec3 corner, edge[2], normal;
     float dot[3]; /* of edges 0 0, 0 1, 1 1 */
@@ -26,7 +26,7 @@ static struct plane plane_of(const struct mesh *mesh, size_t triangle) {
     return p;
 }
 
-/* The place in the atlas where the ray through (x, y) meets the plane. */
+/* Atlas coordinates where the ray through (x, y) meets the plane. */
 static bool place(const struct plane *p, const struct atlas *atlas, size_t triangle, const struct camera *camera,
                   float x, float y, vec2 *at) {
     vec3 direction, origin = camera_origin(camera);
@@ -73,10 +73,10 @@ bool footprint_find(struct footprint *f, const struct mesh *mesh, const struct a
 /* Look-ups along an edge of a footprint. */
 static int lookups(vec2 edge) {
     float length = ceilf(hypotf(edge.x, edge.y));
-    return (int)clampf(length, SIDE_LEAST, FOOTPRINT_SIDE);
+    return (int)clampf(length, MIN_SIDE, FOOTPRINT_SIDE);
 }
 
-/* To the texel's entry, where that is one of the last. */
+/* Adds to the texel's entry if that is one of the last, else appends one. */
 static void add_texel(struct footprint_texels *t, uint32_t texel, float share) {
     size_t end = t->count > REMEMBERED ? t->count - REMEMBERED : 0;
     for (size_t i = t->count; i > end; i--) {

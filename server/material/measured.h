@@ -1,4 +1,4 @@
-/* measured.h -- what the photographs of a texel tell together: a value, how sure it is, and a draw of its noise. */
+/* measured.h -- a value measured from the photographs of a texel, with its weight and a sample of its noise. */
 #ifndef UNBAKE_MATERIAL_MEASURED_H
 #define UNBAKE_MATERIAL_MEASURED_H
 
@@ -9,31 +9,29 @@
 #include "server/capture/robust.h"
 #include "server/scene/rgb_half.h"
 
-/* Half precision but for the weight, since there may be many millions. The variance is that of the sum over the
- * channels. */
+/* Half precision except for the weight, since there may be many millions. Variances are summed over the channels. */
 struct measured {
-    float weight;           /* inverse variance, up to a factor of the capture; 0: nothing was measured */
+    float weight;      /* inverse variance, up to a factor of the capture; 0: not measured */
     uint16_t value[3];
-    uint16_t noise[3];      /* a draw of its noise */
-    uint16_t mixing;        /* variance by light of other surfaces; neighbours share it */
+    uint16_t noise[3]; /* a sample of the value's noise */
+    uint16_t mixing;   /* variance by light of other surfaces; correlated between neighbours */
 };
 
 static inline rgb measured_value(const struct measured *m) {
     return rgb_from_half(m->value);
 }
 
-/* What is gathered of one texel: a look a photograph, of no more photographs than this, those of the greatest weights
- * (best.h) among all of the capture. It bounds the time that highlights take, and memory: 3 KiB a thread, however many
- * photographs there are. In redkitchen 18 % of the seen triangles have more; the best of them in place of the first are
- * worth .09 dB of its held-out views. */
-#define MEASURED_LOOKS 48
-struct measured_looks {
+/* Observations of one texel, one a photograph, of at most this many photographs: those of the greatest weights
+ * (best.h). The limit bounds the time of highlights, and memory to 3 KiB a thread. In redkitchen 18 % of the observed
+ * triangles have more; keeping the best instead of the first gains .09 dB of its held-out views. */
+#define MEASURED_OBSERVATIONS 48
+struct measured_observations {
     size_t count;
-    struct robust_sample look[MEASURED_LOOKS];
+    struct robust_sample observation[MEASURED_OBSERVATIONS];
 };
 
-/* Their mean, weighed by robust_weigh with `scale`; there must be some. `common_noise` is a draw of the relative error that
- * all of them share, by channel. Lowers and sorts the looks' weights. */
-struct measured measured_mean(struct measured_looks *looks, float scale, rgb common_noise);
+/* Robust mean (robust_weigh with `scale`) of count > 0 observations. `common_noise` is a sample of the relative error
+ * that all of them share, by channel. Lowers the observations' weights and sorts them. */
+struct measured measured_mean(struct measured_observations *observations, float scale, rgb common_noise);
 
 #endif

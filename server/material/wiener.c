@@ -6,13 +6,13 @@
 
 #include "common/mem.h"
 
-/* Power is averaged over a square of this many steps of the level's filter to either side. */
+/* Radius of the square over which power is averaged, in steps of the level's filter. */
 #define WINDOW_STEPS 5
-/* Noise of rare, far outliers has more power around a few samples than a draw of it tells. */
+/* Factor on the noise power: noise of rare, far outliers locally exceeds that of its sample. */
 #define NOISE_SAFETY 2.0f
-/* Beyond so many times the noise outliers are too many to be outliers. */
+/* Clipped power over noise power from which samples above POWER_BOUND count as texture, not as outliers. */
 #define TEXTURE_CERTAIN 2.0f
-#define POWER_BOUND 9.0f /* of a sample, in variances of its noise */
+#define POWER_BOUND 9.0f /* clip of a sample's power, in variances of its noise: 3 standard deviations */
 
 void wiener_init(struct wiener *w, size_t samples) {
     *w = (struct wiener){.inside = mem_array(samples, sizeof *w->inside)};
@@ -119,12 +119,12 @@ static bool counts(const struct wiener *w, size_t at) {
     return w->inside[at] && w->plane[WIENER_WEIGHT][at] > 0.0f;
 }
 
-/* Variance of the noise of a sample's detail: what the draws around it tell, by its own weight. */
+/* Noise variance of a sample's detail: local noise power, scaled by the sample's own weight. */
 static float noise_variance(const struct wiener *w, size_t at) {
     return w->noise_power[at] / (w->count[at] * w->plane[WIENER_WEIGHT][at]);
 }
 
-/* Power of the noise around each sample, and what it is to be divided by. */
+/* Noise power around each sample, and the sums that normalise it. */
 static void measure_noise(struct wiener *w, size_t radius) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {
@@ -138,7 +138,7 @@ static void measure_noise(struct wiener *w, size_t radius) {
         window_sums(plane[i], w->scratch, w->width, w->height, radius);
 }
 
-/* Power of what is seen around each sample: all of it, and with that of each sample bounded. */
+/* Power of the value around each sample, and the same with each sample clipped. */
 static void measure_power(struct wiener *w, size_t radius) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {
@@ -154,15 +154,14 @@ static void measure_power(struct wiener *w, size_t radius) {
     window_sums(w->bounded_power, w->scratch, w->width, w->height, radius);
 }
 
-/* Power of texture around a sample: what is beyond noise; of outliers only up to their bound, unless there
- * are so many that they are no outliers. */
+/* Power of texture around a sample: power less noise, with outliers clipped unless they are too many to be outliers. */
 static float texture_power(const struct wiener *w, size_t at) {
     float noise = w->noise_power[at], bounded = w->bounded_power[at];
     float power = bounded < TEXTURE_CERTAIN * noise ? bounded : w->power[at];
     return fmaxf(power - NOISE_SAFETY * noise, 0.0f) / w->weight_sum[at];
 }
 
-/* Adds the share of this level's detail that is texture. */
+/* Adds this level's detail by its share of texture. */
 static void keep_texture(struct wiener *w) {
     size_t samples = w->width * w->height;
     for (size_t at = 0; at < samples; at++) {
@@ -191,20 +190,20 @@ static void take_level(struct wiener *w, size_t step, size_t radius) {
     }
 }
 
-static size_t radius_of(size_t step, size_t window_most) {
-    return WINDOW_STEPS * step < window_most ? WINDOW_STEPS * step : window_most;
+static size_t radius_of(size_t step, size_t max_window) {
+    return WINDOW_STEPS * step < max_window ? WINDOW_STEPS * step : max_window;
 }
 
-void wiener_levels(struct wiener *w, size_t step, int levels, size_t window_most) {
+void wiener_levels(struct wiener *w, size_t step, int levels, size_t max_window) {
     for (int level = 0; level < levels; level++, step *= 2)
-        take_level(w, step, radius_of(step, window_most));
+        take_level(w, step, radius_of(step, max_window));
 }
 
-size_t wiener_reach(size_t step, int levels, size_t window_most) {
+size_t wiener_reach(size_t step, int levels, size_t max_window) {
     size_t reach = 0, widest = 0;
     for (int level = 0; level < levels; level++, step *= 2) {
         reach += 2 * step; /* to either side, of the spline */
-        widest = radius_of(step, window_most);
+        widest = radius_of(step, max_window);
     }
     return reach + widest;
 }

@@ -15,7 +15,7 @@
 #include "server/material/detail.h"
 #include "server/material/divide.h"
 #include "server/material/emission_pattern.h"
-#include "server/material/gloss.h"
+#include "server/material/specular_fit.h"
 #include "server/scene/by_segment.h"
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
@@ -50,13 +50,13 @@ struct solve {
     struct reconstruction *r;
     const struct views *views;
     const struct reconstruct_hooks *hooks;
-    struct divide_sent sent;   /* by the last pass; at first what was fused; owned */
+    struct divide_outgoing outgoing;   /* by the last pass; at first what was fused; owned */
     struct light_field field;  /* for light: rays that are mirrored go on */
     struct light_field evenly; /* for highlights: all is sent alike in all directions */
     struct probes probes;
     struct divide divide;
     bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
-    double texels_a_pixel;   /* detail_texels_a_pixel */
+    double texels_per_pixel;   /* detail_texels_per_pixel */
     double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
     size_t samples;          /* directions of each probe, in the newest pass */
     bool is_shown;           /* the newest pass, by a preview */
@@ -107,7 +107,7 @@ static uint32_t stride_of(const struct solve *s, int pass) {
 }
 
 static bool finds_detail(const struct solve *s) {
-    return stride_of(s, PASS_ALL) == 1 && s->divide.denoises && s->texels_a_pixel > 1.0 &&
+    return stride_of(s, PASS_ALL) == 1 && s->divide.denoises && s->texels_per_pixel > 1.0 &&
            settings_number(s->r->settings, "detail_steps") > 0.0;
 }
 
@@ -163,7 +163,7 @@ static enum status find_detail(struct solve *s, struct error *err) {
     int steps = (int)settings_number(r->settings, "detail_steps");
     enum status status = STATUS_OK;
     struct detail detail;
-    divide_white_all(&s->divide, white);
+    divide_lambert_all(&s->divide, white);
     detail_init(&detail, r, s->views, (const uint16_t(*)[3])white, s->divide.measured);
     for (int i = 0; i < steps && status == STATUS_OK; i++) {
         detail_step(&detail);
@@ -219,7 +219,7 @@ static void average_arrived(const struct solve *s) {
         size_t segment = reconstruction_segment(r, texel);
         rgb white;
         bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].mixed;
-        if (!is_seen || !divide_white(&s->divide, texel, &white))
+        if (!is_seen || !divide_lambert(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
         if (evidence_is_bright(r, texel))
@@ -266,9 +266,9 @@ static void decide_emitters(struct solve *s) {
 /* Gives emitters their own light, and the base colour by which they reflect. */
 static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
-    struct emission_own *own = mem_array(r->segments.count, sizeof *own);
+    struct emitter_fit *own = mem_array(r->segments.count, sizeof *own);
     find_patterns(s);
-    emission_pattern_own(r, own);
+    emission_pattern_separate(r, own);
     for (size_t i = 0; i < r->segments.count; i++)
         r->materials.emission[i] = own[i].radiance;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
@@ -293,20 +293,20 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
     *s = (struct solve){.r = r, .views = views, .hooks = hooks, .is_shown = true};
-    s->sent = (struct divide_sent){mem_calloc_large(texels, sizeof *s->sent.all),
-                                   mem_calloc_large(texels, sizeof *s->sent.unmirrored),
-                                   mem_calloc(r->segments.count, sizeof *s->sent.lobe)};
-    memcpy(s->sent.all, r->fused.radiance, texels * sizeof *s->sent.all);
-    memcpy(s->sent.unmirrored, r->fused.radiance, texels * sizeof *s->sent.unmirrored);
+    s->outgoing = (struct divide_outgoing){mem_calloc_large(texels, sizeof *s->outgoing.total),
+                                   mem_calloc_large(texels, sizeof *s->outgoing.unmirrored),
+                                   mem_calloc(r->segments.count, sizeof *s->outgoing.lobe)};
+    memcpy(s->outgoing.total, r->fused.radiance, texels * sizeof *s->outgoing.total);
+    memcpy(s->outgoing.unmirrored, r->fused.radiance, texels * sizeof *s->outgoing.unmirrored);
     s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
-    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.unmirrored, s->sent.lobe, NULL};
-    s->evenly = (struct light_field){&r->world, (const uint16_t(*)[3])s->sent.all, NULL, NULL};
+    s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.unmirrored, s->outgoing.lobe, NULL};
+    s->evenly = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
-    s->texels_a_pixel = detail_texels_a_pixel(r, views);
+    s->texels_per_pixel = detail_texels_per_pixel(r, views);
     s->divide = (struct divide){
         .r = r, .views = views, .probes = &s->probes, .field = &s->evenly, .noise = &r->noise,
         .denoises = settings_bool(r->settings, "denoise"),
-        .highlight_samples = divide_highlight_samples(s->texels_a_pixel)};
+        .highlight_samples = divide_highlight_samples(s->texels_per_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     s->divide.typical = mem_array(r->segments.count, sizeof *s->divide.typical);
@@ -324,21 +324,21 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
     mem_free(s->patterned);
-    mem_free(s->sent.lobe);
-    mem_free(s->sent.unmirrored);
-    mem_free(s->sent.all);
+    mem_free(s->outgoing.lobe);
+    mem_free(s->outgoing.unmirrored);
+    mem_free(s->outgoing.total);
 }
 
 /* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
  * once gloss is known. */
 static void refit_lamps(struct solve *s, int pass) {
-    struct fused matt;
+    struct fused diffuse;
     if (pass == PASS_GLOSS || is_left_out(s, PASS_GLOSS)) {
         lamps_refit(s->r, s->views, &s->field, NULL);
     } else if (lamps_are_estimated(s->r)) {
-        divide_matt(&s->divide, &matt);
-        lamps_refit(s->r, s->views, &s->field, &matt);
-        fused_release(&matt);
+        divide_diffuse(&s->divide, &diffuse);
+        lamps_refit(s->r, s->views, &s->field, &diffuse);
+        fused_release(&diffuse);
     }
 }
 
@@ -346,7 +346,7 @@ static void refit_lamps(struct solve *s, int pass) {
 static enum status fit(struct solve *s, int pass, struct error *err) {
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
-        gloss_fit(s->r, s->views, &s->probes, &s->evenly);
+        specular_fit(s->r, s->views, &s->probes, &s->evenly);
         s->divide.stride = 1;
         sun_refit(&s->divide);
         s->mirrored_share = sun_caustics_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
@@ -372,7 +372,7 @@ static enum status solve_pass(struct solve *s, int pass, struct error *err) {
         status = find_detail(s, err);
     if (status != STATUS_OK)
         return status;
-    divide_finish(&s->divide, &s->sent);
+    divide_finish(&s->divide, &s->outgoing);
     s->r->has_materials = true;
     s->is_shown = false;
     return show(s, err);

@@ -2,7 +2,7 @@
  *
  * The photographs tell what every surface sends out (fuse.h), so one bounce tells what arrives
  * (probes.h); from both follow, in closed form or by a search over few numbers, which segments emit
- * (emitters.h), how glossy they are (gloss.h) and their base colour (divide.h). What no photograph
+ * (emitters.h), how glossy they are (specular_fit.h) and their base colour (divide.h). What no photograph
  * saw is filled in and sends out light from then on. Done three times: then with the emitters known,
  * and gloss, and at last of every texel and with more rays.
  *

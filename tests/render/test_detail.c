@@ -131,7 +131,7 @@ static void test_paint(bool tiles, int threads, uint32_t *sum) {
     struct capture s;
     capture_init(&s, tiles, threads, 0.0f);
     double before = error_of(&s.room, s.measured), noise = noise_power(&s);
-    CHECK(detail_texels_a_pixel(&s.r, &s.room.views) > 1.0);
+    CHECK(detail_texels_per_pixel(&s.r, &s.room.views) > 1.0);
     find(&s, &s.room.views);
     double after = error_of(&s.room, s.measured);
     printf("%s: error %.4f, after %.4f\n", tiles ? "tiles" : "waves", before, after);
@@ -163,9 +163,9 @@ static void test_black(void) {
 }
 
 /* Texels that the first `count` photographs move. */
-static size_t moved_by(uint32_t count) {
+static size_t changed_by(uint32_t count) {
     struct capture s;
-    size_t moved = 0;
+    size_t changed = 0;
     capture_init(&s, true, 2, 0.0f);
     struct measured *before = mem_array(s.texels, sizeof *before);
     memcpy(before, s.measured, s.texels * sizeof *before);
@@ -173,20 +173,20 @@ static size_t moved_by(uint32_t count) {
     few.train_count = count;
     find(&s, &few);
     for (size_t i = 0; i < s.texels; i++)
-        moved += memcmp(&before[i], &s.measured[i], sizeof before[i]) != 0;
+        changed += memcmp(&before[i], &s.measured[i], sizeof before[i]) != 0;
     mem_free(before);
     capture_release(&s);
-    return moved;
+    return changed;
 }
 
-/* One photograph has nothing to agree with; two have each other, though they are in one half in the first way to part
- * photographs. */
+/* One photograph has nothing to agree with; two have each other, though they are in one half in the first
+ * split. */
 static void test_few(void) {
-    CHECK(moved_by(1) == 0);
+    CHECK(changed_by(1) == 0);
     CHECK(halves_of(0, 0) == halves_of(1, 0) && halves_of(0, 1) != halves_of(1, 1));
-    size_t moved = moved_by(2);
-    printf("two photographs move %zu texels\n", moved);
-    CHECK(moved > 20);
+    size_t changed = changed_by(2);
+    printf("two photographs move %zu texels\n", changed);
+    CHECK(changed > 20);
 }
 
 /* Where one photograph is worth ten thousand times as much as any other, the others are counted, too. */
@@ -202,10 +202,10 @@ static void test_count(void) {
         s.r.noise.share[octave] = octave < NOISE_OCTAVES / 2 - 6 ? 1.0f : 0.01f;
     detail_init(&d, &s.r, &s.room.views, (const uint16_t(*)[3])s.white, s.measured);
     for (size_t i = 0; i < s.texels; i++)
-        counted += (double)d.count[i];
+        counted += (double)d.weight_sum[i];
     for (uint32_t t = 0; t < s.room.views.train_count; t++)
         for (size_t i = 0; i < PAINTED_WIDTH * PAINTED_HEIGHT; i++)
-            *(t == 0 ? &best : &others) += (double)d.worth[t][i];
+            *(t == 0 ? &best : &others) += (double)d.weight[t][i];
     printf("worth %.3f and %.5f, counted %.5f\n", best, others, counted - best);
     CHECK(others > 0.0 && others < 0.01 * best);
     CHECK(fabs(counted - best - others) < 0.01 * others);

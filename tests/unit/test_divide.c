@@ -91,8 +91,8 @@ static void test_base_color(enum faults faults) {
                    (double)(&found.r)[c], (double)base);
         CHECK_NEAR((&noise.r)[c] / base, (&light_noise.r)[c] / (&arrives.r)[c], 4e-3);
     }
-    /* White paint is Lambert's in divide_white but for its roughness, which is 1. */
-    CHECK(divide_white(&divide, texel, &white));
+    /* White paint is Lambert's in divide_lambert but for its roughness, which is 1. */
+    CHECK(divide_lambert(&divide, texel, &white));
     float of_rough = bsdf_diffuse(1.0f, cosf(0.435f), 1.0f, to_light().z) / bsdf_diffuse(ROUGHNESS, cosf(0.435f), 1.0f, to_light().z);
     CHECK_NEAR(white.g, wanted_white.g * of_rough, 1e-4f);
     for (size_t i = 0; i < rig.scene.photograph_count; i++)

@@ -1,6 +1,6 @@
-/* gloss.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the reflection
+/* specular_fit.h: roughness and specular of a plane under a disc of distant light, from photographs that show what the reflection
  * model says, integrated over the disc: a polished, a satin and a matt one come back. */
-#include "server/material/gloss.h"
+#include "server/material/specular_fit.h"
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
 #include "tests/unit/plane_rig.h"
@@ -74,7 +74,7 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
             irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, disc->direction[k], rgb_gray(RADIANCE * disc->angle[k]));
     uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
     struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
-    gloss_fit(r, &rig.views, &probes, &field);
+    specular_fit(r, &rig.views, &probes, &field);
     printf("roughness %.3f specular %.3f, true %.3f %.3f\n", (double)r->materials.roughness[0],
            (double)r->materials.specular[0], (double)roughness, (double)specular);
     CHECK_NEAR(r->materials.specular[0], specular, 0.06f);

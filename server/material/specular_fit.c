@@ -1,0 +1,290 @@
+/* specular_fit.c -- see specular_fit.h. */
+#include "server/material/specular_fit.h"
+
+#include <math.h>
+
+#include "common/mem.h"
+#include "server/material/specular_observation.h"
+#include "server/material/specular_posterior.h"
+
+/* A segment is sampled well enough with this many points, or with one in PART_ENOUGH of those wanted if that is more.
+ * With fewer, pixels nearer to edges are used too, then smaller patches. By hand. */
+#define POINTS_ENOUGH 32
+#define PART_ENOUGH 8
+#define MIN_VIEWS 3 /* observations of a point */
+/* Scale of the robust residual (weight 1/4 at one scale): parts of the texel's radiance and of the room's median. */
+#define SCALE_RELATIVE 0.12f
+#define SCALE_MEDIAN 0.005f
+/* Upper bound of base colour in the fit. Above 1 because incident light may be underestimated: with a bound of 1 white
+ * surfaces would be explained by highlights that do not exist. */
+#define MAX_BASE_COLOR 1.25f
+/* Standard error, as a part of the misfit, from errors that all texels of a segment share: incident light, base colour
+ * and, where every pixel is near an edge, light of other surfaces. Near window bars and door frames the true material's
+ * misfit is up to a tenth above that of a diffuse one. */
+#define MISFIT_FLOOR 0.01
+#define MISFIT_FLOOR_EDGE 0.03
+/* Probability from which a segment is diffuse; below, the posterior mean has the smaller error. */
+#define DIFFUSE_CERTAIN 0.95
+/* Material of a segment with too few observations: half way to an ordinary dielectric, which limits the error of base
+ * colour to 2 % either way. It becomes diffuse if it is darker than that by this part of the misfit and this many
+ * standard errors. */
+#define UNKNOWN_ROUGHNESS 0.5f
+#define UNKNOWN_SPECULAR 0.25f
+#define DARKER_PART 0.03
+#define DARKER_ERRORS 3.0
+
+#define ROUGHNESSES HIGHLIGHT_ROUGHNESSES
+#define SPECULARS (HIGHLIGHT_SPECULARS + 1) /* the first is 0: no highlight */
+
+static const float specular_of[SPECULARS] = {0.0f, 0.125f, 0.25f, 0.5f, 0.75f, 1.0f};
+
+/* Indices into the levels of roughness and specular. */
+struct candidate_levels {
+    size_t k, m;
+};
+
+static const struct candidate_levels diffuse_candidate = {ROUGHNESSES - 1, 0};
+
+/* Points of one segment and their misfits. */
+struct segment_points {
+    size_t count; /* points */
+    double floor; /* MISFIT_FLOOR or MISFIT_FLOOR_EDGE */
+    struct specular_point point[SPECULAR_MAX_POINTS];
+    float misfit[SPECULAR_MAX_POINTS][ROUGHNESSES][SPECULARS];
+};
+
+struct specular_job {
+    struct materials *materials;
+    struct specular_observer observer;
+    struct segment_points *points;      /* [threads]; owned */
+    struct specular_evidence *evidence; /* [segment_count]; owned */
+};
+
+/* --- misfits ------------------------------------------------------------------------------------ */
+
+/* Robust misfit of one channel of a point's observations under roughness k and specular m, with the base colour that
+ * fits them best (iteratively reweighted least squares; Geman and McClure's function). */
+static float misfit_channel(const struct specular_point *p, size_t k, size_t m, int channel, float median) {
+    float diffuse[SPECULAR_VIEWS], unit_diffuse[SPECULAR_VIEWS], weight[SPECULAR_VIEWS], mean = 0.0f, misfit = 0.0f;
+    for (size_t i = 0; i < p->count; i++) {
+        const struct specular_observation *l = &p->observation[i];
+        float highlight = m == 0 ? 0.0f : (&l->highlight.radiance[k][m - 1].r)[channel];
+        diffuse[i] = (&l->observed.r)[channel] - highlight;
+        unit_diffuse[i] = (&l->unit_diffuse[k].r)[channel];
+        weight[i] = 1.0f;
+        mean += (&l->observed.r)[channel] / (float)p->count;
+    }
+    float scale = SCALE_RELATIVE * mean + SCALE_MEDIAN * median;
+    for (int sweep = 0; sweep < 4; sweep++) {
+        float over = 0.0f, under = 1e-20f;
+        for (size_t i = 0; i < p->count; i++) {
+            over += weight[i] * unit_diffuse[i] * diffuse[i];
+            under += weight[i] * unit_diffuse[i] * unit_diffuse[i];
+        }
+        float base = clampf(over / under, 0.0f, MAX_BASE_COLOR);
+        misfit = 0.0f;
+        for (size_t i = 0; i < p->count; i++) {
+            float e = (diffuse[i] - base * unit_diffuse[i]) / scale, influence = 1.0f / (1.0f + e * e);
+            weight[i] = influence * influence;
+            misfit += e * e * influence;
+        }
+    }
+    return misfit;
+}
+
+static void find_misfits(const struct specular_job *job, struct segment_points *e) {
+    float median = job->observer.views->median_radiance;
+    for (size_t i = 0; i < e->count; i++) {
+        for (size_t k = 0; k < ROUGHNESSES; k++) {
+            for (size_t m = 0; m < SPECULARS; m++) {
+                e->misfit[i][k][m] = 0.0f;
+                for (int c = 0; c < 3; c++)
+                    e->misfit[i][k][m] += misfit_channel(&e->point[i], k, m, c, median);
+            }
+        }
+    }
+}
+
+/* Samples points of a segment; false where fewer than two have enough observations. */
+static bool sample_points(const struct specular_job *job, size_t segment, struct specular_criteria criteria,
+                          int thread) {
+    struct segment_points *e = &job->points[thread];
+    e->count = specular_observe(&job->observer, segment, criteria, thread, e->point);
+    e->floor = criteria.edge == 0 ? MISFIT_FLOOR : MISFIT_FLOOR_EDGE;
+    return e->count >= 2;
+}
+
+/* Relaxes the requirements until there are enough points: first pixels nearer to edges, then smaller patches. False
+ * where there are fewer than two. */
+static bool sample_segment(const struct specular_job *job, size_t segment, int thread) {
+    struct specular_criteria criteria = {specular_widest_patch(&job->observer, segment), 0, MIN_VIEWS};
+    size_t enough = specular_points_wanted(&job->observer, segment) / PART_ENOUGH;
+    enough = enough < POINTS_ENOUGH ? POINTS_ENOUGH : enough;
+    for (;; criteria.patch = fmaxf(0.5f * criteria.patch, SPECULAR_MIN_PATCH)) {
+        bool enough_points = false;
+        for (criteria.edge = 0; criteria.edge < VIEWS_EDGE; criteria.edge++) {
+            enough_points = sample_points(job, segment, criteria, thread);
+            if (job->points[thread].count >= enough)
+                return true;
+        }
+        if (criteria.patch <= SPECULAR_MIN_PATCH)
+            return enough_points;
+    }
+}
+
+/* Sum of a candidate's misfits over the points. */
+static double misfit_of(const struct segment_points *e, struct candidate_levels c) {
+    double sum = 0.0;
+    for (size_t i = 0; i < e->count; i++)
+        sum += (double)e->misfit[i][c.k][c.m];
+    return sum;
+}
+
+/* The candidate of the least misfit. */
+static struct candidate_levels best_of(const struct segment_points *e) {
+    struct candidate_levels best = diffuse_candidate;
+    double least = misfit_of(e, diffuse_candidate);
+    for (size_t k = 0; k < ROUGHNESSES && specular_levels.roughness[k] <= SPECULAR_MAX_ROUGHNESS; k++) {
+        for (size_t m = 1; m < SPECULARS; m++) {
+            struct candidate_levels c = {k, m};
+            double misfit = misfit_of(e, c);
+            if (misfit < least)
+                best = c, least = misfit;
+        }
+    }
+    return best;
+}
+
+/* Misfit of candidate `a` less that of `b`: as a part of a's, and in standard errors over the points. */
+static void compare(const struct segment_points *e, struct candidate_levels a, struct candidate_levels b,
+                    double *part, double *errors) {
+    double total = 0.0, gain = 0.0, squares = 0.0, n = (double)e->count;
+    for (size_t i = 0; i < e->count; i++) {
+        double without = (double)e->misfit[i][a.k][a.m], d = without - (double)e->misfit[i][b.k][b.m];
+        total += without;
+        gain += d;
+        squares += d * d;
+    }
+    double floor = e->floor * total;
+    *part = gain / fmax(total, 1e-30);
+    *errors = gain / sqrt(fmax(squares - gain * gain / n + floor * floor, 1e-30));
+}
+
+/* Likelihood of the observations under a candidate, relative to the best one: its excess misfit as a normal deviate. */
+static double likelihood(const struct segment_points *e, struct candidate_levels c, struct candidate_levels best) {
+    double part, errors;
+    compare(e, c, best, &part, &errors);
+    return errors > 0.0 ? exp(-0.5 * errors * errors) : 1.0;
+}
+
+/* --- segments ----------------------------------------------------------------------------------- */
+
+/* Mean over the observed texels of a segment. */
+static rgb mean_base_color(const struct specular_observer *l, size_t segment) {
+    const struct reconstruction *r = l->r;
+    double sum[3] = {0.0}, count = 0.0;
+    for (uint32_t i = l->texels.first[segment]; i < l->texels.first[segment + 1]; i++) {
+        uint32_t texel = l->texels.texel[i];
+        if (!(r->fused.count[texel] > 0.0f))
+            continue;
+        for (size_t c = 0; c < 3; c++)
+            sum[c] += (double)r->materials.base_color.texel[texel][c];
+        count += 1.0;
+    }
+    double scale = 1.0 / fmax(count, 1.0);
+    return rgb_make((float)(scale * sum[0]), (float)(scale * sum[1]), (float)(scale * sum[2]));
+}
+
+/* Offset in [-0.5, 0.5] of the minimum of a parabola through three values of which the middle one is least. */
+static double between(double left, double middle, double right) {
+    double bend = left - 2.0 * middle + right, offset = bend > 0.0 ? 0.5 * (left - right) / bend : 0.0;
+    return offset < -0.5 ? -0.5 : offset > 0.5 ? 0.5 : offset;
+}
+
+/* Roughness of the best candidate, refined between the levels. */
+static double roughness_about(const struct segment_points *e, struct candidate_levels best) {
+    const float *level = specular_levels.roughness;
+    size_t k = best.k, m = best.m;
+    double middle = (double)level[k];
+    if (m == 0 || k == 0 || k + 1 == ROUGHNESSES)
+        return middle;
+    double offset = between(misfit_of(e, (struct candidate_levels){k - 1, m}), misfit_of(e, best),
+                            misfit_of(e, (struct candidate_levels){k + 1, m}));
+    return middle + offset * (offset < 0.0 ? middle - (double)level[k - 1] : (double)level[k + 1] - middle);
+}
+
+static void set_evidence(const struct specular_observer *l, size_t segment, const struct segment_points *e,
+                         struct specular_evidence *evidence) {
+    struct candidate_levels best = best_of(e);
+    evidence->is_observed = true;
+    evidence->part = (double)by_segment_count(&l->texels, segment) / (double)l->r->inverse.valid_count;
+    evidence->base_color = mean_base_color(l, segment);
+    evidence->best = best.m == 0 ? SPECULAR_DIFFUSE : specular_candidate(best.k, best.m - 1);
+    evidence->best_roughness = roughness_about(e, best);
+    evidence->likelihood[SPECULAR_DIFFUSE] = likelihood(e, diffuse_candidate, best);
+    for (size_t k = 0; k < ROUGHNESSES; k++)
+        for (size_t m = 1; m < SPECULARS; m++)
+            evidence->likelihood[specular_candidate(k, m - 1)] = likelihood(e, (struct candidate_levels){k, m}, best);
+}
+
+static void set_lobe(struct materials *materials, size_t segment, double roughness, double specular) {
+    materials->roughness[segment] = (float)roughness;
+    materials->specular[segment] = (float)specular;
+}
+
+/* Whether a segment without clean observations is darker than the material for unknown segments allows, which reflects
+ * a window at grazing angles. Mixed pixels and single photographs suffice for this one-sided test: base colour explains
+ * anything brighter. */
+static bool is_too_dark(const struct specular_job *job, size_t segment, int thread) {
+    struct candidate_levels guess = {0, 0};
+    double part, errors;
+    if (!sample_points(job, segment, (struct specular_criteria){SPECULAR_MIN_PATCH, VIEWS_EDGE, 1}, thread))
+        return false;
+    find_misfits(job, &job->points[thread]);
+    while (specular_levels.roughness[guess.k] < UNKNOWN_ROUGHNESS)
+        guess.k++;
+    while (specular_of[guess.m] < UNKNOWN_SPECULAR)
+        guess.m++;
+    compare(&job->points[thread], diffuse_candidate, guess, &part, &errors);
+    return part < -DARKER_PART && errors < -DARKER_ERRORS;
+}
+
+static void measure_segment(void *user, size_t segment, int thread) {
+    const struct specular_job *job = user;
+    if (job->observer.r->is_emitter[segment]) { /* its own light hides what it reflects */
+        set_lobe(job->materials, segment, 1.0, 0.0);
+        return;
+    }
+    set_lobe(job->materials, segment, UNKNOWN_ROUGHNESS, UNKNOWN_SPECULAR);
+    if (sample_segment(job, segment, thread)) {
+        find_misfits(job, &job->points[thread]);
+        set_evidence(&job->observer, segment, &job->points[thread], &job->evidence[segment]);
+    } else if (is_too_dark(job, segment, thread)) {
+        set_lobe(job->materials, segment, 1.0, 0.0);
+    }
+}
+
+static void fit_segment(void *user, size_t segment, int thread) {
+    (void)thread;
+    const struct specular_job *job = user;
+    if (!job->evidence[segment].is_observed)
+        return;
+    struct specular_posterior posterior = specular_posterior(job->evidence, job->observer.r->segments.count, segment);
+    if (posterior.diffuse > DIFFUSE_CERTAIN)
+        set_lobe(job->materials, segment, 1.0, 0.0);
+    else
+        set_lobe(job->materials, segment, posterior.roughness, posterior.specular);
+}
+
+void specular_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
+               const struct light_field *field) {
+    struct specular_job job = {.materials = &r->materials};
+    specular_observer_init(&job.observer, r, views, probes, field);
+    job.points = mem_array((size_t)parallel_thread_count(r->pool), sizeof *job.points);
+    job.evidence = mem_calloc(r->segments.count, sizeof *job.evidence);
+    parallel_for(r->pool, r->segments.count, measure_segment, &job);
+    parallel_for(r->pool, r->segments.count, fit_segment, &job);
+    mem_free(job.evidence);
+    mem_free(job.points);
+    specular_observer_release(&job.observer);
+}

@@ -1,0 +1,168 @@
+/* specular_observation.c -- see specular_observation.h. */
+#include "server/material/specular_observation.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/capture/choose.h"
+#include "server/render/sampler.h"
+#include "server/scene/surface.h"
+
+/* Points of the whole room, shared out by the square roots of the segments' texel counts; sets the time of the pass. */
+#define POINTS_TOTAL 60000
+#define MIN_POINTS 24  /* a segment */
+#define TRIES 16       /* texels tried for each point wanted */
+#define VIEWS_TRIED 40 /* photographs tried for each point */
+/* Directions for each observation and place of the patch: by each roughness level, and towards lights. */
+#define SAMPLES_A_LEVEL 1
+#define LIGHT_SAMPLES 5
+#define KEY_SPECULAR 17        /* random-number key, distinct from others of the texel */
+#define PATCH 5                /* places a side at which photographs are read */
+#define PATCHES_A_SIDE 14.0    /* patches that must fit along a side of the segment, were it square */
+#define MAX_PATCH 24.0         /* side in a texture of up to 2048 texels; in proportion in larger ones */
+#define MIN_NORMAL_COSINE 0.8f /* least cosine between normals of a patch and that of its middle */
+#define MIN_VIEW_COSINE 0.1f   /* least cosine towards the camera, anywhere in a patch */
+
+const struct highlight_levels specular_levels = {
+    .roughness_count = HIGHLIGHT_ROUGHNESSES,
+    .specular_count = HIGHLIGHT_SPECULARS,
+    .roughness = {0.05f, 0.1f, 0.15f, 0.2f, 0.25f, 0.3f, 0.375f, 0.45f, 0.55f, 0.65f, 0.8f, 1.0f},
+    .specular = {0.125f, 0.25f, 0.5f, 0.75f, 1.0f},
+};
+
+/* Places of a patch, and the irradiance at each. */
+struct patch {
+    size_t count;
+    struct surface_point at[PATCH * PATCH];
+    struct irradiance light[PATCH * PATCH];
+};
+
+/* Places around a texel that are in its chart and have similar normals. */
+static void patch_around(const struct specular_observer *l, uint32_t texel, float side, struct patch *patch) {
+    const struct reconstruction *r = l->r;
+    struct surface_point at;
+    patch->count = 0;
+    if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        return;
+    uint32_t chart = r->atlas.chart_of_triangle[at.triangle];
+    float x0 = (float)(texel % r->atlas.width) + 0.5f, y0 = (float)(texel / r->atlas.width) + 0.5f;
+    for (int i = 0; i < PATCH * PATCH; i++) {
+        struct surface_point p;
+        struct probe_mix mix;
+        float dx = ((float)(i % PATCH) + 0.5f) / PATCH - 0.5f, dy = ((float)(i / PATCH) + 0.5f) / PATCH - 0.5f;
+        float x = x0 + side * dx, y = y0 + side * dy;
+        if (!surface_at(&r->scene->mesh, &r->atlas, &r->inverse, x, y, &p) ||
+            r->atlas.chart_of_triangle[p.triangle] != chart || vec3_dot(p.shading, at.shading) < MIN_NORMAL_COSINE)
+            continue;
+        probes_mix(l->probes, &r->atlas, &r->fused, (uint32_t)y * r->atlas.width + (uint32_t)x, &p, &mix);
+        probes_irradiance(l->probes, &mix, &patch->light[patch->count]);
+        sun_add_light(&r->sun, r->world.accel, &p, &patch->light[patch->count]);
+        patch->at[patch->count++] = p;
+    }
+}
+
+/* Mean radiance of the patch in a photograph. False unless every place faces the camera, has a valid sample and is no
+ * nearer to an edge than class `edge`. */
+static bool patch_observed(const struct views *views, const struct view *view, const struct patch *patch, int edge,
+                        rgb *observed) {
+    const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
+    *observed = rgb_gray(0.0f);
+    for (size_t i = 0; i < patch->count; i++) {
+        const struct surface_point *at = &patch->at[i];
+        struct view place = *view;
+        struct photograph_sample s;
+        float depth_m;
+        if (vec3_dot(at->shading, views_direction(views, view->train, at->position)) < MIN_VIEW_COSINE ||
+            !camera_project(&photo->camera, at->position, &place.x, &place.y, &depth_m) ||
+            views_edge(views, &place, at->triangle) > edge || photograph_has_firefly(photo, place.x, place.y) ||
+            !photograph_sample(photo, place.x, place.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
+            return false;
+        *observed = rgb_mad(*observed, 1.0f / (float)patch->count, s.radiance);
+    }
+    return patch->count > 0;
+}
+
+/* Radiance that each candidate reflects towards a photograph, mean over the patch. */
+static void predict(const struct specular_observer *l, const struct patch *patch, uint32_t texel, uint32_t train,
+                    struct incident *scratch, struct specular_observation *observation) {
+    float share = 1.0f / (float)patch->count;
+    memset(observation->unit_diffuse, 0, sizeof observation->unit_diffuse);
+    memset(&observation->highlight, 0, sizeof observation->highlight);
+    for (size_t i = 0; i < patch->count; i++) {
+        const struct surface_point *at = &patch->at[i];
+        struct highlight highlight;
+        vec3 wo = views_direction(l->views, train, at->position);
+        highlight_gather(&highlight, scratch, l->field, at, wo, &specular_levels,
+                         sampler_key(KEY_SPECULAR + i, texel, train), SAMPLES_A_LEVEL * HIGHLIGHT_ROUGHNESSES,
+                         LIGHT_SAMPLES);
+        for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
+            rgb unit_diffuse = irradiance_diffuse(&patch->light[i], at->shading, specular_levels.roughness[k], wo);
+            observation->unit_diffuse[k] = rgb_mad(observation->unit_diffuse[k], share, unit_diffuse);
+            for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++)
+                observation->highlight.radiance[k][m] =
+                    rgb_mad(observation->highlight.radiance[k][m], share, highlight.radiance[k][m]);
+        }
+    }
+}
+
+static bool observe_texel(const struct specular_observer *l, uint32_t texel, struct specular_criteria criteria,
+                          struct incident *scratch, struct specular_point *point) {
+    struct patch patch;
+    struct view view[VIEWS_TRIED];
+    size_t observed_count = 0;
+    point->count = 0;
+    patch_around(l, texel, criteria.patch, &patch);
+    if (patch.count == 0)
+        return false;
+    const struct surface_point *middle = &patch.at[patch.count / 2];
+    size_t view_count = views_pick(l->views, middle->position, middle->normal, texel, VIEWS_TRIED, view);
+    for (size_t i = 0; i < view_count && observed_count < SPECULAR_VIEWS; i++) {
+        if (patch_observed(l->views, &view[i], &patch, criteria.edge, &point->observation[observed_count].observed))
+            view[observed_count++] = view[i];
+    }
+    if (observed_count < criteria.least)
+        return false;
+    for (size_t i = 0; i < observed_count; i++)
+        predict(l, &patch, texel, view[i].train, scratch, &point->observation[i]);
+    point->count = observed_count;
+    return true;
+}
+
+size_t specular_points_wanted(const struct specular_observer *l, size_t segment) {
+    double texels = (double)by_segment_count(&l->texels, segment);
+    size_t points = (size_t)(POINTS_TOTAL * sqrt(texels) / l->root_sum);
+    return points < MIN_POINTS ? MIN_POINTS : points > SPECULAR_MAX_POINTS ? SPECULAR_MAX_POINTS : points;
+}
+
+float specular_widest_patch(const struct specular_observer *l, size_t segment) {
+    const struct atlas *atlas = &l->r->atlas;
+    double texture = (double)(atlas->width > atlas->height ? atlas->width : atlas->height);
+    double side = sqrt((double)by_segment_count(&l->texels, segment)) / PATCHES_A_SIDE;
+    return fmaxf(SPECULAR_MIN_PATCH, (float)fmin(side, MAX_PATCH * fmax(1.0, texture / 2048.0)));
+}
+
+size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
+                        int thread, struct specular_point *point) {
+    size_t points = specular_points_wanted(l, segment);
+    uint32_t texels = l->texels.first[segment + 1] - l->texels.first[segment];
+    const uint32_t *texel = &l->texels.texel[l->texels.first[segment]];
+    size_t tries = TRIES * points, count = 0, step = choose_even_step(texels);
+    for (size_t i = 0; i < tries && i < texels && count < points; i++)
+        count += observe_texel(l, texel[i * step % texels], criteria, &l->scratch[thread], &point[count]);
+    return count;
+}
+
+void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
+                       const struct probes *probes, const struct light_field *field) {
+    *l = (struct specular_observer){.r = r, .views = views, .probes = probes, .field = field};
+    l->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *l->scratch);
+    by_segment_sort(&l->texels, &r->segments, &r->inverse);
+    for (size_t i = 0; i < r->segments.count; i++)
+        l->root_sum += sqrt((double)by_segment_count(&l->texels, i));
+}
+
+void specular_observer_release(struct specular_observer *l) {
+    by_segment_release(&l->texels);
+    mem_free(l->scratch);
+}

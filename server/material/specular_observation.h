@@ -1,0 +1,69 @@
+/* specular_observation.h -- observations of sample points of a segment, and the radiance that each candidate material
+ * would reflect there.
+ *
+ * A photograph is averaged over a patch around a texel, which reduces its noise; base colour may vary over the patch,
+ * but is the same in all photographs. The diffuse lobe and the highlight of every candidate are gathered at the same
+ * places of the patch, since it may be curved. */
+#ifndef UNBAKE_MATERIAL_SPECULAR_OBSERVATION_H
+#define UNBAKE_MATERIAL_SPECULAR_OBSERVATION_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "server/capture/views.h"
+#include "server/gather/highlight.h"
+#include "server/gather/probes.h"
+#include "server/scene/by_segment.h"
+#include "server/state/reconstruction.h"
+
+#define SPECULAR_VIEWS 10        /* observations of a point, at most; bounds time and memory */
+#define SPECULAR_MAX_POINTS 1024 /* points of a segment, at most; bounds memory: 9 MB a thread */
+#define SPECULAR_MIN_PATCH 8.0f  /* least side of a patch, texels */
+
+/* Roughness and specular of the candidates. */
+extern const struct highlight_levels specular_levels;
+
+/* A point in one photograph: observed radiance, and what each candidate reflects there. */
+struct specular_observation {
+    rgb observed;
+    rgb unit_diffuse[HIGHLIGHT_ROUGHNESSES]; /* by the diffuse lobe of base colour 1 */
+    struct highlight highlight;
+};
+
+struct specular_point {
+    size_t count;
+    struct specular_observation observation[SPECULAR_VIEWS];
+};
+
+struct specular_observer {
+    const struct reconstruction *r; /* borrowed, as the next three */
+    const struct views *views;
+    const struct probes *probes;
+    const struct light_field *field;
+    struct texels_by_segment texels;
+    double root_sum;          /* sum over the segments of the square root of their texel count */
+    struct incident *scratch; /* [threads]; owned */
+};
+
+void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
+                       const struct probes *probes, const struct light_field *field);
+void specular_observer_release(struct specular_observer *l);
+
+/* What a point must fulfil. */
+struct specular_criteria {
+    float patch;  /* side of its patch, texels */
+    int edge;     /* greatest edge class of its pixels (views.h) */
+    size_t least; /* least number of observations */
+};
+
+/* Side of the widest patch of which the segment has room for many, texels. */
+float specular_widest_patch(const struct specular_observer *l, size_t segment);
+
+/* Points wanted of a segment. */
+size_t specular_points_wanted(const struct specular_observer *l, size_t segment);
+
+/* Fills point[SPECULAR_MAX_POINTS] with as many points, or fewer; returns their number. */
+size_t specular_observe(const struct specular_observer *l, size_t segment, struct specular_criteria criteria,
+                        int thread, struct specular_point *point);
+
+#endif

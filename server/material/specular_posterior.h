@@ -1,0 +1,46 @@
+/* specular_posterior.h -- posterior of a segment's specular lobe, from its own observations and those of segments of
+ * similar base colour.
+ *
+ * Observations seldom determine the lobe of small objects, but parts of one colour are often of one material: a door
+ * and its frame, the legs of a table. Segments of similar base colour are modelled as sharing one common material, each
+ * with a probability that falls with the difference of the colours; otherwise a segment's material is independent.
+ * Segments whose observations disagree hardly influence each other. Large segments do not take part: most are painted
+ * walls, and many unrelated objects are white too. */
+#ifndef UNBAKE_MATERIAL_SPECULAR_POSTERIOR_H
+#define UNBAKE_MATERIAL_SPECULAR_POSTERIOR_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "common/vec.h"
+#include "server/material/specular_observation.h"
+
+/* Candidate 0 is diffuse; the others are all pairs of specular_levels. */
+#define SPECULAR_CANDIDATES (1 + HIGHLIGHT_ROUGHNESSES * HIGHLIGHT_SPECULARS)
+#define SPECULAR_DIFFUSE 0
+
+/* Index of the candidate with levels k of roughness and m of specular. */
+static inline size_t specular_candidate(size_t k, size_t m) { return 1 + k * HIGHLIGHT_SPECULARS + m; }
+
+/* Prior of rougher lobes is 0: they cannot be distinguished from diffuse reflection. At .8 large walls still tell by 3
+ * to 10 standard errors. */
+#define SPECULAR_MAX_ROUGHNESS 0.8f
+
+struct specular_evidence {
+    bool is_observed; /* the segment has enough observations; else the other fields are undefined */
+    double part;      /* of the room's texels */
+    rgb base_color;
+    double likelihood[SPECULAR_CANDIDATES]; /* of the observations under each candidate, at most 1 */
+    size_t best;                            /* the likeliest candidate */
+    double best_roughness;                  /* refined between the levels */
+};
+
+/* Probability of the diffuse candidate, and posterior means over all candidates. */
+struct specular_posterior {
+    double diffuse, roughness, specular;
+};
+
+/* Posterior of `segment`, whose told[segment].any must be true; told[count]. */
+struct specular_posterior specular_posterior(const struct specular_evidence *evidence, size_t count, size_t segment);
+
+#endif
