@@ -6,6 +6,8 @@
 #define CLOSE "Connection: close\r\n"
 #define TUS "Tus-Resumable: 1.0.0\r\n"
 #define NO_UPLOAD "/v1/uploads/00000000000000000000000000000000"
+/* Added to a status: libmicrohttpd 1.0 refuses it with 400 before anybody is asked. */
+#define OR_REFUSED 1000
 #define CLOSED 0 /* the connection ends without a word */
 
 static const struct {
@@ -116,13 +118,13 @@ static const struct {
      "Transfer-Encoding: chunked\r\n x\r\n\r\n0\r\n\r\n", 400},
     {"lines that end in LF alone", "GET /healthz HTTP/1.1\n" "Host: localhost\nConnection: close\n\n", 200},
     {"a field without a colon", "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-A\r\n\r\n", 400},
-    {"a field without a name", "GET /healthz HTTP/1.1\r\n" HOST CLOSE ": a\r\n\r\n", 200}, /* the library drops it */
+    {"a field without a name", "GET /healthz HTTP/1.1\r\n" HOST CLOSE ": a\r\n\r\n", OR_REFUSED + 200}, /* 0.9.75 drops it */
     {"an upgrade that nobody offers", "GET /healthz HTTP/1.1\r\n" HOST "Connection: close, Upgrade\r\nUpgrade: h2c\r\n\r\n", 200},
     {"a coding in HTTP/1.0", "POST /v1/jobs/1/cancel HTTP/1.0\r\n" HOST "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 404},
     {"a coding in capitals", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE "Transfer-Encoding: Chunked\r\n\r\n0\r\n\r\n", 404},
     {"an empty coding", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE "Transfer-Encoding:\r\n\r\n", 400},
     {"chunks with extensions and trailers", "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE
-     "Transfer-Encoding: chunked\r\n\r\n3;a=b\r\nabc\r\n0\r\nX: y\r\n\r\n", 404},
+     "Transfer-Encoding: chunked\r\n\r\n3;a=b\r\nabc\r\n0\r\nX: y\r\n\r\n", OR_REFUSED + 404},
     {"a chunk whose size is no number", "POST /v1/jobs HTTP/1.1\r\n" HOST CLOSE "Content-Type: application/json\r\n"
      "Transfer-Encoding: chunked\r\n\r\nzz\r\n{}\r\n0\r\n\r\n", 400},
     {"a chunk of negative size", "POST /v1/jobs HTTP/1.1\r\n" HOST CLOSE "Content-Type: application/json\r\n"
@@ -185,7 +187,7 @@ static void check_bytes(struct rig *rig, const char *what, const char *text, siz
 }
 
 /* Heads and fields that are too large, and bytes that no text can hold. */
-static void check_large(struct rig *rig) {
+static void check_large(struct rig *rig, bool is_late) {
     char *text = mem_alloc(200000);
     int used = sprintf(text, "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-Large: ");
     memset(text + used, 'a', 100000);
@@ -195,23 +197,24 @@ static void check_large(struct rig *rig) {
     memset(text + used, 'a', 100000);
     int end = sprintf(text + used + 100000, " HTTP/1.1\r\n" HOST CLOSE "\r\n");
     check_bytes(rig, "a target of 100 kB", text, (size_t)(used + 100000 + end), 414);
-    /* The library ends a value at a NUL, before anybody can see it: what matters is that there is
+    /* Before 1.0 the library ends a value at a NUL, before anybody can see it: what matters is that there is
      * one reading of it, and that nothing behind it is taken for a request. */
     static const char nul_value[] = "GET /healthz HTTP/1.1\r\n" HOST CLOSE "X-A: a\0b\r\n\r\n";
-    check_bytes(rig, "a NUL in a field", nul_value, sizeof nul_value - 1, 200);
+    check_bytes(rig, "a NUL in a field", nul_value, sizeof nul_value - 1, is_late ? 400 : 200);
     static const char nul_length[] = "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST CLOSE
                                      "Content-Length: 3\0""0\r\n\r\nabc";
-    check_bytes(rig, "a NUL in Content-Length", nul_length, sizeof nul_length - 1, 404);
+    check_bytes(rig, "a NUL in Content-Length", nul_length, sizeof nul_length - 1, is_late ? 400 : 404);
     mem_free(text);
 }
 
 int main(void) {
     struct rig rig;
+    bool is_late = strncmp(listener_library_version(), "0.", 2) != 0;
     rig_start(&rig, &rig_patient, 15);
     CHECK(sizeof cases / sizeof *cases >= 60);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
-        check_bytes(&rig, cases[i].what, cases[i].text, strlen(cases[i].text), cases[i].status);
-    check_large(&rig);
+        check_bytes(&rig, cases[i].what, cases[i].text, strlen(cases[i].text), is_late && cases[i].status >= OR_REFUSED ? 400 : cases[i].status % OR_REFUSED);
+    check_large(&rig, is_late);
     struct buf reply;
     CHECK(rig_get(&rig, "/healthz", "X-Request-Id: my-id.1\r\n", &reply) == 200);
     CHECK(strstr(buf_text(&reply), "X-Request-Id: my-id.1\r\n"));
