@@ -98,9 +98,9 @@ static void put_numbers(const struct client_view *v, double age_sec, struct buf 
         terminal_clean(out, v->metric[i].series);
         buf_printf(out, " %s", figure);
     }
-    if (v->eta_sec >= 0.0) {
+    if (v->eta_sec > age_sec) { /* one that has run out tells nothing */
         char left[16];
-        format_duration(left, fmax(v->eta_sec - age_sec, 0.0));
+        format_duration(left, v->eta_sec - age_sec);
         buf_printf(out, "  ETA %s", left);
     }
 }

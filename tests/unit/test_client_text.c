@@ -291,7 +291,7 @@ static void test_view(void) {
     event(&v, "metric", "{\"series\":\"bad\",\"step\":251,\"value\":null}");
     check_line(&v, 80, true, 5.0,
                "job 17  refine  [#######------------------------]  25%  loss 0.01220  ETA 1m10s");
-    check_line(&v, 80, false, 500.0, "job 17  refine   25%  loss 0.01220  ETA 0s");
+    check_line(&v, 80, false, 500.0, "job 17  refine   25%  loss 0.01220");
     check_line(&v, 30, true, 0.0, "job 17  refine   25%  loss 0.0");
     /* More series than there is room for: the one reported longest ago gives way. */
     event(&v, "metric", "{\"series\":\"b\",\"step\":1,\"value\":1}");

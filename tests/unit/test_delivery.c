@@ -24,7 +24,7 @@ static int worker(const char *folder) {
         return PROGRESS_EXIT_FAILED;
     if (strstr(url, "hang"))
         pause();
-    progress_end(&p, STATUS_OK, strstr(url, "refuse") ? "it answers 500" : "", "");
+    progress_end(&p, strstr(url, "refuse") ? STATUS_UNAVAILABLE : STATUS_OK, "it answers 500", "");
     return strstr(url, "refuse") ? PROGRESS_EXIT_FAILED : PROGRESS_EXIT_OK;
 }
 
