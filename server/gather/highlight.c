@@ -9,11 +9,11 @@
 #include "server/render/light.h"
 #include "server/render/sampler.h"
 
-enum { PAIR_HALF = 8 }; /* beyond those of incident.c */
-#define ALBEDO_SAMPLES 1024 /* a viewer and a direction each */
+enum { PAIR_HALF = 8 }; /* sample dimension of the lobes, after those of incident.c */
+#define ALBEDO_SAMPLES 1024 /* pairs of a view direction and a lobe sample; by hand */
 #define KEY_ALBEDO 11
 
-/* Adds one direction of arriving light to all levels. */
+/* Adds the light from one direction to every level, with the density of the whole mixture of samplers. */
 static void add(struct highlight *h, const struct highlight_levels *levels, const struct bsdf *lobe,
                 const float *eta, vec3 wo, vec3 wi, rgb light, float samples_a_level, float light_density) {
     float lobe_value[HIGHLIGHT_ROUGHNESSES], density = light_density, cos_d = 0.0f;

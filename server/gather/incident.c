@@ -8,7 +8,7 @@
 #include "server/render/sampler.h"
 #include "server/scene/rgb_half.h"
 
-/* 0 is irradiance.c's, from 8 on highlight.c's. */
+/* Sample dimensions; 0 is that of irradiance.c, those of highlight.c begin at 8. */
 enum {
     PAIR_PICK = 1,
     PAIR_LIGHT,
@@ -17,10 +17,12 @@ enum {
     PAIR_REFLECTED_LIGHT = 48,
     PAIR_ROULETTE = 56
 };
-#define MAX_BOUNCES 4 /* one after the other from which a ray goes on */
-#define MIN_COSINE 1e-3f /* to a normal; from farther aside no lobe is followed */
-#define ROULETTE_FACTOR 2.0f /* of a ray to go on by the lobe, over the share of what is sent that is mirrored */
-#define WIDE_ROUGHNESS 0.5f /* at least, of lobes that mirror lights */
+#define MAX_BOUNCES 4 /* continuations of a ray, from backs and from specular fronts; by hand */
+#define MIN_COSINE 1e-3f /* to a normal; more grazing rays are not continued by the lobe; by hand */
+/* Probability to continue by the lobe over the specular share of what is reflected; by hand */
+#define ROULETTE_FACTOR 2.0f
+/* Least roughness of the lobe that reflects lights: narrower ones leave fireflies; by hand */
+#define WIDE_ROUGHNESS 0.5f
 
 vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     vec2 circle = bsdf_circle(u.x);
@@ -30,9 +32,9 @@ vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
     return vec3_mad(d, r * circle.y, frame[1]);
 }
 
-/* --- what a ray finds -------------------------------------------------------------------------------- */
+/* --- radiance along a ray ---------------------------------------------------------------------------- */
 
-/* Where in the texture a hit is, texels. */
+/* Position of a hit in the texture, texels. */
 static vec2 place_at(const struct world *world, const struct accel_hit *hit) {
     const vec2 *c = world->triangle[hit->triangle].corner;
     float b0 = 1.0f - hit->b1 - hit->b2;
@@ -40,7 +42,6 @@ static vec2 place_at(const struct world *world, const struct accel_hit *hit) {
                   b0 * c[0].y + hit->b1 * c[1].y + hit->b2 * c[2].y};
 }
 
-/* The texel there. */
 static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
     vec2 at = place_at(world, hit);
     uint32_t width = world->atlas->width, height = world->atlas->height;
@@ -54,7 +55,7 @@ static bool is_light(const struct world *world, const struct world_triangle *t) 
     return world->lights->area_density[t->segment] > 0.0f;
 }
 
-/* What a ray finds that meets nothing, or a front, and the density of the light sampler there. */
+/* Radiance along a ray that escapes or meets a front, and the density with which the light sampler draws it. */
 static rgb incoming_radiance(const struct light_field *field, const struct accel_ray *ray, const struct accel_hit *hit,
                 float *light_pdf) {
     const struct world *world = field->world;
@@ -71,7 +72,8 @@ static rgb incoming_radiance(const struct light_field *field, const struct accel
     return materials_emission(world->materials, t->segment, at.x, at.y);
 }
 
-/* By how much what it finds counts, t being NULL where it meets nothing. */
+/* Weight of the radiance that a ray finds; t is NULL where it escapes. Emitters found by a lobe sample are weighted by
+ * the balance heuristic against the light sample taken where the ray was reflected. */
 static rgb weight_of(const struct light_field *field, const struct world_triangle *t, const struct incident_path *path,
                      float light_pdf) {
     if (path->is_specular && (!t || is_light(field->world, t)))
@@ -80,9 +82,9 @@ static rgb weight_of(const struct light_field *field, const struct world_triangl
     return is_black ? rgb_gray(0.0f) : path->beta;
 }
 
-/* --- and on from there --------------------------------------------------------------------------------- */
+/* --- continuation --------------------------------------------------------------------------------------- */
 
-/* Towards a sampled light, from a place with such a normal. */
+/* Ray from a surface with this normal to a sampled light. */
 static struct accel_ray shadow_ray(vec3 position, vec3 normal, const struct light_sample *light) {
     vec3 origin = accel_offset(position, normal, light->direction);
     if (light->segment == LIGHT_ENVIRONMENT)
@@ -92,7 +94,7 @@ static struct accel_ray shadow_ray(vec3 position, vec3 normal, const struct ligh
     return (struct accel_ray){origin, 0.0f, vec3_scale(to_light, 1.0f / fmaxf(far_m, 1e-20f)), far_m};
 }
 
-/* Rays under way, and lights that were sampled where they were mirrored. */
+/* The rays of one bounce, and the lights sampled where they were reflected. */
 struct wavefront {
     struct incident *in;
     const struct light_field *field;
@@ -100,7 +102,7 @@ struct wavefront {
     size_t ray_count, light_count;
 };
 
-/* Adds a ray that goes on, from a position whose normal points to its side. */
+/* Appends a ray of the next bounce; the normal points to the side that it leaves on. */
 static void spawn_ray(struct wavefront *u, vec3 position, vec3 normal, vec3 direction, struct incident_path path) {
     u->in->ray[u->ray_count] = (struct accel_ray){accel_offset(position, normal, direction), 0.0f, direction, INFINITY};
     u->in->path[u->ray_count++] = path;
@@ -111,7 +113,7 @@ static vec3 position_at(const struct world_triangle *t, const struct accel_ray *
     return vec3_mad(p, t->plane - vec3_dot(t->normal, p), t->normal);
 }
 
-/* On from a back, by the cosine. */
+/* Continues from a back by a cosine-distributed direction. */
 static void spawn_from_back(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
                       struct incident_path path) {
     const struct world *world = u->field->world;
@@ -125,16 +127,16 @@ static void spawn_from_back(struct wavefront *u, const struct accel_ray *ray, co
         (struct incident_path){path.index, rgb_mul(path.beta, rgb_make(base[0], base[1], base[2])), .is_first = false});
 }
 
-/* Where a ray is mirrored. Of lights it mirrors a lobe that is widened: found by luck a small one would be a few bright
- * specks (Kaplanyan and Dachsbacher 2013). */
+/* A specular reflection. Lights are reflected by a widened lobe: a small light found by chance would leave fireflies
+ * (path-space regularisation, Kaplanyan and Dachsbacher 2013). */
 struct reflection {
     vec3 position, normal;
     vec3 frame[3]; /* about the shading normal */
-    vec3 wo;       /* where the ray came from, in this frame */
+    vec3 wo;       /* towards the ray's origin, in this frame */
     struct bsdf lobe, wide;
 };
 
-/* A direction, in the frame: what the lobes make of light from there, and the density with which it is drawn. */
+/* Both lobes for one direction, and the density of sample_reflection there. */
 struct lobe_values {
     float lobe, wide, pdf;
 };
@@ -149,7 +151,7 @@ static vec3 sample_reflection(const struct reflection *m, vec2 u) {
                       : bsdf_sample(&m->wide, m->wo, 0.0f, 2.0f * u.x - 1.0f, u.y);
 }
 
-/* Samples a light. */
+/* Samples a light to be reflected; added later unless it is occluded. */
 static void sample_light(struct wavefront *u, const struct reflection *m, struct incident_path path) {
     uint32_t sample = u->first_sample + path.index;
     vec2 pick = sampler_pair(u->key, sample, PAIR_REFLECTED_PICK + u->bounce);
@@ -165,8 +167,7 @@ static void sample_light(struct wavefront *u, const struct reflection *m, struct
     u->in->light_sample[u->light_count++] = (struct incident_light_sample){path.index, rgb_mul(weight, light.radiance)};
 }
 
-/* The chance of a ray from such a cosine to go on: small where what it finds adds little to what the texel sends
- * (Russian roulette). */
+/* Russian roulette: the probability to continue, small where the specular share of the reflected light is. */
 static float specular_probability(const struct world *world, const struct incident_lobe *lobe,
                                   const struct accel_hit *hit, float cosine) {
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
@@ -175,7 +176,7 @@ static float specular_probability(const struct world *world, const struct incide
     return fminf(1.0f, ROULETTE_FACTOR * fresnel / (fresnel + diffuse));
 }
 
-/* On by the lobe of a front. */
+/* Continues from a front by its specular lobe. */
 static void spawn_specular(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
                         struct incident_path path) {
     const struct world *world = u->field->world;
@@ -203,7 +204,7 @@ static void spawn_specular(struct wavefront *u, const struct accel_ray *ray, con
                                     rgb_scale(path.beta, r.wide), r.pdf});
 }
 
-/* Takes what ray `k` found; the densities are those of the light sampler at the first end of each. */
+/* Adds the radiance that ray `k` finds and continues it; escapes and light_pdf are those of the first hit. */
 static void shade_hit(struct wavefront *u, size_t k) {
     const struct light_field *field = u->field;
     const struct world *world = field->world;

@@ -8,12 +8,13 @@
 #include "server/render/light.h"
 #include "server/render/sampler.h"
 
-enum { PAIR_DIRECTION }; /* before those of incident.c */
-/* A place is inside a body when all of so many rays meet a back, asked a few at a time. */
+enum { PAIR_DIRECTION }; /* sample dimension, before those of incident.c */
+/* A point is inside a closed body when all of these rays meet a back; traced in batches, most points end with the
+ * first. By hand. */
 #define ENCLOSED_RAYS 32
 #define ENCLOSED_BATCH 4
 
-/* The weights of the moments for light from w at cosine c. */
+/* Integrands of the moments for light from direction w at cosine c. */
 static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
     float f = c * bsdf_schlick(c);
     const float value[IRRADIANCE_MOMENTS] = {
@@ -22,8 +23,8 @@ static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
     memcpy(basis, value, sizeof value);
 }
 
-/* Whether a place is inside a body, where no light comes and from where none gets out. Going on from back to back there
- * costs many rays, and what is once taken for light among them never fades. */
+/* Whether a point is inside a closed body, where no light arrives. Rays continued from back to back are costly there,
+ * and radiance once attributed to such texels would never decay. */
 static bool is_enclosed(struct incident *in, const struct light_field *field, const struct surface_point *at,
                         const vec3 frame[3], uint32_t key) {
     const struct world *world = field->world;
@@ -107,7 +108,7 @@ void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction,
     }
 }
 
-/* The moments of a channel along d: of m = w . d, F m and F m^2. */
+/* The moments of a channel contracted with d: m = w . d, F m and F m^2. */
 struct along {
     float m, fm, fmm;
 };
@@ -126,7 +127,7 @@ rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float 
     const float(*q)[3] = irradiance->moment;
     float fo = bsdf_schlick(fmaxf(vec3_dot(shading, wo), 0.0f)), r = roughness;
     float lambert = 1.0f - 0.5f * fo;
-    /* Factors of 1 and m without F(wi), then of 1, m and m^2 with it. */
+    /* Coefficients of 1 and m without F(wi), then of 1, m and m^2 with it. */
     float one = lambert + r * fo, m1 = r * fo;
     float f0 = -0.5f * lambert + r * (1.0f - fo) + r * r * fo;
     float f1 = r * (1.0f - fo) + 2.0f * r * r * fo, f2 = r * r * fo;
@@ -138,8 +139,8 @@ rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float 
     return rgb_make(out[0], out[1], out[2]);
 }
 
-/* The terms of irradiance_diffuse under a viewer's density cos / pi, in which 1, wo, F(wo), F(wo) wo have means
- * 1, 2/3 n, 1/21, 1/84 n, and F(wo) wo wo^T is 1/252 along n and 11/504 across it. */
+/* The terms of irradiance_diffuse averaged over view directions of density cos / pi, under which 1, wo, F(wo), F(wo) wo
+ * have means 1, 2/3 n, 1/21, 1/84 n, and F(wo) wo wo^T is 1/252 along n and 11/504 across it. */
 rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness) {
     const float(*q)[3] = irradiance->moment;
     const vec3 n = shading;

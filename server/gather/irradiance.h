@@ -1,7 +1,7 @@
 /* irradiance.h -- all light that arrives at a point of the surface, as its diffuse lobe needs it.
  *
- * Sums over what rays find (incident.h), which it draws about the normal; what surfaces send out and where rays go on is
- * decided there, and what is between such points in probes.h. */
+ * Integrates over cosine-distributed rays and light samples (incident.h decides what rays find and how they continue);
+ * interpolation between points is probes.h's. */
 #ifndef UNBAKE_GATHER_IRRADIANCE_H
 #define UNBAKE_GATHER_IRRADIANCE_H
 
@@ -10,29 +10,29 @@
 
 #include "server/gather/incident.h"
 
-/* Moments of the arriving light over the hemisphere of the shading normal, c its cosine and
- * F = (1 - c)^5: integrals of L c, L c w, L c F, L c F w and L c F w w^T (xx yy zz xy xz yz) by solid
- * angle, by channel. Disney diffuse is a polynomial in w . wo and F, so these tell what the diffuse
- * lobe sends to any viewer at any roughness, exactly. */
+/* Moments of the incident radiance L over the hemisphere of the shading normal, with c the cosine to it and F = (1 -
+ * c)^5: integrals of L c, L c w, L c F, L c F w and L c F w w^T (xx yy zz xy xz yz) by solid angle, for each channel.
+ * Disney diffuse is a polynomial in w . wo and F, so these give the diffusely reflected radiance for any viewer and any
+ * roughness exactly. */
 #define IRRADIANCE_MOMENTS 14
 struct irradiance {
     float moment[IRRADIANCE_MOMENTS][3];
-    rgb noise; /* a draw of the error of moment[0]: half the difference of what two halves of the samples tell */
+    rgb noise; /* a draw of the error of moment[0]: half the difference of the two halves of the samples */
 };
 
-/* Gathers from `samples` cosine-distributed directions and half as many light samples. Nothing arrives inside a body,
- * where every ray meets a back. */
+/* Gathers from `samples` cosine-distributed directions and half as many light samples. Zero inside closed bodies, where
+ * every ray meets a back. */
 void irradiance_gather(struct irradiance *irradiance, struct incident *scratch,
                        const struct light_field *field, const struct surface_point *at, uint32_t key,
                        size_t samples);
 
-/* Adds light from one unit direction, of which so much would arrive at a surface that faced it (irradiance). */
+/* Adds light from one unit direction; `flux` is its irradiance on a surface that faces it. */
 void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux);
 
-/* Radiance that the diffuse lobe of a white surface sends towards unit `wo`. */
+/* Radiance that the diffuse lobe with base colour 1 reflects towards unit `wo`. */
 rgb irradiance_diffuse(const struct irradiance *irradiance, vec3 shading, float roughness, vec3 wo);
 
-/* Its mean over viewers, by the cosine of where they are: radiosity over pi. */
+/* Its cosine-weighted mean over view directions: radiosity over pi. */
 rgb irradiance_diffuse_mean(const struct irradiance *irradiance, vec3 shading, float roughness);
 
 #endif

@@ -7,17 +7,18 @@
 #include "common/mem.h"
 #include "server/render/sampler.h"
 
-/* A probe's reach, in blocks: 1.5 lets four to nine speak for a texel, smoothly. */
+/* Radius of the interpolation tent, in blocks: 1.5 blends four to nine probes smoothly. By hand. */
 #define FILTER_RADIUS 1.5f
-/* Weight of a probe in the dark for a texel in view. */
+/* Weight factor of a probe that no photograph sees, for a texel that one does: such probes lie in hidden, dark places.
+ * By hand. */
 #define UNSEEN_WEIGHT 0.01f
 #define CHUNK 16 /* probes a work item */
 
-/* The best place of each chart met in a block so far. */
+/* The best probe position of each chart in one block: a seen texel nearest to the block's centre. */
 struct places {
     size_t count, capacity;
     struct probe *probe;
-    float *distance; /* of the place from the block's centre */
+    float *distance; /* squared, from the block's centre, texels */
 };
 
 static void offer_place(struct places *p, uint32_t texel, uint32_t chart, bool seen, float distance) {

@@ -1,9 +1,9 @@
-/* probes.h -- points of the surface at which arriving light is gathered, and between them.
+/* probes.h -- points of the surface at which incident light is gathered, and interpolation between them.
  *
- * Light changes slowly where textures do not, so it is gathered with many rays at few points: one
- * for every chart in every square block of the atlas. Between them it is interpolated within a
- * chart, from the nine blocks around, by distance in the atlas and likeness of the normals.
- * Probes that no photograph sees (under a vase) do not speak for texels that one does. */
+ * Irradiance varies more slowly than texture, so it is gathered with many rays at few points: one for each chart in
+ * each square block of the atlas. Between them it is interpolated within a chart, from the 3 x 3 blocks around, by
+ * distance in the atlas and similarity of normals. Probes that no photograph sees (under a vase) hardly count for
+ * texels that one does. */
 #ifndef UNBAKE_GATHER_PROBES_H
 #define UNBAKE_GATHER_PROBES_H
 
@@ -33,10 +33,10 @@ struct probes {
     uint32_t *first;         /* [columns * rows + 1] first probe of a block; owned */
 };
 
-/* The number of the probe that stands in the block of texel (x, y) for a chart; UINT32_MAX: none. */
+/* Index of the probe of a chart in the block of texel (x, y); UINT32_MAX: none. */
 uint32_t probes_at(const struct probes *p, uint32_t x, uint32_t y, uint32_t chart);
 
-/* The probes that speak for a texel; weights sum to 1. */
+/* Interpolation weights of a texel; they sum to 1. */
 #define PROBES_AROUND 9
 struct probe_mix {
     size_t count; /* at least 1 for a valid texel */
@@ -44,7 +44,7 @@ struct probe_mix {
     float weight[PROBES_AROUND];
 };
 
-/* Chooses the places; light is 0. */
+/* Chooses the positions; light is 0. */
 void probes_init(struct probes *p, uint32_t spacing, const struct mesh *mesh, const struct atlas *atlas,
                  const struct inverse_uv *inverse, const struct fused *fused);
 void probes_release(struct probes *p);
@@ -54,10 +54,10 @@ void probes_gather(struct probes *p, const struct light_field *field, const stru
                    const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed,
                    size_t samples, size_t first, size_t count, struct parallel *pool);
 
-/* The mix for a valid texel, whose piece of surface `at` is. */
+/* Interpolation weights for a valid texel; `at` is its surface point. */
 void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,
                 uint32_t texel, const struct surface_point *at, struct probe_mix *mix);
-/* *out: what arrives there, the sum of the probes' light by their weights. */
+/* *out: the interpolated irradiance, by the weights of `mix`. */
 void probes_irradiance(const struct probes *p, const struct probe_mix *mix, struct irradiance *out);
 
 #endif

@@ -7,14 +7,14 @@
 #include "server/render/bsdf.h"
 #include "server/scene/latlong.h"
 
-/* Where the first rays agree no more are asked. */
+/* Shadow rays to the disc: the second set is traced only where the first is partly occluded (penumbra). By hand. */
 #define PROBE_RAYS 5
 #define PENUMBRA_RAYS 16
-#define GOLDEN_ANGLE 2.39996323f
-/* Places over a pixel of the map, along each side. */
+#define GOLDEN_ANGLE 2.39996323f /* pi (3 - sqrt 5): Vogel's spiral covers the disc evenly */
+/* Subpixels along each side of a pixel of the map, to rasterise the disc; by hand. */
 #define SUBPIXELS 8
 
-/* In the disc, so far from its middle as a part of its radius. */
+/* Direction of a point in the disc; `part` is its distance from the middle over the radius. */
 static vec3 disc_direction(const struct sun *sun, float angle, float part) {
     vec3 across, up;
     vec3_frame(sun->direction, &across, &up);
@@ -27,7 +27,7 @@ vec3 sun_sample(const struct sun *sun, vec2 u) {
     return disc_direction(sun, 2.0f * BSDF_PI * u.x, sqrtf(u.y));
 }
 
-/* Ray `i` of so many: a sunflower's seeds, evenly over the disc. */
+/* Ray `i` of `rays`, on Vogel's spiral. */
 static vec3 seed_direction(const struct sun *sun, int i, int rays) {
     return disc_direction(sun, GOLDEN_ANGLE * (float)i, rays == 1 ? 0.0f : sqrtf(((float)i + 0.5f) / (float)rays));
 }
@@ -62,8 +62,7 @@ void sun_add_light(const struct sun *sun, const struct accel *accel, const struc
 
 /* --- the map -------------------------------------------------------------------------------------- */
 
-/* Twice as many pixels along each side, read where the coarse ones have the same direction: between four of them, or as
- * the nearest one has it. */
+/* Doubles the resolution, by bilinear interpolation or, with `nearest`, by the nearest pixel. */
 static void refine_image(struct image *image, bool nearest) {
     struct image fine = {.width = 2 * image->width, .height = 2 * image->height,
                          .channel_count = image->channel_count, .channel = image->channel};
@@ -90,7 +89,7 @@ static void refine_image(struct image *image, bool nearest) {
     *image = fine;
 }
 
-/* The share of a pixel of the map that is within an angle of the sun's middle. */
+/* Coverage of a pixel of the map by a cone around `middle`. */
 static float covered(const struct image *map, uint32_t column, uint32_t row, vec3 middle, float cosine) {
     int inside = 0;
     for (int i = 0; i < SUBPIXELS * SUBPIXELS; i++) {
@@ -100,7 +99,7 @@ static float covered(const struct image *map, uint32_t column, uint32_t row, vec
     return (float)inside / (SUBPIXELS * SUBPIXELS);
 }
 
-/* Of each pixel of a row, the share that the disc covers; those of a pole, which are one direction, have it alike. */
+/* Coverage of the pixels of a row by the disc; pixels of a pole are one direction and share their mean. */
 static void cover_row(const struct image *map, uint32_t row, vec3 middle, float radius_rad, float *share) {
     uint32_t width = map->width, height = map->height;
     float cosine = cosf(radius_rad), reach = cosf(fminf(radius_rad + 3.0f * BSDF_PI / (float)height, BSDF_PI));
@@ -114,8 +113,7 @@ static void cover_row(const struct image *map, uint32_t row, vec3 middle, float 
         share[x] = (float)(sum / width);
 }
 
-/* The sum over the map of what each pixel has of the disc, by solid angle; or, with `each`, that much of it is
- * added to every pixel. */
+/* Solid angle of the map that the disc covers; with `each`, adds coverage times `each` to every pixel. */
 static double cover(struct image *map, vec3 middle, float radius_rad, const rgb *each) {
     double sum = 0.0;
     float *share = mem_array(map->width, sizeof *share);
@@ -142,7 +140,7 @@ void sun_draw(const struct sun *sun, struct environment *e) {
         mem_free(e->is_bound);
         e->is_bound = NULL;
     }
-    /* Not narrower than a pixel, which it might slip through. */
+    /* At least a pixel wide, so that no subpixel pattern misses it. */
     float radius = fmaxf(sun->radius_rad, BSDF_PI / (float)e->map.height);
     double angle = cover(&e->map, sun->direction, radius, NULL);
     rgb radiance = rgb_scale(sun->irradiance, 1.0f / (float)angle);

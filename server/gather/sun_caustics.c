@@ -8,20 +8,21 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-/* Rays in all, about; and from one texel at most. */
+/* Photons in all, about, and at most from one texel; by hand. */
 #define MAX_PHOTONS 1000000
 #define MAX_PHOTONS_PER_TEXEL 64
 #define CHUNK 1024 /* texels a work item */
-#define KEY_CAUSTICS 0x3a11u
-/* Light that grazes a probe's surface is taken to come from at least so far above it: its amount stays. */
+#define KEY_CAUSTICS 0x3a11u /* separates these random numbers from others of a texel */
+/* Least cosine by which a photon's flux is converted to radiance at a probe: bounds the weight of grazing photons,
+ * whose flux is kept. By hand. */
 #define MIN_COSINE 0.05f
 enum { PAIR_DISC, PAIR_LOBE };
 
-/* What a ray brings, and where to; no probe: nowhere. */
+/* A photon and the probe that receives it; UINT32_MAX: none. */
 struct photon {
     uint32_t probe;
-    vec3 direction; /* unit, of the ray */
-    rgb flux;       /* times square metres */
+    vec3 direction; /* unit, of travel */
+    rgb flux;       /* irradiance x square metres */
 };
 
 struct caustics {
@@ -31,10 +32,10 @@ struct caustics {
     const struct mesh *mesh;
     const struct inverse_uv *inverse;
     uint64_t seed;
-    bool *lit;               /* [valid_count] a polished texel in the sun */
-    size_t count, rays;      /* lit texels that send rays, and of each */
+    bool *lit;               /* polished and sunlit */
+    size_t count, rays;      /* source texels, and photons of each */
     uint32_t *texel;         /* [count] */
-    float texels_per_source;        /* texels, each of them */
+    float texels_per_source;        /* sunlit texels that each source represents */
     struct photon *photon;   /* [count][rays] */
 };
 
@@ -62,7 +63,7 @@ static void find_lit(void *user, size_t chunk, int thread) {
     }
 }
 
-/* Which texels send rays, evenly spread where there are many, and how many each. */
+/* Chooses source texels, evenly spaced where there are many, and the photons of each. */
 static void choose_texels(struct caustics *m) {
     size_t lit = 0, met = 0;
     for (size_t i = 0; i < m->inverse->valid_count; i++)
@@ -79,7 +80,7 @@ static void choose_texels(struct caustics *m) {
     m->texels_per_source = (float)lit / (float)m->count;
 }
 
-/* One ray of the lobe: the part of the light that goes with it; 0 where it would go into the surface. */
+/* Samples the lobe: the fraction of the light that the photon carries; 0 where it would enter the surface. */
 static float sample_lobe(const struct caustics *m, const struct surface_point *at, uint32_t segment, uint32_t key,
                   uint32_t ray, vec3 *direction) {
     const struct materials *materials = m->world->materials;
@@ -125,7 +126,7 @@ static void trace_texel(void *user, size_t index, int thread) {
 
 /* --- to the probes ---------------------------------------------------------------------------------- */
 
-/* Square metres that each probe stands for. [probe count]; the caller's. */
+/* Area in square metres that each probe stands for. [probe count]; the caller's. */
 static float *probe_areas(const struct caustics *m) {
     float *area = mem_calloc(m->probes->count + 1, sizeof *area);
     for (size_t i = 0; i < m->inverse->valid_count; i++) {
@@ -136,7 +137,7 @@ static float *probe_areas(const struct caustics *m) {
     return area;
 }
 
-/* What arrives at all of the surface, square metres times the mean of the channels. */
+/* Flux that arrives at the whole surface, square metres times the mean of the channels. */
 static double total_flux(const struct probes *probes, const float *area) {
     double sum = 0.0;
     for (size_t k = 0; k < probes->count; k++) {
@@ -152,7 +153,7 @@ static void deposit(struct probe *probe, const struct photon *photon, float area
     irradiance_add(&probe->light, probe->shading, toward, rgb_scale(photon->flux, 1.0f / (facing * area)));
 }
 
-/* Returns the share that it is. */
+/* Deposits all photons; returns their share of the flux that arrives at the surface. */
 static double deposit_all(const struct caustics *m) {
     float *area = probe_areas(m);
     double before = total_flux(m->probes, area);
