@@ -17,14 +17,14 @@ bool best_takes(const struct best *best, float weight, uint32_t index) {
     return weight > 0.0f && (best->count < best->capacity || is_worse(&best->item[0], &candidate));
 }
 
-/* Moves an item up from a place whose parents are better, to below one that is worse. */
+/* Moves an item up the heap from place `at`, past those that are better. */
 static void sift_up(struct best *best, size_t at, struct best_item item) {
     for (; at > 0 && is_worse(&item, &best->item[(at - 1) / 2]); at = (at - 1) / 2)
         best->item[at] = best->item[(at - 1) / 2];
     best->item[at] = item;
 }
 
-/* Moves an item down from the top, to above those that are better. */
+/* Moves an item down from the top, past those that are worse. */
 static void sift_down(struct best *best, struct best_item item) {
     size_t at = 0;
     for (size_t child = 1; child < best->count; child = 2 * at + 1) {

@@ -1,7 +1,7 @@
-/* best.h -- the best of any number of items by weight, in bounded memory.
+/* best.h -- the k items of greatest weight out of a stream, in bounded memory.
  *
- * A binary heap with the worst of those that are kept on top. Of equal weights the lower index is the better one, so
- * what is kept depends on what was offered alone, not on the order. */
+ * A binary heap with the least of the kept items on top. Of equal weights the lower index wins, so the result depends
+ * on the set of items offered and not on their order. */
 #ifndef UNBAKE_CAPTURE_BEST_H
 #define UNBAKE_CAPTURE_BEST_H
 
@@ -14,7 +14,7 @@
 struct best_item {
     float weight;
     uint32_t index; /* of the item, such as a photograph's */
-    uint32_t slot;  /* where the caller keeps it */
+    uint32_t slot;  /* of the caller's storage */
 };
 
 struct best {
@@ -22,14 +22,14 @@ struct best {
     struct best_item *item; /* [most] the heap; borrowed */
 };
 
-/* Keeps up to most > 0 of what is offered from now on. */
+/* An empty heap that keeps up to `capacity` > 0 items. */
 void best_init(struct best *best, struct best_item *item, size_t capacity);
 
-/* Whether an item of this weight would be kept now. Never where it is not above 0, or not a number. */
+/* Whether an item of this weight would be kept now. False where the weight is not above 0, or NaN. */
 bool best_takes(const struct best *best, float weight, uint32_t index);
 
-/* Offers an item; returns the slot in [0, most) that it has from now on, which may have been another's, or BEST_NONE.
- * Slots are given out in order: with `count` items those in use are [0, count). */
+/* Offers an item. Returns its slot in [0, capacity), which may have been that of an item it replaces, or BEST_NONE.
+ * Slots in use are always [0, count). */
 size_t best_put(struct best *best, float weight, uint32_t index);
 
 #endif

@@ -6,23 +6,24 @@
 
 #include "common/mem.h"
 
-#define MIN_OBSERVATIONS 60
-/* Blur of a sharp photograph at level 0, pixels of that level: the pixel, the lens and the binomial. */
+#define MIN_OBSERVATIONS 60 /* of tracks, for a photograph to be judged; by hand */
+/* Standard deviation of a sharp photograph's blur at level 0, pixels of that level: pixel area, lens and the pyramid's
+ * binomial. */
 #define SHARP_PX 0.9
-/* Share of the neighbours' squared slopes below which a photograph counts as blurred. Sharp ones come
- * out at 0.6 and more, single ones of glossy places seen from afar at 0.39 (room bathroom). */
+/* Blurred: the squared slopes are below this share of the neighbours'. Sharp photographs have 0.6 and more, single ones
+ * of glossy places seen from afar 0.39 (room bathroom). */
 #define BLURRED_RATIO 0.38
-#define RATIO_MAX 4.0f /* of one look, against outliers */
+#define RATIO_MAX 4.0f /* of one observation to the median, bounds outliers; by hand */
 
-/* What is summed for one photograph, by direction. */
+/* Sums over one photograph's observations, for each direction: its own squared slopes and the medians of the others. */
 struct sharpness {
     double sum[2], median[2];
     size_t count;
 };
 
-/* Squared slopes along the track's two directions, at the scale of a pixel of the track's own
- * photograph; false where they are not known. A photograph from further away shows an edge wider on
- * the surface, but smooth texture as it is: half of the difference is made up for. */
+/* Squared slopes along the track's two directions, at the pixel scale of the track's own photograph; false where
+ * unknown. A photograph from farther away shows an edge wider on the surface but smooth texture unchanged: half of that
+ * difference is compensated. */
 static bool slopes_of(const struct tracks *tracks, size_t frame, const struct track *track, float step,
                       float slope[2]) {
     const struct views *views = tracks->views;
@@ -54,7 +55,7 @@ static float median_of(float *value, size_t count) {
     return count % 2 ? value[count / 2] : 0.5f * (value[count / 2 - 1] + value[count / 2]);
 }
 
-/* Compares the others of a track with each other. */
+/* Compares the other photographs of a track with each other. */
 static void compare_others(const struct tracks *tracks, const struct track *track, float step,
                            struct sharpness *sharpness) {
     float slope[TRACK_OTHERS][2];

@@ -1,11 +1,10 @@
-/* calibrate_blur.h -- photographs blurred by motion or focus, to be trusted less.
+/* calibrate_blur.h -- finds photographs blurred by motion or focus, which then weigh less.
  *
- * At each track the squared slope of a photograph, along two directions, is compared with the median
- * of the others that see the place. Over an edge that is blurred with standard deviation s the sum
- * of squared slopes falls as 1 / s, so the ratio of a photograph's sum to its neighbours' tells how
- * much wider its blur is, in the direction where it is widest. What stands out is written to
- * photograph.blur_px, by which views weigh it less. Tracks lie where their own photograph has the
- * strongest slopes, which therefore is not judged by them. */
+ * At each track the squared slope of a photograph, along two directions, is compared with the median of the other
+ * photographs that see it. For an edge blurred with standard deviation s the sum of squared slopes falls as 1 / s, so
+ * the ratio of a photograph's sum to its neighbours' gives its blur relative to theirs, in the direction where it is
+ * widest. Outliers get photograph.blur_px, by which views weigh them less. Tracks are chosen where their own photograph
+ * has its strongest slopes, so that photograph is not judged by them. */
 #ifndef UNBAKE_CAPTURE_CALIBRATE_BLUR_H
 #define UNBAKE_CAPTURE_CALIBRATE_BLUR_H
 

@@ -1,4 +1,4 @@
-/* calibrate_light.c -- see calibrate_light.h: which faults a capture has, and putting them right. */
+/* calibrate_light.c -- see calibrate_light.h: model selection and its application. */
 #include "server/capture/calibrate_light.h"
 
 #include <math.h>
@@ -8,23 +8,22 @@
 #include "server/capture/light_fit.h"
 #include "server/capture/overlap.h"
 
+/* Surface points compared: so many a photograph, within these bounds (time and memory); by hand. */
 #define POINTS_PER_FRAME 60
 #define POINTS_MIN 4000
 #define POINTS_MAX 24000
 
-/* A fault is taken up when it takes this share off the robust cost of the points held back, and
- * the gain stands this many standard errors above 0. Drift must be this large besides (rms, in
- * logarithms): what is glossy looks brighter in some photographs, which feigns 0.018 in the rooms
- * staircase2 and bathroom, where there is none. White balance and vignette are feigned by
- * nothing: 0.002 and 0.02 there. */
+/* A fault is accepted when it lowers the robust cost of held-out points by this share, and the gain is this many
+ * standard errors above 0. Drift must also have this rms (in logarithms): glossy surfaces look brighter in some
+ * photographs, which imitates a drift of 0.018 in staircase2 and bathroom, where there is none. Nothing imitates white
+ * balance or a vignette there: 0.002 and 0.02. */
 #define MIN_GAIN 0.04
 #define MIN_SIGNIFICANCE 3.0
 #define MIN_DRIFT 0.025
 
-/* --- which faults there are ------------------------------------------------------------------- */
+/* --- model selection --------------------------------------------------------------------------- */
 
-/* Robust cost of each point that is held back, residuals in units of `scale`. Returns how many
- * there are. */
+/* Robust cost of each held-out point, with residuals in units of `scale`. Returns their number. */
 static size_t held_back_costs(const struct light_fit *f, const double *x, double scale, double *cost) {
     size_t used = 0;
     for (size_t p = 0; p < f->o->point_count; p++) {
@@ -47,7 +46,7 @@ static size_t held_back_costs(const struct light_fit *f, const double *x, double
     return used;
 }
 
-/* The share of the cost that `better` takes off `base`; 0 when that could be chance. */
+/* The share of the cost that `better` saves over `base`; 0 when that is not significant. */
 static double gain_of(const double *base, const double *better, size_t count) {
     double sum = 0.0, squares = 0.0, total = 0.0;
     for (size_t i = 0; i < count; i++) {
@@ -69,7 +68,7 @@ static double drift_of(const struct light_fit *f, const double *x) {
     return sqrt(squares / fmax(1.0, (double)(f->frames - f->unknown_exposure_count)));
 }
 
-/* Takes up faults one by one, the one that explains most first. Returns the model; x is its
+/* Forward selection: accepts faults one by one, the one with the largest gain first. Returns the model; x is its
  * solution. */
 static int choose_model(struct light_fit *f, double *x) {
     size_t n = light_fit_parameter_count(f), points = f->o->point_count / LIGHT_HELD_BACK_EVERY + 1, used;
@@ -109,7 +108,7 @@ static int choose_model(struct light_fit *f, double *x) {
 
 /* --- the whole -------------------------------------------------------------------------------- */
 
-/* Root of the mean squared difference of looks from their point's mean. */
+/* Root mean squared deviation of observations from the mean of their point. */
 static double spread(const struct light_fit *f, const double *x) {
     double squares = 0.0, freedom = 0.0;
     for (size_t p = 0; p < f->o->point_count; p++) {
@@ -128,7 +127,7 @@ static double spread(const struct light_fit *f, const double *x) {
     return freedom > 0.0 ? sqrt(squares / freedom) : 0.0;
 }
 
-/* Where nothing tells the mean level or the mean colour, it is 0. */
+/* Fixes the gauge: a mean level or mean colour that nothing determines is 0. */
 static void fix_gauge(const struct light_fit *f, int model, double *x) {
     double mean[3] = {0};
     for (size_t t = 0; t < f->frames; t++) {

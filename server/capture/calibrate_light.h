@@ -1,14 +1,14 @@
-/* calibrate_light.h -- exposure, white balance and vignette of photographs, from their overlaps.
+/* calibrate_light.h -- exposure, white balance and vignette of photographs, from points that several of them see.
  *
- * The logarithm of what photograph f shows of point p in channel c is taken as
+ * The logarithm of what photograph f shows of point p in channel c is modelled as
  *
- *     L[p][c] + G[f][c] + v0 s + v1 s^2 + v2 s^3 + error,     s as in photograph.h,
+ *      L[p][c] + G[f][c] + v0 s + v1 s^2 + v2 s^3 + error,     s as in photograph.h,
  *
- * and G and v come by weighted least squares with the L eliminated; weights let outliers
- * (highlights, edges) go and count contrast and grazing looks less. Exposures that nobody told are
- * always solved. Three faults are assumed only where the capture shows them: drift of exposures
- * that are told, white balance that changes, a vignette. One is taken up when it makes photographs
- * agree clearly better at points that were held back from the solve; else it stays exactly none. */
+ * and G and v come by weighted least squares with the L eliminated. Robust weights suppress outliers (highlights,
+ * edges); contrast and grazing angles lower weights. Exposures that the bundle does not give are always solved. Three
+ * faults are modelled only where the capture shows them: drift of given exposures, changing white balance, a vignette.
+ * A fault is accepted when it makes photographs agree significantly better at points held out from the solve; otherwise
+ * it is exactly zero. */
 #ifndef UNBAKE_CAPTURE_CALIBRATE_LIGHT_H
 #define UNBAKE_CAPTURE_CALIBRATE_LIGHT_H
 
@@ -20,16 +20,14 @@
 #include "server/scene/inverse_uv.h"
 
 struct light_found {
-    size_t exposures_solved;  /* that nobody told */
-    bool drift, white_balance, vignette; /* whether it was taken up */
-    double spread_before, spread_after;  /* rms of the logarithm of what photographs show of a point
-                                          * about the point's mean, all channels */
+    size_t exposures_solved;  /* that the bundle does not give */
+    bool drift, white_balance, vignette; /* whether the fault was accepted */
+    double spread_before, spread_after;  /* rms deviation of log radiance from the mean of its point, all channels */
 };
 
-/* Sets exposure, gain and vignette of the training photographs, and the vignette of all; what they
- * were set to before is the claim that it starts from. With `faults` false only exposures that are
- * not told are solved. The gauge: where nothing tells the mean, mean G is 0. Same for any number
- * of threads. */
+/* Sets exposure, gain and vignette of the training photographs, and the vignette of all, starting from their present
+ * values. With `faults` false only unknown exposures are solved. Gauge: where nothing determines the mean of G, it is
+ * 0. The same for any number of threads. */
 void calibrate_light(struct scene *scene, const struct views *views, const struct atlas *atlas,
                      const struct inverse_uv *inverse, bool faults, struct parallel *pool,
                      struct light_found *found);

@@ -8,12 +8,11 @@
 #include "server/capture/held_out_poses.h"
 #include "server/capture/pose_solver.h"
 
-#define LAST_ROUNDS 4        /* after the first judgement, at the finest level */
-#define COARSEST_PX 75       /* width of a picture below which it tells more lies than truth */
-#define COMMON_SCALE 0.05    /* for comparing the agreement of all photographs */
+#define LAST_ROUNDS 4 /* after the first judgement, at the finest level; by hand */
+#define COARSEST_PX 75 /* pixels: least width of a pyramid level that is used; coarser ones mislead; by hand */
+#define COMMON_SCALE 0.05 /* of log residuals, to compare the agreement of all photographs; by hand */
 
-/* Root of the mean squared distance, in pixels, between the places of a frame's own tracks in two
- * cameras. */
+/* Root mean squared distance, in pixels, between the image positions of a frame's own tracks in two cameras. */
 static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a,
                        const struct camera *b) {
     double squares = 0.0;
@@ -51,7 +50,7 @@ static void collect_evidence(const struct pose_solver *s, struct pose_evidence *
             if (!isfinite(value) || !camera_project(&frame->before, s->track[i]->point, &x, &y, &depth_m))
                 continue;
             float old = pyramid_value(&s->tracks->pyramid[observation[k].frame], s->level, x, y);
-            observation[k].value = NAN; /* what the others agree on */
+            observation[k].value = NAN; /* leaves it out of the consensus */
             pose_weigh_track(s, i, &consensus, weight);
             observation[k].value = value;
             if (!isfinite(old) || !isfinite(consensus))
@@ -63,7 +62,7 @@ static void collect_evidence(const struct pose_solver *s, struct pose_evidence *
     }
 }
 
-/* Puts back where they were the frames whose correction is small or does not convince. */
+/* Resets frames whose correction is small or not significant. */
 static void judge(struct pose_solver *s, struct parallel *pool) {
     struct pose_evidence *evidence = mem_calloc(s->frames + 1, sizeof *evidence);
     s->level = 0;
@@ -80,14 +79,14 @@ static void judge(struct pose_solver *s, struct parallel *pool) {
     mem_free(evidence);
 }
 
-/* Robust cost of each held-back track with all frames where they are now, offsets fitted to that. */
+/* Robust cost of each held-out track with all frames where they are now and offsets fitted to that. */
 static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost) {
     bool *is_fixed = mem_array(s->frames + 1, sizeof *is_fixed);
     for (size_t f = 0; f < s->frames; f++) {
         is_fixed[f] = s->frame[f].is_fixed;
         s->frame[f].is_fixed = true;
     }
-    run_rounds(s, 0, 2, pool); /* of offsets only */
+    run_rounds(s, 0, 2, pool); /* offsets only: all frames are fixed */
     for (size_t f = 0; f < s->frames; f++)
         s->frame[f].is_fixed = is_fixed[f];
     for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
@@ -107,7 +106,7 @@ static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost
     mem_free(is_fixed);
 }
 
-/* Whether all photographs together agree clearly better than at first. */
+/* Whether all photographs together agree significantly better than before. */
 static bool all_improved(const double *before, const double *now, size_t count) {
     struct pose_evidence e = {0};
     for (size_t i = 0; i < count; i++) {

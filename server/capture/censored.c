@@ -10,7 +10,7 @@ static int compare(const void *a, const void *b) {
 
 float censored_quantile(struct censored *value, size_t count, float share, bool *is_bound) {
     qsort(value, count, sizeof *value, compare);
-    float above = 0.0f, below = 0.0f; /* what pulls upwards and downwards */
+    float above = 0.0f, below = 0.0f; /* weight that pulls up and down */
     for (size_t i = 0; i < count; i++)
         above += value[i].weight;
     size_t i = 0;

@@ -1,7 +1,8 @@
-/* censored.h -- quantiles of values of which some are known to be lower bounds only: saturated pixels.
+/* censored.h -- quantiles of values of which some are lower bounds (saturated pixels).
  *
- * The least absolute deviation with censored values (Powell 1984; other shares as Powell 1986): a bound pulls
- * upwards what is below it and lets be what is above. */
+ * Least absolute deviation with censored values (Powell 1984; other quantiles: Powell 1986): a bound pulls the estimate
+ * up while the estimate is below it, and has no effect otherwise. For few observations, weighted; medians of many by
+ * Kaplan and Meier are quantile.h's. */
 #ifndef UNBAKE_CAPTURE_CENSORED_H
 #define UNBAKE_CAPTURE_CENSORED_H
 
@@ -13,8 +14,8 @@ struct censored {
     bool is_bound;
 };
 
-/* The value below which `share` of the weight lies. Sorts the values; there must be one. *is_bound: it is
- * a bound. */
+/* The value below which `share` of the weight lies. Sorts the values; count > 0. *is_bound: the result is a lower
+ * bound. */
 float censored_quantile(struct censored *value, size_t count, float share, bool *is_bound);
 
 #endif

@@ -12,8 +12,7 @@ uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key) {
     mask |= mask >> 16;
     int shift = (32 - __builtin_clz(mask | 1)) / 2;
     shift = shift > 0 ? shift : 1;
-    /* Each round is a bijection of [0, mask]; repeating all of them until the value is below
-     * count keeps it one of [0, count). */
+    /* Each round is a bijection of [0, mask]; repeating until the value is below count restricts it to [0, count). */
     do {
         for (uint32_t round = 0; round < 5; round++) {
             uint32_t k = rng_mix32(key + round * UINT32_C(0x9e3779b9));

@@ -1,9 +1,9 @@
 /* choose.h -- which texels an iteration works on.
  *
- * The valid texels, in the order of inverse_uv.h (neighbours on the surface are neighbours in
- * the list), are cut into as many strata as an iteration takes texels; each iteration takes one
- * of each stratum, by a random permutation of the stratum that is drawn anew every epoch. So an
- * iteration covers the whole surface evenly, and an epoch visits every texel exactly once. */
+ * The valid texels, in the order of inverse_uv.h (neighbours on the surface are neighbours in the list), are cut into
+ * as many strata as an iteration takes texels; each iteration takes one texel of each stratum, by a random permutation
+ * of the stratum that is redrawn every epoch. So an iteration covers the surface evenly and an epoch visits every texel
+ * once. */
 #ifndef UNBAKE_CAPTURE_CHOOSE_H
 #define UNBAKE_CAPTURE_CHOOSE_H
 
@@ -29,8 +29,8 @@ size_t chooser_item(const struct chooser *c, uint64_t iteration, size_t stratum)
  * next power of two with cycle walking, as in Kensler 2013 (Correlated Multi-Jittered Sampling). */
 uint32_t choose_permute(uint32_t index, uint32_t count, uint32_t key);
 
-/* Multiples of it, modulo `count`, are all of [0, count), each once, and spread evenly wherever the sequence is cut
- * off: the first number from the golden section of `count` on that has no factor in common with it. */
+/* A step whose multiples modulo `count` visit all of [0, count) once and are spread evenly over any prefix: the first
+ * number from count / golden ratio on that is coprime with count. */
 size_t choose_even_step(size_t count);
 
 #endif

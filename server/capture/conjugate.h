@@ -8,15 +8,15 @@
 struct conjugate_system {
     size_t count; /* unknowns */
     void (*multiply)(const void *user, const double *x, double *out);          /* out = A x */
-    void (*precondition)(const void *user, const double *residual, double *out); /* about A^-1 of it */
+    void (*precondition)(const void *user, const double *residual, double *out); /* out = approximately A^-1 residual */
     const void *user;
 };
 
 /* Turns b[count] into the residual b - A x. */
 void conjugate_residual(const struct conjugate_system *system, const double *x, double *b);
 
-/* Moves x[count], whose residual[count] is given and kept, until the residual's square is `goal` or
- * less, by `steps` steps at the most. */
+/* Improves x[count], whose residual[count] is given and kept up to date, until the squared norm of the residual is at
+ * most `goal`, in at most `steps` steps. */
 void conjugate_solve(const struct conjugate_system *system, int steps, double goal, double *residual,
                      double *x);
 

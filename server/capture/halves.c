@@ -5,13 +5,13 @@
 
 #include "common/rng.h"
 
-/* What shows a place less sharply than this share of the best is not held against it: texture would be taken for
- * noise. Unless there is nothing else. */
+/* Samples less sharp than this share of the sharpest are left out of the halves, unless nothing else is there: their
+ * lost texture would count as noise. By hand. */
 #define SHARPNESS_SHARE 0.3f
-/* Ways to part photographs are tried until the lesser half has this part of the weight. */
+/* Splits are tried until the lighter half has this share of the weight; by hand. */
 #define BALANCED_SHARE 0.25f
 
-/* A weighted mean, and its variance if its samples are as noisy as is expected. */
+/* A weighted mean and its expected variance. */
 struct half_mean {
     float weight, variance;
     rgb value;
@@ -32,7 +32,7 @@ int halves_of(uint32_t source, int split) {
     return (int)(rng_mix64(source) >> split & 1);
 }
 
-/* The share of the weight that the lesser half has. */
+/* The share of the weight that the lighter half has. */
 static float lesser_share(const struct robust_sample *sample, size_t count, float min_sharp, int split) {
     float weight[2] = {0.0f, 0.0f};
     for (size_t i = 0; i < count; i++) {
@@ -42,7 +42,7 @@ static float lesser_share(const struct robust_sample *sample, size_t count, floa
     return fminf(weight[0], weight[1]) / (weight[0] + weight[1]);
 }
 
-/* Of those samples alone that are as sharp as that. */
+/* The draw from samples of at least this sharpness. */
 static bool draw_from(const struct robust_sample *sample, size_t count, float min_sharp, rgb *draw) {
     const struct half_mean none = {.weight = 0.0f};
     struct half_mean all = none, half[2] = {none, none};

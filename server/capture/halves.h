@@ -1,9 +1,9 @@
-/* halves.h -- how noisy the mean of several photographs is, told by the photographs alone.
+/* halves.h -- noise of the mean of several photographs, from split halves.
  *
- * Half of them less the others is free of what all of them show, and holds all in which they do not agree:
- * noise however it is distributed, poses that are off, highlights. Scaled to the variance that the mean should have it
- * is a draw of the mean's error. Neighbours that the same photographs show are parted in the same way, so
- * what correlates their errors correlates their draws. */
+ * The difference between the means of two halves cancels what all photographs share and keeps everything in which they
+ * disagree: noise of any distribution, wrong poses, highlights. Scaled to the variance that the full mean should have
+ * it is one draw of the mean's error. Texels seen by the same photographs are split in the same way, so correlated
+ * errors have correlated draws. */
 #ifndef UNBAKE_CAPTURE_HALVES_H
 #define UNBAKE_CAPTURE_HALVES_H
 
@@ -11,12 +11,12 @@
 
 #include "server/capture/robust.h"
 
-/* In which half a photograph is, 0 or 1, in one of HALVES_SPLITS ways to part them. */
+/* Half of a photograph, 0 or 1, in one of HALVES_SPLITS pseudo-random splits. */
 #define HALVES_SPLITS 32
 int halves_of(uint32_t source, int split);
 
-/* Draws the error of the samples' mean by their weights. False, with `draw` as it was, where there is but one
- * source, or no noise is expected of any. */
+/* Draws the error of the weighted mean of the samples. False, with *draw unchanged, where there is only one source or
+ * no noise is expected. */
 bool halves_draw(const struct robust_sample *sample, size_t count, rgb *draw);
 
 #endif

@@ -6,8 +6,8 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define MIN_COSINE 0.2f /* at which a surface is seen */
-#define OCCLUSION_MARGIN 0.01f   /* share of its distance by which what hides a point is nearer */
+#define MIN_COSINE 0.2f /* to the normal, for a surface to count as visible; by hand */
+#define OCCLUSION_MARGIN 0.01f   /* an occluder is nearer than the point by this share of its distance; by hand */
 
 /* A held-out photograph. */
 struct held_out {
@@ -15,24 +15,24 @@ struct held_out {
     struct pyramid pyramid;
     struct pose_frame frame;
     size_t count;
-    uint32_t *track;  /* [count] those it sees, by index; owned */
+    uint32_t *track;  /* tracks that it sees, by index; owned */
 };
 
 struct held_out_set {
     const struct pose_solver *solver;
     struct held_out *held_out;
-    double *consensus;     /* [track_count] what each track looks like at this level; NAN: not known */
+    double *consensus;     /* consensus of each track at this level; NAN: unknown */
     int level;
 };
 
-/* One look at a track. */
+/* One observation of a track. */
 struct track_sample {
     float d[POSE_UNKNOWNS];
-    double residual;       /* beyond the track's look */
+    double residual;       /* observed minus consensus */
     bool held_back;
 };
 
-/* --- what a guest sees ---------------------------------------------------------------------------- */
+/* --- visible tracks ------------------------------------------------------------------------------ */
 
 static bool sees(const struct held_out *h, const struct accel *accel, const struct track *track, float *depth_m) {
     const struct camera *camera = &h->frame.before;
@@ -61,9 +61,9 @@ static void find_tracks(void *user, size_t index, int thread) {
     h->frame.depth_m = depth_sum_m / fmax(1.0, (double)h->count);
 }
 
-/* --- moving it ------------------------------------------------------------------------------------ */
+/* --- alignment ----------------------------------------------------------------------------------- */
 
-/* How a guest's frame shows the tracks, where it does; returns their number. */
+/* Residuals and derivatives of the tracks that the frame shows; returns their number. */
 static size_t evaluate_tracks(const struct held_out_set *all, const struct held_out *h, struct track_sample *sample) {
     size_t count = 0;
     for (size_t k = 0; k < h->count; k++) {
@@ -82,14 +82,14 @@ static size_t evaluate_tracks(const struct held_out_set *all, const struct held_
     return count;
 }
 
-/* By how much the photograph is brighter than the tracks: the median, since its exposure may not be known. */
+/* Offset of the photograph in log radiance: the median residual, since its exposure may be unknown. */
 static double brightness(const struct track_sample *sample, size_t count, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = sample[k].residual;
     return quantile_double(scratch, count, 0.5);
 }
 
-/* The scale of residuals about an offset. */
+/* Robust scale of the residuals about an offset. */
 static double scale_of(const struct track_sample *sample, size_t count, double offset, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = fabs(sample[k].residual - offset);
@@ -147,8 +147,8 @@ static void align(void *user, size_t index, int thread) {
 
 /* --- judgement ------------------------------------------------------------------------------------ */
 
-/* The robust costs of the tracks that were held back, by place in g->track; NAN where there is none. Returns how many
- * tracks, held back or not, are shown. */
+/* Robust costs of the held-out tracks, by place in h->track; NAN elsewhere. Returns the number of tracks shown, held
+ * out or not. */
 static size_t costs(const struct held_out_set *all, const struct held_out *h, const struct camera *camera, double scale,
                     double *cost) {
     double *residual = mem_array(2 * h->count + 1, sizeof *residual), *scratch = residual + h->count;
@@ -168,7 +168,7 @@ static size_t costs(const struct held_out_set *all, const struct held_out *h, co
     return count;
 }
 
-/* Root of the mean squared distance between the tracks' places in both cameras. */
+/* Root mean squared distance between the tracks' image positions in both cameras, pixels. */
 static double shift_of(const struct held_out_set *all, const struct held_out *h) {
     double squares = 0.0, count = 0.0;
     for (size_t k = 0; k < h->count; k++) {
@@ -199,7 +199,7 @@ static void judge(void *user, size_t index, int thread) {
 
 /* --- the whole ------------------------------------------------------------------------------------ */
 
-/* What the tracks look like at a level, by the photographs where they are now. */
+/* Consensus of the tracks at a level, by the training photographs where they are now. */
 static void update_consensus(struct held_out_set *all, struct pose_solver *s, int level, struct parallel *pool) {
     s->level = all->level = level;
     pose_linearise(s, pool);

@@ -1,8 +1,8 @@
-/* held_out_poses.h -- poses of held-out photographs, which are as wrong as those of others.
+/* held_out_poses.h -- poses of held-out photographs, which are as wrong as those of the others.
  *
- * Each is moved on its own until it shows tracks as those photographs see them that are reconstructed from
- * (pose_solver.h, whose looks are kept). It has no say in these, nor in anything else that is learned: only where it
- * is compared with the room is put right. */
+ * Each is aligned on its own to the consensus of the training photographs at the tracks (pose_solver.h), which stays as
+ * it is. A held-out photograph influences neither the consensus nor anything else that is reconstructed: only the place
+ * at which it is compared with the room changes. */
 #ifndef UNBAKE_CAPTURE_HELD_OUT_POSES_H
 #define UNBAKE_CAPTURE_HELD_OUT_POSES_H
 
@@ -10,9 +10,9 @@
 #include "server/capture/pose_solver.h"
 #include "server/scene/scene.h"
 
-/* Moves the cameras of held-out photographs, where that convinces; from level `coarsest` to the finest. Of the solver,
- * whose frames are where they belong, only what is computed for a level is written. Returns how many were moved, and the
- * rms over them of how far, in pixels. */
+/* Moves the cameras of held-out photographs where that is significantly better; from level `coarsest` to the finest. Of
+ * the solver, whose frames must have their final poses, only the values of the current level are written. Returns the
+ * number moved; *shift_px: their rms shift, pixels. */
 size_t held_out_poses_align(struct scene *scene, struct pose_solver *s, int coarsest, struct parallel *pool,
                             double *shift_px);
 

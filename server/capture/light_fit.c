@@ -1,13 +1,13 @@
 /* light_fit.c -- see light_fit.h.
  *
- * Iteratively reweighted least squares. With weights w, A the map from (G, v) to looks and M the
- * weighted mean over the looks of a point, what remains after the L are eliminated is
+ * Iteratively reweighted least squares. With weights w, A the map from (G, v) to observations and M the weighted mean
+ * over the observations of a point, eliminating the L leaves
  *
- *     (A' W (I - M) A + prior) x = A' W (I - M) y,
+ *      (A' W (I - M) A + prior) x = A' W (I - M) y,
  *
- * solved by preconditioned conjugate gradients: the matrix is never formed, so a capture of
- * thousands of photographs costs what its looks cost. Parameters that the model holds at none are
- * projected out of each step; the preconditioner is one number a frame, so it commutes with that. */
+ * solved by preconditioned conjugate gradients: the matrix is never formed, so time grows linearly with the number of
+ * observations. Parameters outside the model are projected out of each step; the preconditioner has one number a frame,
+ * so it commutes with the projection. */
 #include "server/capture/light_fit.h"
 
 #include <math.h>
@@ -17,8 +17,9 @@
 #include "common/quantile.h"
 #include "server/capture/conjugate.h"
 
-/* Standard deviations, in logarithms: of a look at a flat, frontal place; that a grazing one adds
- * (times 1 / cosine - 1); of the priors on told exposures, white balance and vignette. */
+/* Standard deviations, in logarithms: of an observation of a flat, frontal surface; added at grazing angles (times 1 /
+ * cosine - 1); of the priors on unknown exposures, drift of given ones, white balance and vignette coefficients. By
+ * hand. */
 #define OBSERVATION_SIGMA 0.02
 #define GRAZING_SIGMA 0.03
 #define UNKNOWN_EXPOSURE_SIGMA 3.0
@@ -26,9 +27,9 @@
 #define COLOR_SIGMA 0.2
 #define VIGNETTE_SIGMA 0.5
 
-#define ROUNDS 12
-#define CG_STEPS 60
-#define CG_TOLERANCE 1e-7
+#define ROUNDS 12 /* of reweighting; by hand */
+#define CG_STEPS 60 /* of conjugate gradients a round, at most */
+#define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
     size_t observations = o->start[o->point_count];
@@ -68,7 +69,7 @@ double light_fit_predict(const struct light_fit *f, const double *x, size_t obse
     return x[3 * f->o->observation[observation].train + (size_t)channel] + v[0] * s[0] + v[1] * s[1] + v[2] * s[2];
 }
 
-/* out += A' W (I - M) z for the looks of one point and one channel, z[] by look of the point. */
+/* out += A' W (I - M) z for one point and channel; z[] by observation of the point. */
 static void scatter(const struct light_fit *f, size_t point, int channel, const double *z, double *out) {
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
     double sum = 0.0, weight = 0.0;
@@ -87,7 +88,7 @@ static void scatter(const struct light_fit *f, size_t point, int channel, const 
     }
 }
 
-/* Takes out of x what the model holds at none. */
+/* Sets parameters outside the model to 0. */
 static void project(const struct light_fit *f, int model, double *x) {
     for (size_t t = 0; t < f->frames; t++) {
         double *g = x + 3 * t, mean = (g[0] + g[1] + g[2]) / 3.0;
@@ -129,7 +130,7 @@ static void multiply(const void *user, const double *x, double *out) {
     project(f, system->model, out);
 }
 
-/* Sums of weights: one number a frame, one each coefficient of the vignette. */
+/* Jacobi preconditioner: sums of weights, one number a frame and one for each vignette coefficient. */
 static void make_preconditioner(const struct light_fit *f, double *inverse) {
     size_t n = light_fit_parameter_count(f);
     for (size_t i = 0; i < n; i++)
@@ -199,7 +200,8 @@ void light_fit_residuals(const struct light_fit *f, const double *x, size_t poin
     }
 }
 
-/* New weights and scale from the residuals; `gentle` weights do not give up on far ones. */
+/* New weights and scale from the residuals. Convex weights (first rounds) keep some pull from far observations; the
+ * later ones redescend (Cauchy). */
 static void reweight(struct light_fit *f, const double *x, bool is_convex) {
     size_t observations = f->o->start[f->o->point_count], used = 0;
     double *square = mem_array(observations + 1, sizeof *square), *known = mem_array(observations + 1, sizeof *known);

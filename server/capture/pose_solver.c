@@ -1,14 +1,14 @@
-/* pose_solver.c -- see pose_solver.h: cameras, sights, their derivatives and weights. */
+/* pose_solver.c -- see pose_solver.h: cameras, observations, their derivatives and weights. */
 #include "server/capture/pose_solver.h"
 
 #include <string.h>
 
 #include "common/mem.h"
 
-#define FIRST_SCALE 0.1      /* of residuals, before there are any */
+#define FIRST_SCALE 0.1 /* of log residuals, until they are known; by hand */
 
-/* A correction is clearly better when what was held back agrees better by this share of its robust cost and by so many
- * standard errors. */
+/* A correction is accepted when it lowers the robust cost at held-out tracks by this share, and by so many standard
+ * errors. By hand. */
 #define MIN_GAIN 0.02
 #define MIN_SIGNIFICANCE 6.0
 
@@ -111,10 +111,10 @@ static float value_at(const struct pose_solver *s, uint32_t frame, vec3 point, f
     return pyramid_value(&s->tracks->pyramid[frame], s->level, *x, *y);
 }
 
-/* What a sight shows of the track's surroundings. */
+/* An observation's surroundings. */
 struct pose_patch {
     float value, along[2];   /* change of the value per `right` and `down` */
-    float place[2][2];       /* change of the place in the picture per `right` and `down` */
+    float place[2][2];       /* change of the image position per `right` and `down` */
 };
 
 static bool sample_patch(const struct pose_solver *s, const struct track *track, float step, uint32_t frame,
@@ -157,7 +157,7 @@ bool pose_derive(const struct pose_frame *frame, vec3 point, const float g[2], f
     return true;
 }
 
-/* The slope g by pixels of what changes by `along` per `right` and `down` of a track: g . place[i] = along[i]. */
+/* Image gradient g of a value that changes by `along` per `right` and `down` of a track: g . place[i] = along[i]. */
 static bool slope_from(const float along[2], const float place[2][2], float g[2]) {
     float det = place[0][0] * place[1][1] - place[0][1] * place[1][0];
     g[0] = (along[0] * place[1][1] - along[1] * place[0][1]) / det;
@@ -216,7 +216,7 @@ void pose_linearise(struct pose_solver *s, struct parallel *pool) {
 
 /* --- weights ---------------------------------------------------------------------------------- */
 
-/* The track's L by what weights there are, offsets taken off; false where fewer than three tell. */
+/* The track's consensus by the given weights, offsets subtracted; false of fewer than three observations. */
 static bool track_consensus(const struct pose_solver *s, size_t track, const double *weight, double *consensus) {
     const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
     double sum = 0.0, total = 0.0;
@@ -232,7 +232,6 @@ static bool track_consensus(const struct pose_solver *s, size_t track, const dou
     return count >= 3;
 }
 
-/* Robust weights of a track's sights, by their distance from what they agree on. */
 void pose_weigh_track(const struct pose_solver *s, size_t track, double *consensus,
                       double weight[POSE_OBSERVATIONS_MAX]) {
     const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;

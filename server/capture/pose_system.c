@@ -1,10 +1,9 @@
 /* pose_system.c -- pose_solve of pose_solver.h.
  *
- * The L of all tracks are eliminated and what remains is solved by conjugate gradients, as in
- * calibrate_light.c: all twists and offsets at once, since one photograph after the other would
- * hardly move where many are wrong together. What the evidence leaves open is decided by a prior
- * that grows with the size of a correction and not with its square: rather a few photographs moved
- * far than all a little. */
+ * The L of all tracks are eliminated and the rest is solved by conjugate gradients, as in calibrate_light.c: all twists
+ * and offsets at once, since one photograph at a time would hardly move where many are wrong together. What the
+ * observations leave open is decided by a prior that grows linearly with the size of a correction, not quadratically:
+ * it prefers few photographs moved far to all moved a little. */
 #include "server/capture/pose_solver.h"
 
 #include <string.h>
@@ -12,18 +11,19 @@
 #include "common/mem.h"
 #include "server/capture/conjugate.h"
 
-#define OFFSET_SIGMA 0.3
-#define PRIOR_PX 1.0         /* size of the prior: a photograph moves this far for hardly any evidence */
-#define PRIOR_LEAST_PX 0.2   /* below it the prior is a square */
-#define CG_STEPS 40
-#define CG_TOLERANCE 1e-3
+#define OFFSET_SIGMA 0.3 /* standard deviation of the offsets' prior, in logarithms; by hand */
+/* pixels: scale of the prior, which is weak: redkitchen's drift is shared by neighbouring frames */
+#define PRIOR_PX 1.0
+#define PRIOR_LEAST_PX 0.2 /* pixels: the prior is quadratic below this; by hand */
+#define CG_STEPS 40 /* of conjugate gradients, at most */
+#define CG_TOLERANCE 1e-3 /* of the residual's norm, over that of the right-hand side */
 
 double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);
     return 1.0 / (PRIOR_PX * fmax(PRIOR_LEAST_PX, sqrt(squares)));
 }
 
-/* out += A' W (I - M) z over the sights of a track, z[] by sight. */
+/* out += A' W (I - M) z for one track; z[] by observation. */
 static void scatter(const struct pose_solver *s, size_t track, const double *z, double *out) {
     const struct pose_observation *observation = s->observation + track * POSE_OBSERVATIONS_MAX;
     size_t count = pose_observation_count(s->track[track]);
@@ -132,7 +132,6 @@ static void precondition(const void *user, const double *r, double *z) {
     project(s, z);
 }
 
-/* Solves for s->x: the twists from 0, the offsets from what they are. */
 void pose_solve(struct pose_solver *s) {
     size_t n = s->unknowns, twists = POSE_UNKNOWNS * s->frames;
     double *r = mem_calloc(n, sizeof *r), *x = s->x;

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Of normal noise, Cauchy's weight wastes 5 % of the measurements at a scale of so many deviations when it is iterated to
- * the end (Holland and Welsch 1977); a single step from the median, as here, wastes 9 %. */
+/* Tuning constant of Cauchy's weight, deviations: 95 % efficient for normal noise when iterated to convergence (Holland
+ * and Welsch 1977); a single step from the median, as here, has 91 %. */
 #define EFFICIENT 2.385f
 
 static int compare_gray(const void *a, const void *b) {

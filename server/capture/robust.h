@@ -1,4 +1,4 @@
-/* robust.h -- the weighted mean of measurements of which some are wrong. */
+/* robust.h -- weighted means of measurements with outliers. */
 #ifndef UNBAKE_CAPTURE_ROBUST_H
 #define UNBAKE_CAPTURE_ROBUST_H
 
@@ -9,26 +9,26 @@
 
 struct robust_sample {
     rgb value;
-    float gray;      /* what outliers are told by: the logarithm of a brightness */
-    float deviation; /* standard deviation of `gray` by noise alone, as far as is known */
+    float gray;      /* log brightness, by which outliers are found */
+    float deviation; /* standard deviation of `gray` by noise alone, where known */
     float weight;    /* above 0 */
-    /* Not looked at here: */
-    uint32_t source; /* which photograph */
-    float sharp;     /* solid angle per area of surface */
+    /* Not used here: */
+    uint32_t source; /* photograph */
+    float sharp;     /* image resolution on the surface: solid angle per area */
     rgb noise;       /* of the value, as the next; see denoise.h */
     float mixing;
 };
 
-/* Lowers the weights of those of count > 0 samples that are off the median of `gray`, weighed by their weights to the
- * power `trust` in [0, 1]: to half at a distance of `scale`, or further off where noise alone goes that far (Cauchy's
- * weight). Sorts the samples. Returns the sum of the weights. */
+/* Cauchy weights: lowers the weights of samples off the weighted median of `gray` (weights to the power `trust` in [0,
+ * 1]): to half at distance `scale`, or farther where noise explains it. count > 0; sorts the samples. Returns the sum
+ * of the weights. */
 float robust_weigh(struct robust_sample *sample, size_t count, float trust, float scale);
 
-/* Keeps those of count > 0 samples whose `gray` is less than `within` off its median, whatever their weights: what most
- * of them show. Sorts the samples; returns how many are kept. */
+/* Keeps samples whose `gray` is less than `within` from its unweighted median. count > 0; sorts the samples; returns
+ * how many are kept. */
 size_t robust_keep(struct robust_sample *sample, size_t count, float within);
 
-/* The mean of count > 0 samples after robust_weigh with a trust of 1. */
+/* Weighted mean after robust_weigh with trust 1; count > 0. */
 rgb robust_mean(struct robust_sample *sample, size_t count, float scale);
 
 #endif
