@@ -49,7 +49,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 # The goals that build first and then run something build on all processors, unless told otherwise.
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms paper chaos soak asan tsan asan-build tsan-build fuzz \
+.PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms sensitivity paper chaos soak asan tsan asan-build tsan-build fuzz \
         fuzzers fuzz-build portable coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -149,6 +149,10 @@ fidelity: deps ## compare with the truth of known rooms, some 6 minutes each; FI
 rooms: ## make furnished rooms with their truth, by Mitsuba 3, under build/rooms, for FIDELITY_ROOMS; ROOM_SPP
 	@deploy/install-deps.sh rooms
 	@tests/bench/rooms.sh $(B)
+
+sensitivity: deps ## how much results move with each constant of the engine (hours); SENSITIVITY="server/material ..."
+	@+$(BUILD) all
+	@tests/bench/sensitivity.sh $(B)
 
 paper: ## repeat the paper's experiments (hours; PAPER=short: minutes, to see that they run), write build/paper.json
 	@deploy/install-deps.sh bench
