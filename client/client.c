@@ -201,7 +201,7 @@ enum status client_job_id(struct client *c, const char *word, int64_t *id, struc
     *id = strtoll(word, &end, 10);
     if (word[0] >= '0' && word[0] <= '9' && *end == '\0' && *id > 0 && strlen(word) < 19)
         return STATUS_OK;
-    error_set(err, STATUS_INPUT, "\"%.100s\" is no job", word);
+    error_set(err, STATUS_INPUT, "\"%.100s\" is not a job", word);
     return error_hint(err, "a job is a number, as `unbake list` shows it, or `last`");
 }
 

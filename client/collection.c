@@ -27,7 +27,7 @@ static int list(struct client *c, const struct options *o, const struct collecti
     long limit = options_whole(o, "limit", 20);
     reply_init(&reply);
     enum status status =
-        limit < 0 ? error_set(&err, STATUS_INPUT, "--limit takes 0 or more, not %ld", limit)
+        limit < 0 ? error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit)
                   : client_list(c, what->path, (size_t)limit, &items, &reply, &err);
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
@@ -110,22 +110,21 @@ static enum status read_verb(const struct options *o, const struct collection *w
     for (*verb = VERB_LIST; *verb < VERB_COUNT && strcmp(verbs[*verb], word) != 0; ++*verb)
         nearest_offer(&nearest, verbs[*verb]);
     if (*verb == VERB_LIST && o->word_count > 1)
-        return error_set(err, STATUS_INPUT, "%s list takes nothing more, not \"%.100s\"", what->name, o->word[1]);
+        return error_set(err, STATUS_INPUT, "unexpected argument \"%.100s\"", o->word[1]);
     if (*verb < VERB_COUNT && *verb != VERB_LIST && o->word_count == 1)
-        return error_set(err, STATUS_INPUT, "%s %s takes %s..., which is missing", what->name, word, argument);
+        return error_set(err, STATUS_INPUT, "missing argument %s", argument);
     if (*verb < VERB_COUNT)
         return STATUS_OK;
-    error_set(err, STATUS_INPUT, "%s takes nothing, `show %s`, `keep %s` or `rm %s`, not \"%.100s\"", what->name,
-              argument, argument, argument, word);
+    error_set(err, STATUS_INPUT, "unknown action \"%.100s\" of %s", word, what->name);
     return nearest.best ? error_hint(err, "did you mean `unbake %s %s`?", what->name, nearest.best)
-                        : STATUS_INPUT;
+                        : error_hint(err, "list, show %s..., keep %s..., rm %s...", argument, argument, argument);
 }
 
 /* An option that the verb does not take was meant for another one. */
 static enum status check_options(const struct options *o, const struct collection *what, enum verb verb,
                                  bool keeps, struct error *err) {
     if (verb == VERB_KEEP && !keeps)
-        return error_set(err, STATUS_INPUT, "%s keep takes --pin, --unpin or --keep-days N", what->name);
+        return error_set(err, STATUS_INPUT, "%s keep needs --pin, --unpin or --keep-days N", what->name);
     if (verb != VERB_KEEP && keeps)
         return error_set(err, STATUS_INPUT, "--pin, --unpin and --keep-days go with `%s keep`", what->name);
     if (verb != VERB_REMOVE && options_flag(o, "dry-run"))

@@ -134,9 +134,9 @@ const struct command_exit command_exit_statuses[] = {
     {CLIENT_NOT_FOUND, "no such job, scene or output"},
     {CLIENT_REFUSED, "the server refused, and said why"},
     {CLIENT_UNREACHABLE, "the server cannot be reached"},
-    {CLIENT_CONFLICT, "the present state forbids it"},
+    {CLIENT_CONFLICT, "the present state does not allow it"},
     {CLIENT_LOCAL, "a file here cannot be read or written"},
-    {CLIENT_INTERRUPTED, "interrupted; a submitted job goes on"},
+    {CLIENT_INTERRUPTED, "interrupted; a submitted job continues"},
     {0, NULL},
 };
 

@@ -57,7 +57,7 @@ static enum status describe_order(struct client *c, const struct options *o, cJS
     bool first = options_flag(o, "first"), last = options_flag(o, "last");
     int64_t id;
     if ((before != NULL) + first + last > 1)
-        return error_set(err, STATUS_INPUT, "only one of --first, --last and --before can be so");
+        return error_set(err, STATUS_INPUT, "--first, --last and --before exclude each other");
     if (before) {
         enum status status = client_job_id(c, before, &id, reply, err);
         if (status != STATUS_OK)
@@ -78,7 +78,7 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
     if (options_text(o, "priority", NULL))
         json_add_int(body, "priority", options_whole(o, "priority", 0));
     if (options_flag(o, "share") && options_flag(o, "unshare"))
-        return error_set(err, STATUS_INPUT, "only one of --share and --unshare can be so");
+        return error_set(err, STATUS_INPUT, "--share and --unshare exclude each other");
     if (options_flag(o, "share") || options_flag(o, "unshare"))
         json_add_bool(body, "shared", options_flag(o, "share"));
     for (size_t i = 0; i < o->given_count && status == STATUS_OK; i++) {
@@ -93,8 +93,8 @@ static enum status describe_edit(struct client *c, const struct options *o, cJSO
     if (status == STATUS_OK)
         status = describe_order(c, o, body, reply, err);
     if (status == STATUS_OK && !body->child) {
-        error_set(err, STATUS_INPUT, "nothing is to be changed");
-        status = error_hint(err, "`unbake edit --help` lists what can be");
+        error_set(err, STATUS_INPUT, "there is nothing to change");
+        status = error_hint(err, "`unbake edit --help` lists what can be changed");
     }
     return status;
 }
@@ -131,7 +131,7 @@ int extend_run(struct client *c, const struct options *o) {
     enum status status = STATUS_OK;
     reply_init(&reply);
     if ((time != NULL) + (iterations != NULL) + (looks != NULL) != 1) {
-        error_set(&err, STATUS_INPUT, "extend takes --looks, --iterations or --time");
+        error_set(&err, STATUS_INPUT, "extend needs --looks, --iterations or --time");
         status = error_hint(&err, "--iterations or --time where `unbake show %.40s` has such a limit, else --looks",
                             o->word[0]);
     }

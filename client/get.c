@@ -408,7 +408,7 @@ int get_run(struct client *c, const struct options *o) {
     if (status == STATUS_OK)
         status = fetch_all(&f, o, results);
     if (status == STATUS_CANCELLED)
-        error_hint(&err, "the same command goes on where this one stopped");
+        error_hint(&err, "the same command continues where this one stopped");
     if (status != STATUS_OK)
         code = client_fail(c, &f.reply, &err);
     else

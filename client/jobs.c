@@ -33,7 +33,7 @@ static enum status check_state(const char *state, struct error *err) {
             return STATUS_OK;
         nearest_offer(&nearest, *known);
     }
-    error_set(err, STATUS_INPUT, "a job is never \"%.100s\"", state);
+    error_set(err, STATUS_INPUT, "unknown state \"%.100s\"", state);
     return nearest.best ? error_hint(err, "did you mean %s?", nearest.best)
                         : error_hint(err, "queued, running, paused, succeeded, failed or cancelled");
 }
@@ -89,7 +89,7 @@ int list_run(struct client *c, const struct options *o) {
     if (state)
         status = check_state(state, &err);
     if (limit < 0)
-        status = error_set(&err, STATUS_INPUT, "--limit takes 0 or more, not %ld", limit);
+        status = error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit);
     if (status == STATUS_OK) {
         snprintf(path, sizeof path, "/v1/jobs%s%s", state ? "?state=" : "", state ? state : "");
         status = client_list(c, path, (size_t)limit, &items, &reply, &err);
@@ -168,8 +168,8 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     snprintf(text, sizeof text, "%.0f", member_number(job, "id", 0.0));
     field_print(c, "job", text);
     field_print(c, "name", member_text(job, "name"));
-    snprintf(text, sizeof text, "%s%s%s", member_text(job, "state"),
-             strcmp(wanted, "run") == 0 ? "" : ", to ", strcmp(wanted, "run") == 0 ? "" : wanted);
+    snprintf(text, sizeof text, strcmp(wanted, "run") == 0 ? "%s" : "%s, %s requested", member_text(job, "state"),
+             wanted);
     field_print(c, "state", text);
     field_print(c, "reason", member_text(job, "reason"));
     field_print(c, "hint", member_text(job, "hint"));
@@ -283,8 +283,8 @@ static int act_on(struct client *c, const char *word, const char *action) {
     else if (c->json)
         client_print_json(c, reply.json);
     else if (!c->quiet)
-        client_say(c, "job %lld is %s%s%s", (long long)id, state, strcmp(wanted, "run") ? ", to " : "",
-                   strcmp(wanted, "run") ? wanted : "");
+        client_say(c, strcmp(wanted, "run") == 0 ? "job %lld is %s" : "job %lld is %s, %s requested", (long long)id,
+                   state, wanted);
     reply_release(&reply);
     return code;
 }

@@ -44,8 +44,8 @@ static enum status check(struct client *c, const char *token, struct reply *repl
     request_set_token(c->request, token);
     enum status status = request_get(c->request, "/v1/session", reply, err);
     if (status == STATUS_OK && !*member_text(reply->json, "user")) {
-        error_set(err, STATUS_INPUT, "%s does not know this token", request_server(c->request));
-        return error_hint(err, "it needs none: it lets anybody in");
+        error_set(err, STATUS_INPUT, "%s rejects this token", request_server(c->request));
+        return error_hint(err, "it needs no token: it is open to anybody");
     }
     return status;
 }
@@ -79,7 +79,7 @@ int login_run(struct client *c, const struct options *o) {
             client_say(c, "%s at %s, role %s", member_text(reply.json, "user"), server,
                        member_text(reply.json, "role"));
         if (strncmp(server, "http://", 7) == 0 && !request_is_loopback(c->request))
-            client_note(c, "%s is plain http: whoever is on the way can read the token", server);
+            client_note(c, "%s is plain HTTP: anybody on the network path can read the token", server);
     }
     reply_release(&reply);
     return code;
@@ -98,7 +98,7 @@ int logout_run(struct client *c, const struct options *o) {
     mem_free(kept);
     if (credentials_keep(request_server(c->request), NULL, &err) != STATUS_OK)
         return client_fail(c, NULL, &err);
-    client_note(c, "the token for %s is forgotten here; it stays valid until it is revoked there",
+    client_note(c, "the token for %s was removed from this machine; it stays valid until it is revoked on the server",
                 request_server(c->request));
     return CLIENT_OK;
 }

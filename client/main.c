@@ -36,7 +36,7 @@ static int unknown_command(struct client *c, const char *name) {
     nearest_init(&nearest, name);
     for (size_t i = 0; i < count; i++)
         nearest_offer(&nearest, table[i].name);
-    error_set(&err, STATUS_INPUT, *name == '-' ? "\"%.100s\" is no command" : "there is no command \"%.100s\"", name);
+    error_set(&err, STATUS_INPUT, "unknown command \"%.100s\"", name);
     if (nearest.best)
         error_hint(&err, "did you mean \"%s\"?", nearest.best);
     else
@@ -65,13 +65,15 @@ static void put_command_first(int argc, char **argv) {
     argv[1] = name;
 }
 
-static int check_words(struct client *c, const struct command *command, size_t count) {
+static int check_words(struct client *c, const struct command *command, const char *const *words, size_t count) {
     struct error err;
     if (count >= command->words_min && count <= command->words_max)
         return CLIENT_OK;
-    error_set(&err, STATUS_INPUT, "%s takes %s%s", command->name,
-              *command->arguments ? command->arguments : "no further words",
-              count < command->words_min ? ", which is missing" : *command->arguments ? " and nothing more" : "");
+    if (count < command->words_min)
+        error_set(&err, STATUS_INPUT, "missing argument %.*s", (int)strcspn(command->arguments, ". "),
+                  command->arguments);
+    else
+        error_set(&err, STATUS_INPUT, "unexpected argument \"%.100s\"", words[command->words_max]);
     error_hint(&err, "`unbake %s --help` has an example", command->name);
     return client_fail(c, NULL, &err);
 }
@@ -83,7 +85,7 @@ static int present_token(struct client *c, const struct options *o) {
     char *kept = NULL;
     for (const char *at = given; at && *at; at++)
         if (*at <= ' ' || *at > '~') {
-            error_set(&err, STATUS_INPUT, "UNBAKE_TOKEN is no token: it has blanks or other signs in it");
+            error_set(&err, STATUS_INPUT, "UNBAKE_TOKEN is not a token: it contains blanks or other characters that no token has");
             return client_fail(c, NULL, &err);
         }
     ca = options_text(o, "ca", ca && *ca ? ca : NULL);
@@ -149,7 +151,7 @@ static int dispatch(struct client *c, int argc, char **argv) {
         command_help(command, stdout);
     else if (status != STATUS_OK)
         code = client_fail(c, NULL, &err);
-    else if ((code = check_words(c, command, o.word_count)) == CLIENT_OK)
+    else if ((code = check_words(c, command, o.word, o.word_count)) == CLIENT_OK)
         code = run(c, command, &o);
     options_release(&o);
     return code;

@@ -114,7 +114,7 @@ int manual_run(struct client *c, const struct options *o) {
     } else if (strcmp(page, "bash") == 0 || strcmp(page, "zsh") == 0) {
         completion(page[0] == 'z');
     } else {
-        error_set(&err, STATUS_INPUT, "there is no page \"%.100s\": unbake.1, bash, zsh", page);
+        error_set(&err, STATUS_INPUT, "unknown page \"%.100s\": unbake.1, bash, zsh", page);
         return client_fail(c, NULL, &err);
     }
     return CLIENT_OK;

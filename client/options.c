@@ -31,13 +31,13 @@ static void offer(struct nearest *nearest, const struct client_option *table) {
 static enum status unknown(const char *argument, const struct client_option *own,
                            const struct client_option *shared, struct error *err) {
     if (argument[1] != '-')
-        return error_set(err, STATUS_INPUT, "there is no option -%c", argument[1]);
+        return error_set(err, STATUS_INPUT, "unknown option -%c", argument[1]);
     char *name = mem_strndup(argument + 2, strcspn(argument + 2, "="));
     struct nearest nearest;
     nearest_init(&nearest, name);
     offer(&nearest, own);
     offer(&nearest, shared);
-    enum status status = error_set(err, STATUS_INPUT, "there is no option --%s", name);
+    enum status status = error_set(err, STATUS_INPUT, "unknown option --%s", name);
     if (nearest.best)
         status = error_hint(err, "did you mean --%s?", nearest.best);
     mem_free(name);
@@ -49,13 +49,13 @@ static enum status check_value(const struct client_option *option, const char *t
     if (option->kind == OPTION_WHOLE) {
         long value = strtol(text, &end, 10);
         if (end == text || *end || strlen(text) > 10 || value > 999999999 || value < -999999999)
-            return error_set(err, STATUS_INPUT, "--%s takes a whole number, not \"%s\"",
+            return error_set(err, STATUS_INPUT, "--%s must be a whole number, not \"%s\"",
                              option->name, text);
     }
     if (option->kind == OPTION_SECONDS) {
         double value = strtod(text, &end);
         if (end == text || *end || !isfinite(value) || value < 0.0 || value > 1e9)
-            return error_set(err, STATUS_INPUT, "--%s takes a number, 0 or more, not \"%s\"",
+            return error_set(err, STATUS_INPUT, "--%s must be a number, 0 or more, not \"%s\"",
                              option->name, text);
     }
     return STATUS_OK;

@@ -281,7 +281,7 @@ static enum status transport_failed(struct request_try *a, CURLcode code, const 
         curl_easy_getinfo(a->request->easy, CURLINFO_OS_ERRNO, &number) == CURLE_OK && number > 0)
         why = strerror((int)number);
     if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) {
-        error_set(err, STATUS_INPUT, "%s is no server's URL: %s", a->request->server, why);
+        error_set(err, STATUS_INPUT, "%s is not the URL of a server: %s", a->request->server, why);
         return error_hint(err, "an example: --server " PROTOCOL_DEFAULT_SERVER);
     }
     error_set(err, STATUS_UNAVAILABLE, "cannot reach %s: %s", a->request->server, why);

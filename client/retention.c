@@ -8,14 +8,14 @@
 enum status retention_describe(const struct options *o, cJSON *body, struct error *err) {
     bool pin = options_flag(o, "pin"), unpin = options_flag(o, "unpin");
     if (pin && unpin)
-        return error_set(err, STATUS_INPUT, "only one of --pin and --unpin can be so");
+        return error_set(err, STATUS_INPUT, "--pin and --unpin exclude each other");
     if (pin || unpin)
         json_add_bool(body, "pinned", pin);
     if (!options_text(o, "keep-days", NULL))
         return STATUS_OK;
     double days = options_seconds(o, "keep-days", 0.0);
     if (days > 36500.0)
-        return error_set(err, STATUS_INPUT, "--keep-days takes at most 36500");
+        return error_set(err, STATUS_INPUT, "--keep-days must be at most 36500");
     char text[32];
     time_t at = time(NULL) + (time_t)(days * 86400.0);
     struct tm utc;

@@ -247,7 +247,7 @@ static enum status submit(struct submission *s, const struct options *o, struct 
     const char *scene = options_text(o, "scene", NULL);
     if ((scene != NULL) == (o->word_count == 1)) {
         error_set(err, STATUS_INPUT,
-                  scene ? "submit takes ROOM or --scene, not both" : "ROOM is missing");
+                  scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
         return error_hint(err, "an example: unbake submit living-room/ --watch");
     }
     s->scene = scene ? mem_strdup(scene) : NULL;
@@ -282,7 +282,7 @@ int submit_run(struct client *c, const struct options *o) {
     int64_t job = 0;
     enum status status = submit(&s, o, &reply, &err);
     if (status == STATUS_CANCELLED)
-        error_hint(&err, "no job was queued; the same command goes on where this one stopped");
+        error_hint(&err, "no job was queued; the same command continues where this one stopped");
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
     else if (options_flag(o, "dry-run"))

@@ -75,7 +75,7 @@ static enum status create(struct upload_sending *s, struct reply *reply, struct 
     if (status == STATUS_OK && reply->location[0] == '/')
         s->path = mem_strdup(reply->location);
     else if (status == STATUS_OK)
-        status = error_set(err, STATUS_UNAVAILABLE, "the server made an upload and did not say where");
+        status = error_set(err, STATUS_UNAVAILABLE, "the server made an upload but sent no Location");
     buf_release(&metadata);
     return status;
 }
@@ -83,7 +83,7 @@ static enum status create(struct upload_sending *s, struct reply *reply, struct 
 /* Takes the offset that a reply tells. */
 static enum status take_offset(struct upload_sending *s, const struct reply *reply, struct error *err) {
     if (reply->upload_offset < 0 || (uint64_t)reply->upload_offset > s->u->length)
-        return error_set(err, STATUS_UNAVAILABLE, "the server does not say where the upload stands");
+        return error_set(err, STATUS_UNAVAILABLE, "the server sent no valid Upload-Offset");
     if ((uint64_t)reply->upload_offset > s->offset)
         s->moved_at = clock_sec();
     s->offset = (uint64_t)reply->upload_offset;

@@ -201,7 +201,7 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
         if (clock_sec() - w->heard_at > patience)
             return STATUS_UNAVAILABLE;
         if (ever && !told && status != STATUS_OK) {
-            client_note(c, "lost the server; watching goes on when it is back");
+            client_note(c, "lost the connection to the server; watching continues when it is back");
             told = true;
         }
         if (!request_pause(c->request, tries, reply->retry_after_sec))
@@ -255,8 +255,8 @@ static void print_outcome(struct client *c, const cJSON *job) {
 
 static int interrupted(struct client *c, int64_t job) {
     struct error err;
-    error_set(&err, STATUS_CANCELLED, "interrupted; job %lld goes on", (long long)job);
-    error_hint(&err, "`unbake watch %lld` looks again, `unbake cancel %lld` ends it", (long long)job,
+    error_set(&err, STATUS_CANCELLED, "interrupted; job %lld continues", (long long)job);
+    error_hint(&err, "`unbake watch %lld` follows it again, `unbake cancel %lld` ends it", (long long)job,
                (long long)job);
     terminal_keep(&c->out);
     return client_fail(c, NULL, &err);

@@ -153,7 +153,7 @@ void config_set(struct config *c, const char *name, const char *value, const cha
         nearest_init(&nearest, name);
         for (size_t i = 0; i < TABLE_COUNT; i++)
             nearest_offer(&nearest, table[i].name);
-        buf_printf(problems, "%s: there is no option \"%s\"%s%s%s\n", where, name,
+        buf_printf(problems, "%s: unknown option \"%s\"%s%s%s\n", where, name,
                    nearest.best ? "; did you mean " : "", nearest.best ? nearest.best : "",
                    nearest.best ? "?" : "");
         return;

@@ -349,7 +349,7 @@ int daemon_command(int argc, char **argv) {
     int code = invocation_read(&in, argc, argv, daemon_flags, NULL);
     if (code < 0 && in.arguments.word_count > 0) {
         if (commands_find(in.arguments.words[0]))
-            fprintf(stderr, "unbaked: a command goes before its options: unbaked %s ...\n", in.arguments.words[0]);
+            fprintf(stderr, "unbaked: the command comes before its options: unbaked %s ...\n", in.arguments.words[0]);
         else
             fprintf(stderr, "unbaked: unknown command \"%s\"; unbaked --help lists the commands\n", in.arguments.words[0]);
         code = EXIT_USAGE;

@@ -81,7 +81,7 @@ int token_command(int argc, char **argv) {
     const char *action = code < 0 ? in.arguments.words[0] : "";
     bool is_add = strcmp(action, "add") == 0, is_revoke = strcmp(action, "revoke") == 0;
     if (code < 0 && !is_add && !is_revoke && strcmp(action, "list") != 0) {
-        fprintf(stderr, "unbaked: there is no \"token %.80s\": add, list, revoke\n", action);
+        fprintf(stderr, "unbaked: unknown command \"token %.80s\"; known: add, list, revoke\n", action);
         code = EXIT_USAGE;
     } else if (code < 0 && in.arguments.word_count != (is_add || is_revoke ? 2 : 1)) {
         fprintf(stderr, "unbaked: token %s takes %s\n", action,

@@ -213,7 +213,7 @@ static void check_tokens(struct doctor *d, bool runs) {
     else if (is_loopback)
         tell(d, GOOD, "tokens", "none: whoever has an account on this machine may do everything");
     else
-        tell(d, BAD, "tokens", "none, and %s is no loopback address: `unbaked token add NAME --role admin`", c->listen);
+        tell(d, BAD, "tokens", "none, and %s is not a loopback address: `unbaked token add NAME --role admin`", c->listen);
 }
 
 static void check_tls(struct doctor *d) {

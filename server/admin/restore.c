@@ -63,7 +63,7 @@ static enum status open_backup(struct restoring *r, struct buf *sums, struct err
     char *list = file_join(r->backup, BACKUP_SUMS);
     enum status status = STATUS_OK;
     if (!S_ISDIR(info.st_mode) || !file_is_in(r->backup, BACKUP_SUMS)) {
-        error_set(err, STATUS_INPUT, "%s is no folder that `unbaked backup --with-outputs` made", r->backup);
+        error_set(err, STATUS_INPUT, "%s is not a folder that `unbaked backup --with-outputs` made", r->backup);
         status = error_hint(err, "a database alone is put back by copying it to state.db in an empty data folder");
     }
     if (status == STATUS_OK)
@@ -138,7 +138,7 @@ static enum status restore_database(struct restoring *r, const char *digest, str
     else if (status == STATUS_OK)
         status = restore_file(r, LAYOUT_STATE, digest, err);
     if (status == STATUS_OK && r->damaged > before)
-        status = error_set(err, STATUS_CORRUPT, "without its database a backup is none");
+        status = error_set(err, STATUS_CORRUPT, "a backup without its database is incomplete");
     if (status == STATUS_OK)
         status = contents_read(contents, path, err);
     if (status == STATUS_OK && syncfs(r->copy.to) != 0)

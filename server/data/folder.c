@@ -41,7 +41,7 @@ enum status folder_check_room(const struct folder *f, uint64_t keep, uint64_t by
     enum status status = file_free_bytes(f->dir, &room, err);
     if (status != STATUS_OK || (room >= keep && room - keep >= bytes))
         return status;
-    error_set(err, STATUS_NO_SPACE, "%llu MiB are wanted, and of the %llu MiB that are free, %llu MiB must stay so",
+    error_set(err, STATUS_NO_SPACE, "%llu MiB are needed, and of the %llu MiB that are free, %llu MiB are kept free",
               (unsigned long long)(bytes >> 20), (unsigned long long)(room >> 20), (unsigned long long)(keep >> 20));
     return error_hint(err, trash_is_busy(f->trash)
                                ? "what was deleted is still being removed: try again in a moment"
@@ -68,7 +68,7 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
     *fd = -1;
     umask(077);
     if (file_make_dirs(dir, err) != STATUS_OK)
-        return error_hint(err, "--data DIR takes another data folder");
+        return error_hint(err, "--data DIR chooses another data folder");
     char *path = layout_lock(dir);
     char holder[32] = "";
     enum status status = STATUS_OK;

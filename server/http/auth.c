@@ -69,12 +69,12 @@ struct response *auth_reject(struct api *api, struct request *r) {
     if (wait_sec <= 0.0 || is_first)
         log_failure(r, is_first ? "; more of them from this address are refused with 429 and not logged" : "");
     if (wait_sec <= 0.0)
-        return refuse(r, "the token is not, or no longer, valid");
+        return refuse(r, "the token is invalid or was revoked");
     cJSON *members = cJSON_CreateObject();
     json_add_string(members, "type", "urn:unbake:too-many-tokens");
-    json_add_string(members, "title", "Too many tokens that are not valid");
-    struct response *reply = problem_full(r, 429, "too many tokens that are not valid came from this address",
-                                          "a valid token is let in at any time", members);
+    json_add_string(members, "title", "Too many invalid tokens");
+    struct response *reply = problem_full(r, 429, "too many invalid tokens came from this address",
+                                          "a valid token is accepted at any time", members);
     response_field(reply, "Retry-After", "%.0f", ceil(wait_sec));
     reply->must_close = true; /* the next try is to cost a connection */
     r->is_throttled = true;
@@ -103,13 +103,13 @@ struct response *auth_check(struct api *api, struct request *r) {
         return NULL;
     if (r->route->access == ROUTE_ADMIN)
         return problem(r, 403, "only an admin may do that");
-    return problem(r, 403, "a token of role \"%s\" may only look", role_name(r->caller.role));
+    return problem(r, 403, "a token of role \"%s\" may only read", role_name(r->caller.role));
 }
 
 /* --- things ------------------------------------------------------------------------------ */
 
 static struct response *may_only_look(const struct request *r) {
-    return problem(r, 403, "it is shared with you to look at; its owner can change it");
+    return problem(r, 403, "it is shared with you for reading; its owner can change it");
 }
 
 bool auth_job(struct api *api, const struct request *r, enum access needed, struct job *job,
@@ -155,7 +155,7 @@ bool auth_scene(struct api *api, const struct request *r, enum access needed, st
     struct error err;
     enum access access = ACCESS_NONE;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
-        *refusal = problem(r, 404, "\"%.80s\" is no scene's id: 8 to 64 lower-case hex digits", id);
+        *refusal = problem(r, 404, "\"%.80s\" is not a scene's id: 8 to 64 lower-case hex digits", id);
         return false;
     }
     if (auth_find_scene(api, r, id, row, &err) != STATUS_OK) {

@@ -28,7 +28,7 @@ enum status bind_listen(int *fd, const char *address, uint16_t *port, struct err
         bind(*fd, found->ai_addr, found->ai_addrlen) != 0 || listen(*fd, BACKLOG) != 0 ||
         getsockname(*fd, (struct sockaddr *)&bound, &size) != 0) {
         error_set_errno(err, errno, "cannot listen on %s port %s", address, text);
-        status = error_hint(err, "--listen takes another address");
+        status = error_hint(err, "--listen chooses another address");
         if (*fd >= 0)
             close(*fd);
         *fd = -1;

@@ -38,7 +38,7 @@ static struct response *check_fields(const struct request *r) {
         if (!field_is_token(r->fields[i].name))
             return refuse(r, 400, "a header field's name is not a word");
         if (is_lost_framing(r->fields[i].name))
-            return refuse(r, 400, "the body's length is told in a field that is continued on another line");
+            return refuse(r, 400, "the body's length is given in a field that is continued on another line");
         for (const char *at = r->fields[i].value; *at; at++)
             if (((unsigned char)*at < 0x20 && *at != '\t') || *at == 0x7f)
                 return refuse(r, 400, "a header field's value holds a control byte");

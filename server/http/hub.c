@@ -178,8 +178,8 @@ static void render_start(struct subscriber *s) {
         s->what.snapshot = NULL;
     }
     if (s->what.is_ahead)
-        render_resync(s, s->what.after, "this is the newest event, there is none with the id that was named: "
-                                        "GET tells what is so");
+        render_resync(s, s->what.after, "no event has the id that was given, and this is the newest one: "
+                                        "GET shows the present state");
 }
 
 static void mark_dirty(struct subscriber *s) {
@@ -254,7 +254,7 @@ static void fetch(struct subscriber *s) {
     }
     if (page.pruned_id > what->after) {
         buf_clear(&s->text); /* the same events come again, after the news that some are missing */
-        render_resync(s, page.pruned_id, "events up to this one are no longer kept: GET tells what is so");
+        render_resync(s, page.pruned_id, "events up to this one are no longer kept: GET shows the present state");
         mark_dirty(s);
         return;
     }

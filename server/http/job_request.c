@@ -134,10 +134,10 @@ struct response *job_request_read(const struct request *r, struct job_request *w
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
-            problem_param(params, name, is_new ? "there are scene, name, settings, priority, labels, webhook, shared"
-                                               : "there are name, priority, labels, shared, order, pinned, "
+            problem_param(params, name, is_new ? "known: scene, name, settings, priority, labels, webhook, shared"
+                                               : "known: name, priority, labels, shared, order, pinned, "
                                                  "expires_at",
-                          "is not known here");
+                          "is unknown");
     }
     if (is_new && !cJSON_HasObjectItem(w->body, "scene"))
         problem_param(params, "scene", "POST the bundle to /v1/scenes; its reply has the id", "is missing");

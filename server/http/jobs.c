@@ -61,10 +61,10 @@ struct response *jobs_list(struct api *api, struct request *r) {
     enum job_state state = JOB_QUEUED;
     int64_t before = 0;
     if (state_name && !job_state_parse(state_name, &state))
-        return problem_full(r, 400, "there is no such job state",
-                            "queued, running, paused, succeeded, failed, cancelled", NULL);
+        return problem_full(r, 400, "unknown state", "known: queued, running, paused, succeeded, failed, cancelled",
+                            NULL);
     if (cursor && !field_number(cursor, 1, INT64_MAX, &before))
-        return problem(r, 400, "the cursor is not one of ours");
+        return problem(r, 400, "invalid cursor");
     size_t limit = view_limit(r, &refusal), count = 0;
     if (refusal)
         return refusal;
@@ -99,7 +99,7 @@ static bool find_scene(struct api *api, const struct request *r, const char *id,
     size_t digits = strspn(id, "0123456789abcdef");
     struct error err;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
-        problem_param(params, "scene", NULL, "is no scene's id: 8 to 64 lower-case hex digits");
+        problem_param(params, "scene", NULL, "is not a scene's id: 8 to 64 lower-case hex digits");
         return false;
     }
     enum status status = auth_find_scene(api, r, id, row, &err);
@@ -196,7 +196,7 @@ struct response *jobs_add(struct api *api, struct request *r) {
     if (!reply && w.scene)
         has_scene = find_scene(api, r, w.scene, &scene, params, &reply);
     if (!reply && cJSON_GetArraySize(params) > 0) {
-        reply = problem_invalid(r, "the job cannot be taken as it is", params);
+        reply = problem_invalid(r, "the job is invalid", params);
         params = NULL;
     }
     if (!reply && !dry_run)
@@ -222,7 +222,7 @@ static int64_t expected_revision(const struct request *r, struct response **refu
     char digits[24];
     int end = 0;
     if (!match)
-        *refusal = problem_full(r, 428, "a change must say what it changes, by If-Match",
+        *refusal = problem_full(r, 428, "a change needs If-Match",
                                 "send the job's ETag, or * to change whatever is there", NULL);
     else if (strcmp(match, "*") != 0 &&
              (sscanf(match, "\"rev-%20[0-9]\"%n", digits, &end) != 1 || end == 0 || match[end] != '\0' ||
@@ -242,7 +242,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
     struct error err;
     reply = job_request_read(r, &w, false, params);
     if (!reply && cJSON_GetArraySize(params) > 0) {
-        reply = problem_invalid(r, "the change cannot be made", params);
+        reply = problem_invalid(r, "the change is invalid", params);
         params = NULL;
     }
     if (!reply) {
@@ -251,7 +251,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
                                   .retention = w.retention};
         enum status status = store_job_patch(api->store, id, revision, &patch, &err);
         if (status == STATUS_CONFLICT)
-            reply = problem_full(r, 412, err.message, "GET the job and look again", NULL);
+            reply = problem_full(r, 412, err.message, "GET the job and try again", NULL);
         else if (status != STATUS_OK)
             reply = problem_from(r, &err);
         else
@@ -443,7 +443,7 @@ static char *longer_settings(const struct request *r, const struct job *job, str
     } else {
         put_off(settings, &full, body->child, params);
         if (cJSON_GetArraySize(params) > 0) {
-            *refusal = problem_invalid(r, "the job cannot be extended by that", params);
+            *refusal = problem_invalid(r, "the extension is invalid", params);
             params = NULL;
         } else {
             text = json_text(settings);

@@ -37,8 +37,8 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
     if (pledged + bytes <= share)
         return NULL;
     return refuse(r, 507, "user_pledge_percent", "finish or remove an upload that is under way",
-                  mem_printf("%llu MiB are still to come of your uploads, and %llu MiB more are wanted: one user's may take"
-                             " %u %% of the free space, which are %llu MiB",
+                  mem_printf("your uploads under way reserve %llu MiB, and %llu MiB more are needed: the limit of one user is"
+                             " %u %% of the free space, %llu MiB",
                              (unsigned long long)(pledged >> 20), (unsigned long long)(bytes >> 20),
                              api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
 }
@@ -52,7 +52,7 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
         return problem_from(r, &err);
     if (most > 0 && checks >= most)
         return refuse(r, 429, "user_max_checks", "wait until some of them are checked",
-                      mem_printf("%zu scenes of yours wait to be checked already, and of one user's %zu may", checks, most));
+                      mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks, most));
     return check_pledge(api, r, bytes);
 }
 
@@ -60,11 +60,11 @@ struct response *limits_check_stream(struct api *api, const struct request *r) {
     size_t most = api->config.max_streams, of_one = api->config.user_max_streams, all = hub_count(api->hub);
     bool is_bound = limits_bind(r);
     if (all >= most || (is_bound && all >= most - most / ADMIN_STREAMS))
-        return problem_full(r, 503, "there are as many event streams as there may be",
+        return problem_full(r, 503, "the limit of event streams is reached",
                             "an administrator can raise the option max_streams", NULL);
     size_t mine = is_bound && of_one > 0 ? hub_count_of(api->hub, r->caller.user_id) : 0;
     if (mine > 0 && mine >= of_one)
         return refuse(r, 429, "user_max_streams", "close some, or follow all jobs with one stream of /v1/events",
-                      mem_printf("%zu event streams are yours already, and one user may have %zu", mine, of_one));
+                      mem_printf("you have %zu event streams already; the limit of one user is %zu", mine, of_one));
     return NULL;
 }

@@ -68,10 +68,10 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 static bool turn_away(const struct listener *l, int fd, enum connection_answer answer) {
     static const char *const reply[] = {
         [CONNECTION_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
-                               "Connection: close\r\n\r\nthis address has as many connections as one may have; an"
+                               "Connection: close\r\n\r\nthis address has reached the limit of its connections; an"
                                " administrator can raise the option address_max_connections\n",
         [CONNECTION_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
-                       "Connection: close\r\n\r\nthere are as many connections as there may be; an administrator can"
+                       "Connection: close\r\n\r\nthe limit of connections is reached; an administrator can"
                        " raise the option max_connections\n"};
     if (!l->tls) /* whoever is not there to read it has not waited for it */
         (void)!send(fd, reply[answer], strlen(reply[answer]), MSG_NOSIGNAL | MSG_DONTWAIT);

@@ -13,24 +13,24 @@ static const struct problem_kind {
     int status;
     const char *word, *title;
 } kinds[] = {
-    {400, "bad-request", "The request cannot be understood"},
-    {401, "unauthorized", "A token is needed"},
-    {403, "forbidden", "It is not for this caller"},
-    {404, "not-found", "There is no such thing"},
-    {405, "method-not-allowed", "That cannot be done here"},
-    {409, "conflict", "Its present state forbids it"},
-    {412, "stale", "It is not what the request expects it to be"},
-    {413, "too-large", "The body is too large"},
-    {415, "media-type", "The body is of an unsupported type"},
-    {416, "range", "The range lies outside the file"},
-    {417, "expectation", "The expectation cannot be met"},
-    {422, "invalid", "The request is not acceptable"},
-    {428, "needs-if-match", "If-Match is missing"},
-    {460, "checksum", "The bytes that arrived are not those that were sent"},
-    {429, "queue-full", "The queue is full"},
-    {500, "internal", "The server failed"},
-    {503, "unavailable", "Not available just now"},
-    {507, "disk-full", "The server has no room"},
+    {400, "bad-request", "Malformed request"},
+    {401, "unauthorized", "Authentication required"},
+    {403, "forbidden", "Not allowed for this caller"},
+    {404, "not-found", "Not found"},
+    {405, "method-not-allowed", "Method not allowed"},
+    {409, "conflict", "Conflict with the present state"},
+    {412, "stale", "Precondition failed"},
+    {413, "too-large", "Body too large"},
+    {415, "media-type", "Unsupported media type"},
+    {416, "range", "Range not satisfiable"},
+    {417, "expectation", "Expectation failed"},
+    {422, "invalid", "Invalid request"},
+    {428, "needs-if-match", "If-Match required"},
+    {460, "checksum", "Checksum mismatch"},
+    {429, "queue-full", "Limit reached"},
+    {500, "internal", "Internal error"},
+    {503, "unavailable", "Temporarily unavailable"},
+    {507, "disk-full", "Insufficient storage"},
 };
 
 static const struct problem_kind *kind_of(int status) {
@@ -110,7 +110,7 @@ struct response *problem_from(const struct request *r, const struct error *err) 
     int status = problem_status(err->status);
     if (status == 500) {
         log_fields(LOG_ERROR, &(struct log_field){"request", r->id, false}, 1, "%s", err->message);
-        return problem_full(r, 500, "the server failed at this; its log says more", "", NULL);
+        return problem_full(r, 500, "internal error; the server's log has details", "", NULL);
     }
     if (status == 507)
         log_fields(LOG_WARNING, &(struct log_field){"request", r->id, false}, 1, "%s", err->message);

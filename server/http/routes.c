@@ -118,7 +118,7 @@ static struct response *no_route(const struct request *r) {
         return problem_full(r, 404, "there is nothing at this path",
                             "GET / and GET /openapi.json say what there is", NULL);
     char detail[96];
-    snprintf(detail, sizeof detail, "here only %s can be done", allow);
+    snprintf(detail, sizeof detail, "this path supports only %s", allow);
     bool is_other = r->method == METHOD_COUNT && strstr(allow, "POST");
     struct response *reply = problem_full(r, 405, detail, is_other ? "curl -T sends PUT unless -X POST is given" : "", NULL);
     response_field(reply, "Allow", "%s", allow);
@@ -135,8 +135,8 @@ static struct response *check_query(const struct request *r) {
             at += strspn(at, " ");
         }
         if (!*at)
-            return problem(r, 400, "\"%.100s\" is no query parameter here%s%s", name,
-                           *r->route->query ? "; there are: " : "", r->route->query);
+            return problem(r, 400, "unknown query parameter \"%.100s\"%s%s", name,
+                           *r->route->query ? "; known: " : "", r->route->query);
     }
     return NULL;
 }
@@ -159,9 +159,9 @@ static struct response *check_media_type(const struct request *r) {
         [ROUTE_BODY_UPLOAD] = "application/octet-stream", [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
     const char *detail = NULL;
     if (coding && r->has_body)
-        detail = "a body with a Content-Encoding is not taken";
+        detail = "a body with a Content-Encoding is not supported";
     else if (body == ROUTE_BODY_UPLOAD && type && field_is_type(type, "multipart/form-data"))
-        detail = "a form is not taken: send the archive itself as the body, as curl -T does";
+        detail = "a form is not supported: send the archive itself as the body, as curl -T does";
     else if (body == ROUTE_BODY_JSON && !is_json(r))
         detail = "the body must be JSON and Content-Type say so";
     else if (body == ROUTE_BODY_PATCH && !(type && field_is_type(type, MIME_TUS)))

@@ -114,11 +114,11 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
                 problem_param(params, "name", NULL, "must be text of 1 to %d bytes without control characters",
                               API_NAME_MAX_BYTES);
         } else if (!retention_read(retention, member, params)) {
-            problem_param(params, member->string, "there are name, pinned, expires_at", "is not known here");
+            problem_param(params, member->string, "known: name, pinned, expires_at", "is unknown");
         }
     }
     if (cJSON_GetArraySize(params) > 0)
-        *refusal = problem_invalid(r, "the change cannot be made", params);
+        *refusal = problem_invalid(r, "the change is invalid", params);
     else
         cJSON_Delete(params);
 }
@@ -140,7 +140,7 @@ struct response *scenes_patch(struct api *api, struct request *r) {
         return reply;
     scene_tag(&row, tag);
     if (match && !field_etag_listed(match, tag, false))
-        reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and look again", NULL);
+        reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and try again", NULL);
     if (!reply)
         read_patch(r, &body, &name, &retention, &reply);
     if (!reply && store_scene_patch(api->store, &r->caller, row.id, name, &retention, &err) != STATUS_OK)

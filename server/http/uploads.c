@@ -103,7 +103,7 @@ static void add_place(struct response *reply, const struct upload_row *row) {
 
 struct response *uploads_options(struct api *api, struct request *r) {
     if (r->target.segment_count > 2 && !is_upload_id(r->target.segments[2]))
-        return problem(r, 404, "\"%.80s\" is no upload's id", r->target.segments[2]);
+        return problem(r, 404, "\"%.80s\" is not an upload's id", r->target.segments[2]);
     struct response *reply = response_new(204);
     response_field(reply, "Tus-Version", TUS_VERSION);
     response_field(reply, "Tus-Extension", "creation,termination,expiration,checksum");
@@ -168,7 +168,7 @@ static struct response *read_creation(struct api *api, const struct request *r, 
         return problem(r, 400, "an upload is created without a body; its bytes come by PATCH");
     if (!text)
         return problem(r, 400, "the field Upload-Length is missing%s",
-                       request_field(r, "Upload-Defer-Length") ? "; it cannot be told later" : "");
+                       request_field(r, "Upload-Defer-Length") ? "; it cannot be given later" : "");
     if (!field_number(text, 1, INT64_MAX, &length))
         return problem(r, 400, "Upload-Length must be a number of bytes, 1 or more");
     if ((uint64_t)length > api->config.max_upload_bytes) {
@@ -300,7 +300,7 @@ struct response *uploads_begin(struct api *api, struct request *r) {
         STATUS_OK)
         return refuse(r, &err);
     if (r->content_length > 0 && (uint64_t)r->content_length > upload_writer_room(p->writer))
-        return problem(r, 413, "the upload takes %" PRIu64 " further bytes, not %lld", upload_writer_room(p->writer),
+        return problem(r, 413, "the upload needs %" PRIu64 " further bytes, not %lld", upload_writer_room(p->writer),
                        (long long)r->content_length);
     uint64_t unreserved = upload_writer_unreserved(p->writer);
     return unreserved ? space_check_room(api, r, unreserved) : NULL;
@@ -361,10 +361,10 @@ static struct response *change(struct api *api, const struct request *r) {
     cJSON *params = cJSON_CreateArray();
     for (const cJSON *member = body->child; member; member = member->next)
         if (!retention_read(&retention, member, params))
-            problem_param(params, member->string, "there are pinned, expires_at", "is not known here");
+            problem_param(params, member->string, "known: pinned, expires_at", "is unknown");
     cJSON_Delete(body);
     if (cJSON_GetArraySize(params) > 0)
-        return problem_invalid(r, "the change cannot be made", params);
+        return problem_invalid(r, "the change is invalid", params);
     cJSON_Delete(params);
     if (store_upload_keep(api->store, id, &retention, &err) != STATUS_OK ||
         store_upload_get(api->store, id, &row, NULL, 0, &err) != STATUS_OK)
@@ -382,7 +382,7 @@ struct response *uploads_patch(struct api *api, struct request *r) {
     struct upload_row row = {0};
     enum status status = STATUS_OK;
     if (!is_as_sent(p))
-        return problem(r, 460, "the checksum is not that of the bytes that arrived; they are forgotten");
+        return problem(r, 460, "the checksum does not match the bytes that arrived; they were discarded");
     if (p->checksum != CHECKSUM_NONE)
         status = upload_writer_accept(p->writer, &err);
     if (status == STATUS_OK)

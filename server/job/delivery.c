@@ -88,7 +88,7 @@ static bool settle(struct delivery *d, struct store *store) {
     struct error err;
     bool gave_up;
     const struct outbox_outcome outcome = {.delivered = d->delivered, .is_final = d->is_final, .status = d->status,
-                                           .reason = d->delivered ? NULL : d->reason[0] ? d->reason : "its time was up"};
+                                           .reason = d->delivered ? NULL : d->reason[0] ? d->reason : "it timed out"};
     if (store_outbox_settle(store, d->id, &outcome, &gave_up, &err) != STATUS_OK) {
         if (!d->complained)
             log_warning("a webhook's outcome cannot be recorded: %s", err.message);
@@ -97,7 +97,7 @@ static bool settle(struct delivery *d, struct store *store) {
     }
     if (!d->delivered)
         log_warning("job %lld: its webhook cannot be called%s: %s", (long long)d->job_id,
-                    gave_up ? ", and will not be again" : "", d->reason[0] ? d->reason : "its time was up");
+                    gave_up ? ", and will not be again" : "", d->reason[0] ? d->reason : "it timed out");
     forget(d);
     return true;
 }

@@ -81,7 +81,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
         if (a->stopping)
             say(v, OUTCOME_STOPPED, "", "");
         else
-            say(v, OUTCOME_CRASH, "the worker was told to stop from outside", "");
+            say(v, OUTCOME_CRASH, "the worker was stopped from outside", "");
         return;
     case PROGRESS_EXIT_FAILED:
         if (message[0]) {
@@ -112,7 +112,7 @@ static void judge(const struct attempt *a, struct verdict *v) {
     char *words = supervisor_last_words(&a->worker, LAST_WORDS_MAX);
     size_t used = strlen(v->reason);
     if (words[0])
-        snprintf(v->reason + used, sizeof v->reason - used, "; its last words: %s", words);
+        snprintf(v->reason + used, sizeof v->reason - used, "; the end of its log: %s", words);
     mem_free(words);
 }
 
@@ -245,7 +245,7 @@ static enum status make_up(struct attempt *a, struct store *store, struct error 
                        job.wanted != JOB_WANT_RUN;
     job_release(&job);
     if (is_unwanted)
-        log_warning("job %lld: %d announced files are left out, as it is stopped: %s", (long long)a->job_id,
+        log_warning("job %lld: %d announced files are dropped, since it is stopped: %s", (long long)a->job_id,
                     cJSON_GetArraySize(a->untaken), err->message);
     return is_unwanted ? STATUS_OK : status;
 }

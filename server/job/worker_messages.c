@@ -52,7 +52,7 @@ static void say_thinned(struct attempt *a, struct store *store) {
     if (a->said_thinned)
         return;
     a->said_thinned = true;
-    char *message = mem_printf("this attempt has reported %ld events: from here on its metrics and log lines are left out, "
+    char *message = mem_printf("this attempt has reported %ld events: from here on its metrics and log lines are dropped, "
                                "and progress is entered once a second; outputs are all there", a->event_max);
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "level", "warning");
@@ -128,7 +128,7 @@ static void drop_untaken(struct attempt *a, const cJSON *line) {
 
 static void log_file(const struct attempt *a, enum status status, const struct error *err) {
     if (status != STATUS_OK)
-        log_warning("job %lld: its worker announced a file that is not taken%s: %s", (long long)a->job_id,
+        log_warning("job %lld: its worker announced a file that is not entered%s: %s", (long long)a->job_id,
                     is_final(status) ? "" : " yet", err->message);
 }
 
@@ -258,9 +258,9 @@ static bool note_counters(const struct message_listener *l, const cJSON *line) {
 /* An honest worker says nothing that is not understood. Once: more would be of that kind. */
 static void say_unread(struct attempt *a, const char *what) {
     if (!a->said_unread && a->job_id)
-        log_warning("job %lld: a line of its worker %s: it is left out", (long long)a->job_id, what);
+        log_warning("job %lld: a line of its worker %s and is ignored", (long long)a->job_id, what);
     else if (!a->said_unread)
-        log_warning("scene %.12s: a line of its check %s: it is left out", a->scene_id, what);
+        log_warning("scene %.12s: a line of its check %s and is ignored", a->scene_id, what);
     a->said_unread = true;
 }
 

@@ -76,7 +76,7 @@ static enum status delete_expired(struct store *store, const struct expired *wha
                          "DELETE FROM scenes WHERE id = ? AND " SCENE_EXPIRES " BETWEEN 1 AND ?", "ti",
                          what->id, now_ms);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
-        status = error_set(err, STATUS_CONFLICT, "%s is not to go any more", what->id);
+        status = error_set(err, STATUS_CONFLICT, "%s does not expire any more", what->id);
     return store_end(store, status, changed, err);
 }
 

@@ -61,7 +61,7 @@ static enum status compare(uint64_t kept, uint64_t more, uint64_t limit, struct 
         return STATUS_OK;
     if (more > 0)
         error_set(err, STATUS_LIMIT,
-                  "your scenes and jobs take %.1f of the %.1f MiB that a user may keep, and %.1f MiB more are wanted",
+                  "your scenes and jobs take %.1f of the %.1f MiB that a user may keep, and %.1f MiB more are needed",
                   (double)kept / MIB, (double)limit / MIB, (double)more / MIB);
     else
         error_set(err, STATUS_LIMIT, "your scenes and jobs take %.1f of the %.1f MiB that a user may keep",

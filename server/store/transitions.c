@@ -83,13 +83,16 @@ static enum status attempt_begin(struct store *store, int64_t id, int attempt, s
     enum status status = job_begin_stopping(store, id, now, err);
     if (status != STATUS_OK || (now->state == JOB_RUNNING && now->attempt == attempt))
         return status;
-    error_set(err, STATUS_CONFLICT, "job %lld is %s (attempt %d): attempt %d has no say",
+    error_set(err, STATUS_CONFLICT, "job %lld is %s (attempt %d): attempt %d is no longer the current one",
               (long long)id, job_state_name(now->state), now->attempt, attempt);
     return store_end(store, STATUS_CONFLICT, STORE_NOTHING_CHANGED, err);
 }
 
 static enum status forbidden(const struct present *now, const char *action, struct error *err) {
-    return error_set(err, STATUS_CONFLICT, "job %lld is %s and cannot be %s", (long long)now->id,
+    const char *verb = now->state == JOB_SUCCEEDED || now->state == JOB_FAILED ? "has"
+                       : now->state == JOB_CANCELLED                           ? "was"
+                                                                               : "is";
+    return error_set(err, STATUS_CONFLICT, "job %lld %s %s; it cannot be %s", (long long)now->id, verb,
                      job_state_name(now->state), action);
 }
 

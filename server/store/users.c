@@ -186,7 +186,7 @@ enum status store_token_find(struct store *store, const char *token, struct call
     if (status != STATUS_OK || (found && same))
         return status;
     *caller = (struct caller){0};
-    return error_set(err, STATUS_NOT_FOUND, "the token is not, or no longer, valid");
+    return error_set(err, STATUS_NOT_FOUND, "the token is invalid or was revoked");
 }
 
 static enum status revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err) {

@@ -20,8 +20,8 @@ struct upload_writer {
 };
 
 static enum status lost(struct error *err) {
-    error_set(err, STATUS_CONFLICT, "the disk failed: the upload stands at an earlier offset");
-    return error_hint(err, "HEAD tells where; go on from there");
+    error_set(err, STATUS_CONFLICT, "the disk failed: the upload's offset is now an earlier one");
+    return error_hint(err, "HEAD gives the offset; continue from there");
 }
 
 /* --- who writes ---------------------------------------------------------------------------- */
@@ -31,7 +31,7 @@ static enum status check_offset(const struct upload_session *e, uint64_t offset,
     if (!e->is_loaded) /* e->hash is still that of what was forgotten */
         return lost(err);
     if (e->received != offset)
-        return error_set(err, STATUS_CONFLICT, "the upload stands at %llu, not at %llu",
+        return error_set(err, STATUS_CONFLICT, "the upload's offset is %llu, not %llu",
                          (unsigned long long)e->received, (unsigned long long)offset);
     return STATUS_OK;
 }
@@ -67,7 +67,7 @@ static enum status check_holder(const struct upload_writer *c, struct error *err
     if (c->session->is_gone)
         return error_set(err, STATUS_NOT_FOUND, "the upload was removed");
     if (c->session->holder != c)
-        return error_set(err, STATUS_CONFLICT, "another request goes on with this upload");
+        return error_set(err, STATUS_CONFLICT, "another request continues this upload");
     return STATUS_OK;
 }
 

@@ -18,7 +18,7 @@ run 0 --json --retry=1 list
 so '. == []'
 run 0 --server "$UNBAKE_SERVER" -q list
 run 2 --jsn list
-has "$err" '"--jsn" is no command'
+has "$err" 'unknown command "--jsn"'
 run 0 --help list
 has "$out" "usage: unbake list"
 run 2 --server

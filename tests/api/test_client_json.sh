@@ -55,7 +55,7 @@ problem 5 list --server http://nowhere.invalid --retry 0 --json
 problem 5 list --ca /nonexistent --server https://127.0.0.1:"$port" --retry 0 --json
 # After "--" it is a word, and as an option's value it is none of ours once all is read.
 run 2 show -- --json
-has "$err" 'unbake: "--json" is no job'
+has "$err" 'unbake: "--json" is not a job'
 
 # The directory where tokens are kept cannot be read, stdout cannot be written.
 mkdir -p "$XDG_CONFIG_HOME/unbake/tokens"

@@ -9,7 +9,7 @@ quick="--set texture_size=64 --set iterations=1000000000 --set texels_per_iterat
 
 daemon_start
 run 4 login <<<"unbake_1_nothing"
-has "$err" "does not know this token"
+has "$err" "rejects this token"
 alice=$("$build/unbaked" token add alice --data "$data" 2>/dev/null)
 vic=$("$build/unbaked" token add vic --role viewer --data "$data" 2>/dev/null)
 run 4 list
@@ -41,7 +41,7 @@ UNBAKE_TOKEN=$vic run 0 list
 equal "$(head -n 1 <<<"$out" | tr -s " ")" "job state done stage left age expires owner name" "the headings of a list"
 UNBAKE_TOKEN=$vic run 0 logs 1
 UNBAKE_TOKEN=$vic run 4 cancel 1
-has "$err" "may only look"
+has "$err" "may only read"
 run 0 edit 1 --unshare
 UNBAKE_TOKEN=$vic run 3 show 1
 run 0 submit --scene "$(unset out; run 0 show 1 --json; jq -r .scene <<<"$out")" $quick --share
@@ -53,9 +53,9 @@ wait_for 60 test -s "$work/watch"
 wait "$background"; equal $? 4 "exit status of a watch whose token was revoked: $(tail -n 2 "$work/watch")"
 background=
 run 4 list
-has "$err" "no longer, valid"
+has "$err" "invalid or was revoked"
 UNBAKE_TOKEN=$'unbake_1\nx' run 2 list
-has "$err" "UNBAKE_TOKEN is no token"
+has "$err" "UNBAKE_TOKEN is not a token"
 
 # --- the file ---
 run 0 logout

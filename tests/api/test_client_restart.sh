@@ -37,7 +37,7 @@ env --default-signal=INT "$build/unbake" watch 1 >/dev/null 2>"$work/interrupted
 third=$!
 interrupt "$third"
 equal $? 130
-has "$(cat "$work/interrupted")" "job 1 goes on"
+has "$(cat "$work/interrupted")" "job 1 continues"
 wait_for 60 job_is 1 running || fail "the job does not go on"
 
 run 0 cancel 1
@@ -46,7 +46,7 @@ equal $? 1
 wait "$plain"
 equal $? 1
 has "$(cat "$work/plain")" "job 1 cancelled"
-has "$(cat "$work/plain.err")" "lost the server"
+has "$(cat "$work/plain.err")" "lost the connection"
 
 # The events that are stored came once each, in order, across both restarts: what is missing from
 # the daemon's own record is only progress that was overtaken.

@@ -32,11 +32,14 @@ static int64_t user_of(enum who who) {
 
 static int64_t make_job(enum thing thing, int64_t owner) {
     struct error err;
+    struct scene_row row;
     bool existed;
     int64_t id;
     rig_must(store_scene_add(rig.store, scenes[thing], "room", 10, owner, &existed, &err), &err, "scene");
-    if (!existed)
+    rig_must(store_scene_get(rig.store, scenes[thing], &row, &err), &err, "scene");
+    if (row.state == SCENE_CHECKING) /* `existed` tells only of the owner's own */
         rig_must(store_scene_ready(rig.store, scenes[thing], "{}", &err), &err, "scene");
+    scene_row_release(&row);
     struct job_new job = {.scene_id = scenes[thing], .name = "job", .labels = "{}", .settings = "{}",
                           .owner_id = owner, .is_shared = thing == SHARED, .max_attempts = 2};
     bool replayed;

@@ -271,7 +271,7 @@ static void check_garbled(void) {
     for (size_t i = 0; i < sizeof settings / sizeof *settings; i++) {
         struct job_new new = {.scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = settings[i], .max_attempts = 2};
         rig_must(store_job_add(rig.store, &new, 1000, &job, &replayed, &err), &err, "store_job_add");
-        check_answer("POST", "/v1/jobs/{j}/extend", JSON, "{\"looks\":60}", 500, "its log says more");
+        check_answer("POST", "/v1/jobs/{j}/extend", JSON, "{\"looks\":60}", 500, "log has details");
     }
 }
 

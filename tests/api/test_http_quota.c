@@ -55,7 +55,7 @@ static void test_pledges(void) {
     rig.api->config.user_pledge_percent = 0;
 
     rig.api->config.admin_free_bytes = room;
-    expect(anna, 1000, 507, "must stay so");
+    expect(anna, 1000, 507, "are kept free");
     expect(chief, 1000, 201, "");
     rig.api->config.admin_free_bytes = 0;
 

@@ -157,7 +157,7 @@ static void test_overtaken(struct rig *rig) {
     buf_init(&reply, 1 << 16);
     rig_send(fd, "0\r\n\r\n", 5);
     rig_receive(fd, &reply, NULL);
-    CHECK_THAT(rig_status(&reply) == 409 && strstr(buf_text(&reply), "another request goes on"), "%s", buf_text(&reply));
+    CHECK_THAT(rig_status(&reply) == 409 && strstr(buf_text(&reply), "another request continues"), "%s", buf_text(&reply));
     check_received(rig, row.id, 5);
     buf_release(&reply);
     close(fd);

@@ -160,7 +160,7 @@ int main(void) {
     CHECK(send_as(&rig, alice, upload, 600 << 10, &reply) == 201);
     buf_release(&reply);
     CHECK(send_as(&rig, alice, upload, 600 << 10, &reply) == 507); /* the same again: nobody knows yet */
-    CHECK(strstr(buf_text(&reply), "of the 1.0 MiB that a user may keep, and 0.6 MiB more are wanted"));
+    CHECK(strstr(buf_text(&reply), "of the 1.0 MiB that a user may keep, and 0.6 MiB more are needed"));
     buf_release(&reply);
     CHECK(send_as(&rig, bob, upload, 600 << 10, &reply) != 507);
     buf_release(&reply);

@@ -132,7 +132,7 @@ static bool end_once(bool is_sql, long n, bool stays) {
     if (status != STATUS_OK)
         settle(&a);
     CHECK_THAT(state_of(id) == JOB_SUCCEEDED, "call %ld: %s", n, job_state_name(state_of(id)));
-    if (log_count("that is not taken: ") == 0) /* as of a disk that cannot find it again and again */
+    if (log_count("that is not entered: ") == 0) /* as of a disk that cannot find it again and again */
         check_output(id, 1);
     else
         CHECK_THAT(!is_sql && stays, "call %ld: an output is lost", n);

@@ -166,7 +166,7 @@ static void test_interrupted(void) {
     CHECK(waitpid(child, &status, 0) == child);
     CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 130);
     read_text(path, err_text, sizeof err_text);
-    CHECK_PART(err_text, "job 7 goes on");
+    CHECK_PART(err_text, "job 7 continues");
     script_end(&s, "interrupted");
     mem_free(program);
 }

@@ -104,16 +104,16 @@ static void test_options(void) {
     static const struct {
         const char *word, *message, *hint;
     } bad[] = {
-        {"--wach", "there is no option --wach", "did you mean --watch?"},
-        {"--jsno=1", "there is no option --jsno", "did you mean --json?"},
-        {"--quite-else", "there is no option --quite-else", ""},
-        {"-x", "there is no option -x", ""},
+        {"--wach", "unknown option --wach", "did you mean --watch?"},
+        {"--jsno=1", "unknown option --jsno", "did you mean --json?"},
+        {"--quite-else", "unknown option --quite-else", ""},
+        {"-x", "unknown option -x", ""},
         {"--watch=1", "--watch takes no value", ""},
         {"--name", "--name needs a value: --name NAME", ""},
-        {"--priority=1.5", "--priority takes a whole number, not \"1.5\"", ""},
-        {"--priority=99999999999", "--priority takes a whole number, not \"99999999999\"", ""},
-        {"--retry=-1", "--retry takes a number, 0 or more, not \"-1\"", ""},
-        {"--retry=nan", "--retry takes a number, 0 or more, not \"nan\"", ""},
+        {"--priority=1.5", "--priority must be a whole number, not \"1.5\"", ""},
+        {"--priority=99999999999", "--priority must be a whole number, not \"99999999999\"", ""},
+        {"--retry=-1", "--retry must be a number, 0 or more, not \"-1\"", ""},
+        {"--retry=nan", "--retry must be a number, 0 or more, not \"nan\"", ""},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         CHECK(parse(&o, &err, 1, &bad[i].word) == STATUS_INPUT);

@@ -109,14 +109,14 @@ static void check_faults(void) {
                                   "sandbox = maybe\nkeepalive_sec\nqueue_limit = 2.5\nqueue_limit = 7\n"
                                   "entirely_else = 1\r\nhead_timeout_sec = nan\nmax_running = 3\n");
     CHECK_STRING(found,
-        ":1: there is no option \"max_runing\"; did you mean max_running?\n"
+        ":1: unknown option \"max_runing\"; did you mean max_running?\n"
         ":3: threads must be a whole number from 0 to 1024 threads, not \"x\"\n"
         ":4: max_attempts must be a whole number from 1 to 100 attempts, not \"0\"\n"
         ":6: sandbox must be yes or no, not \"maybe\"\n"
         ":7: \"keepalive_sec\" is not of the form name = value\n"
         ":8: queue_limit must be a whole number from 1 to 1000000 jobs, not \"2.5\"\n"
         ":9: queue_limit is given twice\n"
-        ":10: there is no option \"entirely_else\"\n"
+        ":10: unknown option \"entirely_else\"\n"
         ":11: head_timeout_sec must be a number from 1 to 600 s, not \"nan\"\n");
     CHECK(c.max_running == 3 && c.queue_limit == 1000);
     mem_free(found);
@@ -154,7 +154,7 @@ static void check_lines(void) {
     CHECK(config_read(&c, path, &problems, &err) == STATUS_OK);
     config_check(&c, &problems);
     static const char *const wanted[] = {":2: listen", ":4: max_streams", ":5: access", ":6: log_level", ":7: log_format",
-                                         ":8: data_dir", ":9: tls_certificate", ":10: proxy_field", ":11: there is no option"};
+                                         ":8: data_dir", ":9: tls_certificate", ":10: proxy_field", ":11: unknown option"};
     size_t lines = 0;
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         char *start = mem_printf("%s%s", path, wanted[i]);

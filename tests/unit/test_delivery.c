@@ -177,7 +177,7 @@ int main(int argc, char **argv) {
                 strikes++;
     }
     check_refused("http://127.0.0.1/refuse", "it answers 500");
-    check_refused("http://127.0.0.1/hang", "its time was up");
+    check_refused("http://127.0.0.1/hang", "it timed out");
     check_stop();
     rig_stop();
     printf("%ld calls failed\n", strikes);

@@ -352,7 +352,7 @@ static void test_outcomes(struct daemon *d) {
     check_whole_life(d, good, 3);
     expect(d, once, JOB_SUCCEEDED, 2, "", "");
     check_whole_life(d, once, 5);
-    expect(d, segv, JOB_FAILED, 2, "crashed (Segmentation fault); its last words: fatal: boom", "");
+    expect(d, segv, JOB_FAILED, 2, "crashed (Segmentation fault); the end of its log: fatal: boom", "");
     expect(d, liar, JOB_SUCCEEDED, 1, "", "");
     check_whole_life(d, liar, 3);
     expect(d, input, JOB_FAILED, 1, "the mesh is empty", "export it again");
@@ -363,7 +363,7 @@ static void test_outcomes(struct daemon *d) {
     CHECK(is_tidy(killed_dir));
     mem_free(killed_dir);
     expect(d, silent, JOB_FAILED, 2, "without a result", "");
-    expect(d, deserter, JOB_FAILED, 2, "told to stop from outside", "");
+    expect(d, deserter, JOB_FAILED, 2, "stopped from outside", "");
     expect(d, around, JOB_SUCCEEDED, 1, "", "");
     expect(d, damaged, JOB_FAILED, 1, "the job's settings", "");
     expect(d, two_faced, JOB_FAILED, 2, "without a result", "");
