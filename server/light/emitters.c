@@ -88,7 +88,7 @@ static void observe_texel(const struct evidence_job *job, uint32_t texel, struct
 static void observe_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct evidence_job *job = user;
-    if (job->evidence[segment].hidden)
+    if (job->evidence[segment].is_hidden)
         return; /* it is known from elsewhere */
     struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
     size_t count = by_segment_count(&job->texels, segment), wanted = count < TEXELS_PER_SEGMENT ? count : TEXELS_PER_SEGMENT;
@@ -106,15 +106,15 @@ static void observe_segment(void *user, size_t segment, int thread) {
     if (!is_own)
         best = &shown[0]; /* most often it is not what shines: nothing is known */
     struct emitter_evidence *e = &job->evidence[segment];
-    e->seen = is_own;
-    e->mixed = best == &shown[VIEWS_EDGE];
+    e->is_seen = is_own;
+    e->only_mixed = best == &shown[VIEWS_EDGE];
     float value[3] = {0};
     for (int c = 0; c < 3; c++)
-        e->bound[c] = best->channel[c].count > 0 &&
-                      !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
-    e->least = rgb_make(value[0], value[1], value[2]);
-    if (!e->unbound)
-        e->shown = e->least;
+        e->saturated[c] = best->channel[c].count > 0 &&
+                          !quantile_bounded_median(best->channel[c].value, best->channel[c].count, &value[c]);
+    e->observed = rgb_make(value[0], value[1], value[2]);
+    if (!e->is_unbounded)
+        evidence_set_radiance(e, e->observed);
     mem_free(shown);
 }
 
@@ -129,8 +129,9 @@ void emitters_observe(const struct reconstruction *r, const struct views *views,
 void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
-        rgb shown = evidence[i].shown;
-        bool shines = evidence[i].hidden || evidence[i].unbound || rgb_mean(shown) > BRIGHT * views->median_radiance;
+        rgb shown = evidence[i].radiance;
+        bool shines = evidence[i].is_hidden || evidence[i].is_unbounded ||
+                      rgb_mean(shown) > BRIGHT * views->median_radiance;
         r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);

@@ -56,7 +56,7 @@ static void find_candidates(struct search *s, const struct views *views) {
     emitters_observe(r, views, r->evidence);
     s->candidate = mem_array(r->segments.count + 1, sizeof *s->candidate);
     for (size_t i = 0; i < r->segments.count; i++) {
-        if (!r->evidence[i].seen && s->lamps.light.texels.first[i + 1] > s->lamps.light.texels.first[i])
+        if (!r->evidence[i].is_seen && s->lamps.light.texels.first[i + 1] > s->lamps.light.texels.first[i])
             s->candidate[s->candidate_count++] = (struct candidate){.segment = (uint32_t)i};
     }
 }

@@ -104,7 +104,7 @@ static bool is_alike(const struct lamps *l, const struct lamp *lamp, uint32_t se
         !is_near(l->light.area_m2[lamp->segment[0]], l->light.area_m2[segment], ALIKE_AREA))
         return false;
     for (int c = 0; c < 3; c++) {
-        if (lamp->told[c] == e->bound[c] || !is_near((&lamp->least.r)[c], (&e->least.r)[c], ALIKE_RADIANCE))
+        if (lamp->told[c] == e->saturated[c] || !is_near((&lamp->least.r)[c], (&e->observed.r)[c], ALIKE_RADIANCE))
             return false;
     }
     return true;
@@ -120,10 +120,10 @@ void lamps_add_bound(struct lamps *l, uint32_t segment) {
         l->without[segment] = true;
         return;
     }
-    struct lamp *lamp = lamps_add(l, segment, e->shown);
-    lamp->least = e->least;
+    struct lamp *lamp = lamps_add(l, segment, e->radiance);
+    lamp->least = e->observed;
     for (int c = 0; c < 3; c++)
-        lamp->told[c] = !e->bound[c];
+        lamp->told[c] = !e->saturated[c];
 }
 
 void lamps_add_sky(struct lamps *l) {
@@ -217,10 +217,12 @@ void lamps_brighten_sky(struct reconstruction *r, rgb factor) {
 
 static void hand_over_segment(struct reconstruction *r, const struct lamp *lamp, uint32_t segment) {
     struct emitter_evidence *e = &r->evidence[segment];
-    e->unbound = !rgb_is_black(lamp->least);
-    e->hidden = !e->unbound;
+    e->is_unbounded = !rgb_is_black(lamp->least);
+    e->is_hidden = !e->is_unbounded;
+    rgb radiance = lamp->radiance;
     for (int c = 0; c < 3; c++)
-        (&e->shown.r)[c] = lamp->told[c] ? (&e->least.r)[c] : (&lamp->radiance.r)[c];
+        (&radiance.r)[c] = lamp->told[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
+    evidence_set_radiance(e, radiance);
 }
 
 void lamps_hand_over(const struct lamps *l, size_t count) {
@@ -242,7 +244,7 @@ static bool is_brightened(const struct environment *e) {
 bool lamps_are_estimated(const struct reconstruction *r) {
     bool any = false;
     for (size_t i = 0; i < r->segments.count; i++)
-        any = any || r->evidence[i].hidden || r->evidence[i].unbound;
+        any = any || r->evidence[i].is_hidden || r->evidence[i].is_unbounded;
     return any;
 }
 
@@ -253,9 +255,9 @@ void lamps_refit(struct reconstruction *r, const struct views *views, const stru
     if (!shown && is_brightened(&r->environment))
         lamps_add_sky(&l);
     for (size_t i = 0; i < r->segments.count && l.count < LAMPS_MOST; i++) {
-        if (r->evidence[i].hidden)
-            lamps_add(&l, (uint32_t)i, r->evidence[i].shown);
-        else if (r->evidence[i].unbound)
+        if (r->evidence[i].is_hidden)
+            lamps_add(&l, (uint32_t)i, r->evidence[i].radiance);
+        else if (r->evidence[i].is_unbounded)
             lamps_add_bound(&l, (uint32_t)i);
     }
     if (l.count > 0) {

@@ -27,7 +27,7 @@ struct saturated {
 };
 
 static bool is_saturated(const struct emitter_evidence *e) {
-    return e->seen && (e->bound[0] || e->bound[1] || e->bound[2]);
+    return e->is_seen && (e->saturated[0] || e->saturated[1] || e->saturated[2]);
 }
 
 static int by_power(const void *a, const void *b) {
@@ -45,7 +45,7 @@ static void add_segments(struct lamps *l) {
     for (size_t i = 0; i < r->segments.count; i++) {
         const struct emitter_evidence *e = &r->evidence[i];
         if (is_saturated(e))
-            found[count++] = (struct saturated){(uint32_t)i, (double)(rgb_mean(e->shown) * l->light.area_m2[i])};
+            found[count++] = (struct saturated){(uint32_t)i, (double)(rgb_mean(e->radiance) * l->light.area_m2[i])};
     }
     qsort(found, count, sizeof *found, by_power);
     for (size_t i = 0; i < count && l->count < LAMPS_MOST; i++)

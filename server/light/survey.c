@@ -53,7 +53,7 @@ static void leave_out(struct survey *s, const bool *without) {
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
         if (without[segment])
-            rgb_to_half(s->radiance[texel], r->evidence[segment].shown);
+            rgb_to_half(s->radiance[texel], r->evidence[segment].radiance);
     }
 }
 

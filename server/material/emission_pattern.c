@@ -33,7 +33,7 @@ struct emitter {
     const struct finder *finder;
     size_t segment, count;
     const uint32_t *texel; /* [count] of the finder's list */
-    float scale;           /* measured = scale * radiance; at first 1 / mean of evidence.least */
+    float scale;           /* measured = scale * radiance; at first 1 / mean of evidence.observed */
     bool is_measured;      /* enough of it was measured */
 };
 
@@ -55,7 +55,7 @@ struct finder {
  * outweigh dark ones, whose relative noise is larger, wherever neighbours are averaged. */
 static float weight_of(const struct emitter *e, const struct view *view, float mixing) {
     const struct finder *f = e->finder;
-    return view->weight * noise_weight(&f->r->noise, f->views, view, f->r->evidence[e->segment].least, mixing);
+    return view->weight * noise_weight(&f->r->noise, f->views, view, f->r->evidence[e->segment].observed, mixing);
 }
 
 static struct robust_sample observation_of(const struct emitter *e, const struct view *view, float mixing, rgb observed,
@@ -118,7 +118,7 @@ static void measure_texel(const struct emitter *e, uint32_t texel) {
     struct measured_observations observations;
     observe_all(e, texel, &observations);
     /* Of a screen whose picture changed, keep the majority: the rest is another picture, not noise. */
-    if (observations.count > 0 && e->finder->r->evidence[e->segment].changes > 0.0f)
+    if (observations.count > 0 && e->finder->r->evidence[e->segment].changing_share > 0.0f)
         observations.count = robust_keep(observations.observation, observations.count, MAX_SCREEN_DEVIATION);
     if (observations.count > 0)
         e->finder->measured[texel] = measured_mean(&observations, OUTLIER_SCALE, rgb_gray(0.0f));
@@ -218,7 +218,7 @@ static void set_pattern(const struct emitter *e) {
         materials_start_emission_pattern(m);
     for (size_t i = 0; i < e->count; i++)
         materials_set_emission_pattern(m, e->texel[i], denoised_at(f, e->texel[i]), mean);
-    f->r->evidence[e->segment].shown = rgb_scale(mean, 1.0f / e->scale);
+    evidence_set_radiance(&f->r->evidence[e->segment], rgb_scale(mean, 1.0f / e->scale));
 }
 
 /* --- the whole ------------------------------------------------------------------------------------- */
@@ -232,10 +232,10 @@ static void finder_init(struct finder *f, struct reconstruction *r, const struct
     for (size_t s = 0; s < r->segments.count; s++) {
         const struct emitter_evidence *e = &r->evidence[s];
         size_t first = f->texels.first[s], count = f->texels.first[s + 1] - first;
-        if (r->is_emitter[s] && !e->hidden && !e->unbound && count >= MIN_TEXELS && rgb_mean(e->least) > 0.0f)
+        if (r->is_emitter[s] && !e->is_hidden && !e->is_unbounded && count >= MIN_TEXELS && rgb_mean(e->observed) > 0.0f)
             f->emitter[f->emitter_count++] = (struct emitter){
                 .finder = f, .segment = s, .count = count, .texel = f->texels.texel + first,
-                .scale = 1.0f / rgb_mean(e->least)};
+                .scale = 1.0f / rgb_mean(e->observed)};
     }
     /* Only few charts are written; untouched pages take no memory. */
     f->measured = mem_calloc(texels, sizeof *f->measured);
@@ -276,9 +276,9 @@ void emission_pattern_find(struct reconstruction *r, const struct views *views) 
 
 /* Greatest base colour (same in all channels) whose reflected light does not exceed a texel's radiance. */
 static float max_base_color(const struct materials *m, const struct emitter_evidence *e, uint32_t texel) {
-    rgb observed = rgb_mul(rgb_from_half(m->emission_pattern[texel]), e->shown);
+    rgb observed = rgb_mul(rgb_from_half(m->emission_pattern[texel]), e->radiance);
     const float value[3] = {observed.r, observed.g, observed.b};
-    const float arrived[3] = {e->arrived.r, e->arrived.g, e->arrived.b};
+    const float arrived[3] = {e->lambert.r, e->lambert.g, e->lambert.b};
     float most = INFINITY;
     for (int c = 0; c < 3; c++)
         most = arrived[c] > 0.0f ? fminf(most, value[c] / arrived[c]) : most;
@@ -317,10 +317,10 @@ void emission_pattern_separate(struct reconstruction *r, struct emitter_fit *own
             continue;
         float darkest = max_segment_base_color(m, e, texel, count);
         own[s].base_color = fminf(NEUTRAL_BASE_COLOR, darkest);
-        rgb observed = rgb_mad(e->shown, e->hidden ? 0.0f : -own[s].base_color, e->arrived);
+        rgb observed = rgb_mad(e->radiance, e->is_hidden ? 0.0f : -own[s].base_color, e->lambert);
         own[s].radiance = rgb_make(fmaxf(observed.r, 0.0f), fmaxf(observed.g, 0.0f), fmaxf(observed.b, 0.0f));
         for (size_t i = 0; i < count && darkest < INFINITY; i++)
-            subtract_reflected(m, texel[i], e->shown, own[s].radiance);
+            subtract_reflected(m, texel[i], e->radiance, own[s].radiance);
     }
     by_segment_release(&texels);
 }

@@ -11,7 +11,7 @@
 #include "server/state/reconstruction.h"
 
 /* Finds the patterns of all emitters (is_emitter) in their outgoing radiance, emitted and reflected; where there is
- * one, sets evidence.shown to the mean over the surface. Depends only on photographs, emitters and evidence.least, not
+ * one, sets evidence.radiance to the mean over the surface. Depends only on photographs, emitters and evidence.observed, not
  * on the number of threads. */
 void emission_pattern_find(struct reconstruction *r, const struct views *views);
 
@@ -21,7 +21,7 @@ struct emitter_fit {
     float base_color;
 };
 
-/* Subtracts reflected light (base colour times evidence.arrived) from the patterns just found, and fills
+/* Subtracts reflected light (base colour times evidence.lambert) from the patterns just found, and fills
  * own[segment_count], {0, NEUTRAL_BASE_COLOR} where nothing emits. Base colour of an emitter is neutral, or less where
  * the darkest part of its pattern shows less; a hidden emitter reflects nothing. */
 void emission_pattern_separate(struct reconstruction *r, struct emitter_fit *own);

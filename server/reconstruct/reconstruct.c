@@ -279,7 +279,7 @@ static void log_unseen(const struct run *run) {
     size_t lamps = 0;
     char line[128];
     for (size_t i = 0; i < r->segments.count; i++)
-        lamps += r->evidence[i].hidden;
+        lamps += r->evidence[i].is_hidden;
     snprintf(line, sizeof line, "light: %zu lamps that no photograph shows were found by what they light", lamps);
     if (lamps > 0)
         run->hooks->log(run->hooks->user, line);

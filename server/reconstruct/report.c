@@ -211,16 +211,16 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
 void report_emitters(struct reconstruction *r) {
     cJSON *list = cJSON_AddArrayToObject(r->report, "emitters");
     for (size_t s = 0; s < r->segments.count; s++) {
-        if (!r->is_emitter[s] && r->evidence[s].share < REPORTED_SHARE && r->evidence[s].changes == 0.0f)
+        if (!r->is_emitter[s] && r->evidence[s].emitted_share < REPORTED_SHARE && r->evidence[s].changing_share == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s);
         json_add_int(entry, "object_id", r->segments.id[s]);
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
-        json_add_bool(entry, "hidden", r->evidence[s].hidden);
-        json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].share);
-        json_add_number(entry, "share_that_changed", (double)r->evidence[s].changes);
-        json_add_number(entry, "white_by_unseen_sky", (double)r->evidence[s].doubt);
+        json_add_bool(entry, "hidden", r->evidence[s].is_hidden);
+        json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].emitted_share);
+        json_add_number(entry, "share_that_changed", (double)r->evidence[s].changing_share);
+        json_add_number(entry, "white_by_unseen_sky", (double)r->evidence[s].sky_lambert);
         const rgb *e = &r->materials.emission[s];
         const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));

@@ -192,7 +192,7 @@ static void set_lights(struct solve *s) {
     struct reconstruction *r = s->r;
     find_patterns(s);
     for (size_t i = 0; i < r->segments.count; i++)
-        r->materials.emission[i] = r->is_emitter[i] ? r->evidence[i].shown : rgb_gray(0.0f);
+        r->materials.emission[i] = r->is_emitter[i] ? r->evidence[i].radiance : rgb_gray(0.0f);
     world_update_lights(&r->world);
 }
 
@@ -218,7 +218,7 @@ static void average_arrived(const struct solve *s) {
         uint32_t texel = r->inverse.valid[i];
         size_t segment = reconstruction_segment(r, texel);
         rgb white;
-        bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].mixed;
+        bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].only_mixed;
         if (!is_seen || !divide_lambert(&s->divide, texel, &white))
             continue;
         add_arrived(sum[segment].all, white);
@@ -228,9 +228,10 @@ static void average_arrived(const struct solve *s) {
     for (size_t i = 0; i < r->segments.count; i++) {
         struct emitter_evidence *e = &r->evidence[i];
         const double *from = sum[i].bright[3] > 0.0 ? sum[i].bright : sum[i].all;
-        e->arrived = e->shown; /* without evidence a segment reflects what it shows */
+        rgb lambert = e->radiance; /* without evidence a segment counts as a reflector */
         if (from[3] > 0.0)
-            e->arrived = rgb_make((float)(from[0] / from[3]), (float)(from[1] / from[3]), (float)(from[2] / from[3]));
+            lambert = rgb_make((float)(from[0] / from[3]), (float)(from[1] / from[3]), (float)(from[2] / from[3]));
+        evidence_set_lambert(e, lambert);
     }
     mem_free(sum);
 }
@@ -245,13 +246,12 @@ static void decide(void *user, size_t segment, int thread) {
     struct reconstruction *r = d->solve->r;
     struct emitter_evidence *e = &r->evidence[segment];
     size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
-    float shown = rgb_mean(e->shown), arrived = rgb_mean(e->arrived);
-    float needed = (e->mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) + EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
-    e->share = shown > 0.0f ? clampf(1.0f - arrived / shown, 0.0f, 1.0f) : 0.0f;
-    e->doubt = e->share > needed && !r->sky_is_fitted ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
-    e->changes = changing_light(&d->solve->divide, d->texels.texel + first, count, thread);
-    r->is_emitter[segment] = e->hidden || e->changes > EMITTER_CHANGES ||
-                             shown - arrived - SKY_DOUBT * e->doubt > needed * shown;
+    float shown = rgb_mean(e->radiance), arrived = rgb_mean(e->lambert);
+    float needed = (e->only_mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) + EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
+    e->sky_lambert = e->emitted_share > needed && !r->sky_is_fitted ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
+    e->changing_share = changing_light(&d->solve->divide, d->texels.texel + first, count, thread);
+    r->is_emitter[segment] = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
+                             shown - arrived - SKY_DOUBT * e->sky_lambert > needed * shown;
 }
 
 static void decide_emitters(struct solve *s) {

@@ -1,8 +1,7 @@
-/* adam.h -- Adam that moves only what was touched (Kingma & Ba 2015, Algorithm 1, sparse form).
+/* adam.h -- sparse Adam (Kingma & Ba 2015, Algorithm 1).
  *
- * An entry is `width` numbers that are always touched together (the channels of a texel). Its
- * moments decay, and its bias correction counts, per touch and not per iteration: an entry that
- * no path reached stays where it is at no cost. */
+ * An entry is `width` numbers that always have a gradient together (the channels of a texel). Moments decay, and bias
+ * correction counts, per update of the entry and not per iteration: an entry without a gradient costs nothing. */
 #ifndef UNBAKE_REFINE_ADAM_H
 #define UNBAKE_REFINE_ADAM_H
 
@@ -13,9 +12,8 @@ struct adam {
     size_t count; /* entries */
     int width;    /* numbers an entry, at most 4 */
     float beta1, beta2;
-    /* [count][1 + 2 * width] owned: touches so far (a whole number, up to 2^24), first moment in
-     * gradient units, second in gradient units squared. Side by side: a texel that is touched at
-     * a random place costs one trip to memory and not three. */
+    /* [count][1 + 2 * width] owned: number of updates (up to 2^24), first moment in gradient units, second in gradient
+     * units squared. Interleaved: a random access costs one cache miss instead of three. */
     float *record;
 };
 
@@ -31,7 +29,7 @@ static inline size_t adam_bytes(const struct adam *a) {
 
 void adam_init(struct adam *a, size_t count, int width, float beta1, float beta2);
 void adam_release(struct adam *a);
-/* Forgets the moments of `count` entries from `first` on. */
+/* Resets `count` entries from `first` on. */
 void adam_reset(struct adam *a, size_t first, size_t count);
 
 /* Takes the finite gradient[width] of one entry into its moments and writes the step for rate 1:

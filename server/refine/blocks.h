@@ -1,5 +1,4 @@
-/* blocks.h -- square blocks of 2^level x 2^level texels, whose base colour moves by a common factor:
- * what differs within a block stays. */
+/* blocks.h -- square blocks of 2^level x 2^level texels, whose base colours are scaled by a common factor. */
 #ifndef UNBAKE_REFINE_BLOCKS_H
 #define UNBAKE_REFINE_BLOCKS_H
 
@@ -9,7 +8,7 @@
 #include "common/vec.h"
 #include "server/scene/texture.h"
 
-/* No factor takes a texel below this: from 0 none would bring it back. */
+/* Lower bound of scaled base colour: no factor could raise 0 again. */
 #define BLOCKS_LEAST_COLOR 0.002f
 
 /* Blocks that lie across so many texels. */

@@ -9,21 +9,20 @@
 #include "server/scene/rgb_half.h"
 
 #define NONE UINT32_MAX
-/* Standard deviations of logarithms: of a cell's factor, and of its difference from that of the cell beside it. The
- * first are wide, since what the cells of a chart are off by they share. */
-static const double about_one[CORRECTION_KINDS] = {0.2, 0.03}, about_beside[CORRECTION_KINDS] = {0.02, 0.006};
-/* So many looks of the whole room's noise are added to those of a cell, whose own tell little of theirs. */
-#define ROOM_LOOKS 64.0f
-/* A logarithm is moved by so much at most. */
-#define MOST_MOVED 0.1f
-/* Conjugate gradients end when the residual has this part of its square, or after so many steps: the looser the hold
- * on 1, the further what a chart's cells share has to travel. */
+/* Prior standard deviations of logarithms, by kind: of a cell's factor, and of its difference from a neighbour's. The
+ * first are wide, since the cells of a chart share most of their error. By hand. */
+static const double factor_deviation[CORRECTION_KINDS] = {0.2, 0.03};
+static const double difference_deviation[CORRECTION_KINDS] = {0.02, 0.006};
+/* Observations with the room's mean variance that are added to a cell's own, which are too few for a variance. */
+#define ROOM_OBSERVATIONS 64.0f
+#define MAX_LOG_FACTOR 0.1f /* bound of a logarithm */
+/* Conjugate gradients end at this part of the squared residual, or after so many steps. The wide prior on factors makes
+ * the system ill-conditioned. */
 #define RESIDUAL_PART 1e-8
-#define STEPS_MOST 2000
-/* What a texel counts that photographs show only in pixels with other surfaces, when the light of its cell is told. */
-#define UNCLEAN 0.01f
-/* No factor takes a texel below this: from 0 none would bring it back. */
-#define LEAST_COLOR 0.002f
+#define MAX_STEPS 2000
+#define MIXED_WEIGHT 0.01f /* weight in a cell's light of a texel observed only in mixed pixels */
+/* Lower bound of corrected base colour: no factor could raise 0 again. */
+#define MIN_COLOR 0.002f
 
 /* --- cells -------------------------------------------------------------------------------------- */
 
@@ -43,7 +42,7 @@ static uint32_t cell_of(const struct correction *c, uint32_t texel) {
                    c->chart_of_triangle[c->inverse->triangle[texel]]);
 }
 
-/* Adds the cells of a block, which is the last so far. */
+/* Appends the cells of the next block. */
 static void add_cells(struct correction *c, size_t block, size_t *capacity) {
     const struct inverse_uv *inverse = c->inverse;
     uint32_t x0 = (uint32_t)(block % c->columns) * c->spacing, y0 = (uint32_t)(block / c->columns) * c->spacing;
@@ -63,14 +62,14 @@ static void add_cells(struct correction *c, size_t block, size_t *capacity) {
     }
 }
 
-static void find_beside(struct correction *c, size_t block) {
+static void find_neighbours(struct correction *c, size_t block) {
     long column = (long)(block % c->columns), row = (long)(block / c->columns);
     for (uint32_t k = c->first[block]; k < c->first[block + 1]; k++) {
         struct correction_cell *cell = &c->cell[k];
-        cell->beside[0] = cell_in(c, column - 1, row, cell->chart);
-        cell->beside[1] = cell_in(c, column + 1, row, cell->chart);
-        cell->beside[2] = cell_in(c, column, row - 1, cell->chart);
-        cell->beside[3] = cell_in(c, column, row + 1, cell->chart);
+        cell->neighbour[0] = cell_in(c, column - 1, row, cell->chart);
+        cell->neighbour[1] = cell_in(c, column + 1, row, cell->chart);
+        cell->neighbour[2] = cell_in(c, column, row - 1, cell->chart);
+        cell->neighbour[3] = cell_in(c, column, row + 1, cell->chart);
     }
 }
 
@@ -85,7 +84,7 @@ void correction_init(struct correction *c, struct texture *base_color, const str
     for (size_t block = 0; block < blocks; block++)
         add_cells(c, block, &capacity);
     for (size_t block = 0; block < blocks; block++)
-        find_beside(c, block);
+        find_neighbours(c, block);
     c->sums = mem_calloc(c->count, sizeof *c->sums);
     c->solved = mem_calloc_large((size_t)inverse->width * inverse->height, sizeof *c->solved);
     c->light = mem_calloc(c->count, sizeof *c->light);
@@ -110,31 +109,31 @@ void correction_start(struct correction *c) {
 }
 
 void correction_set_light(struct correction *c, const struct fused *fused) {
-    rgb *solved = mem_calloc(c->count, sizeof *solved), *shown = mem_calloc(c->count, sizeof *shown);
+    rgb *solved = mem_calloc(c->count, sizeof *solved), *observed = mem_calloc(c->count, sizeof *observed);
     for (size_t i = 0; i < c->inverse->valid_count; i++) {
         uint32_t texel = c->inverse->valid[i], cell = cell_of(c, texel);
         rgb radiance = fused_radiance(fused, texel);
         if (rgb_is_black(radiance))
             continue;
-        float weight = fused->count[texel] > 0.0f ? 1.0f : UNCLEAN;
+        float weight = fused->count[texel] > 0.0f ? 1.0f : MIXED_WEIGHT;
         solved[cell] = rgb_mad(solved[cell], weight, rgb_from_half(c->solved[texel]));
-        shown[cell] = rgb_mad(shown[cell], weight, radiance);
+        observed[cell] = rgb_mad(observed[cell], weight, radiance);
     }
     for (size_t k = 0; k < c->count; k++) {
-        rgb s = rgb_clamp(solved[k], LEAST_COLOR * UNCLEAN, INFINITY);
-        c->light[k] = rgb_make(shown[k].r / s.r, shown[k].g / s.g, shown[k].b / s.b);
+        rgb s = rgb_clamp(solved[k], MIN_COLOR * MIXED_WEIGHT, INFINITY);
+        c->light[k] = rgb_make(observed[k].r / s.r, observed[k].g / s.g, observed[k].b / s.b);
     }
-    mem_free(shown);
+    mem_free(observed);
     mem_free(solved);
 }
 
-/* --- looks -------------------------------------------------------------------------------------- */
+/* --- observations ------------------------------------------------------------------------------- */
 
 rgb correction_expected(const struct correction *c, uint32_t texel) {
     return rgb_mul(c->light[cell_of(c, texel)], rgb_from_half(c->solved[texel]));
 }
 
-/* The mean of the channels by their weights; 0 where they have none. */
+/* Weighted mean of the channels; 0 where all weights are 0. */
 static float mean_by(const float value[3], const float weight[3]) {
     float sum = 0.0f, weights = 0.0f;
     for (int k = 0; k < 3; k++) {
@@ -148,55 +147,57 @@ static float mean_of(const float value[3]) {
     return (value[0] + value[1] + value[2]) / 3.0f;
 }
 
-void correction_look(struct correction *c, uint32_t texel, const struct match *match, float weight) {
+void correction_add(struct correction *c, uint32_t texel, const struct comparison *comparison, float weight) {
     struct correction_sums *s = &c->sums[cell_of(c, texel)];
-    float off[3];
+    float residual[3];
     for (int k = 0; k < 3; k++) {
-        float worth = weight * match->worth[k];
-        s->weight[k] += worth;
-        s->shown[k] += worth * match->shown[k];
-        s->rendered[k] += worth * match->rendered[k] * expf(-s->factor[k]);
-        off[k] = match->shown[k] - match->rendered[k];
+        float channel_weight = weight * comparison->channel_weight[k];
+        s->weight[k] += channel_weight;
+        s->observed[k] += channel_weight * comparison->observed[k];
+        s->rendered[k] += channel_weight * comparison->rendered[k] * expf(-s->factor[k]);
+        residual[k] = comparison->observed[k] - comparison->rendered[k];
     }
-    float gray = mean_by(off, match->worth);
-    s->squared[CORRECTION_GRAY] += weight * mean_of(match->worth) * gray * gray;
-    for (int k = 0; k < 3; k++)
-        s->squared[CORRECTION_TINT] += weight / 3.0f * match->worth[k] * (off[k] - gray) * (off[k] - gray);
+    float gray = mean_by(residual, comparison->channel_weight);
+    s->squared[CORRECTION_GRAY] += weight * mean_of(comparison->channel_weight) * gray * gray;
+    for (int k = 0; k < 3; k++) {
+        float tint = residual[k] - gray;
+        s->squared[CORRECTION_TINT] += weight / 3.0f * comparison->channel_weight[k] * tint * tint;
+    }
 }
 
 /* --- factors ------------------------------------------------------------------------------------ */
 
-/* The logarithms of one kind, and of a channel where it is a tint, as least squares: drawn to what looks tell, to 0,
- * and to those of the cells beside. */
-struct likely {
+/* Normal equations of the logarithms of one kind (and channel, of a tint): terms of observations, prior and
+ * neighbours. */
+struct normal_equations {
     const struct correction *correction;
-    double to_one, to_beside; /* inverse variances */
-    double *precision;        /* [count] of looks */
+    double prior, smoothness; /* inverse prior variances */
+    double *precision;        /* [count] inverse variances of the observations */
 };
 
-static void likely_multiply(const void *user, const double *value, double *out) {
-    const struct likely *l = user;
+static void equations_multiply(const void *user, const double *value, double *out) {
+    const struct normal_equations *l = user;
     for (size_t i = 0; i < l->correction->count; i++) {
-        out[i] = (l->precision[i] + l->to_one) * value[i];
+        out[i] = (l->precision[i] + l->prior) * value[i];
         for (int k = 0; k < 4; k++) {
-            uint32_t beside = l->correction->cell[i].beside[k];
-            out[i] += beside == NONE ? 0.0 : l->to_beside * (value[i] - value[beside]);
+            uint32_t neighbour = l->correction->cell[i].neighbour[k];
+            out[i] += neighbour == NONE ? 0.0 : l->smoothness * (value[i] - value[neighbour]);
         }
     }
 }
 
-/* By the diagonal. */
-static void likely_precondition(const void *user, const double *residual, double *out) {
-    const struct likely *l = user;
+/* Jacobi preconditioner. */
+static void equations_precondition(const void *user, const double *residual, double *out) {
+    const struct normal_equations *l = user;
     for (size_t i = 0; i < l->correction->count; i++) {
-        double diagonal = l->precision[i] + l->to_one;
+        double diagonal = l->precision[i] + l->prior;
         for (int k = 0; k < 4; k++)
-            diagonal += l->correction->cell[i].beside[k] == NONE ? 0.0 : l->to_beside;
+            diagonal += l->correction->cell[i].neighbour[k] == NONE ? 0.0 : l->smoothness;
         out[i] = residual[i] / diagonal;
     }
 }
 
-/* Mean squares of what looks in the whole room are off by. */
+/* Mean squared residual of all observations. */
 static void room_variance(const struct correction *c, float variance[CORRECTION_KINDS]) {
     double weight = 0.0, squared[CORRECTION_KINDS] = {0.0};
     for (size_t i = 0; i < c->count; i++) {
@@ -208,35 +209,38 @@ static void room_variance(const struct correction *c, float variance[CORRECTION_
         variance[kind] = weight > 0.0 ? (float)(squared[kind] / weight) : 0.0f;
 }
 
-/* How sure the looks at a cell are of its logarithms of one kind, as the inverse of a variance; of a channel where it is
- * a tint. */
+/* Inverse variance of a cell's observed logarithm of one kind (and channel, of a tint). */
 static float precision_of(const struct correction_sums *s, int kind, int channel, float room) {
-    float weight = mean_of(s->weight), variance = (s->squared[kind] + ROOM_LOOKS * room) / (weight + ROOM_LOOKS);
+    float weight = mean_of(s->weight);
+    float variance = (s->squared[kind] + ROOM_OBSERVATIONS * room) / (weight + ROOM_OBSERVATIONS);
     return variance > 0.0f ? (kind == CORRECTION_GRAY ? weight : s->weight[channel]) / variance : 0.0f;
 }
 
-/* Logarithm of shown over rendered, by channel; 0 where nothing was rendered. */
-static void told_by(const struct correction_sums *s, float log_ratio[3]) {
+/* Logarithm of observed over rendered radiance, by channel; 0 where either is 0. */
+static void log_ratios(const struct correction_sums *s, float log_ratio[3]) {
     for (int k = 0; k < 3; k++)
-        log_ratio[k] = s->shown[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->shown[k] / s->rendered[k]) : 0.0f;
+        log_ratio[k] = s->observed[k] > 0.0f && s->rendered[k] > 0.0f ? logf(s->observed[k] / s->rendered[k]) : 0.0f;
 }
 
-/* Adds to factor[count][3] the most likely logarithms of one kind, of a channel where it is a tint. They are sought
- * from 0 and not from what they were, or to apply twice would be to seek for longer. */
+/* Adds to factor[count][3] the logarithms of one kind (and channel, of a tint). Starts from 0, not from the previous
+ * solution, so that applying twice gives the same result. */
 static void add_kind(const struct correction *c, int kind, int channel, float room, float (*factor)[3]) {
-    struct likely l = {c, 1.0 / (about_one[kind] * about_one[kind]), 1.0 / (about_beside[kind] * about_beside[kind]),
-                       mem_array(c->count, sizeof *l.precision)};
-    const struct conjugate_system system = {c->count, likely_multiply, likely_precondition, &l};
+    struct normal_equations l = {
+        .correction = c,
+        .prior = 1.0 / (factor_deviation[kind] * factor_deviation[kind]),
+        .smoothness = 1.0 / (difference_deviation[kind] * difference_deviation[kind]),
+        .precision = mem_array(c->count, sizeof *l.precision)};
+    const struct conjugate_system system = {c->count, equations_multiply, equations_precondition, &l};
     double *value = mem_calloc(c->count, sizeof *value), *residual = mem_array(c->count, sizeof *residual);
     for (size_t i = 0; i < c->count; i++) {
-        float told[3];
-        told_by(&c->sums[i], told);
-        float gray = mean_by(told, c->sums[i].weight);
+        float log_ratio[3];
+        log_ratios(&c->sums[i], log_ratio);
+        float gray = mean_by(log_ratio, c->sums[i].weight);
         l.precision[i] = (double)precision_of(&c->sums[i], kind, channel, room);
-        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : told[channel] - gray);
+        residual[i] = l.precision[i] * (double)(kind == CORRECTION_GRAY ? gray : log_ratio[channel] - gray);
     }
     double goal = RESIDUAL_PART * conjugate_dot(residual, residual, c->count);
-    conjugate_solve(&system, STEPS_MOST, goal, residual, value);
+    conjugate_solve(&system, MAX_STEPS, goal, residual, value);
     for (size_t i = 0; i < c->count; i++)
         for (int k = 0; k < 3; k++)
             factor[i][k] += kind == CORRECTION_GRAY || k == channel ? (float)value[i] : 0.0f;
@@ -254,13 +258,13 @@ static void find_factors(struct correction *c) {
         add_kind(c, CORRECTION_TINT, channel, room[CORRECTION_TINT], factor);
     for (size_t i = 0; i < c->count; i++)
         for (int k = 0; k < 3; k++)
-            c->sums[i].factor[k] = clampf(factor[i][k], -MOST_MOVED, MOST_MOVED);
+            c->sums[i].factor[k] = clampf(factor[i][k], -MAX_LOG_FACTOR, MAX_LOG_FACTOR);
     mem_free(factor);
 }
 
 /* --- texels ------------------------------------------------------------------------------------- */
 
-/* The logarithms at a valid texel: bilinear between the middles of the cells of its chart. */
+/* Logarithms at a valid texel: bilinear between the centres of the cells of its chart. */
 static void factor_at(const struct correction *c, uint32_t texel, float factor[3]) {
     uint32_t width = c->inverse->width, chart = c->chart_of_triangle[c->inverse->triangle[texel]];
     float x = ((float)(texel % width) + 0.5f) / (float)c->spacing - 0.5f;
@@ -281,7 +285,7 @@ static void factor_at(const struct correction *c, uint32_t texel, float factor[3
         factor[k] /= weights;
 }
 
-static void move_row(void *user, size_t row, int thread) {
+static void apply_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct correction *c = user;
     for (uint32_t x = 0; x < c->inverse->width; x++) {
@@ -293,11 +297,11 @@ static void move_row(void *user, size_t row, int thread) {
         rgb solved = rgb_from_half(c->solved[texel]);
         const float from[3] = {solved.r, solved.g, solved.b};
         for (int k = 0; k < 3; k++)
-            c->base_color->texel[texel][k] = clampf(from[k] * expf(factor[k]), LEAST_COLOR, 1.0f);
+            c->base_color->texel[texel][k] = clampf(from[k] * expf(factor[k]), MIN_COLOR, 1.0f);
     }
 }
 
 void correction_apply(struct correction *c, struct parallel *pool) {
     find_factors(c);
-    parallel_for(pool, c->inverse->height, move_row, c);
+    parallel_for(pool, c->inverse->height, apply_row, c);
 }

@@ -1,16 +1,15 @@
-/* correction.h -- the smooth factor by which refine moves base colour, and how sure it is of it.
+/* correction.h -- the smooth factors by which refine corrects base colour.
  *
- * What solve leaves are errors of the light, which change slowly along a surface: of a chart's part in each block of
- * the atlas, a cell, what photographs showed and what was rendered is summed, and their ratio is the factor by which
- * its base colour is off (to first order a surface's radiance is its base colour times its light). One look is off by
- * a third, so factors are those that are most likely by all looks and two priors: solve's light is about right, and a
- * factor is about that of the cells beside it in its chart (a Gaussian Markov random field: Rue and Held 2005). What
- * makes colours other than they are is thought less likely than what makes them lighter or darker. Between the middles
- * of cells factors are interpolated; texture within stays.
+ * Errors that solve leaves are those of light, which vary slowly along a surface. Each cell, the part of a chart in one
+ * block of the atlas, sums observed and rendered radiance; their ratio is the factor by which its base colour must
+ * change (to first order a surface's radiance is its base colour times its light). A single observation is off by a
+ * third, so the logarithms of the factors are the maximum a posteriori of a Gaussian Markov random field (Rue and Held
+ * 2005): they are near 0, and near those of the neighbouring cells of the chart. Changes of tint have a narrower prior
+ * than changes of lightness. Factors are interpolated between the centres of cells; texture within a cell stays.
  *
- * Photographs' noise is taken as the looks themselves tell of it; but a channel counts for less, in lightness too, the
- * more of it is noise: that is told of all photographs (noise.h). No factor moves base colour by more than a tenth:
- * what asks for more is not what solve left, but light that the renders lack or have too much of. */
+ * The noise of a cell is measured on its observations; channels are weighted by the noise of all photographs (noise.h).
+ * No factor changes base colour by more than a tenth: anything more is light that the renders lack or have too much
+ * of. */
 #ifndef UNBAKE_REFINE_CORRECTION_H
 #define UNBAKE_REFINE_CORRECTION_H
 
@@ -19,24 +18,24 @@
 
 #include "common/parallel.h"
 #include "server/capture/fuse.h"
-#include "server/refine/match.h"
+#include "server/refine/comparison.h"
 #include "server/scene/inverse_uv.h"
 #include "server/scene/texture.h"
 
-/* Of lightness, common to all channels, and of what the channels differ in. */
+/* Lightness, common to all channels, and tint, the channels' differences from it. */
 enum { CORRECTION_GRAY, CORRECTION_TINT, CORRECTION_KINDS };
 
 struct correction_cell {
     uint32_t chart;
-    uint32_t beside[4];              /* cells of the chart in the blocks around; UINT32_MAX: none */
+    uint32_t neighbour[4];              /* cells of the chart left, right, above, below; UINT32_MAX: none */
 };
 
-/* What looks told of a cell. */
+/* Sums over the observations of a cell. */
 struct correction_sums {
-    float weight[3];                 /* of looks, each of 1 at most, by channel */
-    float shown[3], rendered[3];     /* weighted, relative to what was expected; rendered with base colour as solved */
-    float squared[CORRECTION_KINDS]; /* squares of what looks are off by, weighted by the mean of the channels */
-    float factor[3];                 /* logarithm, now in force */
+    float weight[3];                 /* at most 1 an observation, by channel */
+    float observed[3], rendered[3];     /* weighted, over the expected radiance; rendered with solve's base colour */
+    float squared[CORRECTION_KINDS]; /* squared residuals, weighted by the mean of the channels */
+    float factor[3];                 /* logarithm of the factor in force */
 };
 
 struct correction {
@@ -49,27 +48,27 @@ struct correction {
     size_t count;
     struct correction_cell *cell;    /* [count] by block */
     struct correction_sums *sums;    /* [count] */
-    uint16_t (*solved)[3];           /* [height][width] base colour before it was moved */
-    rgb *light;                      /* [count] what is shown of a cell over its base colour, in the mean */
+    uint16_t (*solved)[3];           /* [height][width] base colour before correction */
+    rgb *light;                      /* [count] mean observed radiance of a cell over its mean base colour */
 };
 
 /* Cells of `spacing` texels. */
 void correction_init(struct correction *c, struct texture *base_color, const struct inverse_uv *inverse,
                      const uint32_t *chart_of_triangle, uint32_t spacing);
 void correction_release(struct correction *c);
-/* The base colour that is now is the one to be moved; nothing was looked at. */
+/* Takes the present base colour as that to be corrected, and clears the sums. */
 void correction_start(struct correction *c);
-/* Before the first look, and after sums and solved were filled from elsewhere. */
+/* Finds `light`. To be called before the first observation, and after sums and solved were loaded. */
 void correction_set_light(struct correction *c, const struct fused *fused);
 
-/* What a valid texel is expected to show. It has little of the noise of the photographs: that of a single texel would
- * be in what is shown of it, too, and relative to it the mean of what is shown too small. */
+/* Expected radiance of a valid texel, from the mean of its cell: the observed radiance of a single texel shares noise
+ * with its observations, which would bias their ratio. */
 rgb correction_expected(const struct correction *c, uint32_t texel);
 
-/* Adds one look at a valid texel that was rendered with base colour as it is now; `weight` in [0, 1]. */
-void correction_look(struct correction *c, uint32_t texel, const struct match *match, float weight);
+/* Adds one observation of a valid texel, rendered with the present base colour; `weight` in [0, 1]. */
+void correction_add(struct correction *c, uint32_t texel, const struct comparison *comparison, float weight);
 
-/* Moves base colour to the factors that are most likely by all looks. */
+/* Finds the factors from all observations and applies them to base colour. */
 void correction_apply(struct correction *c, struct parallel *pool);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "common/mem.h"
 
-/* Moments of the last 10 and 100 iterations, of the some thousand that a run has. */
+/* Time constants of 10 and 100 iterations; a run has about a thousand. */
 #define BETA1 0.9f
 #define BETA2 0.99f
 
@@ -13,7 +13,7 @@
 #define LOG_RADIANCE_MIN (-20.0f)
 #define LOG_RADIANCE_MAX 20.0f
 
-#define EMITTER_SLOWDOWN 0.05f
+#define EMITTER_SLOWDOWN 0.05f /* factor of an emitter's base colour steps; by hand */
 
 static float log_radiance(float radiance) {
     return radiance > 0.0f ? fmaxf(logf(radiance), LOG_RADIANCE_MIN) : LOG_RADIANCE_MIN;

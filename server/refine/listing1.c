@@ -7,19 +7,17 @@
 #include "server/refine/params.h"
 #include "server/state/evidence.h"
 
-/* Parts of the run, as fractions of it. The levels of the coarse part get equal time; the decision
- * about emitters falls into the first of them. */
+/* Fractions of the run: the decision about emitters; the end of the coarse levels, which get equal time. By hand. */
 #define DECISION_AT OPTIMISER_FALL_FROM
 #define COARSE_PART 0.4
-/* The neutral start of emission. Of what the photographs show of a segment the part
- * q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) is its own light, q being how many times brighter it is than
- * the median of the room; the rest is reflected. A segment that no photograph shows does not emit. */
+/* At the start a segment emits the part q^2 / (q^2 + NEUTRAL_BRIGHTNESS^2) of its observed radiance, q being its
+ * brightness over the room's median. A segment that no photograph shows does not emit. By hand. */
 #define NEUTRAL_BRIGHTNESS 3.0f
 
 _Static_assert(PASS_CHUNK_TEXELS >= EMITTER_DECISION_TEXELS, "the decision works in a pass's batches");
 
-/* What a checkpoint holds of how far the method is. */
-struct progress {
+/* Progress of the method; in checkpoints. */
+struct listing1_progress {
     int32_t level;
     int32_t decided; /* the emitters are fixed */
 };
@@ -30,7 +28,7 @@ struct listing1 {
     struct params_rates rates; /* at the start */
     struct gradient *gradient;
     struct gradient_log **log; /* [chunk_count] */
-    struct progress progress;
+    struct listing1_progress progress;
     int coarse_levels;
     bool any_emits; /* setting emitters */
 };
@@ -58,8 +56,8 @@ static void start_base_color(struct reconstruction *r) {
     }
 }
 
-static float neutral_share(rgb shown, float median) {
-    float q = rgb_mean(shown) / median;
+static float neutral_share(rgb observed, float median) {
+    float q = rgb_mean(observed) / median;
     return q * q / (q * q + NEUTRAL_BRIGHTNESS * NEUTRAL_BRIGHTNESS);
 }
 
@@ -67,8 +65,8 @@ static void start_neutral(struct reconstruction *r, const struct views *views) {
     start_base_color(r);
     emitters_observe(r, views, r->evidence);
     for (size_t s = 0; s < r->segments.count; s++) {
-        rgb shown = r->evidence[s].shown;
-        r->materials.emission[s] = rgb_scale(shown, neutral_share(shown, views->median_radiance));
+        rgb observed = r->evidence[s].radiance;
+        r->materials.emission[s] = rgb_scale(observed, neutral_share(observed, views->median_radiance));
     }
 }
 
@@ -82,8 +80,8 @@ static void decide_emitters(struct listing1 *l) {
     struct reconstruction *r = l->o->r;
     if (!l->any_emits)
         emitter_decision_make(r, l->o->pass.batch, r->evidence);
-    /* A part of a segment's median light may have been more than all of its dark parts': what base
-     * colour did about that is worth nothing. */
+    /* Emission by the segment's median may have exceeded the radiance of its dark parts, which base colour then
+     * compensated: start it anew. */
     start_base_color(r);
     params_refine(&l->params, l->progress.level);
     fix_emitters(l);
@@ -93,10 +91,10 @@ static void decide_emitters(struct listing1 *l) {
     l->progress.decided = 1;
 }
 
-static void walk_backwards(void *self, size_t chunk, struct look_batch *b) {
+static void walk_backwards(void *self, size_t chunk, struct observation_batch *b) {
     struct listing1 *l = self;
     gradient_log_clear(l->log[chunk]);
-    if (b->look_count > 0)
+    if (b->observation_count > 0)
         path_batch_backward(b->paths, b->d_radiance, l->log[chunk]);
 }
 
@@ -105,14 +103,14 @@ static void iterate(void *self, double fraction) {
     struct optimiser *o = l->o;
     if (!l->progress.decided && fraction >= DECISION_AT)
         decide_emitters(l);
-    /* Never back to a coarser one: an extended job has a smaller part of its run behind it. */
+    /* Never back to a coarser level: extending a job lowers its fraction done. */
     if (l->progress.level > level_at(l, fraction)) {
         l->progress.level = level_at(l, fraction);
         params_refine(&l->params, l->progress.level);
     }
     pass_run(&o->pass, o->counters.iteration, walk_backwards, l);
     gradient_reduce(l->gradient, l->log, o->pass.chunk_count, o->r->pool);
-    pass_d_emission(&o->pass, l->gradient->d_emission); /* in place of the derivative by all that it sheds */
+    pass_d_emission(&o->pass, l->gradient->d_emission); /* instead of the full derivative (struct pass_emission) */
     struct params_rates rates = rates_at(l, fraction);
     params_step(&l->params, l->gradient, &rates, o->r->pool);
 }

@@ -10,12 +10,11 @@
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
 
-/* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. */
+/* Step sizes fall as 1 / (1 + RATE_FALL t), t in [0, 1]. By hand. */
 #define RATE_FALL 15.0
 
-/* Where hardly anything of the surface is seen, visits that found no photograph end a run by observations: so many times
- * the observations that are wanted. */
-#define VISITS_MOST 10.0
+/* Attempted observations per wanted one after which a run ends even if most of the surface is not observed. By hand. */
+#define MAX_VISITS 10.0
 
 void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes) {
     assert(o->state_count < OPTIMISER_ARRAYS);
@@ -26,7 +25,7 @@ void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t by
     optimiser_keep_since(o, 1, name, data, bytes);
 }
 
-/* A checkpoint speaks of texels and segments by number: they are the same ones where this is. */
+/* Hash of the numbering of texels and segments, which the arrays of a checkpoint depend on. */
 static uint64_t surface_of(const struct reconstruction *r) {
     size_t texels = (size_t)r->inverse.width * r->inverse.height;
     uint64_t of_texels = hash64(r->inverse.triangle, texels * sizeof *r->inverse.triangle, r->inverse.width);
@@ -82,21 +81,21 @@ void optimiser_free(struct optimiser *o) {
 }
 
 /* Observations so far. */
-static double look_count(const struct optimiser *o) {
+static double observation_count(const struct optimiser *o) {
     return (double)o->counters.path_count / settings_number(o->r->settings, "samples_per_camera");
 }
 
 /* Observations of an iteration, at most. */
-static double visits_an_iteration(const struct optimiser *o) {
+static double visits_per_iteration(const struct optimiser *o) {
     return (double)o->pass.chooser.stratum_count * settings_number(o->r->settings, "cameras_per_texel");
 }
 
-/* Iterations, or else observations, that are to be done; infinite where the time limit alone ends them. */
+/* Planned iterations, or else observations; infinite where only the time limit ends them. */
 static double wanted(const struct optimiser *o) {
-    return o->iteration_limit ? (double)o->iteration_limit : pace_looks_wanted(o->r);
+    return o->iteration_limit ? (double)o->iteration_limit : pace_observations_wanted(o->r);
 }
 
-/* How much of the run is done, in [0, 1]: a matter of the clock only where there is a time limit. */
+/* Part of the run that is done, in [0, 1]; depends on the clock only where there is a time limit. */
 static double fraction_done(const struct optimiser *o) {
     const struct plan_work *work = &o->r->plan.part[PLAN_REFINE];
     double iteration = (double)o->counters.iteration, fraction;
@@ -105,18 +104,19 @@ static double fraction_done(const struct optimiser *o) {
     else if (isinf(work->wanted))
         fraction = 0.0;
     else
-        fraction = fmax(look_count(o), iteration * visits_an_iteration(o) / VISITS_MOST) / wanted(o);
+        fraction = fmax(observation_count(o), iteration * visits_per_iteration(o) / MAX_VISITS) / wanted(o);
     if (isinf(work->wanted) || plan_is_cut(&o->r->plan, PLAN_REFINE))
         fraction = fmax(fraction, work->now > work->done ? work->done / work->now : 1.0);
     return fraction < 1.0 ? fraction : 1.0;
 }
 
-/* Iterations as observations, by those that there were. */
+/* Plans an iteration limit as observations, by the mean number of an iteration so far. */
 static void plan_iterations(struct optimiser *o) {
     double iteration = (double)o->counters.iteration;
-    double each = iteration > 0.0 && look_count(o) > 0.0 ? look_count(o) / iteration : visits_an_iteration(o);
+    double done = observation_count(o);
+    double each = iteration > 0.0 && done > 0.0 ? done / iteration : visits_per_iteration(o);
     if (o->iteration_limit)
-        pace_plan_looks(o->r, each * (double)o->iteration_limit);
+        pace_plan_observations(o->r, each * (double)o->iteration_limit);
 }
 
 float optimiser_rate_fall(double fraction) {
@@ -134,7 +134,7 @@ enum status optimiser_save(struct optimiser *o, struct error *err) {
     return o->hooks->checkpoint_save(o->hooks->user, (long)o->counters.iteration, o->state, o->state_count, err);
 }
 
-/* The run was extended: what the curve has lies in a smaller part of it. */
+/* Rescales the curve's axis when a run was extended. */
 static void redraw_curve(struct optimiser *o, bool is_extended) {
     struct optimiser_counters *c = &o->counters;
     double planned = wanted(o);
@@ -148,7 +148,7 @@ static void redraw_curve(struct optimiser *o, bool is_extended) {
     c->planned = planned;
 }
 
-/* Takes up the plan of the attempts before. */
+/* Restores the plan of earlier attempts. */
 static void resume_plan(struct optimiser *o) {
     struct plan *plan = &o->r->plan;
     for (int i = PLAN_GATHER; i <= PLAN_DETAIL; i++) {
@@ -156,8 +156,8 @@ static void resume_plan(struct optimiser *o) {
         plan->part[i].wanted = o->plan.wanted[i];
         plan_close(plan, (enum plan_part)i);
     }
-    plan_resume(plan, PLAN_REFINE, look_count(o));
-    /* Extended by time, the job goes on for so long after the limit that it ended by. */
+    plan_resume(plan, PLAN_REFINE, observation_count(o));
+    /* A job whose time limit was raised after it had ended gets the difference of the limits. */
     bool is_extended = o->plan.ended_at_sec > 0.0 && plan->limit_sec > o->plan.ended_at_sec;
     plan->used_sec += is_extended ? fmax(o->counters.elapsed_sec, o->plan.ended_at_sec) : o->counters.elapsed_sec;
     o->plan.ended_at_sec = 0.0;
@@ -168,8 +168,7 @@ enum status optimiser_load(struct optimiser *o, bool *found, struct error *err) 
         o->hooks->checkpoint_load(o->hooks->user, o->state, o->state_count, found, err);
     if (status != STATUS_OK)
         return status;
-    /* The plan's first part is never without work: where it has none the checkpoint is of format 1, whose curve was
-     * drawn over seconds. */
+    /* The plan's first part always has work; without any the checkpoint is of format 1, whose curve is over seconds. */
     redraw_curve(o, *found && o->plan.wanted[0] > 0.0);
     if (!*found)
         return STATUS_OK;
@@ -181,23 +180,23 @@ enum status optimiser_load(struct optimiser *o, bool *found, struct error *err) 
     return STATUS_OK;
 }
 
-/* One iteration; returns the mean loss of its looks. */
+/* One iteration; returns the mean loss of its observations. */
 static double iterate(struct optimiser *o, double fraction) {
     struct optimiser_counters *c = &o->counters;
-    /* First, since after a resume the lights are not yet those of the materials. */
+    /* First, since after a resume the lights do not match the materials yet. */
     world_update_lights(&o->r->world);
     o->method->iterate(o->self, fraction);
     double loss = pass_mean_loss(&o->pass);
     size_t bin = (size_t)(fraction * (OPTIMISER_CURVE_POINTS - 1));
     c->curve_sum[bin] += loss;
     c->curve_count[bin] += 1.0;
-    c->path_count += pass_look_count(&o->pass) * (size_t)o->pass.batch[0].samples;
+    c->path_count += pass_observation_count(&o->pass) * (size_t)o->pass.batch[0].samples;
     c->iteration++;
     return loss;
 }
 
-/* What an iteration of this loss tells. */
-static void tell(const struct optimiser *o, double loss) {
+/* Emits the metrics of an iteration. */
+static void emit_metrics(const struct optimiser *o, double loss) {
     const struct reconstruct_hooks *hooks = o->hooks;
     long iteration = (long)o->counters.iteration;
     uint64_t rays, dropped;
@@ -206,14 +205,14 @@ static void tell(const struct optimiser *o, double loss) {
     hooks->metric(hooks->user, "rays", iteration, (double)rays); /* of this attempt */
 }
 
-/* Iterates once and says how far it is. */
-static void go_on(struct optimiser *o, double fraction) {
+/* One iteration with its progress and metrics. */
+static void advance(struct optimiser *o, double fraction) {
     double before = o->r->plan.part[PLAN_REFINE].spent_sec;
     double loss = iterate(o, fraction);
     plan_iterations(o);
-    pace_advance(o->r, o->hooks, "refine", PLAN_REFINE, (double)pass_look_count(&o->pass));
+    pace_advance(o->r, o->hooks, "refine", PLAN_REFINE, (double)pass_observation_count(&o->pass));
     o->counters.iterate_sec += o->r->plan.part[PLAN_REFINE].spent_sec - before;
-    tell(o, loss);
+    emit_metrics(o, loss);
 }
 
 static enum status loop(struct optimiser *o, struct error *err) {
@@ -222,7 +221,7 @@ static enum status loop(struct optimiser *o, struct error *err) {
     if (isfinite(o->r->plan.limit_sec))
         plan_fit(&o->r->plan);
     for (double fraction = fraction_done(o); fraction < 1.0; fraction = fraction_done(o)) {
-        go_on(o, fraction);
+        advance(o, fraction);
         bool stop = hooks->stop_requested(hooks->user);
         if (stop || hooks->checkpoint_due(hooks->user)) {
             enum status status = optimiser_save(o, err);

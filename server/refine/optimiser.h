@@ -1,11 +1,9 @@
-/* optimiser.h -- iterating on a reconstruction until its iterations or its observations are done: what the two
- * methods that follow paths, listing1.h and refine.h, have in common. Time ends it only where the plan has a limit
- * (plan.h).
+/* optimiser.h -- the loop that the two path-traced methods, listing1.h and refine.h, share: iterations until their
+ * number or that of the observations is reached. Time ends it only where the plan has a limit (plan.h).
  *
- * An iteration is a pass over the surface (pass.h) and a step by what it found; both are the
- * method's. Around them here: progress, the loss curve, checkpoints, previews, figures.
- * A checkpoint holds the materials, the evidence and decision about emitters, what is told with
- * optimiser_keep, and the counters; the method says what it needs beyond that. */
+ * An iteration is a pass over the surface (pass.h) and a step by its result; both are the method's. The loop adds
+ * progress, the loss curve, checkpoints, previews and figures. A checkpoint holds the materials, the evidence and
+ * decision about emitters, the counters, and the arrays that the method names with optimiser_keep. */
 #ifndef UNBAKE_REFINE_OPTIMISER_H
 #define UNBAKE_REFINE_OPTIMISER_H
 
@@ -17,36 +15,36 @@
 #include "server/refine/pass.h"
 #include "server/state/reconstruction.h"
 
-#define OPTIMISER_CURVE_POINTS 256
-#define OPTIMISER_ARRAYS 24
+#define OPTIMISER_CURVE_POINTS 256 /* of the loss curve; part of the checkpoint format */
+#define OPTIMISER_ARRAYS 24        /* arrays of a checkpoint, at most */
 
-/* Step sizes fall from this part of the run on; listing1 decides about emitters there. */
+/* Part of the run after which step sizes fall; listing1 decides about emitters there. By hand. */
 #define OPTIMISER_FALL_FROM 0.08
 
-/* How a method iterates; `self` is its own. */
+/* A method; `self` is its object. */
 struct optimiser_method {
     /* Runs a pass of o->pass and moves the materials. `fraction` of the run is done, in [0, 1). */
     void (*iterate)(void *self, double fraction);
-    /* The arrays that are kept were just filled from a checkpoint. */
+    /* Called after the kept arrays were filled from a checkpoint. */
     void (*resumed)(void *self);
-    /* After the last iteration, before it is saved; NULL: nothing is left to do. */
+    /* Called after the last iteration, before the checkpoint; may be NULL. */
     void (*finish)(void *self);
     void (*free)(void *self);
 };
 
-/* What a checkpoint holds of the run itself. */
+/* The run's counters; in checkpoints. */
 struct optimiser_counters {
     uint64_t iteration, path_count;
     double elapsed_sec; /* working time of all attempts */
-    double iterate_sec; /* that iterations took */
-    double planned;     /* iterations or observations that the curve is drawn over */
+    double iterate_sec; /* time of iterations */
+    double planned;     /* iterations or observations along the curve's axis */
     double curve_sum[OPTIMISER_CURVE_POINTS], curve_count[OPTIMISER_CURVE_POINTS]; /* of mean losses */
 };
 
-/* What a checkpoint holds of the plan: of each part what was wanted and what is done. */
+/* The plan's state; in checkpoints. */
 struct optimiser_plan {
     double wanted[PLAN_PARTS], done[PLAN_PARTS];
-    double ended_at_sec; /* the time limit that was in force when the run was over; 0: it is not */
+    double ended_at_sec; /* time limit in force when the run ended; 0: it has not ended */
 };
 
 struct optimiser {
@@ -59,34 +57,34 @@ struct optimiser {
     struct emission emission;
     struct optimiser_counters counters;
     struct optimiser_plan plan;
-    uint64_t surface;                      /* names what textures are laid over */
-    uint64_t iteration_limit;              /* 0: by observations */
+    uint64_t surface;                      /* hash of the surface parametrisation (STATE_SURFACE) */
+    uint64_t iteration_limit;              /* 0: the number of observations ends the run */
     size_t state_count;
-    struct state_array state[OPTIMISER_ARRAYS]; /* what a checkpoint holds */
+    struct state_array state[OPTIMISER_ARRAYS]; /* arrays of a checkpoint */
 };
 
-/* Starts from r->materials. `derivatives` says that paths will be walked backwards. Borrows all but
- * `self`, which it takes. */
+/* Starts from r->materials. `derivatives`: paths are kept for a backward pass. Borrows all but `self`, which it
+ * takes. */
 struct optimiser *optimiser_new(struct reconstruction *r, const struct views *views,
                                 const struct reconstruct_hooks *hooks, bool derivatives,
                                 const struct optimiser_method *method, void *self);
 void optimiser_free(struct optimiser *o);
 
-/* Checkpoints hold data[bytes], too, from now on. It stays where it is; the name is not copied. */
+/* Adds data[bytes] to the checkpoints. Borrows both name and data. */
 void optimiser_keep(struct optimiser *o, const char *name, void *data, size_t bytes);
 
-/* Checkpoints of formats before `format` (state.h) do not have it: it keeps what it holds. */
+/* The same for an array that checkpoints of formats before `format` (state_array.h) lack: it is left as it is then. */
 void optimiser_keep_since(struct optimiser *o, int format, const char *name, void *data, size_t bytes);
 
-/* Takes up the newest checkpoint where there is one that fits; saves one. */
+/* Loads the newest checkpoint that fits, if any; saves one. */
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err);
 enum status optimiser_save(struct optimiser *o, struct error *err);
 
-/* Iterates to the end, with a checkpoint there. Adds "refine" and the loss curve to r->report.
- * STATUS_CANCELLED when stopped (a checkpoint was saved). */
+/* Iterates to the end and saves a checkpoint. Adds "refine" and the loss curve to r->report. STATUS_CANCELLED when
+ * stopped, after a checkpoint. */
 enum status optimiser_run(struct optimiser *o, struct error *err);
 
-/* The factor of step sizes when `fraction` of the run is done: 1 at first, then falling. */
+/* Factor of step sizes when `fraction` of the run is done: 1 at first, then falling. */
 float optimiser_rate_fall(double fraction);
 
 #endif

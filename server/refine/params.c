@@ -7,17 +7,17 @@
 #include "common/mem.h"
 #include "server/refine/blocks.h"
 
-/* Touches are few (tens a texel in a whole run), so the moments must be quick to fill. */
+/* A texel has few steps, tens in a whole run, so the moments must adapt fast. */
 #define BASE_BETA1 0.9f
 #define BASE_BETA2 0.999f
 #define SEGMENT_BETA1 0.9f
 #define SEGMENT_BETA2 0.99f
 
-/* A block moves in the logarithm, at this multiple of the rate: the same speed at a mid grey. */
+/* Rate of a block's logarithmic step over that of a texel's linear one: the same speed at base colour .5. */
 #define BLOCK_RATE 2.0f
 
 #define CHUNK 1024 /* touched texels a work item */
-#define AHEAD 16   /* texels under way to the cache */
+#define AHEAD 16   /* texels of prefetch distance */
 
 void params_init(struct params *p, struct materials *materials, const struct inverse_uv *inverse,
                  const struct segments *segments, struct emission *emission, int level) {
@@ -84,8 +84,8 @@ static void step_texels(void *user, size_t chunk, int thread) {
     for (size_t i = chunk * CHUNK; i < end; i++) {
         uint32_t texel = job->gradient->texel[i];
         if (i + AHEAD < job->count) {
-            /* At a random place a step is little arithmetic and three trips to memory. (Not in a
-             * function of its own: GCC finds that it does nothing and leaves it out.) */
+            /* A step is little arithmetic and three cache misses. (In a function of its own GCC removes the
+             * prefetches as dead code.) */
             uint32_t later = job->gradient->texel[i + AHEAD];
             __builtin_prefetch(adam_record(&job->p->base_color, later), 1);
             __builtin_prefetch(job->p->materials->base_color.texel[later], 1);
@@ -130,8 +130,8 @@ static void step_blocks(void *user, size_t chunk, int thread) {
     }
 }
 
-/* Adds up by block, in the gradient's order, the derivatives by the logarithm of the block's common
- * factor, and lists the blocks. */
+/* Sums by block, in the gradient's order, the derivatives by the logarithm of the block's factor, and lists the
+ * blocks. */
 static size_t sum_blocks(struct params *p, const struct gradient *gradient) {
     const struct texture *texture = &p->materials->base_color;
     size_t count = 0;

@@ -17,13 +17,13 @@ void pass_init(struct pass *p, const struct reconstruction *r, const struct view
     int threads = parallel_thread_count(r->pool);
     p->batch = mem_calloc((size_t)threads, sizeof *p->batch);
     for (int t = 0; t < threads; t++)
-        look_batch_init(&p->batch[t], r, views, path, (int)settings_number(set, "cameras_per_texel"),
+        observation_batch_init(&p->batch[t], r, views, path, (int)settings_number(set, "cameras_per_texel"),
                         (int)settings_number(set, "samples_per_camera"), PASS_CHUNK_TEXELS);
-    p->look_capacity = p->batch[0].look_capacity;
+    p->observation_capacity = p->batch[0].observation_capacity;
     p->chunk_count = (p->chooser.stratum_count + PASS_CHUNK_TEXELS - 1) / PASS_CHUNK_TEXELS;
     p->chunk = mem_calloc(p->chunk_count, sizeof *p->chunk);
     for (size_t c = 0; c < p->chunk_count; c++)
-        p->chunk[c].emission = mem_array(p->look_capacity, sizeof *p->chunk[c].emission);
+        p->chunk[c].emission = mem_array(p->observation_capacity, sizeof *p->chunk[c].emission);
 }
 
 void pass_release(struct pass *p) {
@@ -31,7 +31,7 @@ void pass_release(struct pass *p) {
         mem_free(p->chunk[c].emission);
     mem_free(p->chunk);
     for (int t = 0; t < parallel_thread_count(p->r->pool); t++)
-        look_batch_release(&p->batch[t]);
+        observation_batch_release(&p->batch[t]);
     mem_free(p->batch);
     *p = (struct pass){0};
 }
@@ -43,28 +43,28 @@ struct pass_job {
     void *user;
 };
 
-static void choose_looks(const struct pass *p, size_t chunk, uint64_t iteration, struct look_batch *b) {
-    look_batch_clear(b);
+static void choose_observations(const struct pass *p, size_t chunk, uint64_t iteration, struct observation_batch *b) {
+    observation_batch_clear(b);
     size_t end = (chunk + 1) * PASS_CHUNK_TEXELS;
     for (size_t i = chunk * PASS_CHUNK_TEXELS; i < end && i < p->chooser.stratum_count; i++) {
         size_t item = chooser_item(&p->chooser, iteration, i);
         if (p->by_pixels)
-            look_add_pixels(b, i, iteration);
+            observation_add_pixels(b, i, iteration);
         else if (item != CHOOSE_NONE)
-            look_add(b, p->r->inverse.valid[item], iteration);
+            observation_add(b, p->r->inverse.valid[item], iteration);
     }
 }
 
-/* Compares look k with its photograph; returns the loss. */
-static float compare(const struct pass *p, struct look_batch *b, size_t k, struct pass_emission *emission) {
-    const struct look *look = &b->look[k];
+/* Compares observation k with its photograph; returns the loss. */
+static float compare(const struct pass *p, struct observation_batch *b, size_t k, struct pass_emission *emission) {
+    const struct observation *observation = &b->observation[k];
     size_t first = k * (size_t)b->samples;
     rgb *d_radiance = b->d_radiance + first;
-    float loss = loss_pair(look->photograph, b->reference + first, b->radiance + first, b->samples,
+    float loss = loss_pair(observation->photograph, b->reference + first, b->radiance + first, b->samples,
                            p->one_estimate, p->views->median_radiance, d_radiance);
-    *emission = (struct pass_emission){.segment = look->segment};
+    *emission = (struct pass_emission){.segment = observation->segment};
     for (int i = 0; i < b->samples; i++) {
-        d_radiance[i] = rgb_scale(d_radiance[i], look->trust);
+        d_radiance[i] = rgb_scale(d_radiance[i], observation->weight);
         emission->d_radiance = rgb_add(emission->d_radiance, d_radiance[i]);
     }
     return loss;
@@ -74,12 +74,12 @@ static void run_chunk(void *user, size_t number, int thread) {
     const struct pass_job *job = user;
     struct pass *p = job->pass;
     struct pass_chunk *chunk = &p->chunk[number];
-    struct look_batch *b = &p->batch[thread];
-    choose_looks(p, number, job->iteration, b);
-    look_trace(b);
+    struct observation_batch *b = &p->batch[thread];
+    choose_observations(p, number, job->iteration, b);
+    observation_trace(b);
     chunk->loss = 0.0;
-    chunk->look_count = b->look_count;
-    for (size_t k = 0; k < b->look_count; k++)
+    chunk->observation_count = b->observation_count;
+    for (size_t k = 0; k < b->observation_count; k++)
         chunk->loss += (double)compare(p, b, k, &chunk->emission[k]);
     job->visit(job->user, number, b);
 }
@@ -89,26 +89,26 @@ void pass_run(struct pass *p, uint64_t iteration, pass_visit *visit, void *user)
     parallel_for(p->r->pool, p->chunk_count, run_chunk, &job);
 }
 
-size_t pass_look_count(const struct pass *p) {
-    size_t looks = 0;
+size_t pass_observation_count(const struct pass *p) {
+    size_t observations = 0;
     for (size_t c = 0; c < p->chunk_count; c++)
-        looks += p->chunk[c].look_count;
-    return looks;
+        observations += p->chunk[c].observation_count;
+    return observations;
 }
 
 double pass_mean_loss(const struct pass *p) {
-    size_t looks = pass_look_count(p);
+    size_t observations = pass_observation_count(p);
     double loss = 0.0;
     for (size_t c = 0; c < p->chunk_count; c++)
         loss += p->chunk[c].loss;
-    return looks ? loss / (double)looks : 0.0;
+    return observations ? loss / (double)observations : 0.0;
 }
 
 void pass_d_emission(const struct pass *p, double (*d_radiance)[3]) {
     memset(d_radiance, 0, p->r->segments.count * sizeof *d_radiance);
     for (size_t c = 0; c < p->chunk_count; c++) {
         const struct pass_chunk *chunk = &p->chunk[c];
-        for (size_t k = 0; k < chunk->look_count; k++) {
+        for (size_t k = 0; k < chunk->observation_count; k++) {
             double *d = d_radiance[chunk->emission[k].segment];
             d[0] += (double)chunk->emission[k].d_radiance.r;
             d[1] += (double)chunk->emission[k].d_radiance.g;

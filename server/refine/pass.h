@@ -1,9 +1,8 @@
-/* pass.h -- one pass over the surface: what an iteration of either method that follows paths looks at.
+/* pass.h -- one pass over the surface: the observations of an iteration.
  *
- * Texels are chosen evenly over the surface (or pixels over the photographs), each is looked at in a
- * few photographs that see it, paths are traced, and what they bring is compared with the photograph.
- * The chosen are cut into chunks; what a chunk finds is stored by its number and summed in the order
- * of numbers, so threads and timing leave no trace. */
+ * Texels are chosen evenly over the surface (or pixels over the photographs), each is observed by a few photographs,
+ * paths are traced, and their radiance is compared with the photograph. The texels are cut into chunks; results are
+ * stored by chunk and summed in the order of chunks, so they depend on neither threads nor timing. */
 #ifndef UNBAKE_REFINE_PASS_H
 #define UNBAKE_REFINE_PASS_H
 
@@ -13,25 +12,23 @@
 
 #include "server/capture/choose.h"
 #include "server/capture/views.h"
-#include "server/refine/look.h"
+#include "server/refine/observation.h"
 #include "server/state/reconstruction.h"
 
-#define PASS_CHUNK_TEXELS 32 /* a look batch has room for so many texels */
+#define PASS_CHUNK_TEXELS 32 /* texels of a chunk, and of an observation batch */
 
-/* The derivative of one look's loss by the emission of the segment that it looks at. Only what is
- * seen of a segment moves its emission. What it sheds on other surfaces is left out: there emission
- * and base colour can stand in for each other (the bias that this accepts: none at the optimum,
- * where both derivatives are 0), and while base colours are still too dark it would drive the lamps
- * up. */
+/* Derivative of one observation's loss by the emission of the observed segment. The derivative by light that the
+ * segment sheds on other surfaces is left out: there emission and base colour are ambiguous, and while base colours are
+ * too dark it would drive the lamps up. Bias: none at the optimum, where both derivatives are 0. */
 struct pass_emission {
     uint32_t segment;
     rgb d_radiance;
 };
 
 struct pass_chunk {
-    double loss; /* sum over its looks */
-    size_t look_count;
-    struct pass_emission *emission; /* [look_capacity], of them look_count filled; owned */
+    double loss; /* sum over its observations */
+    size_t observation_count;
+    struct pass_emission *emission; /* [observation_capacity], observation_count of them filled; owned */
 };
 
 struct pass {
@@ -39,26 +36,25 @@ struct pass {
     const struct views *views;
     struct chooser chooser;
     bool by_pixels, one_estimate; /* settings choose and estimates */
-    struct look_batch *batch;     /* [threads of r->pool] owned */
-    size_t look_capacity;         /* looks a chunk */
+    struct observation_batch *batch;     /* [threads of r->pool] owned */
+    size_t observation_capacity;         /* of a chunk */
     size_t chunk_count;
     struct pass_chunk *chunk;     /* [chunk_count] owned */
 };
 
-/* Settings of `r` say how much it looks at; `path` how paths are traced. */
+/* The amounts are settings of `r`. */
 void pass_init(struct pass *p, const struct reconstruction *r, const struct views *views,
                const struct path_settings *path);
 void pass_release(struct pass *p);
 
-/* Looks at what `iteration` chooses. visit(user, chunk, batch) is called once a chunk, by any thread,
- * while the batch still holds the chunk's looks: their paths, radiance and d_radiance, the derivative
- * of the loss, each look of which counts by its trust. */
-typedef void pass_visit(void *user, size_t chunk, struct look_batch *batch);
+/* Runs the pass of an iteration. visit(user, chunk, batch) is called once a chunk, by any thread, while the batch holds
+ * the chunk's observations: their paths, radiance, and d_radiance, the derivative of the loss times their weight. */
+typedef void pass_visit(void *user, size_t chunk, struct observation_batch *batch);
 void pass_run(struct pass *p, uint64_t iteration, pass_visit *visit, void *user);
 
-/* Of the last run: its looks; the mean loss of one; the loss's derivatives d_radiance[segment_count]
- * by emission (see struct pass_emission). */
-size_t pass_look_count(const struct pass *p);
+/* Of the last run: its observations; their mean loss; derivatives d_radiance[segment_count] of the loss by emission
+ * (struct pass_emission). */
+size_t pass_observation_count(const struct pass *p);
 double pass_mean_loss(const struct pass *p);
 void pass_d_emission(const struct pass *p, double (*d_radiance)[3]);
 

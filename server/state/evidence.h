@@ -1,6 +1,6 @@
-/* evidence.h -- what is known of each segment's own light, on which the decision whether it emits rests.
+/* evidence.h -- evidence for the decision whether a segment emits.
  *
- * server/light fills it; solve.c and, of listing1, emitter_decision.c decide by it. */
+ * server/light and server/material fill it; solve.c and, of listing1, emitter_decision.c decide by it. */
 #ifndef UNBAKE_STATE_EVIDENCE_H
 #define UNBAKE_STATE_EVIDENCE_H
 
@@ -10,26 +10,35 @@
 #include "server/capture/fuse.h"
 #include "server/state/reconstruction.h"
 
-/* What is known of a segment's light. */
+/* Radiances are by channel. */
 struct emitter_evidence {
-    rgb shown;   /* radiance that the photographs show, median by channel; 0: nothing is seen of it */
-    rgb least;   /* the same: it stays when `shown` is made brighter */
-    bool seen;   /* some photograph shows it, and not what is beside or behind it */
-    bool mixed;  /* it was only seen in pixels that mix surfaces */
-    bool hidden; /* a lamp that no photograph shows: `shown` is told by what it lights (lamp_find.h) */
-    bool bound[3]; /* by channel: half of what shows it saturates or more, and `least` is a lower bound */
-    bool unbound;  /* such a lamp: `shown` is told by what it lights (saturated_light.h) */
-    rgb arrived; /* radiance that a white diffuse surface there would reflect, mean by channel */
-    float share; /* part of `shown` that base colour 1 could not reflect */
-    float changes; /* share of its surface whose light changed between photographs (changing_light.h) */
-    float doubt; /* radiance that a white surface there would send of unseen sky (sky_doubt.h) */
+    rgb radiance;          /* estimated outgoing radiance; 0: not observed; set by evidence_set_radiance only */
+    rgb observed;          /* median of the photographs; a lower bound in saturated channels */
+    bool is_seen;          /* some photograph shows it, and not what is beside or behind it */
+    bool only_mixed;       /* observed only in pixels that mix surfaces */
+    bool is_hidden;        /* a lamp that no photograph shows: `radiance` is inferred from its light (lamp_find.h) */
+    bool saturated[3];     /* by channel: at least half of its pixels saturate */
+    bool is_unbounded;     /* a saturated lamp whose `radiance` is inferred from its light (saturated_light.h) */
+    rgb lambert;           /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
+    float emitted_share;   /* part of `radiance` beyond `lambert`, in [0, 1] */
+    float changing_share;  /* part of its surface whose light changed between photographs (changing_light.h) */
+    float sky_lambert;     /* mean radiance of a Lambertian surface of albedo 1 by unobserved sky (sky_doubt.h) */
 };
 
-/* Whether a texel shows about what its segment was observed to show. */
-#define EVIDENCE_AS_BRIGHT 0.7f
+static inline void evidence_set_radiance(struct emitter_evidence *e, rgb radiance) { e->radiance = radiance; }
+
+/* Sets `lambert`, and `emitted_share` from it and from `radiance`. */
+static inline void evidence_set_lambert(struct emitter_evidence *e, rgb lambert) {
+    float radiance = rgb_mean(e->radiance);
+    e->lambert = lambert;
+    e->emitted_share = radiance > 0.0f ? clampf(1.0f - rgb_mean(lambert) / radiance, 0.0f, 1.0f) : 0.0f;
+}
+
+/* Whether a texel is about as bright as its segment. */
+#define EVIDENCE_AS_BRIGHT 0.7f /* least part of the segment's radiance; by hand */
 static inline bool evidence_is_bright(const struct reconstruction *r, uint32_t texel) {
-    float shown = rgb_mean(r->evidence[reconstruction_segment(r, texel)].shown);
-    return rgb_mean(fused_radiance(&r->fused, texel)) > EVIDENCE_AS_BRIGHT * shown;
+    float radiance = rgb_mean(r->evidence[reconstruction_segment(r, texel)].radiance);
+    return rgb_mean(fused_radiance(&r->fused, texel)) > EVIDENCE_AS_BRIGHT * radiance;
 }
 
 #endif

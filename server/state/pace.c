@@ -42,7 +42,7 @@ static double side(const struct reconstruction *r) { return settings_number(r->s
 
 static bool solves(const struct reconstruction *r) { return settings_is(r->settings, "method", "solve"); }
 
-double pace_looks_wanted(const struct reconstruction *r) {
+double pace_observations_wanted(const struct reconstruction *r) {
     const char *name = solves(r) ? "refine_looks" : "listing1_looks";
     double looks = settings_number(r->settings, name);
     if (looks == 0.0)
@@ -57,7 +57,7 @@ static void plan_refine(struct reconstruction *r, double wanted, double modest) 
     plan_set(&r->plan, PLAN_REFINE, wanted, MODEST_LOOKS * modest, 0.0, solves(r) ? sec : LISTING1_TIMES * sec);
 }
 
-void pace_plan_looks(struct reconstruction *r, double looks) { plan_refine(r, looks, looks); }
+void pace_plan_observations(struct reconstruction *r, double looks) { plan_refine(r, looks, looks); }
 
 static void plan_report(struct reconstruction *r, double pixels) {
     double samples = settings_number(r->settings, "report_samples");
@@ -112,7 +112,7 @@ void pace_start(struct reconstruction *r, const struct reconstruct_hooks *hooks)
 }
 
 void pace_measure_room(struct reconstruction *r) {
-    double held_out = 0.0, wanted = pace_looks_wanted(r);
+    double held_out = 0.0, wanted = pace_observations_wanted(r);
     const char *name = solves(r) ? "refine_looks" : "listing1_looks";
     for (size_t i = 0; i < r->scene->photograph_count; i++) {
         const struct camera *c = &r->scene->photograph[i].camera;

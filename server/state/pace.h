@@ -25,7 +25,7 @@ void pace_plan_solve(struct reconstruction *r, double valid, double directions, 
                      double detail_steps);
 
 /* So many observations of refine or listing1. */
-void pace_plan_looks(struct reconstruction *r, double looks);
+void pace_plan_observations(struct reconstruction *r, double looks);
 
 /* So much more of a part is done: tells the progress of the stage, its parts being first to last, and the time left, and
  * plans anew where there is a limit. */
@@ -34,7 +34,7 @@ void pace_advance(struct reconstruction *r, const struct reconstruct_hooks *hook
 
 /* Observations of refine or listing1 that are wanted for each part of the texture, times their number; infinite where
  * only the time limit ends them. */
-double pace_looks_wanted(const struct reconstruction *r);
+double pace_observations_wanted(const struct reconstruction *r);
 
 /* Adds "work" to the report, and "time_limit" where there is one. Where that left something out, r->left_out says so in
  * a sentence, which is logged as a warning. */

@@ -80,10 +80,10 @@ static void test(enum paint paint, int threads, struct parallel *pool) {
         int64_t id = r.segments.id[s];
         bool changes = id == SCREEN && paint == CHANGING;
         if (id == SCREEN)
-            printf("paint %d: changes %.2f, shown %.3f, arrived %.3f\n", paint, (double)r.evidence[s].changes,
-                   (double)rgb_mean(r.evidence[s].shown), (double)rgb_mean(r.evidence[s].arrived));
+            printf("paint %d: changes %.2f, shown %.3f, arrived %.3f\n", paint, (double)r.evidence[s].changing_share,
+                   (double)rgb_mean(r.evidence[s].radiance), (double)rgb_mean(r.evidence[s].lambert));
         CHECK_THAT(r.is_emitter[s] == (id == LAMP || changes), "paint %d, segment %zu", paint, s);
-        CHECK_THAT((r.evidence[s].changes > 0.0f) == changes, "paint %d, segment %zu", paint, s);
+        CHECK_THAT((r.evidence[s].changing_share > 0.0f) == changes, "paint %d, segment %zu", paint, s);
     }
     if (paint == CHANGING)
         check_picture(&r);

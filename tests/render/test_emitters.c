@@ -42,7 +42,7 @@ static void check_emitters(struct scene *scene, size_t frame) {
     shell_solve(scene, 2, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu, frame %zu", s, frame);
-        CHECK_THAT(r.evidence[s].seen == (r.segments.id[s] != SPECK), "segment %zu, frame %zu", s, frame);
+        CHECK_THAT(r.evidence[s].is_seen == (r.segments.id[s] != SPECK), "segment %zu, frame %zu", s, frame);
     }
     reconstruct_release(&r);
 }

@@ -24,7 +24,7 @@ static void test_hidden(struct parallel *pool) {
         shell_solve(&scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
             bool is_lamp = r.segments.id[s] == LAMP;
-            CHECK_THAT(r.evidence[s].hidden == is_lamp && r.is_emitter[s] == is_lamp, "segment %zu", s);
+            CHECK_THAT(r.evidence[s].is_hidden == is_lamp && r.is_emitter[s] == is_lamp, "segment %zu", s);
             if (is_lamp)
                 found[i] = r.materials.emission[s];
         }
@@ -51,7 +51,7 @@ static void test_none_hidden(struct parallel *pool) {
     struct reconstruction r;
     shell_solve(&scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++)
-        CHECK_THAT(!r.evidence[s].hidden && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+        CHECK_THAT(!r.evidence[s].is_hidden && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
     reconstruct_release(&r);
     scene_release(&scene);
 }
@@ -69,8 +69,8 @@ static void test_thin(struct parallel *pool) {
     shell_solve(&scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++) {
         bool is_lamp = r.segments.id[s] == LAMP;
-        CHECK_THAT(r.is_emitter[s] == is_lamp && !r.evidence[s].hidden, "segment %zu", s);
-        CHECK(!is_lamp || r.evidence[s].mixed);
+        CHECK_THAT(r.is_emitter[s] == is_lamp && !r.evidence[s].is_hidden, "segment %zu", s);
+        CHECK(!is_lamp || r.evidence[s].only_mixed);
     }
     reconstruct_release(&r);
     scene_release(&scene);

@@ -34,7 +34,7 @@ static void test_lamp(struct parallel *pool) {
         shell_solve(&scene, threads[i], &r);
         for (size_t s = 0; s < r.segments.count; s++) {
             bool is_lamp = r.segments.id[s] == LAMP;
-            CHECK_THAT(r.evidence[s].unbound == is_lamp && r.is_emitter[s] == is_lamp && !r.evidence[s].hidden,
+            CHECK_THAT(r.evidence[s].is_unbounded == is_lamp && r.is_emitter[s] == is_lamp && !r.evidence[s].is_hidden,
                        "segment %zu", s);
             if (is_lamp)
                 found[i] = r.materials.emission[s];
@@ -169,7 +169,7 @@ static void test_measured(struct parallel *pool) {
     struct reconstruction r;
     shell_solve(&scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++)
-        CHECK_THAT(!r.evidence[s].unbound && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
+        CHECK_THAT(!r.evidence[s].is_unbounded && r.is_emitter[s] == (r.segments.id[s] == LAMP), "segment %zu", s);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(r.report, "saturated_light")) == 0);
     reconstruct_release(&r);
     scene_release(&scene);
@@ -197,7 +197,7 @@ static void test_bar(struct parallel *pool) {
     struct reconstruction r;
     shell_solve(&scene, 0, &r);
     for (size_t s = 0; s < r.segments.count; s++)
-        CHECK_THAT(!r.evidence[s].unbound && !r.is_emitter[s], "segment %zu", s);
+        CHECK_THAT(!r.evidence[s].is_unbounded && !r.is_emitter[s], "segment %zu", s);
     reconstruct_release(&r);
     image_release(&sky);
     scene_release(&scene);

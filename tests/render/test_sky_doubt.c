@@ -49,11 +49,11 @@ int main(void) {
     for (size_t s = 0; s < r.segments.count; s++) {
         const struct emitter_evidence *e = &r.evidence[s];
         CHECK_THAT(r.is_emitter[s] == (r.segments.id[s] == LAMP), "object %d shows %g of which %g is beyond white",
-                   (int)r.segments.id[s], (double)rgb_mean(e->shown), (double)e->share);
+                   (int)r.segments.id[s], (double)rgb_mean(e->radiance), (double)e->emitted_share);
         if (r.segments.id[s] != SILL)
             continue;
-        CHECK_THAT(e->share > 0.3f, "%g: the test is too easy", (double)e->share);
-        CHECK_THAT(e->doubt > 0.3f * rgb_mean(e->arrived), "%g", (double)e->doubt);
+        CHECK_THAT(e->emitted_share > 0.3f, "%g: the test is too easy", (double)e->emitted_share);
+        CHECK_THAT(e->sky_lambert > 0.3f * rgb_mean(e->lambert), "%g", (double)e->sky_lambert);
     }
     reconstruct_release(&r);
     image_release(&sky);

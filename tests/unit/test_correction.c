@@ -1,4 +1,4 @@
-/* correction.h: factors of base colour told by noisy looks, and what is thought of them where there are few. */
+/* correction.h: factors of base colour from noisy observations, and their priors where there are few. */
 #include "server/refine/correction.h"
 
 #include <math.h>
@@ -41,24 +41,24 @@ static void end(void) {
 }
 
 /* How far each channel of the photographs tells. */
-static float worth[3] = {1.0f, 1.0f, 1.0f};
+static float channel_weight[3] = {1.0f, 1.0f, 1.0f};
 
-/* Looks at the texels of columns [x0, x1): shown is `ratio` times what base colour as solved would have rendered, by
+/* Observes the texels of columns [x0, x1): shown is `ratio` times what base colour as solved would have rendered, by
  * channel, both with noise of half of it and more; base colour moves in between. */
-static void look(uint32_t x0, uint32_t x1, const float ratio[3], uint64_t rounds) {
+static void observe(uint32_t x0, uint32_t x1, const float ratio[3], uint64_t rounds) {
     for (uint64_t round = 0; round < rounds; round++) {
         for (uint32_t i = 0; i < TEXELS; i++) {
             if (i % WIDTH < x0 || i % WIDTH >= x1)
                 continue;
-            struct match match;
+            struct comparison comparison;
             for (int c = 0; c < 3; c++) {
                 float noise = 2.0f * rng_to_float((uint32_t)rng_key(1, round * TEXELS + i, (uint64_t)c));
                 float bright = -logf(1.0f - rng_to_float((uint32_t)rng_key(2, round * TEXELS + i, (uint64_t)c)));
-                match.shown[c] = ratio[c] * bright;
-                match.worth[c] = worth[c];
-                match.rendered[c] = noise * base_color.texel[i][c] / (i == 1 && c == 0 ? 0.25f : 0.5f);
+                comparison.observed[c] = ratio[c] * bright;
+                comparison.channel_weight[c] = channel_weight[c];
+                comparison.rendered[c] = noise * base_color.texel[i][c] / (i == 1 && c == 0 ? 0.25f : 0.5f);
             }
-            correction_look(&correction, i, &match, 1.0f);
+            correction_add(&correction, i, &comparison, 1.0f);
         }
         if (round % 16 == 15)
             correction_apply(&correction, pool);
@@ -70,38 +70,38 @@ static double factor(uint32_t x, uint32_t y, int channel) {
     return (double)base_color.texel[y * WIDTH + x][channel] / 0.5;
 }
 
-/* Many looks tell the factor; what texels differ in stays. */
-static void test_looks(void) {
+/* Many observations determine the factor; texture stays. */
+static void test_many(void) {
     const float ratio[3] = {1.05f, 1.05f, 1.05f};
     begin();
-    look(0, WIDTH, ratio, 256);
+    observe(0, WIDTH, ratio, 256);
     for (int c = 0; c < 3; c++)
         CHECK_NEAR(factor(20, 16, c), 1.05, 0.012);
     CHECK_NEAR(factor(1, 0, 0), 0.5 * factor(1, 0, 1), 0.005);
     end();
 }
 
-/* A cell that nobody looked at goes with those beside it, but not with another chart's; where nothing is near it goes
+/* A cell without observations follows its neighbours, but not with another chart's; where nothing is near it goes
  * back to what was solved. */
 static void test_beside(void) {
     const float ratio[3] = {1.08f, 1.08f, 1.08f};
     begin();
-    look(0, 8, ratio, 256);
+    observe(0, 8, ratio, 256);
     double here = factor(4, 16, 0), beside = factor(12, 16, 0), far = factor(28, 16, 0);
     CHECK_THAT(here > 1.05 && beside > 1.02 && beside < here && far < beside, "%.3f %.3f %.3f", here, beside, far);
     CHECK_NEAR(factor(40, 16, 0), 1.0, 1e-3);
     end();
 }
 
-/* Of few looks little is believed, and less of a tint than of lightness. */
+/* Few observations change little, and tint less than lightness. */
 static void test_few(void) {
     const float lighter[3] = {1.08f, 1.08f, 1.08f}, redder[3] = {1.08f, 1.0f, 1.0f};
     begin();
-    look(0, WIDTH, lighter, 1);
+    observe(0, WIDTH, lighter, 1);
     double light = factor(20, 16, 0) - 1.0;
     end();
     begin();
-    look(0, WIDTH, redder, 64);
+    observe(0, WIDTH, redder, 64);
     double red = factor(20, 16, 0) - factor(20, 16, 1);
     end();
     CHECK_THAT(fabs(light) < 0.06, "%.4f", light);
@@ -112,9 +112,9 @@ static void test_few(void) {
 static void test_lost_channel(void) {
     const float ratio[3] = {1.0f, 1.0f, 1.5f};
     begin();
-    worth[2] = 0.01f;
-    look(0, WIDTH, ratio, 128);
-    worth[2] = 1.0f;
+    channel_weight[2] = 0.01f;
+    observe(0, WIDTH, ratio, 128);
+    channel_weight[2] = 1.0f;
     CHECK_THAT(fabs(factor(20, 16, 0) - 1.0) < 0.01 && factor(20, 16, 2) < 1.06, "%.4f %.4f", factor(20, 16, 0),
                factor(20, 16, 2)); /* each alike: 1.06 */
     end();
@@ -125,7 +125,7 @@ static void test_together(void) {
     const float ratio[3] = {1.08f, 1.08f, 1.08f};
     double mean = 0.0;
     begin();
-    look(0, WIDTH, ratio, 8);
+    observe(0, WIDTH, ratio, 8);
     for (uint32_t i = 2; i < TEXELS; i++)
         mean += factor(i % WIDTH, i / WIDTH, 1) / (TEXELS - 2);
     CHECK_NEAR(mean, 1.08, 0.015);
@@ -137,7 +137,7 @@ static void test_noise(void) {
     const float ratio[3] = {1.0f, 1.0f, 1.0f};
     double squares = 0.0;
     begin();
-    look(0, WIDTH, ratio, 16);
+    observe(0, WIDTH, ratio, 16);
     for (uint32_t i = 0; i < TEXELS; i++)
         squares += i == 1 ? 0.0 : pow(factor(i % WIDTH, i / WIDTH, 0) - 1.0, 2.0);
     CHECK_THAT(sqrt(squares / TEXELS) < 0.01, "%.4f", sqrt(squares / TEXELS)); /* cells alone: .04 */
@@ -148,7 +148,7 @@ static void test_noise(void) {
 static void test_again(void) {
     const float ratio[3] = {1.05f, 1.0f, 0.97f};
     begin();
-    look(0, WIDTH / 4, ratio, 8);
+    observe(0, WIDTH / 4, ratio, 8);
     double once = factor(20, 16, 0);
     correction_apply(&correction, pool);
     CHECK(factor(20, 16, 0) == once && once != 1.0);
@@ -178,11 +178,11 @@ static void test_expected(void) {
     end();
 }
 
-/* However long looks ask for more, they move base colour by a tenth. */
+/* No number of observations changes base colour by more than a tenth. */
 static void test_bound(void) {
     const float ratio[3] = {3.0f, 1.0f, 0.2f};
     begin();
-    look(0, WIDTH, ratio, 512);
+    observe(0, WIDTH, ratio, 512);
     CHECK_NEAR(factor(20, 16, 0), exp(0.1), 1e-3);
     CHECK_NEAR(factor(20, 16, 2), exp(-0.1), 1e-3);
     end();
@@ -191,13 +191,13 @@ static void test_bound(void) {
 static void test_threads(void) {
     const float ratio[3] = {1.05f, 1.0f, 0.97f};
     begin();
-    look(0, WIDTH, ratio, 8);
+    observe(0, WIDTH, ratio, 8);
     struct texture one = base_color;
     correction_release(&correction);
     struct parallel *alone = pool;
     pool = parallel_new(3);
     begin();
-    look(0, WIDTH, ratio, 8);
+    observe(0, WIDTH, ratio, 8);
     CHECK(memcmp(one.texel, base_color.texel, TEXELS * sizeof *one.texel) == 0);
     end();
     parallel_free(pool);
@@ -208,7 +208,7 @@ static void test_threads(void) {
 int main(void) {
     make_surface();
     pool = parallel_new(1);
-    test_looks();
+    test_many();
     test_beside();
     test_few();
     test_together();

@@ -110,7 +110,8 @@ static void test_emission_pattern(uint32_t count) {
     struct plane_rig rig;
     photograph_all(&rig, count, 1, paint_halves);
     rig.r.is_emitter[0] = true;
-    rig.r.evidence[0] = (struct emitter_evidence){.shown = {0.5f, 0.5f, 0.5f}, .least = {0.5f, 0.5f, 0.5f}, .seen = true};
+    rig.r.evidence[0] = (struct emitter_evidence){.radiance = {0.5f, 0.5f, 0.5f}, .observed = {0.5f, 0.5f, 0.5f},
+                                                  .is_seen = true};
     emission_pattern_find(&rig.r, &rig.views);
     CHECK(rig.r.materials.emission_pattern != NULL);
     if (rig.r.materials.emission_pattern) {

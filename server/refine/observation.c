@@ -1,20 +1,20 @@
-/* look.c -- see look.h. */
-#include "server/refine/look.h"
+/* observation.c -- see observation.h. */
+#include "server/refine/observation.h"
 
 #include <math.h>
 
 #include "common/mem.h"
 #include "common/rng.h"
 
-/* Weight of a photograph's pixel that mixes surfaces: it speaks only where nothing else does. */
-#define UNCLEAN_TRUST 0.02f
+/* Weight of a pixel that mixes surfaces: it matters only where there is no clean observation. By hand. */
+#define MIXED_WEIGHT 0.02f
 
-void look_batch_init(struct look_batch *b, const struct reconstruction *r, const struct views *views,
+void observation_batch_init(struct observation_batch *b, const struct reconstruction *r, const struct views *views,
                      const struct path_settings *path, int cameras, int samples, size_t texels) {
-    size_t looks = texels * (size_t)cameras, paths = looks * (size_t)samples;
-    *b = (struct look_batch){.r = r, .views = views, .path = *path, .cameras = cameras,
-                             .samples = samples, .look_capacity = looks};
-    b->look = mem_array(looks, sizeof *b->look);
+    size_t observations = texels * (size_t)cameras, paths = observations * (size_t)samples;
+    *b = (struct observation_batch){.r = r, .views = views, .path = *path, .cameras = cameras,
+                             .samples = samples, .observation_capacity = observations};
+    b->observation = mem_array(observations, sizeof *b->observation);
     b->paths = path->derivatives ? path_batch_new(paths, path->max_depth) : path_batch_new_forward(paths);
     b->ray = mem_array(paths, sizeof *b->ray);
     b->key = mem_array(paths, sizeof *b->key);
@@ -23,25 +23,24 @@ void look_batch_init(struct look_batch *b, const struct reconstruction *r, const
     b->d_radiance = mem_array(paths, sizeof *b->d_radiance);
 }
 
-void look_batch_release(struct look_batch *b) {
-    mem_free(b->look);
+void observation_batch_release(struct observation_batch *b) {
+    mem_free(b->observation);
     path_batch_free(b->paths);
     mem_free(b->ray);
     mem_free(b->key);
     mem_free(b->reference);
     mem_free(b->radiance);
     mem_free(b->d_radiance);
-    *b = (struct look_batch){0};
+    *b = (struct observation_batch){0};
 }
 
-void look_batch_clear(struct look_batch *b) {
-    b->look_count = 0;
+void observation_batch_clear(struct observation_batch *b) {
+    b->observation_count = 0;
 }
 
-/* Sets up the paths of look number `at`, whose first sample has number `sample_number`. False when
- * one cannot be used: out of the picture, masked, a pixel that shines by chance, or one that mixes surfaces while the
- * texel's centre is not in such a one. */
-static bool connect(struct look_batch *b, size_t at, const struct view *view, uint32_t texel,
+/* Sets up the paths of observation `at`, whose first sample has number `sample_number`. False when one cannot be used:
+ * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. */
+static bool connect(struct observation_batch *b, size_t at, const struct view *view, uint32_t texel,
                     uint64_t iteration, uint32_t sample_number) {
     const struct reconstruction *r = b->r;
     const struct photograph *photo = &r->scene->photograph[b->views->train[view->train]];
@@ -50,7 +49,7 @@ static bool connect(struct look_batch *b, size_t at, const struct view *view, ui
     for (int i = 0; i < b->samples; i++) {
         struct path_key key = {texel, (uint32_t)(2 * iteration) + (uint32_t)(i & 1),
                                sample_number + (uint32_t)i / 2};
-        /* Where in the texel: the photograph saw all of it, not its centre. */
+        /* A random place in the texel: the photograph shows all of it, not its centre. */
         uint64_t bits = rng_key(b->path.seed ^ key.iteration, key.index, key.sample);
         uint32_t triangle;
         float b1, b2, depth_m;
@@ -68,12 +67,12 @@ static bool connect(struct look_batch *b, size_t at, const struct view *view, ui
         b->ray[path] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
         b->key[path] = key;
     }
-    b->look[at] = (struct look){texel, reconstruction_segment(r, texel), photo, *view,
-                                clean ? 1.0f : UNCLEAN_TRUST};
+    b->observation[at] = (struct observation){texel, reconstruction_segment(r, texel), photo, *view,
+                                clean ? 1.0f : MIXED_WEIGHT};
     return true;
 }
 
-void look_add(struct look_batch *b, uint32_t texel, uint64_t iteration) {
+void observation_add(struct observation_batch *b, uint32_t texel, uint64_t iteration) {
     const struct reconstruction *r = b->r;
     uint32_t triangle;
     float b1, b2;
@@ -86,16 +85,16 @@ void look_add(struct look_batch *b, uint32_t texel, uint64_t iteration) {
     uint32_t key = (uint32_t)rng_key(b->path.seed, iteration, texel);
     size_t seen = views_pick(b->views, point, normal, key, (size_t)b->cameras, view);
     uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
-    for (size_t k = 0; k < seen && b->look_count < b->look_capacity; k++) {
-        if (connect(b, b->look_count, &view[k], texel, iteration, (uint32_t)k * samples_a_half))
-            b->look_count++;
+    for (size_t k = 0; k < seen && b->observation_count < b->observation_capacity; k++) {
+        if (connect(b, b->observation_count, &view[k], texel, iteration, (uint32_t)k * samples_a_half))
+            b->observation_count++;
     }
 }
 
-void look_add_pixels(struct look_batch *b, uint64_t number, uint64_t iteration) {
+void observation_add_pixels(struct observation_batch *b, uint64_t number, uint64_t iteration) {
     const struct reconstruction *r = b->r;
     uint32_t samples_a_half = ((uint32_t)b->samples + 1) / 2;
-    for (int k = 0; k < b->cameras && b->look_count < b->look_capacity; k++) {
+    for (int k = 0; k < b->cameras && b->observation_count < b->observation_capacity; k++) {
         uint64_t pick = rng_key(b->path.seed, iteration, number * VIEWS_PICK_MAX + (uint64_t)k);
         uint64_t place = rng_mix64(pick);
         struct view view = {.train = rng_below((uint32_t)pick, (uint32_t)b->views->train_count)};
@@ -110,13 +109,13 @@ void look_add_pixels(struct look_batch *b, uint64_t number, uint64_t iteration) 
         vec2 at = atlas_point(&r->atlas, hit.triangle, hit.b1, hit.b2);
         uint32_t texel = (uint32_t)at.y * r->atlas.width + (uint32_t)at.x;
         if (r->inverse.triangle[texel] != INVERSE_UV_NONE &&
-            connect(b, b->look_count, &view, texel, iteration, (uint32_t)k * samples_a_half))
-            b->look_count++;
+            connect(b, b->observation_count, &view, texel, iteration, (uint32_t)k * samples_a_half))
+            b->observation_count++;
     }
 }
 
-void look_trace(struct look_batch *b) {
-    size_t paths = b->look_count * (size_t)b->samples;
+void observation_trace(struct observation_batch *b) {
+    size_t paths = b->observation_count * (size_t)b->samples;
     if (paths > 0)
         path_batch_trace(b->paths, &b->r->world, &b->path, paths, b->ray, b->key, b->radiance);
 }
