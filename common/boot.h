@@ -1,4 +1,4 @@
-/* boot.h -- which start of the machine this is: what the kernel holds in memory outlives a process, not a boot. */
+/* boot.h -- identifies the current boot: kernel memory outlives a process but not a reboot. */
 #ifndef UNBAKE_COMMON_BOOT_H
 #define UNBAKE_COMMON_BOOT_H
 

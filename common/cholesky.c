@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#define LEAST_PIVOT 1e-9 /* of the diagonal entry; rounding leaves some 1e-15 of it */
+#define MIN_PIVOT 1e-9 /* of the diagonal entry; rounding leaves some 1e-15 of it */
 
 bool cholesky_factor(size_t n, size_t stride, double *a) {
     for (size_t i = 0; i < n; i++) {
@@ -13,7 +13,7 @@ bool cholesky_factor(size_t n, size_t stride, double *a) {
             double sum = row[j];
             for (size_t k = 0; k < j; k++)
                 sum -= row[k] * other[k];
-            if (i == j && sum <= LEAST_PIVOT * whole)
+            if (i == j && sum <= MIN_PIVOT * whole)
                 return false;
             row[j] = i == j ? sqrt(sum) : sum / other[j];
         }

@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Replaces `a` by its lower factor. False, and `a` is spoilt, where it is singular: a pivot of 1e-9 of its diagonal entry
- * or less. */
+/* Replaces `a` by its lower factor. False, with `a` destroyed, when it is singular: a pivot of at most 1e-9 of its
+ * diagonal entry. */
 bool cholesky_factor(size_t n, size_t stride, double *a);
 
 /* Replaces the right side x[n] by the solution, given the factor. */

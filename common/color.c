@@ -17,9 +17,9 @@ const struct color_primaries color_adobe_rgb = {{0.64, 0.33}, {0.21, 0.71}, {0.1
 const struct color_primaries color_rec601_525 = {{0.630, 0.340}, {0.310, 0.595}, {0.155, 0.070}, {0.3127, 0.3290}};
 const struct color_primaries color_rec601_625 = {{0.64, 0.33}, {0.29, 0.60}, {0.15, 0.06}, {0.3127, 0.3290}};
 
-/* Matrices this near the identity change no value by a step of 8 bits: those of sRGB's profiles are rounded so. */
+/* Tolerance for the identity: sRGB profiles have rounded matrices, and this changes no 8-bit value. */
 #define SAME_MATRIX 2e-3
-/* Below this a value is a colour outside of Rec. 709, and not the rounding of one at its edge. */
+/* Values below are colours outside of Rec. 709, and not rounding errors. */
 #define OUTSIDE (-1.0f / 512.0f)
 
 #define PQ_WHITE 203.0 /* cd/m2 */
@@ -189,7 +189,7 @@ void color_set_adobe_rgb(struct color *color, int bits) {
 
 /* --- pixels -------------------------------------------------------------------------------- */
 
-static inline void turn_pixel(const float m[3][3], const float in[3], float *pixel, size_t *outside) {
+static inline void multiply_pixel(const float m[3][3], const float in[3], float *pixel, size_t *outside) {
     float r = m[0][0] * in[0] + m[0][1] * in[1] + m[0][2] * in[2];
     float g = m[1][0] * in[0] + m[1][1] * in[1] + m[1][2] * in[2];
     float b = m[2][0] * in[0] + m[2][1] * in[1] + m[2][2] * in[2];
@@ -199,9 +199,9 @@ static inline void turn_pixel(const float m[3][3], const float in[3], float *pix
     *outside += fminf(r, fminf(g, b)) < OUTSIDE;
 }
 
-void color_turn(const float matrix[3][3], float *pixel, size_t stride, size_t count, size_t *outside) {
+void color_multiply(const float matrix[3][3], float *pixel, size_t stride, size_t count, size_t *outside) {
     for (size_t i = 0; i < count; i++, pixel += stride)
-        turn_pixel(matrix, (const float[3]){pixel[0], pixel[1], pixel[2]}, pixel, outside);
+        multiply_pixel(matrix, (const float[3]){pixel[0], pixel[1], pixel[2]}, pixel, outside);
 }
 
 static void convert_by_profile(const struct color *color, float *pixel, size_t stride, size_t count, size_t *outside) {
@@ -231,6 +231,6 @@ void color_convert(const struct color *color, float *pixel, size_t stride, size_
             float stored = pixel[c] > 0.0f ? fminf(pixel[c], 1.0f) : 0.0f;
             linear[c] = color->curve[c * color->step_count + (size_t)(stored * last + 0.5f)];
         }
-        turn_pixel(color->matrix, linear, pixel, outside);
+        multiply_pixel(color->matrix, linear, pixel, outside);
     }
 }

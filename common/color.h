@@ -1,8 +1,8 @@
-/* color.h -- what the numbers of a picture's file mean, and the way from them to linear light of Rec. 709's primaries and
- * white (D65). A file says it by an ICC profile (color_icc.h) or by numbers: primaries, white and a curve.
+/* color.h -- colour spaces of picture files and the conversion to linear Rec. 709 (white D65). A file specifies its
+ * space by an ICC profile (color_icc.h) or by numbers: primaries, white and a transfer curve.
  *
- * Whites are adapted by Bradford's matrix (as ICC profiles are). Colours outside of Rec. 709 come out below 0 or above 1:
- * what to do with them is the caller's affair. Private to the picture codecs. */
+ * White points are adapted by Bradford's matrix (as in ICC). Colours outside of Rec. 709 become negative or exceed 1;
+ * callers decide what to do with them. Private to the picture codecs. */
 #ifndef UNBAKE_COMMON_COLOR_H
 #define UNBAKE_COMMON_COLOR_H
 
@@ -30,39 +30,40 @@ extern const struct color_primaries color_rec709, color_display_p3, color_dci_p3
     color_rec601_525, color_rec601_625;
 
 struct color {
-    char name[COLOR_NAME_SIZE];       /* of the file's space, for people: "Display P3"; "" where it says nothing */
-    char warning[COLOR_WARNING_SIZE]; /* why what the file says of its colours is not used; "" where it is */
-    bool is_srgb;                     /* nothing is to be done but sRGB's curve; the rest is not set then */
+    char name[COLOR_NAME_SIZE];       /* name for people: "Display P3"; "" if unspecified */
+    char warning[COLOR_WARNING_SIZE]; /* why the file's colour information is not used; "" if it is */
+    bool is_srgb;                     /* only sRGB's curve is to be applied; the rest is not set */
     uint32_t step_count;              /* of a curve: stored value 0 to 1 */
-    float *curve;                     /* [3][step_count] linear light; NULL with a profile that is no curve and matrix; owned */
-    float matrix[3][3];               /* Rec. 709 from the file's primaries, by rows */
-    void *profile;                    /* where curve is NULL, of color_icc.c; owned */
+    float *curve;                     /* [3][step_count] linear light; NULL for a profile other than curves and
+                                       * matrix; owned */
+    float matrix[3][3];               /* to Rec. 709 from the file's primaries, row-major */
+    void *profile;                    /* used when curve is NULL, see color_icc.c; owned */
     void (*profile_convert)(const void *profile, float (*pixel)[3], size_t count); /* stored values to linear light */
     void (*profile_free)(void *profile);
 };
 
-/* A file that says nothing: sRGB. */
+/* Initialises to sRGB. */
 void color_init(struct color *color);
 void color_release(struct color *color);
 
-/* By numbers. `bits` is that of the file, for the steps of its curve. What cannot be (primaries on a line) is a warning.
- * Numbers that mean sRGB leave is_srgb. */
+/* From numbers. `bits` per channel determines the steps of the curve. Impossible primaries give a warning. Values
+ * equivalent to sRGB leave is_srgb set. */
 void color_set(struct color *color, const char *name, const struct color_primaries *primaries,
                enum color_transfer transfer, double gamma, int bits);
 
 /* Adobe RGB (1998), whose curve is the power 563 / 256. */
 void color_set_adobe_rgb(struct color *color, int bits);
 
-/* The matrix from these primaries to Rec. 709's, by rows; false where there is none. `is_same`: whether nothing changes. */
+/* Matrix from these primaries to Rec. 709, row-major; false when they are degenerate. *is_same: it is the identity. */
 bool color_matrix(const struct color_primaries *from, float matrix[3][3], bool *is_same);
 
-/* The same from X, Y, Z of the three primaries (its columns) relative to white D50, as profiles have them. */
+/* The same from X, Y, Z of the three primaries (its columns) relative to D50, as in profiles. */
 void color_matrix_d50(const double xyz[3][3], float matrix[3][3], bool *is_same);
 
-/* Converts `count` pixels of `stride` values, of which the first three are stored values from 0 to 1. `outside` counts
- * pixels that Rec. 709 cannot show. */
+/* Converts `count` pixels of `stride` values, the first three of which are stored values in [0, 1]. `outside` counts
+ * pixels outside of Rec. 709. */
 void color_convert(const struct color *color, float *pixel, size_t stride, size_t count, size_t *outside);
-/* The same of linear values, by a matrix alone. */
-void color_turn(const float matrix[3][3], float *pixel, size_t stride, size_t count, size_t *outside);
+/* The same for linear values, by a matrix only. */
+void color_multiply(const float matrix[3][3], float *pixel, size_t stride, size_t count, size_t *outside);
 
 #endif

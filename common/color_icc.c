@@ -1,10 +1,11 @@
 /* color_icc.c -- see color_icc.h.
  *
- * Most profiles of cameras are three curves and a matrix: these are taken out of the profile, since the library, which
- * walks its tables for each pixel, takes 20 times as long. Others (tables of three dimensions, grey) go through it. The
- * intent is relative colorimetric: the file's white becomes Rec. 709's. The library sees memory only, ours.
+ * Most camera profiles are three curves and a matrix: these are extracted and applied by us, 20 times as fast as by
+ * the library. Others (3D tables, grey) go through the library. The intent is relative colorimetric: the file's white
+ * becomes Rec. 709's.
  *
- * A profile comes from whoever made the picture: the library's complaint becomes a warning, and the picture sRGB. */
+ * Profiles are untrusted input: errors of the library become a warning, and the picture is read as sRGB. The library
+ * uses our allocator and no files. */
 #include "common/color_icc.h"
 
 #include <lcms2.h>
@@ -16,9 +17,9 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-/* What the library may ask for at once. */
+/* Largest single allocation of the library. */
 #define MAX_ALLOCATION ((size_t)256 << 20)
-/* Curves this near sRGB's are sRGB's: their tables are rounded so. */
+/* Tolerance for sRGB's curve: profiles have rounded tables. */
 #define SAME_CURVE 1e-3f
 
 struct color_icc {
@@ -95,7 +96,7 @@ static cmsHPROFILE make_rec709(cmsContext context) {
 
 /* --- what a profile is ---------------------------------------------------------------------- */
 
-/* NULL, or why the profile says nothing of a picture like this. */
+/* NULL, or why the profile does not apply to such a picture. */
 static const char *misfit(cmsHPROFILE profile, bool is_grey) {
     static char const other[] = "is not of red, green and blue";
     cmsProfileClassSignature class = cmsGetDeviceClass(profile);
@@ -116,7 +117,7 @@ static void read_name(cmsHPROFILE profile, char name[COLOR_NAME_SIZE]) {
     snprintf(name, COLOR_NAME_SIZE, "%s", text[0] ? text : "an ICC profile without a name");
 }
 
-/* Fills the curves and the matrix; false where the profile is none of these. *is_srgb: whether they are sRGB's. */
+/* Extracts curves and matrix; false when the profile is not made of these. *is_srgb: they are sRGB's. */
 static bool take_curves(cmsHPROFILE profile, struct color *color, bool *is_srgb) {
     static const cmsTagSignature colorant[3] = {cmsSigRedColorantTag, cmsSigGreenColorantTag, cmsSigBlueColorantTag};
     static const cmsTagSignature tone[3] = {cmsSigRedTRCTag, cmsSigGreenTRCTag, cmsSigBlueTRCTag};
@@ -173,7 +174,7 @@ static bool make_transform(struct color_icc *icc) {
     return isfinite(sum);
 }
 
-/* Sets what of `color` the profile tells; else returns why not. */
+/* Sets `color` from the profile; returns the reason when it cannot. */
 static const char *use(struct color_icc *icc, struct color *color, const void *data, size_t size, bool is_grey) {
     static const char damaged[] = "is damaged";
     bool is_srgb = false;

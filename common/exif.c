@@ -55,7 +55,7 @@ static double entry_value(const struct block *b, size_t entry) {
     return denominator == 0 ? 0 : (double)integer_at(b, place, 4) / denominator;
 }
 
-/* What the sensitivity tags said, in order of preference. */
+/* Values of the sensitivity tags, in order of preference. */
 struct sensitivity {
     double photographic, iso_speed, standard, recommended;
 };
@@ -73,7 +73,7 @@ static bool says_adobe_rgb(const struct block *b, size_t offset) {
     return false;
 }
 
-/* What directories point to. */
+/* Offsets found in a directory. */
 struct next {
     size_t exif, interoperability; /* offsets; 0: none */
 };

@@ -1,6 +1,6 @@
-/* exr_check.c -- whether an EXR file that was written holds the picture: each chunk is decoded and compared, so that a
- * fault of the library or of what lies between shows where the file is made and not where it is used. What the page cache
- * has is what is read: that the disk keeps it is not known. Takes the memory of one chunk. */
+/* exr_check.c -- verifies that a written EXR file holds the picture: each chunk is decoded and compared, so that
+ * faults of the library or the file system show where the file is made. Reads through the page cache; does not prove
+ * that the data is on disk. Uses the memory of one chunk. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -110,7 +110,7 @@ enum status image_check_exr(const char *path, const struct image *image, struct 
         status = error_set_errno(err, source.io_error, "cannot read back %s", path);
     else if (status == STATUS_CORRUPT)
         error_set(err, status, "%s", own.message);
-    else if (status != STATUS_OK) /* what a reader refuses in a file that we made is our fault */
+    else if (status != STATUS_OK) /* a file of ours that does not read is our fault */
         status = error_set(err, STATUS_CORRUPT, "read back: %s", own.message);
     image_source_close(&source);
     return status;

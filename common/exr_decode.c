@@ -1,10 +1,10 @@
-/* exr_decode.c -- the pixels of an EXR file by the C library OpenEXRCore (openexr.com/en/latest/OpenEXRCoreAPI), chunk by
- * chunk. Every chunk is checked to lie inside the data window before it is decoded. */
+/* exr_decode.c -- decodes the pixels of an EXR file, chunk by chunk, by the C library OpenEXRCore
+ * (openexr.com/en/latest/OpenEXRCoreAPI). Every chunk is checked to lie inside the data window first. */
 #include "common/exr_reader.h"
 #include "common/exr_unzip.h"
 #include "common/mem.h"
 
-/* Whom a chunk's rows go to; the pipeline's user data. */
+/* Receiver of a chunk's rows; the pipeline's user data. */
 struct receiver {
     void (*take)(void *user, const struct exr_row *row);
     void *user;
@@ -12,7 +12,7 @@ struct receiver {
     bool is_zip;
 };
 
-/* A chunk holds line after line, in each the channels' rows one after the other. */
+/* A chunk holds line after line, each with the channels' rows in sequence. */
 static void hand_out(const exr_decode_pipeline_t *pipeline, const struct receiver *to, const uint8_t *from) {
     struct exr_row row = {.x = to->x, .width = (uint32_t)pipeline->chunk.width};
     for (int y = 0; y < pipeline->chunk.height; y++)
@@ -27,8 +27,7 @@ static void hand_out(const exr_decode_pipeline_t *pipeline, const struct receive
         }
 }
 
-/* In place of the library's own unpacking, which in 3.1.5 mixes up the channels of interleaved
- * RGBA halves. */
+/* Replaces the library's unpacking, which in 3.1.5 mixes up the channels of interleaved RGBA halves. */
 static exr_result_t unpack(exr_decode_pipeline_t *pipeline) {
     const struct receiver *to = pipeline->decoding_user_data;
     const uint8_t *from = pipeline->unpacked_buffer;

@@ -1,8 +1,7 @@
-/* exr_header.c -- which part and which channels of an EXR file make the picture, and whether the file can hold it.
+/* exr_header.c -- chooses the part and channels of an EXR file and checks its sizes.
  *
- * A file's sizes are checked against image.h's limits and against the file's own length before pixels are asked for: a
- * chunk takes at least 8 bytes of table and compresses at most MAX_RATIO : 1, so a small file cannot ask for a large
- * picture. */
+ * Sizes are checked against image.h's limits and against the file's length before pixels are allocated: a chunk takes
+ * at least 8 bytes of table and compresses at most MAX_RATIO : 1, so a small file cannot demand a large picture. */
 #include <string.h>
 
 #include "common/exr_reader.h"
@@ -17,7 +16,7 @@ static int find_channel(const exr_attr_chlist_t *list, const char *name) {
     return -1;
 }
 
-/* Takes the first part with R, G and B; failing that, the first one that is not deep. */
+/* Chooses the first part with R, G and B, else the first that is not deep. */
 static enum status choose_part(struct exr_reader *r, struct error *err) {
     int part_count = 0;
     exr_result_t code = exr_get_count(r->context, &part_count);
@@ -50,7 +49,7 @@ static enum status choose_part(struct exr_reader *r, struct error *err) {
     return STATUS_OK;
 }
 
-/* Refuses what the picture cannot hold. */
+/* Refuses channels that the picture cannot hold. */
 static enum status check_channels(const struct exr_reader *r, struct error *err) {
     const exr_attr_chlist_t *list = r->list;
     const char *file = r->stream->source->name;
@@ -82,8 +81,7 @@ static enum status check_channels(const struct exr_reader *r, struct error *err)
     return error_hint(err, "save the file with ZIP or PIZ compression");
 }
 
-/* Gives every channel of the file its place: R, G, B, A first, then the rest in the file's
- * (alphabetical) order. Fills name[] and returns the count of the picture's channels. */
+/* Orders the channels: R, G, B, A first, then the others alphabetically. Fills name[] and returns their count. */
 static uint32_t order_channels(struct exr_reader *r, const char **name) {
     const exr_attr_chlist_t *list = r->list;
     bool colour = find_channel(list, "R") >= 0 || find_channel(list, "G") >= 0 ||
@@ -117,7 +115,7 @@ static int64_t side(int32_t min, int32_t max) {
     return (int64_t)max - min + 1;
 }
 
-/* Against the file's length. */
+/* Checks the sizes against the file's length. */
 static enum status check_plausible(const struct exr_reader *r, struct error *err) {
     const struct image_source *source = r->stream->source;
     int32_t chunk_count = 0;

@@ -98,7 +98,8 @@ static void convert(const struct exr_reader *r, struct image *image, struct imag
     if (is_same)
         return;
     snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
-    color_turn(matrix, image->pixel, image->channel_count, (size_t)image->width * image->height, &info->outside_count);
+    color_multiply(matrix, image->pixel, image->channel_count, (size_t)image->width * image->height,
+                   &info->outside_count);
 }
 
 enum status image_read_exr(struct image_source *source, bool probe, struct image *image,

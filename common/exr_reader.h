@@ -1,4 +1,4 @@
-/* exr_reader.h -- an EXR file while it is read: what exr_header.c finds and exr_decode.c follows; private to the codec. */
+/* exr_reader.h -- state of reading an EXR file, shared by exr_header.c and exr_decode.c; private to the codec. */
 #ifndef UNBAKE_COMMON_EXR_READER_H
 #define UNBAKE_COMMON_EXR_READER_H
 
@@ -16,12 +16,10 @@ struct exr_reader {
     int target[IMAGE_MAX_CHANNELS]; /* channel of the picture for each of `list` */
 };
 
-/* Chooses the part and the channels, and holds the sizes against the limits; *image gets the size of the display window
- * and the names of channels. */
+/* Chooses part and channels and checks the limits; sets the size (display window) and channel names of *image. */
 enum status exr_read_header(struct exr_reader *r, struct image *image, struct image_info *info, struct error *err);
 
-/* One channel's values on one line of a chunk, in the data window, from (x, y) on to the right; little-endian, of the
- * channel's type. */
+/* One channel of one line of a chunk, from (x, y) in the data window; little-endian, of the channel's type. */
 struct exr_row {
     int channel; /* of r->list */
     uint16_t type;
@@ -29,7 +27,7 @@ struct exr_row {
     const uint8_t *values;
 };
 
-/* Hands each row of the part's pixels (level 0) to `take`. Every one lies in the data window. */
+/* Passes each row of the part's pixels (level 0) to `take`. All rows lie in the data window. */
 enum status exr_decode(const struct exr_reader *r, void (*take)(void *user, const struct exr_row *row), void *user,
                        struct error *err);
 

@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 
-/* What the library may ask for at once; a chunk of the largest picture stays below. */
+/* Largest single allocation; a chunk of the largest picture is smaller. */
 #define MAX_ALLOCATION ((size_t)2 << 30)
 static void *limited_alloc(size_t bytes) {
     return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL;
@@ -29,8 +29,7 @@ static void note_error(exr_const_context_t context, exr_result_t code, const cha
         exr_stream_printable(message, stream->message, sizeof stream->message);
 }
 
-/* While it writes, the library holds its lock when it reports, and asking it for the stream
- * would wait for that lock for ever. */
+/* When writing, the library holds its lock while it reports, and a query of the stream would deadlock. */
 static void drop_error(exr_const_context_t context, exr_result_t code, const char *message) {
     (void)context;
     (void)code;
@@ -83,9 +82,8 @@ static exr_context_initializer_t initializer(struct exr_stream *stream,
     init.write_fn = stream_write;
     init.max_image_width = init.max_image_height = IMAGE_MAX_SIDE;
     init.max_tile_width = init.max_tile_height = IMAGE_MAX_SIDE;
-    init.zip_level = 4; /* twice as fast as zlib's default for 0 to 3 % more bytes */
-    /* A table of chunks that was never written means a writer that died: refuse the file
-     * rather than guess. */
+    init.zip_level = 4; /* twice as fast as zlib's default, for 0 to 3 % more bytes */
+    /* A chunk table that was never written means an interrupted writer: refuse the file. */
     init.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
     return init;
 }

@@ -37,9 +37,9 @@ static exr_result_t write_header(exr_context_t context, const struct image *imag
     return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
 }
 
-/* In place of the library's own step, which it calls. A reader takes a chunk whose size in the file is that of its pixels
- * for pixels as they are; the library (up to 3.4.6, its issue 2306) stores them so only where its zlib stream is larger
- * than they, not where it is just as large. */
+/* Wraps the library's compression step. Readers take a chunk whose stored size equals its raw size for raw pixels,
+ * but the library (up to 3.4.6, its issue 2306) stores raw pixels only when the zlib stream is larger, not when it is
+ * equal. */
 static exr_result_t compress_or_store(exr_encode_pipeline_t *pipeline) {
     const struct encoder *encoder = pipeline->encoding_user_data;
     exr_result_t code = encoder->compress(pipeline);

@@ -12,16 +12,14 @@
 /* Appends the whole file to *out; STATUS_LIMIT when it does not fit out's limit. */
 enum status file_read(const char *path, struct buf *out, struct error *err);
 
-/* Replaces `path` with `length` bytes so that a reader (or a crash) sees the old or the new
- * content and never a part: a temporary name beside it, fsync, rename, fsync of the folder. */
+/* Replaces `path` atomically with `length` bytes: temporary file, fsync, rename, fsync of the folder. */
 enum status file_replace(const char *path, const void *data, size_t length, struct error *err);
 
-/* Gives a complete file its final name, after its content is on disk; removes it where that fails. Both
- * names are in one folder. */
+/* Gives a complete file its final name after syncing its content; removes it on failure. Both names are in one
+ * folder. */
 enum status file_put_in_place(const char *temporary, const char *path, struct error *err);
 
-/* Renames within a folder where nothing has the new name yet: STATUS_CONFLICT otherwise, and both stay. Not
- * yet durable. */
+/* Renames within a folder; STATUS_CONFLICT when the new name exists. Not yet durable. */
 enum status file_rename_new(const char *from, const char *to, struct error *err);
 
 /* Writes all of `data` to fd, through short writes and EINTR. `path` is for the message. */
@@ -31,8 +29,7 @@ enum status file_write_all(int fd, const void *data, size_t length, const char *
 /* fsync of the folder that holds `path`, so that a rename in it is durable. */
 enum status file_sync_parent(const char *path, struct error *err);
 
-/* Creates the folder and its parents (0750), whose names are on disk then; an existing one is no
- * error. */
+/* Creates the folder and its parents (0750) durably; an existing folder is no error. */
 enum status file_make_dirs(const char *path, struct error *err);
 
 /* The names in a folder, sorted, without "." and ".."; the caller's (file_free_names). Where the disk gives
@@ -43,15 +40,13 @@ void file_free_names(char **names, size_t count);
 /* Removes a file or a whole tree, never following a symbolic link; absent is no error. */
 enum status file_remove_tree(const char *path, struct error *err);
 
-/* Adds up the plain files below `path` and what they take of the disk; what is not there, or goes
- * meanwhile, is nothing. */
+/* Adds up the plain files below `path` and their disk usage; missing or vanishing files count as nothing. */
 enum status file_tree_size(const char *path, uint64_t *files, uint64_t *bytes, struct error *err);
 
 /* Bytes free to an unprivileged process on the file system of `path`. */
 enum status file_free_bytes(const char *path, uint64_t *bytes, struct error *err);
 
-/* Whether there is something of that name in the folder. Where that cannot be known there is: whoever opens it is told
- * why not. */
+/* Whether the folder has an entry of that name. True when that is unknown: whoever opens it gets the error. */
 bool file_is_in(const char *dir, const char *name);
 
 /* "a" + "b" -> "a/b"; the caller's (mem_free). */

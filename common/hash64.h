@@ -1,7 +1,7 @@
 /* hash64.h -- XXH64 (Yann Collet, 2014; specification at xxhash.com), a fast 64-bit hash.
  *
- * It finds accidents (a flipped bit, a page of another time), not attacks: every change of up to
- * eight bytes at one aligned place changes the hash, others slip through once in 2^64. */
+ * Detects accidental changes (a flipped bit, a stale page), not attacks: every change within eight aligned bytes
+ * changes the hash, others go undetected with probability 2^-64. */
 #ifndef UNBAKE_COMMON_HASH64_H
 #define UNBAKE_COMMON_HASH64_H
 

@@ -12,8 +12,8 @@
 #include "common/image_codec.h"
 #include "common/mem.h"
 
-/* A scanline costs at least 8 bytes; old-style runs multiply by 255 and more. Past this many
- * pixels a byte the header lies. */
+/* A scanline takes at least 8 bytes, and old-style runs multiply by 255 or more. A header that claims more pixels per
+ * byte is refused. */
 #define MAX_PIXELS_PER_BYTE 4096
 
 /* The file as a stream of bytes. */
@@ -67,7 +67,7 @@ static bool next_line(struct hdr_stream *s, char *line, size_t size) {
     return false;
 }
 
-/* Where no PRIMARIES= line is, files are of Rec. 709's, whatever filefmts.pdf says: nobody writes Radiance's own. */
+/* Files without PRIMARIES= are taken for Rec. 709, although filefmts.pdf has other defaults, which no program uses. */
 static void read_primaries(const char *text, struct header *h, struct image_info *info) {
     struct color_primaries p;
     bool is_same = true;
@@ -203,7 +203,7 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
     mem_free(row);
     if (status == STATUS_OK && header.is_other) {
         snprintf(info->color_space, sizeof info->color_space, "primaries of its own, linear light");
-        color_turn(header.matrix, image->pixel, 3, width * image->height, &info->outside_count);
+        color_multiply(header.matrix, image->pixel, 3, width * image->height, &info->outside_count);
     }
     return status;
 }

@@ -23,22 +23,21 @@ struct image {
     uint32_t channel_count;
     char (*channel)[64]; /* [channel_count] names, "R" "G" "B" "A" "base_color.R"; owned */
     float *pixel;        /* [height][width][channel_count]; owned */
-    uint8_t *clipped;    /* [height][width] bit c: channel c is at its largest as the file stores it (IMAGE_CLIP_SHARE);
-                          * of IMAGE_CONVERTED pictures, else NULL; owned */
+    uint8_t *clipped;    /* [height][width] bit c: channel c has its largest value in the file (IMAGE_CLIP_SHARE);
+                          * only for IMAGE_CONVERTED, else NULL; owned */
 };
 
-/* The code value (of 255) from which a channel of an ordinary photograph counts as clipped. A
- * clipped surface is 255 in the camera, but JPEG's quantisation and the resizing that poses are
- * often computed after leave it a few levels lower; 250 takes those in, and what it takes too
- * many is above 95 % of the clip in linear light, where the bound says nearly what the value
- * would. */
+/* Code value, as a share of the maximum, from which a channel of an ordinary photograph counts as clipped. Clipped
+ * surfaces are 255 in the camera, but JPEG quantisation and resizing (often done before poses are computed) lower
+ * them by a few levels. Unclipped values above 250 are within 5 % of the clip in linear light, so treating them as
+ * bounds loses little. */
 #define IMAGE_CLIP_SHARE (250.0f / 255.0f)
 
-/* How the values of a file relate to linear light, as the reader found them. */
+/* Relation of pixel values to linear light. */
 enum image_encoding {
     IMAGE_LINEAR,   /* EXR, Radiance: linear light, unbounded */
     IMAGE_SRGB,     /* PNG, JPEG: as stored, in [0, 1]; linear only after image_srgb_to_linear */
-    IMAGE_CONVERTED /* PNG, JPEG of another colour space: linear light, converted; image.clipped says where it is bounded */
+    IMAGE_CONVERTED /* PNG, JPEG of another colour space: converted to linear light; image.clipped marks lower bounds */
 };
 
 struct image_info {
@@ -47,47 +46,45 @@ struct image_info {
     /* From EXIF where present, else 0. */
     double exposure_time_sec, iso, f_number;
     int orientation;       /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
-    bool is_adobe_rgb;     /* EXIF says so, as cameras do that write no profile */
-    bool is_uncalibrated;  /* EXIF says that the colours are not those of sRGB, and not what they are */
-    /* Of pictures that were read, not only probed: */
-    char color_space[64];    /* that pixels were converted from to Rec. 709, for people: "Display P3"; "" where they were not */
-    char color_warning[160]; /* what the file says of its colours and cannot be used, so that they pass for sRGB; or "" */
-    size_t outside_count;    /* pixels of colours that Rec. 709 cannot show: a channel is below 0 */
-    float clip;              /* of IMAGE_CONVERTED: what IMAGE_CLIP_SHARE in all channels became */
+    bool is_adobe_rgb;     /* EXIF says so; cameras without profile do that */
+    bool is_uncalibrated;  /* EXIF says that the colour space is not sRGB, without naming it */
+    /* Set by reading, not by probing: */
+    char color_space[64];    /* converted from, for people: "Display P3"; "" if not converted */
+    char color_warning[160]; /* why the file's colour information is not used and sRGB is assumed; or "" */
+    size_t outside_count;    /* pixels outside of Rec. 709: a channel is negative */
+    float clip;              /* IMAGE_CONVERTED: the smallest channel of IMAGE_CLIP_SHARE after conversion */
 };
 
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
                 const char *const *channel); /* zero pixels; names are copied */
 void image_init_rgb(struct image *image, uint32_t width, uint32_t height); /* channels R G B */
-/* The first three channels of `from`, which are R G B, as a new picture. */
+/* The first three channels of `from`, which must be R G B, as a new picture. */
 void image_take_rgb(const struct image *from, struct image *image);
 void image_release(struct image *image);
 
-/* As image_init in two steps, for sizes that a file tells: sets size and channel names, without pixels;
- * STATUS_LIMIT when the sizes pass the limits, STATUS_INPUT when one is 0. `name` is for messages. */
+/* First half of image_init, for sizes from a file: sets size and channel names, without pixels; STATUS_LIMIT when a
+ * limit is exceeded, STATUS_INPUT when a size is 0. `name` is for messages. */
 enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
                          uint32_t channel_count, const char *const *channel, struct error *err);
 
-/* Zero pixels for an image that has its header. */
+/* Second half: zero pixels. */
 void image_allocate(struct image *image);
 
 /* Index of a channel by its exact name; -1 when absent. */
 int image_channel(const struct image *image, const char *name);
 
-/* Reads EXR, PNG, JPEG or Radiance HDR by content (not by extension). Channels come in the
- * order R, G, B, A first where they exist, then the rest by name; grey PNG/JPEG and an EXR
- * with Y in place of R, G, B become R = G = B. An EXR's picture is its display window, for
- * which cameras are given: what its data window leaves out is 0, what it adds is dropped; of
- * several parts the first with R, G, B is taken. info may be NULL. On error *image is empty
- * (releasing it does no harm).
+/* Reads EXR, PNG, JPEG or Radiance HDR by content (not by extension). Channels are in the order R, G, B, A if they
+ * exist, then the others by name; grey PNG/JPEG, and Y of an EXR without R, G, B, become R = G = B. An EXR's picture
+ * is its display window, to which cameras refer: pixels outside of the data window are 0; of several parts the first
+ * with R, G, B is read. info may be NULL. On error *image is empty (releasing it does no harm).
  *
- * Colours are of Rec. 709's primaries and white D65. A file that says that its own are others (ICC profile; PNG's cICP,
- * cHRM and gAMA; EXIF for Adobe RGB; EXR's chromaticities) is converted to linear light of these; what cannot be used is
- * a warning in info. */
+ * Colours are linear or sRGB of Rec. 709's primaries and white D65. Files that specify others (ICC profile; PNG's
+ * cICP, cHRM and gAMA; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these; colour
+ * information that cannot be used gives a warning in info. */
 enum status image_read(const char *path, struct image *image, struct image_info *info,
                        struct error *err);
 
-/* The same with a PNG's or JPEG's values as stored, whatever the file says of its colours: for masks. */
+/* The same with stored values of PNG and JPEG, without colour conversion: for masks. */
 enum status image_read_stored(const char *path, struct image *image, struct error *err);
 
 /* The same from memory; `name` stands for the path in messages. */
@@ -100,12 +97,11 @@ enum status image_probe(const char *path, struct image *image, struct image_info
 
 enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
 
-/* Both writers read back what they have written, where it is a file, and compare it with the picture: STATUS_CORRUPT says
- * what a reader would find in its place.
+/* Both writers read the file back and compare it with the picture; STATUS_CORRUPT says what a reader would find
+ * instead.
  *
- * Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these
- * channels; the same pixels give the same bytes. Overwrites `path` in place: callers that
- * need atomicity write a temporary name. */
+ * Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these channels; the same pixels
+ * give the same bytes. Overwrites `path` in place: callers that need atomicity write a temporary name. */
 enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
                             bool tiled, struct error *err);
 

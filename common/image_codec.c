@@ -35,10 +35,9 @@ void image_source_close(struct image_source *source) {
     close(source->fd);
 }
 
-/* Which channels of the file are at their largest, by the channel of Rec. 709 that each is the most of. With the matrix of
- * a space that is wider than Rec. 709 each is most of its own. The others that it is a little of, by .23 at most for
- * Display P3, pass for known though what is beyond the clip is missing in them too: as in every camera, whose sensor
- * clips before its matrix. */
+/* Maps clipped channels of the file to the Rec. 709 channels they contribute most to (for wider spaces each to its
+ * own). Their smaller contributions to other channels (at most 0.23 for Display P3) are not marked, though they are
+ * underestimated, as in a camera, whose sensor clips before its matrix. */
 static void find_clipped(struct image *image) {
     size_t count = (size_t)image->width * image->height;
     image->clipped = mem_alloc(count);

@@ -16,7 +16,7 @@ struct image_source {
     int fd;
     uint64_t size;         /* bytes */
     int io_error;          /* errno of the first read that the system refused, else 0 */
-    bool as_stored;        /* values of PNG and JPEG stay what they are, whatever the colours */
+    bool as_stored;        /* values of PNG and JPEG are not converted */
 };
 
 /* Opens a file (a FIFO under a picture's name does not block) that must be a regular one; `path` is borrowed. */
@@ -27,10 +27,10 @@ void image_source_close(struct image_source *source);
 size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
                          size_t length);
 
-/* Converts a picture that was read, of values from 0 to 1, as *color says, and tells it in *info; releases *color. */
+/* Converts a picture with values in [0, 1] by *color and records it in *info; releases *color. */
 void image_convert(struct image *image, struct image_info *info, struct color *color);
 
-/* By EXIF, where the file has nothing better. */
+/* Colour space from EXIF, for files without a better source. */
 void image_color_by_exif(const struct image_info *info, struct color *color);
 
 /* The names of a colour picture's channels, for image_header. */
@@ -47,8 +47,8 @@ enum status image_read_png(struct image_source *source, bool probe, struct image
 enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
                             struct image_info *info, struct error *err);
 
-/* Whether the files that were written hold these pictures, as image_write_exr and image_write_png ask of themselves:
- * STATUS_CORRUPT says what a reader finds in their place. */
+/* Whether written files hold these pictures; called by image_write_exr and image_write_png. STATUS_CORRUPT says what
+ * a reader finds instead. */
 enum status image_check_exr(const char *path, const struct image *image, struct error *err);
 enum status image_check_png(const char *path, const struct image *image, float scale, struct error *err);
 

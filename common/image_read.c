@@ -1,4 +1,4 @@
-/* image_read.c -- the readers of image.h: where a picture's bytes come from, and which codec takes them. */
+/* image_read.c -- the readers of image.h: opens a picture and chooses its codec. */
 #include <string.h>
 
 #include "common/image_codec.h"
@@ -35,7 +35,7 @@ static enum status read_source(struct image_source *source, bool probe, struct i
     else
         error_set(err, status, "%s: not a picture in EXR, PNG, JPEG or Radiance HDR format",
                   source->name);
-    /* What a decoder takes for a short file may be a failing disk. */
+    /* a truncated file may be a failing disk */
     if (source->io_error)
         status = error_set_errno(err, source->io_error, "cannot read %s", source->name);
     if (status != STATUS_OK)

@@ -1,8 +1,7 @@
-/* jpeg.c -- JPEG pictures by libjpeg-turbo (its libjpeg.txt), with EXIF from the first APP1.
+/* jpeg.c -- reads JPEG pictures by libjpeg-turbo (its libjpeg.txt), with EXIF from the first APP1.
  *
- * The library tolerates damage: it fills what is missing with grey and counts a warning. Grey
- * that no camera saw would be taken for light, so data that is corrupt or ends early is an
- * error here. Errors arrive by longjmp; what must survive one is in struct jpeg_reader. */
+ * The library fills damaged parts with grey and counts a warning. That grey would be taken for light, so corrupt or
+ * truncated data is an error here. Errors arrive by longjmp; what must survive one is in struct jpeg_reader. */
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -49,7 +48,7 @@ static void damaged(j_common_ptr common) {
     struct jpeg_reader *r = common->client_data;
     char message[JMSG_LENGTH_MAX];
     int which = common->err->msg_parm.i[0];
-    /* Where the system gave none; 1 and 3 are pictures that ask for too much (jmemmgr.c). */
+    /* Allocation failure; codes 1 and 3 are pictures that ask for too much (jmemmgr.c). */
     if (common->err->msg_code == JERR_OUT_OF_MEMORY && which != 1 && which != 3)
         mem_exhausted("libjpeg");
     common->err->format_message(common, message);

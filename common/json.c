@@ -16,8 +16,7 @@
 #define NUMBER_(digits) #digits
 #define WHOLE_MAX 9007199254740992.0 /* 2^53: every whole number up to it is a double */
 
-/* cJSON leaves out of a tree what there was no memory for: as everywhere, running out of memory ends
- * the process instead. */
+/* cJSON silently drops members when out of memory; here that ends the process, as everywhere. */
 __attribute__((constructor)) static void set_allocator(void) {
     cJSON_InitHooks(&(cJSON_Hooks){.malloc_fn = mem_alloc, .free_fn = mem_free});
 }
@@ -36,8 +35,8 @@ static void locate(const char *text, const char *at, size_t *line, size_t *colum
     }
 }
 
-/* What cJSON would take and we do not; NULL when there is nothing, else where. Brackets nested too deep for our
- * stack, and a NUL within a string, at which cJSON would cut it without a word. */
+/* What cJSON accepts and we do not: nesting too deep for our stack, and NUL within strings, where cJSON would
+ * truncate. NULL when there is nothing, else `where` is set. */
 static const char *own_fault(const char *text, size_t length, const char **where) {
     int depth = 0;
     bool in_string = false;
@@ -70,8 +69,8 @@ static int by_text(const void *a, const void *b) {
     return strcmp(*(const char *const *)a, *(const char *const *)b);
 }
 
-/* A key that this object holds twice; NULL when there is none. Sorted, since whoever sends a megabyte of
- * keys must not keep us busy for a minute. */
+/* A duplicate key of this object; NULL when there is none. Sorts, since a megabyte of keys must not take quadratic
+ * time. */
 static const char *own_duplicate(const cJSON *object) {
     size_t count = 0, filled = 0;
     for (const cJSON *member = object->child; member; member = member->next)
@@ -89,7 +88,7 @@ static const char *own_duplicate(const cJSON *object) {
     return twice;
 }
 
-/* A key that an object anywhere in the tree holds twice; NULL when there is none. */
+/* A duplicate key of any object in the tree; NULL when there is none. */
 static const char *duplicate_key(const cJSON *value) {
     const char *twice = cJSON_IsObject(value) ? own_duplicate(value) : NULL;
     for (const cJSON *child = value->child; child && !twice; child = child->next)

@@ -21,9 +21,9 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
 /* Reads and parses a file of at most `limit` bytes. */
 enum status json_read(const char *path, size_t limit, cJSON **value, struct error *err);
 
-/* Compact text of the tree with no newline inside, invisible characters escaped (utf8_kind), or text with line breaks for people to read;
- * the caller's (mem_free). A number reads back as the same double; whole ones up to 2^53 are
- * written without an exponent. */
+/* Text of the tree: json_text is compact, without newlines, with invisible characters escaped (utf8_kind); json_page
+ * has line breaks; the caller's (mem_free). Numbers read back as the same double; whole ones up to 2^53 are written
+ * without an exponent. */
 char *json_text(const cJSON *value);
 char *json_page(const cJSON *value);
 
@@ -36,11 +36,11 @@ enum status json_string(const cJSON *object, const char *key, const char *what,
 enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback,
                       bool *value, struct error *err);
 
-/* A string. What is not UTF-8 in it (a file's name, a sentence cut within a character) becomes '?',
- * so that what we write can always be read. */
+/* A string. Invalid UTF-8 (file names, truncated sentences) is replaced by '?', so that our output can always be
+ * read. */
 cJSON *json_new_string(const char *text);
 
-/* Adding members to an object under construction. */
+/* Add a member to an object under construction. */
 void json_add_string(cJSON *object, const char *key, const char *value); /* NULL: JSON null */
 void json_add_number(cJSON *object, const char *key, double value); /* non-finite: JSON null */
 void json_add_int(cJSON *object, const char *key, int64_t value);

@@ -11,7 +11,7 @@
 
 #include "common/utf8.h"
 
-/* Sentence and values are cut before they are quoted, so that a line is whole whatever they hold. */
+/* Message and values are truncated before quoting, so that a line is always complete. */
 #define MESSAGE_BYTES 1500
 #define VALUE_BYTES 256
 #define CLEAN_FACTOR 4 /* utf8_show */

@@ -19,12 +19,12 @@ void *mem_realloc_array(void *old, size_t count, size_t size);
  * offers them: for arrays of many megabytes that are read at random. */
 void *mem_calloc_large(size_t count, size_t size);
 char *mem_strdup(const char *text);
-char *mem_strndup(const char *text, size_t length);  /* at most `length` bytes of it */
+char *mem_strndup(const char *text, size_t length);  /* at most `length` bytes of text */
 /* A formatted string of its own; never NULL. */
 char *mem_printf(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void mem_free(void *pointer);
 
-/* Ends the process as the functions above do, for a library that has told of its failure. */
+/* Ends the process likewise, for a library that reported out of memory. */
 void mem_exhausted(const char *who) __attribute__((noreturn));
 
 /* True when count * size does not fit size_t. */

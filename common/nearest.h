@@ -1,13 +1,12 @@
-/* nearest.h -- the valid name that a mistyped one was probably meant to be. */
+/* nearest.h -- suggests the valid name closest to a mistyped one. */
 #ifndef UNBAKE_COMMON_NEAREST_H
 #define UNBAKE_COMMON_NEAREST_H
 
 #include <stddef.h>
 
-/* Offer every valid name; `best` is then the one that is fewest edits (Levenshtein) away, the
- * first of equals. Names further off than a third of the longer one's length plus one are no
- * correction, nor are names of more than 63 bytes; a name that `typed` begins counts as one edit
- * away. */
+/* Offer every valid name; `best` is then the one with the smallest Levenshtein distance, the first of equals. Names
+ * further away than a third of the longer length plus one are not suggested, nor are names of more than 63 bytes; a
+ * name that begins with `typed` counts as distance 1. */
 struct nearest {
     const char *typed; /* borrowed */
     const char *best;  /* NULL while nothing is near; borrowed */

@@ -1,8 +1,8 @@
-/* parallel.h -- the engine's only threads: a fixed pool that runs loops.
+/* parallel.h -- the engine's only threads: a fixed pool that runs parallel loops.
  *
- * Chunks are handed out in order but finish in any order, so a body must write only to places
- * that belong to its own index. Results then depend on neither the number of threads nor on
- * timing; what must be summed across indices is summed afterwards, in index order, or as whole numbers, atomically. */
+ * Indices are handed out in order but finish in any order, so a body must write only to data of its own index.
+ * Results then do not depend on the number of threads or on timing; sums across indices are computed afterwards in
+ * index order, or atomically in integers. */
 #ifndef UNBAKE_COMMON_PARALLEL_H
 #define UNBAKE_COMMON_PARALLEL_H
 
@@ -10,8 +10,8 @@
 
 struct parallel; /* a pool; opaque */
 
-/* A pool of `thread_count` threads, the caller's included (1: everything runs in the caller).
- * 0 asks for one per processor that this process may use. */
+/* `thread_count` threads including the caller's (1: everything runs in the caller); 0: one per processor available to
+ * the process. */
 struct parallel *parallel_new(int thread_count);
 void parallel_free(struct parallel *pool);
 int parallel_thread_count(const struct parallel *pool);

@@ -1,7 +1,6 @@
-/* png_color.c -- see png_color.h. Chunks: PNG specification, third edition, 11.3.2; numbers of cICP: ITU-T H.273.
+/* png_color.c -- see png_color.h. Chunks: PNG specification, third edition, 11.3.2; cICP's numbers: ITU-T H.273.
  *
- * Not by libpng, which before 1.6.46 does not know cICP and of a file with several kinds of chunks keeps what came
- * first. */
+ * libpng is not used: before 1.6.46 it ignores cICP, and of several kinds of chunks it keeps the first. */
 #include "common/png_color.h"
 
 #include <math.h>
@@ -12,7 +11,7 @@
 #include "common/color_icc.h"
 #include "common/mem.h"
 
-#define CHUNK_MAX ((size_t)8 << 20)    /* bytes; a longer profile is none of a picture */
+#define CHUNK_MAX ((size_t)8 << 20)    /* bytes; no picture has a longer profile */
 #define PROFILE_MAX ((size_t)16 << 20) /* inflated */
 
 enum kind { CICP, ICCP, SRGB, CHRM, GAMA, KIND_COUNT };
@@ -134,8 +133,8 @@ static double hundred_thousandths(const uint8_t *at) {
     return (double)big_endian(at) / 100000.0;
 }
 
-/* A file of sRGB that wants to be read right by programs which know only gAMA has 1/2.2 there (11.3.2.5), which is not
- * sRGB's curve: that, with sRGB's primaries or none, is sRGB. A file without gAMA has sRGB's curve. */
+/* sRGB files may carry gAMA 1/2.2 for programs that know only gAMA (11.3.2.5); together with sRGB's primaries or none
+ * this means sRGB. Files without gAMA have sRGB's curve. */
 static bool use_numbers(const struct chunk *chrm, const struct chunk *gama, int bits, struct color *color) {
     struct color_primaries p = color_rec709;
     char name[COLOR_NAME_SIZE] = "", curve[32] = "";
@@ -162,7 +161,7 @@ bool png_color_read(struct image_source *source, bool is_grey, int bits, struct 
     struct color before;
     color_init(color);
     find_chunks(source, found, color);
-    before = *color; /* with the warning of a chunk that was damaged */
+    before = *color; /* keeps the warning of a damaged chunk */
     bool is_told = (found[CICP].data && use_cicp(found[CICP].data, bits, color)) ||
                    (found[ICCP].data && use_iccp(&found[ICCP], is_grey, bits, color)) || found[SRGB].data != NULL ||
                    ((found[CHRM].data || found[GAMA].data) && use_numbers(&found[CHRM], &found[GAMA], bits, color));

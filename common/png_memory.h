@@ -1,4 +1,4 @@
-/* png_memory.h -- libpng's memory is ours: running out of it is nobody's damaged picture. Private to the PNG codec. */
+/* png_memory.h -- libpng on our allocator: out of memory is not a damaged picture. Private to the PNG codec. */
 #ifndef UNBAKE_COMMON_PNG_MEMORY_H
 #define UNBAKE_COMMON_PNG_MEMORY_H
 

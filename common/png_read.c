@@ -1,8 +1,8 @@
-/* png_read.c -- PNG pictures by libpng (libpng.org/pub/png/libpng-manual.txt).
+/* png_read.c -- reads PNG pictures by libpng (libpng.org/pub/png/libpng-manual.txt).
  *
- * libpng reports errors by longjmp, so each entry point keeps what must survive in one struct
- * that outlives the jump and does its cleaning after setjmp has returned. A damaged file is
- * refused as a whole, whatever part could be decoded: checksums are part of the check. */
+ * libpng reports errors by longjmp, so each entry point keeps its state in one struct that outlives the jump and
+ * cleans up after setjmp has returned. A damaged file is refused as a whole, even if part of it decodes: checksums
+ * are checked. */
 #include <setjmp.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 
 /* Deflate's best ratio is 1032 : 1. */
 #define MAX_RATIO 1032
-/* What libpng may ask for at once, for text and profiles that we do not want. */
+/* Largest single allocation of libpng, for text and profiles that are ignored. */
 #define MAX_CHUNK_BYTES ((png_alloc_size_t)8 << 20)
 
 struct png_reader {
@@ -30,7 +30,7 @@ struct png_reader {
     uint8_t *row;      /* [row_bytes] one row as stored */
     bool is_grey;
     struct color color;
-    char warning[128]; /* the last one: it often says what the error that follows means */
+    char warning[128]; /* the last one, which often explains the error that follows */
 };
 
 static void read_failed(png_structp png, png_const_charp message) {
@@ -40,7 +40,7 @@ static void read_failed(png_structp png, png_const_charp message) {
     longjmp(png_jmpbuf(png), 1);
 }
 
-/* Alone, warnings are about chunks that do not touch the pixels (profiles, times, text). */
+/* Warnings alone concern chunks that do not affect pixels (profiles, times, text). */
 static void note_warning(png_structp png, png_const_charp message) {
     struct png_reader *r = png_get_error_ptr(png);
     snprintf(r->warning, sizeof r->warning, "%s", message);
@@ -59,7 +59,7 @@ static void stop(struct png_reader *r, enum status status) {
     longjmp(png_jmpbuf(r->png), 1);
 }
 
-/* Has libpng expand everything to grey-free 8 or 16-bit RGB or RGBA. */
+/* Makes libpng expand everything to 8 or 16-bit RGB or RGBA. */
 static void set_transforms(struct png_reader *r, int color) {
     bool transparent = png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
     if (color == PNG_COLOR_TYPE_PALETTE)
@@ -72,8 +72,8 @@ static void set_transforms(struct png_reader *r, int color) {
         png_set_gray_to_rgb(r->png);
 }
 
-/* libpng asks for the memory that a chunk claims before it reads it, up to 2 GiB whatever its
- * limit says: a chunk must not claim more than the file has. What follows IEND is not read. */
+/* libpng allocates the size that a chunk claims before reading it, up to 2 GiB regardless of its limit: a chunk must
+ * not claim more than the file has. Data after IEND is not read. */
 static void check_chunks(struct png_reader *r) {
     uint64_t size = r->source->size, at = 8;
     uint8_t head[8];
@@ -122,8 +122,8 @@ static void convert_row(const struct png_reader *r, const uint8_t *from, float *
             to[i] = (float)(from[2 * i] << 8 | from[2 * i + 1]) / 65535.0f;
 }
 
-/* Rows of an interlaced picture gather over seven passes; they do so in the memory of their own
- * float row, which has room for them, and are converted once the last pass has completed them. */
+/* Rows of an interlaced picture accumulate over seven passes in the memory of their own float row, which is large
+ * enough, and are converted after the last pass. */
 static void read_pixels(struct png_reader *r) {
     int pass_count = png_set_interlace_handling(r->png);
     png_read_update_info(r->png, r->png_info);

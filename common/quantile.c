@@ -32,7 +32,7 @@ double quantile_double(double *value, size_t count, double share) {
     return value[index_of(count, share)];
 }
 
-/* Of two that are equal, the bound is the larger. */
+/* Among equal values, the bound counts as larger. */
 static int ascending_bounded(const void *a, const void *b) {
     const struct bounded *x = a, *y = b;
     if (x->value != y->value)
@@ -41,7 +41,7 @@ static int ascending_bounded(const void *a, const void *b) {
 }
 
 bool quantile_bounded_median(struct bounded *value, size_t count, float *median) {
-    double larger = 1.0; /* the share of all values that is larger than those looked at */
+    double larger = 1.0; /* estimated share of values larger than those visited */
     qsort(value, count, sizeof *value, ascending_bounded);
     *median = count > 0 ? value[count - 1].value : 0.0f;
     for (size_t i = 0; i < count; i++) {

@@ -13,7 +13,7 @@
 
 #define NAME_MAX_LENGTH 64
 #define TEXT_MAX_LENGTH 255
-#define UNKNOWN_MAX 50 /* names that are no settings: so many are told, the others counted */
+#define UNKNOWN_MAX 50 /* unknown names reported one by one; further ones are only counted */
 
 static const struct setting table[] = {
     {"base_color_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.03", "listing1",
@@ -148,7 +148,7 @@ static int choice_index(const char *choices, const char *word) {
     return -1;
 }
 
-/* The default of what is kept in `number`. */
+/* Default of a setting that is stored in `number`. */
 static double default_number(const struct setting *t) {
     switch (t->type) {
     case SETTING_BOOL: return strcmp(t->default_text, "true") == 0;
@@ -160,7 +160,7 @@ static double default_number(const struct setting *t) {
     return strtod(t->default_text, NULL);
 }
 
-/* The row of by_quality; NULL where quality does not set it. */
+/* Row of by_quality; NULL for settings that quality does not affect. */
 static const double *amounts_of(const char *name) {
     for (size_t i = 0; i < BY_QUALITY_COUNT; i++) {
         if (strcmp(by_quality[i].name, name) == 0)
@@ -169,7 +169,7 @@ static const double *amounts_of(const char *name) {
     return NULL;
 }
 
-/* What entry i is where it is not given. */
+/* Value of entry i when it is not given. */
 static double usual_number(const struct settings *s, size_t i) {
     const double *amount = amounts_of(table[i].name);
     return amount ? amount[(int)settings_number(s, "quality")] : default_number(&table[i]);
@@ -181,7 +181,7 @@ double settings_of_quality(const struct settings *s, const char *name) {
     return usual_number(s, (size_t)i);
 }
 
-/* Gives those that are not given what quality says. */
+/* Sets values that were not given from the quality. */
 static void follow_quality(struct settings *s) {
     for (size_t i = 0; i < TABLE_COUNT; i++) {
         if (table[i].type != SETTING_TEXT && !s->is_given[i])
@@ -292,9 +292,9 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
     return false;
 }
 
-/* What is wrong with an object of settings. */
+/* Problems of an object of settings. */
 struct faults {
-    cJSON *problems; /* borrowed; NULL: nobody wants a list */
+    cJSON *problems; /* borrowed; NULL: no list wanted */
     size_t count;
     char first[256];
 };
@@ -323,7 +323,7 @@ static void add_unknown(struct faults *f, const char *name) {
         f->count++;
 }
 
-/* Takes back what the method does not use; f: NULL where the method itself is a fault. */
+/* Resets settings that the method does not use; f: NULL when the method itself is invalid. */
 static void check_method(struct settings *s, const cJSON *object, struct faults *f) {
     char reason[256], hint[128], chosen[NAME_MAX_LENGTH];
     int method = index_of("method");

@@ -32,8 +32,8 @@ const struct setting *settings_find(const char *name);
 /* The valid name nearest to `name` by edit distance, or NULL when none is near. */
 const char *settings_nearest(const char *name);
 
-/* What a job uses: one value per table entry, what is not given filled in: by the setting `quality` where that names an
- * amount of work, else by the default. */
+/* A job's settings: one value per table entry. Values that are not given come from the setting `quality` where it
+ * sets an amount of work, else from the default. */
 struct settings {
     bool *is_given; /* [table count] settings_apply was given a value; owned */
     double *number; /* [table count] numbers and booleans (0 or 1); choices by index; owned */
@@ -43,16 +43,16 @@ struct settings {
 void settings_init(struct settings *s); /* all defaults */
 void settings_release(struct settings *s);
 double settings_number(const struct settings *s, const char *name); /* name must exist */
-/* What it would be if it were not given: by the quality, or the default. Numbers only; name must exist. */
+/* The value it would have if it were not given. Numbers only; name must exist. */
 double settings_of_quality(const struct settings *s, const char *name);
 bool settings_bool(const struct settings *s, const char *name);
 /* Whether a SETTING_CHOICE has the value `word`. */
 bool settings_is(const struct settings *s, const char *name, const char *word);
 const char *settings_text(const struct settings *s, const char *name); /* borrowed */
 
-/* Checks a JSON object and applies it over *s. All problems at once: each appends an object
- * {"name", "reason", "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. A setting that
- * the method does not use is one, unless its value is the default: what settings_to_json wrote is taken. */
+/* Checks a JSON object and applies it over *s. Collects all problems: each appends an object {"name", "reason",
+ * "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. A setting that the method does not use is a
+ * problem unless its value is the default, so the output of settings_to_json is accepted. */
 enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
                            struct error *err);
 

@@ -1,5 +1,5 @@
 /* sha256_arm.c -- SHA-256 by the cryptographic extension of ARMv8 (Arm Architecture Reference Manual, SHA256H,
- * SHA256H2, SHA256SU0, SHA256SU1); and the answer of processors that have nothing of the kind. */
+ * SHA256H2, SHA256SU0, SHA256SU1); NULL on processors without it. */
 #include "common/sha256_blocks.h"
 
 #if defined __aarch64__ && defined __AARCH64EL__

@@ -1,4 +1,4 @@
-/* url.h -- the http and https URLs that we call, taken apart (RFC 3986, the part that matters). */
+/* url.h -- parses http and https URLs (RFC 3986, the parts used here). */
 #ifndef UNBAKE_COMMON_URL_H
 #define UNBAKE_COMMON_URL_H
 
@@ -15,8 +15,7 @@ struct url {
     const char *target; /* path and query; borrowed from the text; "" for none */
 };
 
-/* STATUS_INPUT for other schemes, names with a user or a password, fragments, and characters that
- * no URL has. */
+/* STATUS_INPUT for other schemes, user names or passwords, fragments, and invalid characters. */
 enum status url_parse(const char *text, struct url *url, struct error *err);
 
 #endif

@@ -1,4 +1,4 @@
-/* utf8.h -- whether bytes are text, and which characters may be shown to people as they are. */
+/* utf8.h -- validation of UTF-8, and which characters may be shown to people. */
 #ifndef UNBAKE_COMMON_UTF8_H
 #define UNBAKE_COMMON_UTF8_H
 
@@ -10,14 +10,14 @@
  * *bad (may be NULL) is the offset of the first sequence at fault. */
 bool utf8_valid(const char *text, size_t length, size_t *bad);
 
-/* The character that `text` begins with and how many bytes it has; 0 where there is no whole,
- * well-formed one (also at length 0). */
+/* The first character of `text` and its size in bytes; 0 when there is no complete, well-formed one (also at length
+ * 0). */
 size_t utf8_next(const char *text, size_t length, uint32_t *character);
 
 enum utf8_kind {
     UTF8_VISIBLE,
-    /* Invisible, but with a use in text: soft hyphen, joiners, direction marks, tags. Names may have them
-     * (messengers put U+200E into the names of photographs); what is shown to people spells them out. */
+    /* Invisible, but used in text: soft hyphen, joiners, direction marks, tags. Names may contain them (messengers
+     * put U+200E into names of photographs); output spells them out. */
     UTF8_HIDDEN,
     /* Control characters (Cc), line and paragraph separators, and the bidirectional embeddings, overrides and
      * isolates, which change how the text beside them reads ("Trojan Source", CVE-2021-42574). */
@@ -29,9 +29,9 @@ enum utf8_kind utf8_kind(uint32_t character); /* by Unicode 15.1's general categ
 bool utf8_is_name(const char *text);
 
 #define UTF8_SHOWN_SIZE 12
-/* What stands for the first character of text[length > 0] before people, on terminals and in logs: itself where it
- * is visible, '?' for a byte that is no UTF-8 and for C0 and DEL, "<U+202E>" for the others, as `less` has it.
- * Returns how many bytes of `text` that was; shown[] has at most 4 times as many. */
+/* Printable form of the first character of text[length > 0], for terminals and logs: itself if visible, '?' for
+ * invalid UTF-8, C0 and DEL, "<U+202E>" for the others, as in `less`. Returns the number of bytes consumed; shown[]
+ * has at most 4 times as many. */
 size_t utf8_show(const char *text, size_t length, char shown[UTF8_SHOWN_SIZE]);
 
 #endif
