@@ -1,12 +1,12 @@
 /* archive.c -- see archive.h.
  *
- * 1. Every name goes through path_clean before anything is done with it.
- * 2. Folders are walked one name at a time from the descriptor of `dir` with O_NOFOLLOW, and
- *    files are made with O_EXCL: nothing that lies there already is followed or replaced.
- * 3. Bytes are counted as they are written, whatever the entry's header claims.
- * 4. An archive of far too many small files is refused by its headers, before the first of them is made: to make
- *    100,000 files and to remove them again takes 10 s, to read their headers .1 s.
- * 5. gzip is read through zlib: libarchive's own filter does not look at the checksum. */
+ *   1. Every name goes through path_clean first.
+ *   2. Folders are opened one component at a time from the descriptor of `dir` with O_NOFOLLOW, and files are created
+ *      with O_EXCL: nothing that exists is followed or replaced.
+ *   3. Bytes are counted as they are written, whatever the entry's header claims.
+ *   4. An archive of too many small files is refused by its headers before any is created: creating and removing
+ *      100,000 files takes 10 s, reading their headers 0.1 s.
+ *   5. gzip is read through zlib: libarchive's own filter does not check the checksum. */
 #include "server/ingest/archive.h"
 
 #include <archive.h>
@@ -26,27 +26,26 @@
 #include "server/ingest/path.h"
 
 #define BLOCK_BYTES ((size_t)256 << 10)
-/* What may follow a tar's end inside the gzip stream: padding, at most one large record. */
-#define COUNT_BYTES ((uint64_t)64 << 20) /* of content, behind which headers are not counted beforehand */
+/* What may follow the end of a tar in the gzip stream: padding, at most one large record. */
+#define COUNT_BYTES ((uint64_t)64 << 20) /* of content; larger archives are not counted beforehand */
 #define GZIP_TAIL_BYTES ((size_t)16 << 20)
 
 struct unpacking {
     struct archive *archive;
-    struct archive_entry *entry; /* ours: libarchive 3.6.2 forgets to look whether it could make its own */
-    const char *name; /* the archive's, for messages */
+    struct archive_entry *entry; /* our own: libarchive 3.6.2 does not check the allocation of its entry */
+    const char *name; /* for messages */
     const struct archive_limits *limits;
     uint64_t packed_bytes, written_bytes, entry_count, file_count;
     int dir_fd;
-    int fd;      /* of the archive; -1 where there is none, or zlib has it */
+    int fd;      /* of the archive; -1 if none is open or zlib owns it */
     char *block; /* [BLOCK_BYTES] */
     gzFile gzip; /* NULL: libarchive reads the file itself */
     char *gzip_block;
     struct error *err;
 };
 
-/* What libarchive says went wrong: a fault of the file, unless reading it failed. For want of memory, or
- * while it looks what kind of archive it is, it often says nothing, or words of its own, and then errno
- * tells: callers set it to 0 before. */
+/* Translates libarchive's error: a fault of the file, unless reading it failed. Out of memory, and during format
+ * detection, libarchive often sets no message or its own, and only errno is reliable: callers set it to 0 before. */
 static enum status library_error(struct unpacking *u, const char *entry) {
     int number = archive_errno(u->archive);
     if (number == ENOMEM || errno == ENOMEM)
@@ -69,7 +68,7 @@ static la_ssize_t read_gzip(struct archive *a, void *user, const void **block) {
     if (fault == Z_MEM_ERROR)
         mem_exhausted("zlib");
     if (got < 0 || (got == 0 && fault != Z_OK && fault != Z_STREAM_END)) {
-        const char *fact = strstr(text, ">: "); /* after "<fd:6>", which is zlib's name for it */
+        const char *fact = strstr(text, ">: "); /* skips zlib's name of the file, "<fd:6>" */
         archive_set_error(a, fault == Z_ERRNO ? errno : EINVAL, "gzip: %s", fact ? fact + 3 : text);
         return -1;
     }
@@ -77,7 +76,7 @@ static la_ssize_t read_gzip(struct archive *a, void *user, const void **block) {
     return got;
 }
 
-/* The checksum stands at the stream's end, which the tar reader does not reach by itself. */
+/* The checksum is at the end of the stream, which the tar reader does not read by itself. */
 static enum status finish_gzip(struct unpacking *u) {
     const void *ignored;
     la_ssize_t got = 0;
@@ -89,7 +88,7 @@ static enum status finish_gzip(struct unpacking *u) {
     return got < 0 ? library_error(u, NULL) : STATUS_OK;
 }
 
-/* Takes the file to zlib if it begins as gzip does. */
+/* Opens the file with zlib if it is gzip. */
 static bool open_gzip(struct unpacking *u) {
     unsigned char magic[2] = {0, 0};
     if (pread(u->fd, magic, 2, 0) != 2 || magic[0] != 0x1f || magic[1] != 0x8b)
@@ -102,8 +101,8 @@ static bool open_gzip(struct unpacking *u) {
     return true;
 }
 
-/* As archive_read_open and archive_read_open_fd, which in libarchive 3.6.2 do not look whether there was memory for the
- * first of these; what is there is not made again. */
+/* archive_read_open and archive_read_open_fd, which in libarchive 3.6.2 do not check their first allocation; existing
+ * state is kept. */
 static int open_stream(struct unpacking *u) {
     struct archive *a = u->archive;
     if (archive_read_set_callback_data(a, u) != ARCHIVE_OK)
@@ -113,7 +112,7 @@ static int open_stream(struct unpacking *u) {
     return archive_read_set_read_callback(a, read_gzip) == ARCHIVE_OK ? archive_read_open1(a) : ARCHIVE_FATAL;
 }
 
-/* The formats and filters that are promised and no others: each is a parser of hostile bytes. */
+/* Only the documented formats and filters: each is a parser of hostile input. */
 static enum status open_archive(struct unpacking *u, const char *path) {
     struct archive *a = u->archive;
     struct stat info;
@@ -133,7 +132,7 @@ static enum status open_archive(struct unpacking *u, const char *path) {
     return open_stream(u) == ARCHIVE_OK ? STATUS_OK : library_error(u, NULL);
 }
 
-/* A word for an entry that is neither file nor folder; NULL for those two. */
+/* Description of an entry that is neither file nor folder; NULL for these two. */
 static const char *forbidden_kind(struct archive_entry *entry) {
     if (archive_entry_hardlink(entry))
         return "a hard link";
@@ -166,8 +165,8 @@ static enum status check_entry(struct unpacking *u, struct archive_entry *entry,
     return STATUS_OK;
 }
 
-/* Opens the folder `path` below the root, making what is missing; -1 with *err set. An empty
- * path gives a copy of the root. */
+/* Opens the folder `path` below the root, creating missing ones; -1 with *err set. An empty path duplicates the
+ * root's descriptor. */
 static int open_folder(struct unpacking *u, const char *path, size_t length, enum status *status) {
     int at = fcntl(u->dir_fd, F_DUPFD_CLOEXEC, 0);
     for (size_t start = 0; at >= 0 && start < length;) {
@@ -211,7 +210,7 @@ static enum status write_content(struct unpacking *u, int fd, const char *path) 
         la_ssize_t got = archive_read_data(u->archive, u->block, BLOCK_BYTES);
         if (got == 0)
             return STATUS_OK;
-        /* A warning here is a wrong checksum or size: no content to trust either. */
+        /* a warning means a wrong checksum or size: the content is not usable either */
         if (got < 0)
             return library_error(u, path);
         enum status status = count_bytes(u, (size_t)got);
@@ -278,10 +277,11 @@ out:
 static enum status check_count(struct unpacking *u) {
     if (++u->entry_count <= u->limits->file_count)
         return STATUS_OK;
-    return error_set(u->err, STATUS_LIMIT, "%s holds more than %" PRIu64 " files, the limit", u->name, u->limits->file_count);
+    return error_set(u->err, STATUS_LIMIT, "%s holds more than %" PRIu64 " files, the limit", u->name,
+                     u->limits->file_count);
 }
 
-/* The headers at the archive's beginning. Other faults than their number are for unpack_all to tell. */
+/* Counts the headers at the archive's beginning. Other errors are left for unpack_all to report. */
 static enum status count_entries(struct unpacking *u) {
     uint64_t bytes = 0;
     while (bytes <= COUNT_BYTES) {
@@ -303,7 +303,7 @@ static enum status unpack_all(struct unpacking *u) {
         int result = archive_read_next_header2(u->archive, u->entry);
         if (result == ARCHIVE_EOF)
             break;
-        /* Warnings are about attributes and names; names that matter are checked next. */
+        /* warnings concern attributes and names; names are checked below */
         if (result != ARCHIVE_OK && result != ARCHIVE_WARN)
             return library_error(u, NULL);
         enum status status = check_count(u);
@@ -317,7 +317,7 @@ static enum status unpack_all(struct unpacking *u) {
     return finish_gzip(u);
 }
 
-/* Reads the archive from its beginning: `work` on each entry, or on all. */
+/* Reads the archive from its beginning and calls `work` with it open. */
 static enum status read_archive(struct unpacking *u, const char *path, enum status (*work)(struct unpacking *u)) {
     u->archive = archive_read_new();
     u->entry = archive_entry_new();
@@ -358,8 +358,8 @@ static enum status count_and_unpack(struct unpacking *u, const char *path, const
 enum status archive_unpack(const char *path, const char *name, const char *dir,
                            const struct archive_limits *limits, struct error *err) {
     struct unpacking u = {.name = name, .limits = limits, .err = err, .dir_fd = -1, .block = mem_alloc(BLOCK_BYTES)};
-    /* libarchive turns names into the locale's characters and loses those it cannot; the "C"
-     * locale of a daemon has none but ASCII. For this thread, for this call. */
+    /* libarchive converts names to the locale's character set and drops what it cannot convert; the daemon's "C"
+     * locale is ASCII only. Set for this thread and this call. */
     locale_t utf8 = newlocale(LC_CTYPE_MASK, "C.UTF-8", (locale_t)0), previous = (locale_t)0;
     if (utf8)
         previous = uselocale(utf8);

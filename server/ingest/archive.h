@@ -10,18 +10,16 @@
 struct archive_limits {
     uint64_t file_count;  /* entries, folders included */
     uint64_t total_bytes; /* unpacked */
-    double ratio;         /* unpacked / packed, looked at beyond ARCHIVE_RATIO_FREE_BYTES */
+    double ratio;         /* unpacked / packed, checked beyond ARCHIVE_RATIO_FREE_BYTES */
 };
 
-/* Small archives may well be mostly zeros; only a large result is worth calling a bomb. */
+/* Below this size the compression ratio is not checked: small archives may be mostly zeros. */
 #define ARCHIVE_RATIO_FREE_BYTES ((uint64_t)256 << 20)
 
-/* Unpacks `path` (zip; tar as such, gzip or zstd) into the new folder `dir`; `name` is the
- * archive's name in messages. Nothing is written outside `dir`, only regular files and folders
- * come out, with our own modes and times; litter (path_is_litter) is left out. On failure
- * nothing of `dir` is left.
- * STATUS_INPUT: no archive of these kinds, damaged, encrypted, unsafe or duplicate names, links
- * or devices; STATUS_LIMIT: a limit; STATUS_NO_SPACE: the disk is full. */
+/* Unpacks `path` (zip, or tar: plain, gzip or zstd) into the new folder `dir`; `name` is the archive's name in
+ * messages. Writes nothing outside `dir`, only regular files and folders, with our modes and times; skips files of
+ * operating systems (path_is_litter). On failure `dir` is removed. STATUS_INPUT: not such an archive, damaged,
+ * encrypted, unsafe or duplicate names, links or devices; STATUS_LIMIT: a limit; STATUS_NO_SPACE: the disk is full. */
 enum status archive_unpack(const char *path, const char *name, const char *dir,
                            const struct archive_limits *limits, struct error *err);
 

@@ -22,7 +22,7 @@ struct bundle_limits bundle_default_limits(void) {
     return (struct bundle_limits){
         .file_count = 100000,
         .total_bytes = (uint64_t)256 << 30,
-        .ratio = 200.0, /* deflate ends at 1032; a room's pictures stay below 20 */
+        .ratio = 200.0, /* deflate's maximum is 1032; photographs of rooms stay below 20 */
         .photograph_pixels = (uint64_t)1 << 28,
         .triangles = (uint64_t)1 << 26,
     };
@@ -36,7 +36,7 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
 
 /* --- the folder -------------------------------------------------------------------------- */
 
-/* Names in a folder, sorted, litter and hidden files left out; the caller's (file_free_names). */
+/* Names in a folder, sorted, without hidden and operating systems' files; the caller's (file_free_names). */
 static enum status list_folder(const char *dir, char ***names, size_t *count, struct error *err) {
     enum status status = file_list(dir, names, count, err);
     size_t kept = 0;
@@ -51,7 +51,7 @@ static enum status list_folder(const char *dir, char ***names, size_t *count, st
     return status;
 }
 
-/* The bundle's own folder: `dir`, or the single folder in it; the caller's. */
+/* The bundle's root: `dir`, or the single folder in it; the caller's. */
 static enum status find_root(const char *dir, char **root, struct error *err) {
     char **names;
     size_t count;
@@ -108,8 +108,7 @@ static void tell_no_cameras(const char *name, struct findings *f) {
     findings_error(f, name, &own);
 }
 
-/* Where transforms.json is not there and poses of another kind are, those take its place: *name
- * becomes their name. */
+/* Without a transforms.json, reads poses of another format and sets *name to their file. */
 static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
                                 struct error *err) {
     *t = (struct transforms){0};
@@ -129,23 +128,23 @@ static enum status load_cameras(const char *root, char **name, struct transforms
 
 /* --- mesh -------------------------------------------------------------------------------- */
 
-static enum status look_for_faces(const char *root, const char *name, bool *has, struct error *err) {
+static enum status file_has_faces(const char *root, const char *name, bool *has, struct error *err) {
     char *path = file_join(root, name);
     enum status status = mesh_file_has_faces(path, name, has, err);
     mem_free(path);
     return status;
 }
 
-/* What the files at the top are, as far as a mesh is looked for. */
+/* Mesh files at the top level. */
 struct candidates {
     char **name; /* [count] sorted */
     size_t count;
     size_t point_cloud_count;
     const char *first, *second; /* meshes */
-    const char *unknown;        /* a mesh of a format that is not read */
+    const char *unknown;        /* a mesh in a format that we do not read */
 };
 
-/* Of PLY files, or of those of the other formats that are read. */
+/* Among PLY files, or among files of the other formats. */
 static enum status find_candidates(struct candidates *c, const char *root, bool ply, struct error *err) {
     static const char *const unknown[] = {"stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
     for (size_t i = 0; i < c->count; i++) {
@@ -156,7 +155,7 @@ static enum status find_candidates(struct candidates *c, const char *root, bool 
                 c->unknown = c->name[i];
         if (!mesh_file_is_known(c->name[i]) || (strcasecmp(extension, "ply") == 0) != ply)
             continue;
-        enum status status = look_for_faces(root, c->name[i], &has_faces, err);
+        enum status status = file_has_faces(root, c->name[i], &has_faces, err);
         if (status != STATUS_OK)
             return status;
         if (!has_faces)
@@ -169,8 +168,8 @@ static enum status find_candidates(struct candidates *c, const char *root, bool 
     return STATUS_OK;
 }
 
-/* The only PLY with faces at the top; where there is none, the only mesh of another format. NULL with
- * a problem when there is none or more. */
+/* The only PLY with faces at the top level, else the only mesh of another format. NULL with a problem when there is
+ * none or more than one. */
 static enum status search_mesh(const char *root, char **found, struct findings *f, struct error *err) {
     struct candidates c = {0};
     struct error two;
@@ -201,7 +200,7 @@ static enum status search_mesh(const char *root, char **found, struct findings *
     return STATUS_OK;
 }
 
-/* The mesh's name, the caller's; NULL with a problem. */
+/* Name of the mesh file, the caller's; NULL with a problem. */
 static enum status find_mesh(const char *root, const char *transforms_name, const struct transforms *t,
                              char **found, struct findings *f, struct error *err) {
     *found = NULL;
@@ -212,7 +211,7 @@ static enum status find_mesh(const char *root, const char *transforms_name, cons
             findings_problem(f, transforms_name, "\"mesh\" names %s, which is not in the bundle", name);
             return STATUS_OK;
         }
-        enum status status = is_mesh || !is_there ? STATUS_OK : look_for_faces(root, name, &is_mesh, err);
+        enum status status = is_mesh || !is_there ? STATUS_OK : file_has_faces(root, name, &is_mesh, err);
         if (status != STATUS_OK)
             return status;
         if (is_mesh) {
@@ -247,7 +246,7 @@ static enum status load_mesh(const char *root, const char *name, uint64_t triang
     return STATUS_OK;
 }
 
-/* Poses in other units or axes than the mesh's make a run fail late and puzzlingly: say it. */
+/* Poses in other units or axes than the mesh's would only fail late and confusingly. */
 static void check_frames_meet_mesh(const struct scene *scene, struct findings *f) {
     vec3 lower, upper;
     mesh_bounds(&scene->mesh, &lower, &upper);
@@ -266,7 +265,7 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
 
 /* --- all of it --------------------------------------------------------------------------- */
 
-static void take_warnings(struct findings *f, struct scene *scene) {
+static void move_warnings(struct findings *f, struct scene *scene) {
     if (f->warning_count > FINDINGS_MAX) {
         char *last = f->warning[FINDINGS_MAX - 1];
         f->warning[FINDINGS_MAX - 1] =
@@ -292,7 +291,7 @@ static enum status sum_up(const struct findings *f, struct error *err) {
         cJSON_AddItemToArray(f->problems, more);
         mem_free(text);
     }
-    assert(file && reason); /* add_problem has given it both */
+    assert(file && reason); /* set by add_problem */
     if (f->problem_count == 1)
         return error_set(err, STATUS_INPUT, "%s: %s", file, reason);
     return error_set(err, STATUS_INPUT, "%zu problems; the first: %s: %s", f->problem_count, file, reason);
@@ -327,7 +326,7 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
         status = sum_up(&f, err);
     if (status == STATUS_OK) {
         check_frames_meet_mesh(scene, &f);
-        take_warnings(&f, scene);
+        move_warnings(&f, scene);
     }
 out:
     if (status != STATUS_OK)

@@ -1,4 +1,4 @@
-/* colmap.c -- see colmap.h. Counts that a file promises are held against the bytes that are there. */
+/* colmap.c -- see colmap.h. Counts in a file are checked against its size. */
 #include "server/ingest/colmap.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ struct images {
     struct findings *findings;
 };
 
-/* world-to-camera, q = w x y z and t, as camera-to-world rows. */
+/* World-to-camera, q = w x y z and t, to a camera-to-world matrix. */
 static void invert(const double q[4], const double t[3], double m[3][4]) {
     double n = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     double w = q[0] * n, x = q[1] * n, y = q[2] * n, z = q[3] * n;
@@ -36,7 +36,7 @@ static void invert(const double q[4], const double t[3], double m[3][4]) {
     }
 }
 
-/* A frame at fault is a problem, and left out; STATUS_INPUT where there are too many. */
+/* A faulty frame is left out with a problem; STATUS_INPUT for too many. */
 static enum status add_image(const struct colmap_cursor *r, struct images *in, const double pose[7],
                              uint64_t camera, const char *name) {
     struct transforms *t = in->t;
@@ -89,7 +89,7 @@ static enum status read_images_binary(struct colmap_cursor *r, struct images *in
         r->at += (size_t)(end - name) + 1;
         if (!colmap_take_whole(r, 8, &points) || points > (r->size - r->at) / 24)
             return colmap_cut_off(r);
-        r->at += (size_t)points * 24; /* x, y, the number of a point */
+        r->at += (size_t)points * 24; /* x, y, point id */
         enum status status = add_image(r, in, pose, camera, name);
         if (status != STATUS_OK)
             return status;
@@ -97,7 +97,7 @@ static enum status read_images_binary(struct colmap_cursor *r, struct images *in
     return STATUS_OK;
 }
 
-/* Two lines an image, the second of which may be empty. */
+/* Two lines per image, the second of which may be empty. */
 static enum status read_images_text(struct colmap_cursor *r, struct images *in) {
     while (colmap_next_record(r)) {
         double pose[7];

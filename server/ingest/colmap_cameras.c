@@ -12,8 +12,8 @@
 
 #define MAX_PARAMETERS 12
 
-/* What a model's parameters are, in order: f both focal lengths, F G each, x y the principal point,
- * 1 to 6 radial, p q tangential. */
+/* Parameters of each model, in order: f both focal lengths, F G one each, x y the principal point, 1 to 6 radial, p q
+ * tangential. */
 static const struct model {
     const char *name;
     int id;

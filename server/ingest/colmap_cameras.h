@@ -1,8 +1,7 @@
-/* colmap_cameras.h -- the lenses of a COLMAP reconstruction, from cameras.bin or cameras.txt.
+/* colmap_cameras.h -- lenses of a COLMAP reconstruction, from cameras.bin or cameras.txt.
  *
  * Camera models: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE,
- * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE. Counts that a file promises are held against the bytes that
- * are there. */
+ * SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE. Counts in a file are checked against its size. */
 #ifndef UNBAKE_INGEST_COLMAP_CAMERAS_H
 #define UNBAKE_INGEST_COLMAP_CAMERAS_H
 
@@ -20,7 +19,7 @@ struct colmap_cameras *colmap_cameras_parse(const void *data, size_t size, const
                                             struct error *err);
 void colmap_cameras_free(struct colmap_cameras *c); /* NULL is fine */
 
-/* The lens of the camera of that number; borrowed; NULL where there is none. */
+/* Lens of the camera with that id; borrowed; NULL when there is none. */
 const struct lens *colmap_cameras_find(const struct colmap_cameras *c, uint32_t id);
 
 #endif

@@ -1,5 +1,4 @@
-/* faces.h -- polygons on their way into a mesh: cut into triangles, held against a limit. What the
- * readers of meshes share. */
+/* faces.h -- collects the polygons of a mesh file: triangulation and limits. Shared by the mesh readers. */
 #ifndef UNBAKE_INGEST_FACES_H
 #define UNBAKE_INGEST_FACES_H
 
@@ -28,14 +27,13 @@ struct faces {
     uint32_t triangle[POLYGON_MAX_CORNERS][3];
 };
 
-/* At most triangle_limit triangles will be taken; an empty *mesh gets them. The caller's (mem_free). */
+/* Appends to *mesh, which is empty, at most triangle_limit triangles. The caller's (mem_free). */
 struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_limit, bool has_object_id);
 
-/* Makes room for so many triangles in all. */
+/* Reserves memory for `triangle_count` triangles in total. */
 void faces_reserve(struct faces *f, size_t triangle_count);
 
-/* Adds the polygon as the face number mesh->face_count of the input, which is counted up. STATUS_LIMIT
- * where that makes too many triangles. */
+/* Adds the polygon as face number mesh->face_count, which it increments. STATUS_LIMIT for too many triangles. */
 enum status faces_add(struct faces *f, int64_t object_id, struct error *err);
 
 #endif

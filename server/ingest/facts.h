@@ -1,4 +1,4 @@
-/* facts.h -- what a scene holds, as the service tells it. */
+/* facts.h -- a summary of a scene, as the API shows it. */
 #ifndef UNBAKE_INGEST_FACTS_H
 #define UNBAKE_INGEST_FACTS_H
 

@@ -14,7 +14,7 @@ void findings_release(struct findings *f) {
     *f = (struct findings){0};
 }
 
-/* Readers begin their messages with the file's name, which has a member of its own here. */
+/* Removes the file name that readers put first; here it has its own member. */
 static const char *without_name(const char *reason, const char *file) {
     size_t length = strlen(file);
     if (length == 0 || strncmp(reason, file, length) != 0)

@@ -1,5 +1,5 @@
-/* findings.h -- what reading a bundle brings to light: problems, which reject it, and warnings,
- * which do not. All that can be found at once are, so a user mends a bundle in one go. */
+/* findings.h -- problems, which reject a bundle, and warnings, which do not. As many as possible are collected in one
+ * go. */
 #ifndef UNBAKE_INGEST_FINDINGS_H
 #define UNBAKE_INGEST_FINDINGS_H
 
@@ -7,7 +7,7 @@
 
 #include "common/json.h"
 
-#define FINDINGS_MAX 50 /* of each kind that are kept; the rest are counted */
+#define FINDINGS_MAX 50 /* kept of each kind; further ones are only counted */
 
 struct findings {
     cJSON *problems; /* array of {"file", "reason"} or with "hint" too; borrowed */
@@ -21,8 +21,8 @@ void findings_problem(struct findings *f, const char *file, const char *format, 
     __attribute__((format(printf, 3, 4)));
 /* The message of an error, with its hint. */
 void findings_error(struct findings *f, const char *file, const struct error *err);
-/* A reader's status and error: faults of the bundle become a problem, and STATUS_OK; others become *err, which may be
- * NULL. */
+/* Turns a reader's status and error into a problem and STATUS_OK if the bundle is at fault; copies other errors to
+ * *err, which may be NULL. */
 enum status findings_settle(struct findings *f, const char *file, enum status status, const struct error *own,
                             struct error *err);
 void findings_warning(struct findings *f, const char *format, ...)

@@ -1,5 +1,5 @@
-/* gltf.c -- see gltf.h. The nodes of a file form trees (glTF 2.0 specification, 3.5.2): each is visited
- * once at most, so neither a circle nor a node with many parents costs anything. */
+/* gltf.c -- see gltf.h. The nodes of a file form trees (glTF 2.0 specification, 3.5.2): each is visited at most once,
+ * so cycles and nodes with several parents are harmless. */
 #include "server/ingest/gltf.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ struct gltf_reader {
     struct mesh *mesh;
     struct faces *faces;
     size_t vertex_capacity;
-    bool has_bare;       /* a primitive without normals */
+    bool lacks_normals;       /* a primitive without normals */
     bool *visited;       /* [nodes.count]; owned */
     int64_t object_count;
     struct error *err;
@@ -44,17 +44,17 @@ static enum status open_attribute(struct gltf_reader *r, const cJSON *primitive,
     return status;
 }
 
-/* One of them on its way into the mesh. Only vertices that its triangles use are taken: files let many
- * primitives share one array of vertices. */
+/* A primitive being added to the mesh. Only vertices used by its triangles are added, since primitives may share
+ * large arrays. */
 struct primitive {
     const char *where; /* for messages */
     int mode;
     const struct affine *t;
-    double turn[3][3]; /* of normals */
+    double normal_matrix[3][3]; /* inverse transpose of the transform, for normals */
     bool mirrored, has_normal, is_indexed;
     struct gltf_span position, normal, indices;
     size_t table_size;
-    uint32_t (*table)[2]; /* [table_size] number in the file, and in the mesh or NONE; owned */
+    uint32_t (*table)[2]; /* [table_size] index in the file, and in the mesh or NONE; owned */
 };
 
 static vec3 apply(const double m[3], const double m1[3], const double m2[3], const float v[3]) {
@@ -77,14 +77,14 @@ static uint32_t append_vertex(struct gltf_reader *r, const struct primitive *p, 
     vec3 move = {(float)t->m[0][3], (float)t->m[1][3], (float)t->m[2][3]};
     if (p->has_normal) {
         gltf_read_vec3(&p->normal, number, value);
-        normal = apply(p->turn[0], p->turn[1], p->turn[2], value);
+        normal = apply(p->normal_matrix[0], p->normal_matrix[1], p->normal_matrix[2], value);
     }
     mesh->position[mesh->vertex_count] = vec3_add(at, move);
     mesh->normal[mesh->vertex_count] = p->mirrored ? vec3_neg(normal) : normal;
     return (uint32_t)mesh->vertex_count++;
 }
 
-/* The mesh's number for vertex `number` of the file, which is added when it is new. */
+/* The mesh vertex for vertex `number` of the file, added on first use. */
 static uint32_t vertex_of(struct gltf_reader *r, const struct primitive *p, size_t number) {
     size_t slot = rng_mix64(number) & (p->table_size - 1);
     for (; p->table[slot][1] != NONE; slot = (slot + 1) & (p->table_size - 1))
@@ -95,7 +95,7 @@ static uint32_t vertex_of(struct gltf_reader *r, const struct primitive *p, size
     return p->table[slot][1];
 }
 
-/* The corners of triangle number i among the primitive's indices (3.7.2.1). */
+/* The corners of triangle i among the primitive's indices (3.7.2.1). */
 static void corners_of(int mode, size_t i, size_t corner[3]) {
     corner[0] = mode == TRIANGLES ? 3 * i : mode == STRIP ? i : i + 1;
     corner[1] = mode == TRIANGLES ? 3 * i + 1 : mode == STRIP ? i + 1 + i % 2 : i + 2;
@@ -161,20 +161,21 @@ static enum status add_primitive(struct gltf_reader *r, const cJSON *object, con
         return status;
     size_t count = p.is_indexed ? p.indices.count : p.position.count;
     size_t triangles = mode == TRIANGLES ? count / 3 : count < 3 ? 0 : count - 2;
-    affine_cofactors(t, p.turn);
-    p.mirrored = t->m[0][0] * p.turn[0][0] + t->m[0][1] * p.turn[0][1] + t->m[0][2] * p.turn[0][2] < 0.0;
+    affine_cofactors(t, p.normal_matrix);
+    const double *first = p.normal_matrix[0];
+    p.mirrored = t->m[0][0] * first[0] + t->m[0][1] * first[1] + t->m[0][2] * first[2] < 0.0;
     size_t most = count < p.position.count ? count : p.position.count;
     for (p.table_size = 16; p.table_size < 2 * most;)
         p.table_size *= 2;
     p.table = mem_array(p.table_size, sizeof *p.table);
     memset(p.table, 0xff, p.table_size * sizeof *p.table);
-    r->has_bare = r->has_bare || !p.has_normal;
+    r->lacks_normals = r->lacks_normals || !p.has_normal;
     status = add_triangles(r, &p, triangles);
     mem_free(p.table);
     return status;
 }
 
-/* Each change of material within the node begins an object. */
+/* Each change of material within the node starts an object. */
 static enum status add_mesh(struct gltf_reader *r, size_t mesh, const struct affine *t) {
     const cJSON *primitives = cJSON_GetObjectItemCaseSensitive(r->file.meshes.item[mesh], "primitives"), *item;
     double material = NAN; /* -1: none */
@@ -249,7 +250,7 @@ static enum status visit_list(struct gltf_reader *r, const cJSON *list, const ch
     return STATUS_OK;
 }
 
-/* All nodes that are no other's child. */
+/* All nodes that are no child. */
 static enum status visit_roots(struct gltf_reader *r) {
     cJSON *roots = cJSON_CreateArray();
     bool *is_child = mem_calloc(r->file.nodes.count + 1, sizeof *is_child);
@@ -285,7 +286,7 @@ static enum status read_scene(struct gltf_reader *r) {
 
 static void finish(struct gltf_reader *r) {
     struct mesh *mesh = r->mesh;
-    if (r->has_bare) {
+    if (r->lacks_normals) {
         mem_free(mesh->normal);
         mesh->normal = NULL;
     }

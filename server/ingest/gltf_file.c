@@ -10,7 +10,7 @@
 #include "common/mem.h"
 #include "server/ingest/path.h"
 
-#define MAX_JSON_BYTES ((size_t)64 << 20) /* the tree of it takes some ten times as much */
+#define MAX_JSON_BYTES ((size_t)64 << 20) /* the parsed tree takes about ten times as much */
 #define MAX_BYTES ((double)((uint64_t)1 << 40))
 #define MAGIC 0x46546c67
 #define CHUNK_JSON 0x4e4f534a
@@ -55,7 +55,7 @@ static enum status split_glb(const uint8_t *data, size_t size, const char *name,
 
 /* --- buffers (3.6.1) ------------------------------------------------------------------------ */
 
-/* Undoes %41 in place; what is no escape stays. */
+/* Decodes percent escapes in place; invalid ones stay. */
 static void unescape(char *text) {
     char *to = text;
     for (const char *c = text; *c; c++) {
@@ -130,7 +130,7 @@ static enum status make_list(const struct gltf_file *g, struct gltf_list *list, 
     return STATUS_OK;
 }
 
-/* Extensions that leave shapes and places alone. */
+/* Extensions that do not affect geometry. */
 static bool is_harmless(const char *extension) {
     static const char *const start[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_",
                                         "KHR_animation_", "KHR_xmp", "EXT_lights_"};
@@ -207,7 +207,7 @@ void gltf_file_release(struct gltf_file *g) {
 
 /* --- numbers -------------------------------------------------------------------------------- */
 
-/* A whole number from `least` to `most`; `fallback` where it is absent. */
+/* An integer from `least` to `most`; `fallback` when it is absent. */
 static enum status whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where,
                          size_t index, double fallback, double least, double most, uint64_t *value,
                          struct error *err) {
@@ -247,7 +247,7 @@ static size_t component_bytes(uint64_t component) {
     }
 }
 
-/* The bytes of the accessor's view from its byteOffset on (3.6.2.4). */
+/* The bytes of the accessor's buffer view from its byteOffset on (3.6.2.4). */
 static enum status view_of(const struct gltf_file *g, size_t index, size_t element, struct gltf_span *span,
                            size_t *size, struct error *err) {
     const cJSON *accessor = g->accessors.item[index];

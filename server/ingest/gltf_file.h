@@ -1,8 +1,8 @@
-/* gltf_file.h -- a glTF 2.0 file (.glb or .gltf) and the numbers in it: its JSON, its buffers, and
- * accessors, each of which is proved to lie within its buffer before it is read.
+/* gltf_file.h -- a glTF 2.0 file (.glb or .gltf): its JSON, buffers and accessors. Accessors are checked to lie
+ * within their buffers before they are read.
  *
- * Buffers are the GLB's own, files below the .gltf's folder, and data: URIs in base64. Sparse
- * accessors and compressed ones are refused with a sentence. */
+ * Buffers are the GLB's own, files below the .gltf's folder, or base64 data: URIs. Sparse and compressed accessors
+ * are refused. */
 #ifndef UNBAKE_INGEST_GLTF_FILE_H
 #define UNBAKE_INGEST_GLTF_FILE_H
 
@@ -13,7 +13,7 @@
 #include "common/json.h"
 #include "server/ingest/mapping.h"
 
-/* The elements of one array at the top of the JSON, by number. */
+/* The elements of a top-level array of the JSON, by index. */
 struct gltf_list {
     const char *key;
     size_t count;
@@ -21,26 +21,26 @@ struct gltf_list {
 };
 
 struct gltf_buffer {
-    const uint8_t *data; /* NULL: could not be had, with `problem` */
+    const uint8_t *data; /* NULL: not available, for the reason `problem` */
     size_t size;
     struct mapping file;
     uint8_t *decoded;    /* owned */
 };
 
 struct gltf_file {
-    const char *name, *folder; /* the file's name in messages; where buffers are, NULL: nowhere */
+    const char *name, *folder; /* file name for messages; folder of external buffers, NULL: none */
     cJSON *json;
     struct gltf_list buffers, views, accessors, meshes, nodes, scenes;
     struct gltf_buffer *buffer; /* [buffers.count] */
 };
 
-/* `data` must stay until gltf_file_release, which is called also after a failure. */
+/* `data` must stay until gltf_file_release, which must also be called after a failure. */
 enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name,
                            const char *folder, struct error *err);
 void gltf_file_release(struct gltf_file *g);
 
-/* The member as an index into a list: STATUS_INPUT where it is none. `where` names the object in
- * messages ("nodes[3]"). *found is false, and there is no error, where the member is absent. */
+/* The member as an index into a list: STATUS_INPUT when it is not one. `where` names the object in messages
+ * ("nodes[3]"). *found is false, without an error, when the member is absent. */
 enum status gltf_index(const struct gltf_file *g, const cJSON *object, const char *key, const char *where,
                        const struct gltf_list *list, bool *found, size_t *index, struct error *err);
 
@@ -52,11 +52,11 @@ struct gltf_span {
     enum gltf_component component;
 };
 
-/* The elements of accessor number `index`, whose type must be `type` ("VEC3", "SCALAR"). */
+/* The elements of accessor `index`, which must be of `type` ("VEC3", "SCALAR"). */
 enum status gltf_span(const struct gltf_file *g, size_t index, const char *type, struct gltf_span *span,
                       struct error *err);
 
-/* Three floats; an unsigned number of any width. */
+/* Read three floats; read an unsigned integer of any width. */
 void gltf_read_vec3(const struct gltf_span *span, size_t at, float value[3]);
 uint32_t gltf_read_index(const struct gltf_span *span, size_t at);
 

@@ -22,7 +22,7 @@ void affine_cofactors(const struct affine *a, double c[3][3]) {
     }
 }
 
-/* `count` finite numbers, or the fallback's where the member is absent. */
+/* `count` finite numbers, or the fallback's when the member is absent. */
 static enum status read_numbers(const struct gltf_file *g, size_t node, const char *key, int count,
                                 const double *fallback, double *value, struct error *err) {
     const cJSON *array = cJSON_GetObjectItemCaseSensitive(g->nodes.item[node], key), *item;
@@ -68,6 +68,6 @@ enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct a
             trs.m[i][j] = j < 3 ? turn[i][j] * scale[j] : move[i];
         }
     }
-    *t = affine_multiply(&columns, &trs); /* a node has one or the other */
+    *t = affine_multiply(&columns, &trs); /* a node has either a matrix or TRS */
     return STATUS_OK;
 }

@@ -4,17 +4,17 @@
 
 #include "server/ingest/gltf_file.h"
 
-/* world = m p, rows first; the last row is 0 0 0 1. */
+/* world = m p, row-major; the last row is 0 0 0 1. */
 struct affine {
     double m[3][4];
 };
 
 /* a after b. */
 struct affine affine_multiply(const struct affine *a, const struct affine *b);
-/* The inverse's transpose times the determinant: what turns normals, also where there is no inverse. */
+/* Cofactor matrix (inverse transpose times determinant): transforms normals, and exists for singular matrices. */
 void affine_cofactors(const struct affine *a, double c[3][3]);
 
-/* From the node's axes to its parent's, by its matrix or its translation, rotation and scale. */
+/* From the node's frame to its parent's, by its matrix or its translation, rotation and scale. */
 enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t,
                                 struct error *err);
 

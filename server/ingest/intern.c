@@ -1,4 +1,4 @@
-/* intern.c -- see intern.h. Open addressing; the hash is that of Fowler, Noll and Vo, mixed. */
+/* intern.c -- see intern.h. Open addressing with a mixed FNV hash. */
 #include "server/ingest/intern.h"
 
 #include <string.h>

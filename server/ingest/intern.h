@@ -1,4 +1,4 @@
-/* intern.h -- numbers for byte strings: equal strings get the same one, from 0 in order of first use. */
+/* intern.h -- string interning: equal byte strings get the same number, from 0 in order of first use. */
 #ifndef UNBAKE_INGEST_INTERN_H
 #define UNBAKE_INGEST_INTERN_H
 
@@ -12,12 +12,12 @@ struct intern {
     size_t table_size;
     uint32_t *table;    /* entries by hash; owned */
     size_t used, room;
-    char *bytes;        /* of all strings, one after the other; owned */
+    char *bytes;        /* of all strings, concatenated; owned */
 };
 
 void intern_init(struct intern *in);
 void intern_release(struct intern *in);
-/* The number of the string, which is copied where it is new. */
+/* Number of the string, which is copied when it is new. */
 uint32_t intern_number(struct intern *in, const void *bytes, size_t length);
 
 #endif

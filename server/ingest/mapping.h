@@ -1,5 +1,5 @@
-/* mapping.h -- a file of an unpacked bundle in memory. Nobody else writes to it, so it does not
- * shrink under its reader. */
+/* mapping.h -- memory-mapped files of an unpacked bundle. No other process writes to them, so they cannot shrink
+ * while mapped. */
 #ifndef UNBAKE_INGEST_MAPPING_H
 #define UNBAKE_INGEST_MAPPING_H
 
@@ -12,8 +12,7 @@ struct mapping {
     size_t size;
 };
 
-/* `name` is the file's and `kind` what it should be ("a PLY file"), both for messages: an empty file
- * is STATUS_INPUT. */
+/* `name` and `kind` ("a PLY file") are for messages; an empty file is STATUS_INPUT. */
 enum status mapping_open(struct mapping *m, const char *path, const char *name, const char *kind,
                          struct error *err);
 void mapping_close(struct mapping *m);

@@ -1,4 +1,4 @@
-/* mesh_file.h -- a mesh in any of the formats that are read, told apart by the file's extension. */
+/* mesh_file.h -- reads a mesh in any supported format, chosen by the file's extension. */
 #ifndef UNBAKE_INGEST_MESH_FILE_H
 #define UNBAKE_INGEST_MESH_FILE_H
 
@@ -11,15 +11,15 @@
 
 #define MESH_FILE_FORMATS "PLY, OBJ or glTF" /* for messages */
 
-/* Whether there is a reader for files of this name. */
+/* Whether the name has an extension of a supported format. */
 bool mesh_file_is_known(const char *name);
 
-/* As ply_read; a name of no known extension is taken for a PLY. */
+/* As ply_read; unknown extensions are read as PLY. */
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err);
 
-/* *has: false for what is only a point cloud. What cannot be told before all of it is read, or is damaged, counts as a
- * mesh, so that reading it says what is wrong. Fails only where the disk does. */
+/* *has: false for a point cloud. Files that would have to be read whole to know, or are damaged, count as meshes, so
+ * that reading them reports the error. Fails only on I/O errors. */
 enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err);
 
 #endif

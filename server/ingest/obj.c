@@ -1,5 +1,5 @@
-/* obj.c -- see obj.h. One pass over the file in place; what it makes grows with the lines that are
- * there, so no promise of the file has to be believed. */
+/* obj.c -- see obj.h. One pass over the file in place; memory grows with the lines read, so no count in the file is
+ * trusted. */
 #include "server/ingest/obj.h"
 
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 
 #define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
 #define NONE UINT32_MAX
-/* Below it there are fewer points than NONE, as each takes a line of 8 bytes, "v 0 0 0". */
+/* Below this size there are fewer points than NONE, since each takes a line of 8 bytes, "v 0 0 0". */
 #define MAX_BYTES ((size_t)8 * (NONE - 1))
 
 struct points {
@@ -25,16 +25,16 @@ struct obj_reader {
     const char *name;
     const uint8_t *data;
     size_t size, at, line_end; /* `at` is within the line */
-    size_t line, next_line;    /* numbers, from 1; a line that is continued is several */
+    size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
     struct points position, normal;
     struct faces *faces;
-    bool has_bare;             /* a corner without normal */
+    bool lacks_normals;             /* a corner without normal */
     struct intern pairs;       /* position and normal of each vertex of the mesh */
     uint32_t (*pair)[2];       /* [pairs.count]; owned */
     size_t pair_capacity;
     struct intern labels, objects;
-    uint32_t label[LABEL_COUNT]; /* what holds now */
-    uint32_t object;             /* their combination, once a face has it: */
+    uint32_t label[LABEL_COUNT]; /* current labels */
+    uint32_t object;             /* number of their combination, once a face has used it: */
     bool object_known;
     struct error *err;
 };
@@ -45,7 +45,7 @@ static enum status line_error(const struct obj_reader *r, const char *what) {
     return error_set(r->err, STATUS_INPUT, "%s, line %zu: %s", r->name, r->line, what);
 }
 
-/* Whether the line that ends at `end` goes on in the next. */
+/* Whether the line that ends at `end` continues in the next. */
 static bool is_continued(const struct obj_reader *r, size_t end) {
     if (end > r->at && r->data[end - 1] == '\r')
         end--;
@@ -71,8 +71,7 @@ static bool is_blank(uint8_t c) {
     return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\\';
 }
 
-/* The next word of the line, "" at its end. One that is too long for a number or a corner is made
- * into something that is neither. */
+/* The next word of the line, "" at its end. A word too long for a number or corner is replaced by an invalid one. */
 static size_t next_token(struct obj_reader *r, char token[MAX_TOKEN]) {
     size_t length = 0;
     while (r->at < r->line_end && is_blank(r->data[r->at]))
@@ -126,7 +125,7 @@ static uint32_t object_of_face(struct obj_reader *r) {
 
 /* --- faces ---------------------------------------------------------------------------------- */
 
-/* An index of the file, 1 for the first of `count` or -1 for the last, as one from 0. */
+/* Converts an index of the file (1 for the first of `count`, -1 for the last) to one from 0. */
 static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count,
                            const char *kind, uint32_t *index) {
     long value = strtol(text, end, 10);
@@ -139,7 +138,7 @@ static enum status resolve(const struct obj_reader *r, const char *text, char **
     return STATUS_OK;
 }
 
-/* "v", "v/vt", "v//vn", "v/vt/vn": position and, or NONE, normal. */
+/* "v", "v/vt", "v//vn", "v/vt/vn": position and normal (or NONE). */
 static enum status read_corner(const struct obj_reader *r, char *token, uint32_t pair[2]) {
     char *end;
     pair[1] = NONE;
@@ -180,7 +179,7 @@ static enum status read_face(struct obj_reader *r) {
         enum status status = read_corner(r, token, pair);
         if (status != STATUS_OK)
             return status;
-        r->has_bare = r->has_bare || pair[1] == NONE;
+        r->lacks_normals = r->lacks_normals || pair[1] == NONE;
         f->corner[f->corner_count] = vertex_of(r, pair);
         f->position[f->corner_count++] = r->position.at[pair[0]];
     }
@@ -210,7 +209,7 @@ static enum status read_line(struct obj_reader *r) {
 static void finish(struct obj_reader *r, struct mesh *mesh) {
     mesh->vertex_count = r->pairs.count;
     mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
-    if (!r->has_bare)
+    if (!r->lacks_normals)
         mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         mesh->position[v] = r->position.at[r->pair[v][0]];

@@ -1,11 +1,10 @@
-/* obj.h -- reading meshes from Wavefront OBJ files (appendix B1 of the Advanced Visualizer manual; the
- * polygonal part, which is what programs write).
+/* obj.h -- reads meshes from Wavefront OBJ files (appendix B1 of the Advanced Visualizer manual; polygons only, as
+ * programs write them).
  *
- * Taken are v (x y z), vn, f with indices from 1 or backwards from the last, and the names of o, g and
- * usemtl; texture coordinates, materials, lines, points and curves are skipped. A vertex of the mesh
- * is a pair of position and normal; normals count where every corner of a face has one. Each
- * combination of object, group and material that faces have becomes an object_id, numbered from 0 in
- * order of first use; where all have the same, there is none. */
+ * Reads v (x y z), vn, f with indices from 1 or negative from the last, and the names of o, g and usemtl; skips
+ * texture coordinates, materials, lines, points and curves. A mesh vertex is a pair of position and normal; normals
+ * are used if every corner of every face has one. Each combination of object, group and material with faces is an
+ * object_id, numbered from 0 in order of first use; no object_id if there is only one. */
 #ifndef UNBAKE_INGEST_OBJ_H
 #define UNBAKE_INGEST_OBJ_H
 

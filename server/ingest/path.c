@@ -27,7 +27,7 @@ static void printable(const char *name, char out[SHOWN_MAX + UTF8_SHOWN_SIZE + 3
 
 #define ABSOLUTE "is an absolute path: names must be relative to the bundle"
 
-/* What is wrong with the name as a whole; NULL when nothing is. */
+/* What is wrong with the name as a whole, or NULL. */
 static const char *whole_fault(const char *name, size_t length) {
     if (length > PATH_MAX_BYTES)
         return "is too long a name";
@@ -40,8 +40,8 @@ static const char *whole_fault(const char *name, size_t length) {
     return name[0] == '/' ? ABSOLUTE : NULL;
 }
 
-/* Whether the plain form clean[length] of `name` begins with a drive of Windows, "C:/". A colon elsewhere is a
- * character like others: "a:b", "12:30/x.jpg". */
+/* Whether clean[length], normalised from `name`, begins with a Windows drive, "C:/". A colon elsewhere is an ordinary
+ * character: "a:b", "12:30/x.jpg". */
 static bool has_drive(const char *clean, size_t length, const char *name) {
     return length > 1 && isalpha((unsigned char)clean[0]) && clean[1] == ':' &&
            (length > 2 ? clean[2] == '/' : name[strlen(name) - 1] == '/');
@@ -68,7 +68,7 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
         part += n + (part[n] == '/');
     }
     if (!fault && has_drive(out, used, name))
-        fault = ABSOLUTE; /* also behind "./" */
+        fault = ABSOLUTE; /* also after "./" */
     if (fault) {
         char shown[SHOWN_MAX + UTF8_SHOWN_SIZE + 3];
         printable(name, shown);

@@ -1,4 +1,4 @@
-/* path.h -- names of files inside a bundle, as archives and transforms.json give them. */
+/* path.h -- names of files inside a bundle, as in archives and transforms.json. */
 #ifndef UNBAKE_INGEST_PATH_H
 #define UNBAKE_INGEST_PATH_H
 
@@ -9,17 +9,16 @@
 #define PATH_MAX_BYTES 1024
 #define PATH_MAX_DEPTH 32
 
-/* Brings a name to its plain form, "a/b/c" without "." or empty parts; the caller's (mem_free),
- * NULL on error. It may be "" (the bundle's own folder). Refused with STATUS_INPUT: absolute
- * names ("C:/x" too, but not "a:b"), "..", backslashes, what is no name by utf8_is_name, and
- * names too long or too deep. The message begins with the name, made fit to print. */
+/* Normalises a name to "a/b/c" without "." or empty components; the caller's (mem_free), NULL on error. It may be ""
+ * (the bundle's root). STATUS_INPUT for absolute names ("C:/x" too, but not "a:b"), "..", backslashes, names that
+ * fail utf8_is_name, and names too long or too deep. The message begins with the name, made printable. */
 enum status path_clean(const char *name, char **clean, struct error *err);
 
-/* Whether the name is litter that operating systems leave in archives: __MACOSX, ._name,
- * .DS_Store, Thumbs.db. `clean` as path_clean gives it. */
+/* Whether the name is a file that operating systems leave in archives: __MACOSX, ._name, .DS_Store, Thumbs.db.
+ * `clean` is from path_clean. */
 bool path_is_litter(const char *clean);
 
-/* The part behind the last '/' and, of that, the part behind the last '.', "" if none. */
+/* The part after the last '/'; and of that, the part after the last '.', "" if none. */
 const char *path_base(const char *path);
 const char *path_extension(const char *path);
 

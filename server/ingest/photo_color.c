@@ -6,7 +6,7 @@
 #include "common/buf.h"
 #include "common/mem.h"
 
-/* The share of pixels outside of Rec. 709 that is worth saying. */
+/* Share of pixels outside of Rec. 709 above which there is a warning. */
 #define OUTSIDE_SHARE 1e-3
 
 #define FACT_MAX ((size_t)1000)
@@ -18,8 +18,8 @@ void photo_color_note(struct photo_color *color, const char *file, const struct 
     memcpy(color->warning, info->color_warning, sizeof color->warning);
 }
 
-/* Whether an earlier photograph has the same to say. */
-static bool is_said(const struct photo_color *color, size_t i) {
+/* Whether an earlier photograph has the same warning. */
+static bool is_repeated(const struct photo_color *color, size_t i) {
     for (size_t k = 0; k < i; k++)
         if (strcmp(color[k].warning, color[i].warning) == 0)
             return true;
@@ -28,7 +28,7 @@ static bool is_said(const struct photo_color *color, size_t i) {
 
 static void warn_of_profiles(const struct photo_color *color, size_t count, struct findings *f) {
     for (size_t i = 0; i < count; i++) {
-        if (color[i].warning[0] == '\0' || is_said(color, i))
+        if (color[i].warning[0] == '\0' || is_repeated(color, i))
             continue;
         size_t same = 0;
         for (size_t k = i + 1; k < count; k++)

@@ -1,5 +1,4 @@
-/* photo_color.h -- what is said of the colours of photographs: which were converted, and whose file could not be
- * understood. */
+/* photo_color.h -- reports the colour spaces of photographs: conversions, and profiles that could not be used. */
 #ifndef UNBAKE_INGEST_PHOTO_COLOR_H
 #define UNBAKE_INGEST_PHOTO_COLOR_H
 
@@ -7,7 +6,7 @@
 #include "server/ingest/findings.h"
 #include "server/scene/scene.h"
 
-/* Of one photograph, out of what its reader told. */
+/* Of one photograph, from its reader. */
 struct photo_color {
     const char *file; /* borrowed */
     char warning[sizeof ((struct image_info *)NULL)->color_warning];
@@ -16,10 +15,10 @@ struct photo_color {
 
 void photo_color_note(struct photo_color *color, const char *file, const struct image *image, const struct image_info *info);
 
-/* Warnings: profiles that are damaged or not understood, by what is wrong with them; colours outside of Rec. 709. */
+/* Warns of damaged or unsupported profiles, grouped by reason, and of colours outside of Rec. 709. */
 void photo_color_warn(const struct photo_color *color, size_t count, struct findings *f);
 
-/* "Display P3, converted to Rec. 709 (6 of 6)"; NULL where nothing was. The caller's. */
+/* "Display P3, converted to Rec. 709 (6 of 6)"; NULL when nothing was converted. The caller's. */
 char *photo_color_fact(const struct scene *scene);
 
 #endif

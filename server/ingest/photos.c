@@ -15,7 +15,7 @@
 
 #define HALF_LARGEST 65504.0f
 
-/* What one frame's loading found; only its own body writes it. */
+/* Result of loading one frame; written by that frame's work item only. */
 struct outcome {
     enum status status;
     struct error err;
@@ -33,14 +33,14 @@ struct loading {
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
-    uint16_t *half_of_srgb; /* [65536] linear half of a code value in 65535ths */
+    uint16_t *half_of_srgb; /* [65536] linear half value of a 16-bit sRGB code value */
     float clip;
 };
 
 /* --- finding files ----------------------------------------------------------------------- */
 
-/* The file of a frame: as named or, as instant-ngp takes names without one, with an extension
- * added. NULL when there is none. */
+/* Path of a frame's picture: as named or, for names without extension (instant-ngp), with one added. NULL when there
+ * is none. */
 static char *find_picture(const char *dir, const char *name) {
     static const char *const extensions[] = {"png", "jpg", "jpeg", "exr", "PNG", "JPG", "JPEG", "EXR"};
     if (file_is_in(dir, name))
@@ -65,8 +65,8 @@ static int by_file(const void *a, const void *b) {
     return order ? order : (x->number > y->number) - (x->number < y->number);
 }
 
-/* One picture with two poses: one of them is wrong. Compared after the files were found, so that
- * "a" and "a.png" are the same. */
+/* Reports pictures with two poses, one of which must be wrong. Compares resolved paths, so "a" and "a.png" are the
+ * same. */
 static void find_duplicates(const struct loading *l, const char *name, struct findings *f) {
     size_t count = l->transforms->frame_count;
     struct named *sorted = mem_array(count, sizeof *sorted);
@@ -102,8 +102,8 @@ static void convert_srgb(const struct loading *l, const struct image *image,
         }
 }
 
-/* Values beyond what a half holds become lower bounds, as clipped ones are; negative ones, left
- * by reconstruction filters or of colours outside of Rec. 709, become 0. */
+/* Values above the range of half become lower bounds, as clipped ones; negative ones (from filters or colours outside
+ * of Rec. 709) become 0. */
 static void convert_linear(const struct image *image, struct photograph *photo,
                            struct outcome *outcome) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
@@ -121,8 +121,8 @@ static void convert_linear(const struct image *image, struct photograph *photo,
         photo->clip = HALF_LARGEST;
 }
 
-/* Transparent pixels of a PNG show nothing. An EXR's alpha only says whether a renderer's ray
- * met a surface: the light behind it is real. */
+/* Transparent pixels of a PNG have no content. An EXR's alpha only marks whether a ray hit surface; the light behind
+ * it is real. */
 static void mask_by_alpha(const struct image *image, struct photograph *photo) {
     size_t count = (size_t)image->width * image->height;
     int alpha = image_channel(image, "A");
@@ -133,7 +133,7 @@ static void mask_by_alpha(const struct image *image, struct photograph *photo) {
         photo->mask[i] = image->pixel[i * image->channel_count + (size_t)alpha] < 0.5f ? 0 : 255;
 }
 
-/* A mask's black pixels are not used, all others are (nerfstudio's rule). */
+/* Black mask pixels are excluded (nerfstudio's convention). */
 static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo,
                              struct error *err) {
     struct image image;
@@ -200,8 +200,9 @@ static enum status check_size(const struct loading *l, const struct transforms_f
     return status;
 }
 
-/* Where the file clips, and what was done to its colours; takes image->clipped. */
-static void keep_clip(const struct loading *l, struct image *image, const struct image_info *info, struct photograph *photo) {
+/* Takes over image->clipped and the clip value and names the colour space. */
+static void set_clip(const struct loading *l, struct image *image, const struct image_info *info,
+                     struct photograph *photo) {
     photo->is_hdr = info->encoding == IMAGE_LINEAR;
     photo->clip = photo->is_hdr ? INFINITY : info->encoding == IMAGE_CONVERTED ? info->clip : l->clip;
     photo->clipped = image->clipped;
@@ -226,11 +227,11 @@ static enum status load_photograph(const struct loading *l, size_t index) {
     photo->name = mem_strdup(frame->file);
     photo->is_test = frame->is_test;
     photo->gain = rgb_gray(1.0f);
-    keep_clip(l, &image, &info, photo);
+    set_clip(l, &image, &info, photo);
     photo_color_note(&l->color[index], frame->file, &image, &info);
     outcome->orientation = info.orientation;
     set_exposure(frame, &info, photo, outcome);
-    /* Colour comes first where there is any (image_read). */
+    /* image_read puts R, G, B first */
     if (image_channel(&image, "B") != 2) {
         status = error_set(&outcome->err, STATUS_INPUT, "the picture has no red, green and blue");
     } else {
@@ -259,8 +260,7 @@ static void load_body(void *user, size_t index, int thread) {
 
 /* --- all of them ------------------------------------------------------------------------- */
 
-/* Messages of the picture readers begin with the path they were given; the user knows the part
- * below the bundle's folder. */
+/* Removes the bundle's folder from the path that readers put first in their messages. */
 static void make_relative(struct error *err, const char *dir) {
     char *prefix = file_join(dir, ""), *at;
     size_t length = strlen(prefix);
@@ -326,8 +326,8 @@ static enum status collect(struct loading *l, const char *name, struct findings 
     return status;
 }
 
-/* Keeps what was loaded, in order. */
-static void keep_loaded(struct loading *l, struct scene *scene) {
+/* Moves the loaded photographs to the scene, in order. */
+static void move_photographs(struct loading *l, struct scene *scene) {
     size_t kept = 0;
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         if (l->path[i] && l->outcome[i].status == STATUS_OK)
@@ -361,7 +361,7 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
         .outcome = mem_calloc(t->frame_count, sizeof *l.outcome),
         .half_of_srgb = make_srgb_table(),
     };
-    /* Through the table, so that a pixel of just this code value is not rounded below it. */
+    /* through the table, so that a pixel of this code value is not below it after rounding */
     l.clip = image_float_from_half(l.half_of_srgb[(size_t)(IMAGE_CLIP_SHARE * 65535.0f + 0.5f)]);
     for (size_t i = 0; i < t->frame_count; i++)
         l.path[i] = find_picture(dir, t->frame[i].file);
@@ -369,7 +369,7 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     find_duplicates(&l, name, f);
     parallel_for(pool, t->frame_count, load_body, &l);
     enum status status = collect(&l, name, f, err);
-    keep_loaded(&l, scene);
+    move_photographs(&l, scene);
     check_count(scene, name, t->named_count, f);
     warn_about_pixels(&l, f);
     photo_color_warn(l.color, t->frame_count, f);

@@ -1,8 +1,8 @@
-/* photos.h -- loading the photographs that transforms.json names.
+/* photos.h -- loads the photographs named by transforms.json.
  *
- * EXR and Radiance are linear light; PNG and JPEG are taken as sRGB and made linear, or as what their
- * ICC profile or their numbers say (image.h), which is told. The stored
- * pixels are what the poses are for: an EXIF orientation is not applied. */
+ * EXR and Radiance are linear; PNG and JPEG are sRGB unless an ICC profile or colour chunks say otherwise (image.h),
+ * and are made linear; conversions are reported. EXIF orientation is not applied, since poses refer to the stored
+ * pixels. */
 #ifndef UNBAKE_INGEST_PHOTOS_H
 #define UNBAKE_INGEST_PHOTOS_H
 
@@ -14,12 +14,11 @@
 #include "server/ingest/transforms.h"
 #include "server/scene/scene.h"
 
-#define PHOTOS_MIN_COUNT 3 /* with fewer nothing can be told from one view's light */
+#define PHOTOS_MIN_COUNT 3 /* fewer views do not constrain materials and light */
 
-/* Loads every frame's picture and mask from the folder `dir` into scene->photograph, in the
- * frames' order, the absent ones left out with a warning. Faults of the files become problems
- * in *f; another status than STATUS_OK is a failure of the machine. `name` is that of the
- * transforms file. */
+/* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
+ * pictures are left out with a warning. Faults of the files become problems in *f; other statuses than STATUS_OK are
+ * failures of the machine. `name` is that of the transforms file. */
 enum status photos_load(const char *dir, const char *name, const struct transforms *t,
                         uint64_t pixel_limit, struct parallel *pool, struct scene *scene,
                         struct findings *f, struct error *err);

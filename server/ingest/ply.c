@@ -1,8 +1,7 @@
-/* ply.c -- see ply.h; ply_header.c reads the head, this file the body.
+/* ply.c -- see ply.h; ply_header.c reads the header, this file the body.
  *
- * The file is read in place. Memory is asked for only after the header's promises were held
- * against the bytes that are there, so a lying header costs nothing. An ASCII record is one
- * line; further values on it are ignored, missing ones are an error. */
+ * The file is read in place. Counts in the header are checked against the file's size before memory is allocated. An
+ * ASCII record is one line; extra values are ignored, missing ones are an error. */
 #include "server/ingest/ply.h"
 
 #include <inttypes.h>
@@ -21,7 +20,7 @@
 struct ply_reader {
     struct ply_cursor cursor;
     struct ply_header header;
-    const char *element; /* what is being read, for messages */
+    const char *element; /* element being read, for messages */
     uint64_t record;
     struct error *err;
 };
@@ -127,7 +126,7 @@ static enum status skip_property(struct ply_reader *r, const struct ply_property
     return STATUS_OK;
 }
 
-/* Goes to the first value of the next record: in ASCII, the next line that is not blank. */
+/* Moves to the first value of the next record; in ASCII, skips blank lines. */
 static enum status begin_record(struct ply_reader *r, uint64_t record) {
     r->record = record;
     if (r->header.format != PLY_ASCII)
@@ -151,7 +150,7 @@ static void end_record(struct ply_reader *r) {
         r->cursor.at = r->cursor.line_end < r->cursor.size ? r->cursor.line_end + 1 : r->cursor.size;
 }
 
-/* Whether the rest of the file can hold the element's records at all. */
+/* Checks that the rest of the file is large enough for the element's records. */
 static enum status begin_element(struct ply_reader *r, const struct ply_element *e) {
     r->element = e->name;
     uint64_t least = 0;
@@ -161,7 +160,7 @@ static enum status begin_element(struct ply_reader *r, const struct ply_element 
         enum ply_type first = p->is_list ? p->count_type : p->type;
         least += r->header.format == PLY_ASCII ? 2 : ply_type_bytes(first);
     }
-    uint64_t rest = r->cursor.size - r->cursor.at + 1; /* the last line may lack its end */
+    uint64_t rest = r->cursor.size - r->cursor.at + 1; /* the last line may lack its newline */
     if (least > 0 && e->count > rest / least)
         return error_set(r->err, STATUS_INPUT,
                          "%s: the header promises %" PRIu64 " of element %s, but the %" PRIu64
@@ -194,7 +193,7 @@ static enum status skip_element(struct ply_reader *r, const struct ply_element *
 
 static enum status read_vertices(struct ply_reader *r, const struct ply_element *e, struct mesh *mesh) {
     static const char *const wanted[6] = {"x", "y", "z", "nx", "ny", "nz"};
-    signed char target[PLY_MAX_PROPERTIES]; /* which of the six a property is; -1: none */
+    signed char target[PLY_MAX_PROPERTIES]; /* index of the wanted property among six; -1: none */
     memset(target, -1, sizeof target);
     bool has_normal = true;
     for (int i = 0; i < 6; i++) {
@@ -304,7 +303,7 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
         if (status != STATUS_OK)
             return status;
         end_record(r);
-        /* In text nothing holds the value to its type; out of range would be undefined. */
+        /* ASCII values are unbounded, and the conversion would be undefined out of range */
         if (!(fabs(object_id) < 0x1p53) || object_id != floor(object_id))
             return value_error(r, "has an object_id that is no integer");
         status = faces_add(faces, (int64_t)object_id, r->err);
@@ -316,7 +315,7 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
 
 static enum status read_body(struct ply_reader *r, struct faces *faces) {
     bool has_vertices = false, has_faces = false;
-    const struct ply_element *later = NULL; /* faces that come before the vertices */
+    const struct ply_element *later = NULL; /* faces that precede the vertices */
     size_t later_at = 0, later_line = 0;
     for (size_t i = 0; i < r->header.element_count; i++) {
         const struct ply_element *e = &r->header.element[i];

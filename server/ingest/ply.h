@@ -1,9 +1,8 @@
-/* ply.h -- reading triangle meshes from PLY files.
+/* ply.h -- reads triangle meshes from PLY files.
  *
- * ASCII and binary of either byte order; properties in any order and of any type; elements,
- * properties and lists that nothing here needs are skipped. Taken are of `vertex` x y z and,
- * where all three are there, nx ny nz; of `face` the list vertex_indices (or vertex_index) and
- * an integer property object_id. Damage is STATUS_INPUT with the line or byte of the file. */
+ * ASCII and binary of either byte order; properties in any order and of any type; unused elements, properties and
+ * lists are skipped. Uses of `vertex` x y z and nx ny nz if all three exist; of `face` the list vertex_indices (or
+ * vertex_index) and an integer property object_id. Damage is STATUS_INPUT with the line or byte offset. */
 #ifndef UNBAKE_INGEST_PLY_H
 #define UNBAKE_INGEST_PLY_H
 
@@ -14,9 +13,8 @@
 #include "server/ingest/faces.h"
 #include "server/scene/mesh.h"
 
-/* Reads `path` into *mesh, the caller's (mesh_release); vertex numbers are in range, nothing
- * else about the geometry is checked (mesh_check does). More than triangle_limit triangles are
- * STATUS_LIMIT. `name` is the file's name in messages; report may be NULL. */
+/* Reads `path` into *mesh, the caller's (mesh_release). Vertex indices are in range; geometry is not checked (see
+ * mesh_check). STATUS_LIMIT for more than triangle_limit triangles. `name` is for messages; report may be NULL. */
 enum status ply_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                      struct faces_report *report, struct error *err);
 
@@ -24,7 +22,7 @@ enum status ply_read(const char *path, const char *name, size_t triangle_limit, 
 enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
                       struct mesh *mesh, struct faces_report *report, struct error *err);
 
-/* How many faces the header promises; 0 for a point cloud. */
+/* Number of faces in the header; 0 for a point cloud. */
 enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);
 
 #endif

@@ -117,8 +117,8 @@ static enum status parse_format(struct parser *p, char *const *word, size_t word
     return header_error(p, "unknown format", words >= 2 ? word[1] : "");
 }
 
-/* Splits at blanks into NUL-terminated words within `copy`: the first 6, though all are counted.
- * False when one of these is too long for a name. */
+/* Splits at blanks into NUL-terminated words in `copy`, storing the first 6 and counting all. False when a stored
+ * word is too long for a name. */
 static bool split_words(char *copy, char **word, size_t *words) {
     *words = 0;
     char *rest = copy;

@@ -1,4 +1,4 @@
-/* ply_header.h -- the head of a PLY file: what its body holds, in which types and which order. */
+/* ply_header.h -- the header of a PLY file: elements, their properties and the encoding of the body. */
 #ifndef UNBAKE_INGEST_PLY_HEADER_H
 #define UNBAKE_INGEST_PLY_HEADER_H
 
@@ -12,7 +12,7 @@
 #define PLY_MAX_PROPERTIES 256 /* of all elements together */
 #define PLY_MAX_NAME 64
 
-/* The integer types come first: `type >= PLY_FLOAT32` asks for the others. */
+/* Integer types first, so that `type >= PLY_FLOAT32` means floating point. */
 enum ply_type {
     PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64
 };
@@ -40,20 +40,20 @@ struct ply_header {
     struct ply_property property[PLY_MAX_PROPERTIES];
 };
 
-/* A place in a file that lies in memory. */
+/* A position in a file in memory. */
 struct ply_cursor {
     const char *name;      /* of the file, for messages */
     const uint8_t *data;
     size_t size, at;       /* bytes */
     uint8_t newline;       /* '\n', or '\r' in files with old Macintosh lines */
-    size_t line, line_end; /* number of the present line, where it ends */
+    size_t line, line_end; /* number of the current line, and its end */
 };
 
-/* Reads the header at the start of c's data (name, data and size are set) and leaves c at the
- * first byte of the body. Messages name the line. */
+/* Parses the header at the start of c's data (set name, data and size) and moves c to the first byte of the body.
+ * Messages name the line. */
 enum status ply_header_parse(struct ply_cursor *c, struct ply_header *header, struct error *err);
 
-/* Moves to the next line and gives it without its end; false at the end of the file. */
+/* Moves to the next line and returns it without its newline; false at the end of the file. */
 bool ply_next_line(struct ply_cursor *c, const uint8_t **line, size_t *length);
 
 /* The element of that name; NULL when there is none. */

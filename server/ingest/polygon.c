@@ -1,5 +1,5 @@
-/* polygon.c -- see polygon.h. Ear clipping after Meisters, "Polygons have ears" (1975), in the
- * plane of the polygon's Newell normal, dropped to the two axes in which it is largest. */
+/* polygon.c -- see polygon.h. Ear clipping (Meisters, "Polygons have ears", 1975) in the plane of the polygon's
+ * Newell normal, projected along its largest component. */
 #include "server/ingest/polygon.h"
 
 #include <assert.h>
@@ -14,7 +14,7 @@ static double area2(struct polygon_point a, struct polygon_point b, struct polyg
     return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-/* Projects so that the polygon turns counter-clockwise. */
+/* Projects to 2D so that the polygon is counter-clockwise. */
 static void flatten(const vec3 *corner, size_t count, struct polygon_point *flat) {
     double n[3] = {0.0, 0.0, 0.0};
     for (size_t i = 0; i < count; i++) {
@@ -41,9 +41,8 @@ static bool is_convex(const struct polygon_point *flat, size_t count) {
     return true;
 }
 
-/* Whether the corner at `at` of the ring of `left` corners can be cut off: it turns left and no
- * other corner lies in its triangle. Corners at the same place as one of the three do not count
- * (a bridge to a hole visits its ends twice). */
+/* Whether the corner at `at` of a ring of `left` corners is an ear: convex, with no other corner in its triangle.
+ * Corners that coincide with one of the three are ignored (a bridge to a hole visits its ends twice). */
 static bool is_ear(const struct polygon_point *flat, const uint32_t *ring, size_t left, size_t at) {
     struct polygon_point a = flat[ring[(at + left - 1) % left]], b = flat[ring[at]],
                  c = flat[ring[(at + 1) % left]];
@@ -78,7 +77,7 @@ void polygon_triangulate(const vec3 *corner, size_t count, uint32_t (*triangle)[
         ring[i] = i;
     size_t made = 0;
     for (size_t left = count; left > 3; left--) {
-        /* When there is no ear (the polygon crosses itself) any corner is as good. */
+        /* without an ear (self-intersecting polygon) any corner will do */
         size_t at = 1;
         for (size_t i = 0; i < left; i++) {
             if (is_ear(flat, ring, left, (i + 1) % left)) {

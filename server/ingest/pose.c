@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#define SHEAR_LIMIT 0.02 /* largest entry of R^T R - 1 that passes for rounding or estimation error */
+#define SHEAR_LIMIT 0.02 /* largest entry of R^T R - 1 that counts as rounding or estimation error */
 
 static double determinant(double m[3][3]) {
     return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
@@ -36,7 +36,7 @@ static double shear(double m[3][3]) {
     return worst;
 }
 
-/* Makes m a rotation; NULL, or what forbids it. */
+/* Orthonormalises m; NULL, or the reason why it is no rotation. */
 static const char *make_rotation(double m[3][3], double *scale) {
     double det = determinant(m), largest = 0.0;
     for (int i = 0; i < 9; i++)
@@ -85,7 +85,7 @@ enum status pose_from_matrix(const double matrix[3][4], const char *what, enum p
         }
     }
     world_from_camera->translation = vec3_make((float)t[0], (float)t[1], (float)t[2]);
-    /* In double: rigid_inverse would lose the digits that a far origin needs. */
+    /* in double: rigid_inverse would lose precision for a far origin */
     double inverse[3];
     for (int j = 0; j < 3; j++) {
         double sign = axes == POSE_RIGHT_UP_BACK && j > 0 ? -1.0 : 1.0;

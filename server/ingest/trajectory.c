@@ -27,7 +27,7 @@ const char *trajectory_find(const char *root) {
 
 /* --- matrices ------------------------------------------------------------------------------- */
 
-/* A small file as text, the caller's. `name` is below the folder and what messages say. */
+/* Reads a small text file; the caller's. `name` is relative to the folder and used in messages. */
 static enum status read_text(const char *root, const char *name, char **text, struct error *err) {
     struct mapping file;
     char *path = file_join(root, name);
@@ -40,7 +40,7 @@ static enum status read_text(const char *root, const char *name, char **text, st
     return status;
 }
 
-/* 16 numbers of a text, which ends in a NUL; false where there are others. */
+/* Parses 16 numbers of a NUL-terminated text; false when it contains anything else. */
 static bool read_matrix(const char *text, double m[4][4]) {
     for (int i = 0; i < 16; i++) {
         char *end;
@@ -59,7 +59,7 @@ static bool is_finite(double m[4][4]) {
     return true;
 }
 
-/* Takes `file`. A pose at fault is a problem, one that was lost is counted. */
+/* Adds a frame; takes `file`. Faulty poses are problems, lost ones are counted. */
 static void add_frame(struct transforms *t, double m[4][4], const struct lens *lens, char *file,
                       const char *name, const char *place, struct findings *f, size_t *lost_count) {
     struct transforms_frame frame = {.number = t->named_count++, .file = file, .lens = *lens,
@@ -116,7 +116,7 @@ enum status trajectory_parse(const void *data, size_t size, const char *name, co
     return STATUS_OK;
 }
 
-/* The numbers w h fx fy cx cy of the member "camera". */
+/* Reads w h fx fy cx cy from the member "camera". */
 static enum status read_parameters(const char *root, struct lens *lens, struct error *err) {
     static const char *const key[6] = {"w", "h", "fx", "fy", "cx", "cy"};
     double value[6];
@@ -171,7 +171,7 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* The numbers N of the files N.txt in the folder, as ScanNet writes them, without zeros before; ascending, the caller's. */
+/* Numbers N of the files N.txt in the folder, without leading zeros as ScanNet writes them; ascending, the caller's. */
 static enum status list_poses(const char *root, long **number, size_t *count, struct error *err) {
     char *path = file_join(root, POSES), **names;
     size_t name_count;

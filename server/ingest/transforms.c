@@ -11,13 +11,13 @@
 #include "server/ingest/path.h"
 #include "server/ingest/pose.h"
 
-/* One reading: where values come from and where faults go. */
+/* State of reading a file. */
 struct context {
-    const cJSON *root, *frame; /* frame: NULL while the top is read */
+    const cJSON *root, *frame; /* frame: NULL while the top level is read */
     const char *name;          /* of the file */
     char place[256];           /* "frames[3] (images/003.png)" */
     struct findings *findings;
-    bool ok;                   /* no problem since it was set */
+    bool ok;                   /* no problem so far in this frame */
     size_t scaled_count;
     const cJSON *list[3];      /* train_filenames, val_filenames, test_filenames or NULL */
     size_t unlisted_count;
@@ -25,7 +25,7 @@ struct context {
 
 __attribute__((format(printf, 2, 3)))
 static void problem(struct context *c, const char *format, ...) {
-    char what[1024]; /* of a longer one this much is told */
+    char what[1024]; /* longer messages are truncated */
     va_list args;
     va_start(args, format);
     vsnprintf(what, sizeof what, format, args);
@@ -36,8 +36,8 @@ static void problem(struct context *c, const char *format, ...) {
 
 /* --- values ------------------------------------------------------------------------------ */
 
-/* The frame's value or the file's; fallback when neither says. Looked up in the frame first, so
- * that a fault at the top is reported once, by read_top. */
+/* The object that has the value: the frame or the file; NULL when neither does. Faults at the top level are reported
+ * once, by read_top. */
 static const cJSON *holder(const struct context *c, const char *key) {
     const cJSON *own = c->frame ? cJSON_GetObjectItemCaseSensitive(c->frame, key) : NULL;
     return own && !cJSON_IsNull(own) ? c->frame : c->root;
@@ -65,8 +65,7 @@ static const char *string(struct context *c, const cJSON *object, const char *ke
     return value;
 }
 
-/* A path in the bundle; NULL when absent or at fault. Backslashes, as tools on Windows write
- * them, separate folders. */
+/* A path in the bundle; NULL when absent or faulty. Backslashes (Windows tools) separate folders. */
 static char *path(struct context *c, const cJSON *object, const char *key) {
     const char *value = string(c, object, key);
     if (!value)
@@ -118,7 +117,7 @@ static enum camera_model read_model(struct context *c) {
     return CAMERA_OPENCV;
 }
 
-/* A value that must be positive where it is given. */
+/* A value that must be positive if present. */
 static double positive(struct context *c, const char *key) {
     double value = number(c, key, NAN);
     if (value <= 0.0) {
@@ -177,7 +176,7 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
         fx = 0.5 * width / tan(0.5 * lens->angle_x);
     if (isnan(fy) && !isnan(lens->angle_y))
         fy = 0.5 * height / tan(0.5 * lens->angle_y);
-    /* Square pixels unless the file says otherwise. */
+    /* square pixels by default */
     fx = isnan(fx) ? fy : fx;
     fy = isnan(fy) ? fx : fy;
     double cx = isnan(lens->cx) ? 0.5 * width : lens->cx;
@@ -265,8 +264,7 @@ static bool is_listed(const cJSON *list, const char *clean) {
     return false;
 }
 
-/* False when the frame is in none of the lists that the file has: it is left out, as nerfstudio
- * does. */
+/* False when the frame is in none of the file's split lists: it is left out, as in nerfstudio. */
 static bool read_split(struct context *c, struct transforms_frame *frame) {
     const char *split = string(c, c->frame, "split");
     frame->is_test = false;
@@ -328,7 +326,7 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
     return c->ok && listed;
 }
 
-/* What is wrong at the top is reported here, once, instead of once per frame. */
+/* Faults at the top level are reported here once, and not per frame. */
 static bool read_top(struct context *c, struct transforms *t) {
     static const char *const lists[3] = {"train_filenames", "val_filenames", "test_filenames"};
     struct transforms_frame scratch;

@@ -1,11 +1,10 @@
-/* transforms.h -- reading transforms.json, as nerfstudio and instant-ngp write it.
+/* transforms.h -- reads transforms.json of nerfstudio and instant-ngp.
  *
- * Taken from each frame, else from the top: fl_x fl_y cx cy w h, camera_angle_x / _y (radians),
- * k1 to k6, p1, p2, camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV,
- * FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye, exposure, exposure_time (s), iso, f_number. Per
- * frame: file_path, transform_matrix, mask_path, split (train, test, val). At the top: `mesh` or
- * ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val is test.
- * Everything else is ignored. k4 to k6 are OpenCV's: with a pinhole lens, the denominator. */
+ * Per frame, else at the top level: fl_x fl_y cx cy w h, camera_angle_x / _y (radians), k1 to k6, p1, p2,
+ * camera_model (PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE) or is_fisheye,
+ * exposure, exposure_time (s), iso, f_number. Per frame: file_path, transform_matrix, mask_path, split (train, test,
+ * val). At the top level: `mesh` or ply_file_path, and the lists train_filenames, val_filenames, test_filenames. val
+ * counts as test. Everything else is ignored. k4 to k6 are OpenCV's: with a pinhole lens, the denominator. */
 #ifndef UNBAKE_INGEST_TRANSFORMS_H
 #define UNBAKE_INGEST_TRANSFORMS_H
 
@@ -21,18 +20,18 @@
 
 struct lens {
     enum camera_model model;
-    /* NAN where the file does not say. */
+    /* NAN if absent. */
     double width, height, fl_x, fl_y, cx, cy, angle_x, angle_y;
     double k[6], p[2];
 };
 
-/* Where a frame's exposure comes from; a bundle that mixes sources has mixed units. */
+/* Source of a frame's exposure; a bundle that mixes sources has mixed units. */
 enum exposure_source {
     EXPOSURE_UNKNOWN,
     EXPOSURE_FACTOR, /* "exposure" */
     EXPOSURE_CAMERA, /* "exposure_time", "iso", "f_number" */
     EXPOSURE_EXIF,
-    EXPOSURE_HDR     /* a linear picture without any of these: 1 */
+    EXPOSURE_HDR     /* a linear picture without these: 1 */
 };
 
 struct transforms_frame {
@@ -42,29 +41,29 @@ struct transforms_frame {
     struct lens lens;
     struct rigid world_from_camera, camera_from_world;
     enum exposure_source exposure_source;
-    double exposure;        /* 0 where unknown */
+    double exposure;        /* 0 if unknown */
 };
 
 struct transforms {
     char *mesh;             /* clean path or NULL; owned */
-    char *point_cloud;      /* ply_file_path, which may be a mesh or only points, or NULL; owned */
+    char *point_cloud;      /* ply_file_path, a mesh or a point cloud, or NULL; owned */
     size_t named_count;     /* frames in the file */
-    size_t frame_count;     /* usable frames: those with problems are left out */
+    size_t frame_count;     /* usable frames: faulty ones are left out */
     struct transforms_frame *frame;
 };
 
-/* Reads from the parsed file; `name` is the file's name in problems. Every problem and warning
- * goes to *f. The result is the caller's (transforms_release) in any case. */
+/* Reads the parsed file; `name` is for messages. Problems and warnings go to *f. The result is the caller's
+ * (transforms_release) in any case. */
 void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f);
 void transforms_release(struct transforms *t);
 
-/* The camera of a frame whose picture has width x height pixels. STATUS_INPUT when the file
- * states another size or a lens that cannot be. */
+/* The camera of a frame whose picture is width x height pixels. STATUS_INPUT when the file states another size or an
+ * invalid lens. */
 enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
                               struct camera *camera, struct error *err);
 
-/* Pixel value per radiance from what a camera records: seconds x ISO / 100 / f-number^2, each
- * missing (0) factor but the time taken as 1. */
+/* Pixel value per radiance from the camera's settings: seconds x ISO / 100 / f-number^2. Missing (0) factors except
+ * the time count as 1. */
 double transforms_exposure(double time_sec, double iso, double f_number);
 
 #endif
