@@ -1,18 +1,18 @@
-/* emission_texture.h -- emission for formats whose textures have 8 bits: a picture of what emitters with a pattern
- * (materials.h) show, and the radiance of each segment that is white in it. Segments without a pattern are
- * black there: these formats hold their radiance as a number. */
+/* emission_texture.h -- emission for formats with 8-bit textures: a picture of emitters with a pattern (materials.h),
+ * scaled to [0, 1] per segment, and the scales. Segments without a pattern are black in it; their radiance is a
+ * number in those formats. */
 #ifndef UNBAKE_EXPORT_EMISSION_TEXTURE_H
 #define UNBAKE_EXPORT_EMISSION_TEXTURE_H
 
 #include "common/image.h"
 #include "server/export/input.h"
 
-/* [segment_count] the greatest radiance of a texel in any channel, 0 of segments without a pattern; the caller's. NULL
- * where no segment has one. */
-float *emission_texture_whites(const struct export_input *input);
+/* [segment_count] greatest radiance of a texel in any channel, 0 for segments without a pattern; the caller's. NULL
+ * when no segment has a pattern. */
+float *emission_texture_scales(const struct export_input *input);
 
-/* Linear R G B, radiance over whites[segment]. Texels read from source[], see picture_margin. */
-void emission_texture(const struct export_input *input, const uint32_t *source, const float *whites,
+/* Linear R G B: radiance over scales[segment]. source[] is that of picture_margin. */
+void emission_texture(const struct export_input *input, const uint32_t *source, const float *scales,
                       struct image *image);
 
 #endif

@@ -1,18 +1,17 @@
-/* formats.h -- the whole room as files for other programs, which hold one object for each segment. */
+/* formats.h -- exports of the whole room for other programs, with one object per segment. */
 #ifndef UNBAKE_EXPORT_FORMATS_H
 #define UNBAKE_EXPORT_FORMATS_H
 
 #include "server/export/input.h"
 #include "server/export/parts.h"
 
-/* These must be in the folder before the others are written; the latter (emission_texture.h) where an emitter has a
- * pattern. */
+/* These files must be in the folder first; the second (emission_texture.h) only if an emitter has a pattern. */
 #define FORMATS_BASE_COLOR "base_color.png"
 #define FORMATS_EMISSION "emission.png"
 
 struct format {
     const char *name, *content_type, *about;
-    /* Puts the file into `dir`. STATUS_LIMIT where its format or another program could not hold it. */
+    /* Writes the file into `dir`. STATUS_LIMIT when the format or its readers cannot hold it. */
     enum status (*write)(const char *dir, const struct export_input *input, const struct parts *parts,
                          struct error *err);
 };

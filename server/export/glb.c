@@ -31,13 +31,13 @@
 #define CAMERAS_MAX 100 /* of held-out views */
 #define NEAR_M 0.01
 
-/* Buffer views, in order; NORMAL is missing where the mesh has no normals, EMISSION where no emitter has a pattern. */
+/* Buffer views, in order. Without normals there is no NORMAL, without emission patterns no EMISSION. */
 enum view { VIEW_POSITION, VIEW_NORMAL, VIEW_UV, VIEW_INDEX, VIEW_BASE_COLOR, VIEW_EMISSION, VIEW_COUNT };
 
 struct glb {
     const struct export_input *in;
     const struct parts *parts;
-    const float *whites; /* [segment_count] of emission_texture.h; NULL: no emitter has a pattern */
+    const float *scales; /* [segment_count] see emission_texture.h; NULL: no emission pattern */
     struct { uint64_t offset, length; int number; } view[VIEW_COUNT];
     uint64_t length; /* of the bytes, padding included */
     cJSON *root, *accessors, *nodes, *children;
@@ -94,7 +94,7 @@ static void add_views(struct glb *g) {
         json_add_int(view, "byteOffset", (int64_t)g->view[v].offset);
         json_add_int(view, "byteLength", (int64_t)g->view[v].length);
         if (v < VIEW_INDEX)
-            json_add_int(view, "byteStride", v == VIEW_UV ? 8 : 12); /* several accessors share it */
+            json_add_int(view, "byteStride", v == VIEW_UV ? 8 : 12); /* shared by several accessors */
         if (v < VIEW_BASE_COLOR)
             json_add_int(view, "target", v == VIEW_INDEX ? TARGET_INDICES : TARGET_VERTICES);
     }
@@ -119,11 +119,11 @@ static void add_pictures(struct glb *g) {
     json_add_int(sampler, "wrapT", WRAP_CLAMP);
     cJSON *textures = cJSON_AddArrayToObject(g->root, "textures");
     add_picture(images, textures, "base_color", g->view[VIEW_BASE_COLOR].number);
-    if (g->whites)
+    if (g->scales)
         add_picture(images, textures, "emission", g->view[VIEW_EMISSION].number);
 }
 
-/* Returns its number. */
+/* Returns its index. */
 static int add_accessor(struct glb *g, enum view view, size_t first, size_t count, const char *type,
                         int64_t stride, const struct part *bounds) {
     cJSON *accessor = append(g->accessors);
@@ -165,20 +165,20 @@ static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
 
 static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
     const struct materials *m = g->in->materials;
-    bool varies = g->whites && g->whites[s] > 0.0f, shines = rgb_max(m->emission[s]) > 0.0f;
+    bool varies = g->scales && g->scales[s] > 0.0f, emits = rgb_max(m->emission[s]) > 0.0f;
     json_add_string(material, "name", name);
     cJSON *model = add_object(material, "pbrMetallicRoughness");
     json_add_int(add_object(model, "baseColorTexture"), "index", 0);
     json_add_number(model, "metallicFactor", 0.0);
     json_add_number(model, "roughnessFactor", (double)m->roughness[s]);
-    json_add_bool(material, "doubleSided", !shines);
+    json_add_bool(material, "doubleSided", !emits);
     cJSON *extensions = add_object(material, "extensions");
     double root = sqrt(0.08 * (double)m->specular[s]);
     json_add_number(add_object(extensions, "KHR_materials_specular"), "specularFactor",
                     root > 0.0 ? 1.0 : 0.0);
     json_add_number(add_object(extensions, "KHR_materials_ior"), "ior", (1.0 + root) / (1.0 - root));
-    if (shines)
-        add_emission(material, extensions, varies ? rgb_gray(g->whites[s]) : m->emission[s]);
+    if (emits)
+        add_emission(material, extensions, varies ? rgb_gray(g->scales[s]) : m->emission[s]);
     if (varies)
         json_add_int(add_object(material, "emissiveTexture"), "index", 1);
     json_add_number(add_object(material, "extras"), "specular", (double)m->specular[s]);
@@ -211,7 +211,7 @@ static void add_camera(struct glb *g, cJSON *cameras, const struct export_compar
     const float(*r)[3] = c->world_from_camera.rotation;
     vec3 at = c->world_from_camera.translation;
     cJSON *node = add_node(g, view->name);
-    /* Ours: x right, y down, z forward; theirs: x right, y up, z back. By columns. */
+    /* Our camera: x right, y down, z forward; glTF's: x right, y up, z back. Column-major. */
     add_numbers(node, "matrix", (float[]){r[0][0], r[1][0], r[2][0], 0.0f, -r[0][1], -r[1][1], -r[2][1],
                                           0.0f, -r[0][2], -r[1][2], -r[2][2], 0.0f, at.x, at.y, at.z,
                                           1.0f}, 16);
@@ -226,7 +226,7 @@ static void add_camera(struct glb *g, cJSON *cameras, const struct export_compar
     json_add_number(lens, "znear", NEAR_M);
 }
 
-/* An empty array is not valid glTF. */
+/* glTF does not allow empty arrays. */
 static void add_cameras(struct glb *g) {
     cJSON *cameras = cJSON_CreateArray();
     for (size_t i = 0; i < g->in->comparison_count && i < CAMERAS_MAX; i++)
@@ -240,12 +240,12 @@ static void add_cameras(struct glb *g) {
 
 /* The rotation, as a quaternion x y z w, that brings an axis to +y. */
 static const float *upright(vec3 up) {
-    static const float turn[6][4] = {
+    static const float rotation[6][4] = {
         {0, 0, 0.70710678f, 0.70710678f}, {0, 0, 0, 1}, {-0.70710678f, 0, 0, 0.70710678f},
         {0, 0, -0.70710678f, 0.70710678f}, {1, 0, 0, 0}, {0.70710678f, 0, 0, 0.70710678f},
     };
     int axis = up.x != 0.0f ? 0 : up.z != 0.0f ? 2 : 1;
-    return turn[axis + (up.x + up.y + up.z < 0.0f ? 3 : 0)];
+    return rotation[axis + (up.x + up.y + up.z < 0.0f ? 3 : 0)];
 }
 
 static void add_room(struct glb *g) {
@@ -318,7 +318,7 @@ static void put_bytes(const struct glb *g, struct sink *out, const char *base_co
                 sink_u32(out, seams->index[g->parts->order[i]][c] - (uint32_t)part->first_vertex);
     }
     put_picture(g, out, VIEW_BASE_COLOR, base_color);
-    if (g->whites)
+    if (g->scales)
         put_picture(g, out, VIEW_EMISSION, emission);
 }
 
@@ -335,14 +335,14 @@ enum status glb_write(const char *path, const struct export_input *input, const 
         return error_set_errno(err, errno, "cannot look at %s", base_color);
     if (input->materials->emission_pattern && stat(emission, &emission_info) != 0)
         return error_set_errno(err, errno, "cannot look at %s", emission);
-    float *whites = emission_texture_whites(input);
-    struct glb g = {.in = input, .parts = parts, .whites = whites};
+    float *scales = emission_texture_scales(input);
+    struct glb g = {.in = input, .parts = parts, .scales = scales};
     lay_out(&g, (uint64_t)info.st_size, (uint64_t)emission_info.st_size);
     char *json = describe(&g);
     uint64_t json_length = strlen(json);
     uint64_t length = HEAD_BYTES + 2 * CHUNK_HEAD_BYTES + json_length + g.length;
     enum status status = STATUS_OK;
-    if (length > UINT32_MAX) /* before gigabytes are written that cannot be kept */
+    if (length > UINT32_MAX) /* fail before gigabytes are written */
         status = error_set(err, STATUS_LIMIT, "%s would have %llu bytes, a GLB has 4 GiB at most", path,
                            (unsigned long long)length);
     if (status == STATUS_OK)
@@ -358,6 +358,6 @@ enum status glb_write(const char *path, const struct export_input *input, const 
         status = sink_close(&out, STATUS_OK, err);
     }
     mem_free(json);
-    mem_free(whites);
+    mem_free(scales);
     return status;
 }

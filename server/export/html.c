@@ -10,7 +10,7 @@
 #include "common/mem.h"
 
 #define PICTURE_LIMIT ((size_t)1 << 26) /* bytes of one embedded PNG */
-#define LIST_ITEMS 16                   /* of a list; of more the page says that they are in report.json */
+#define LIST_ITEMS 16                   /* of a list; beyond these the page refers to report.json */
 
 void html_text(struct buf *out, const char *text) {
     for (const char *c = text; *c; c++) {

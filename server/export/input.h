@@ -1,4 +1,4 @@
-/* input.h -- what the files of a job are made from: the room as it was recovered, and its report. */
+/* input.h -- the input of all exporters: the recovered room and its report. */
 #ifndef UNBAKE_EXPORT_INPUT_H
 #define UNBAKE_EXPORT_INPUT_H
 
@@ -18,10 +18,10 @@
 #define EXPORT_MARGIN 16         /* texels */
 #define EXPORT_PREVIEW_SIZE 1024 /* texels */
 
-/* A held-out view: both pictures in linear radiance, R G B, of one size. */
+/* A held-out view: photograph and re-render in linear radiance, R G B, of one size. */
 struct export_comparison {
     const char *name;               /* the photograph's, for labels */
-    const struct image *photograph; /* saturated or masked pixels as they are */
+    const struct image *photograph; /* saturated and masked pixels unchanged */
     const struct image *render;
     const struct camera *camera;    /* that took it */
 };
@@ -34,15 +34,15 @@ struct export_input {
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
     const struct materials *materials;
-    const float *confidence_count;     /* [height][width] observations; NULL while not known: */
-    const float *confidence_spread;    /* [height][width] their spread;  then no preview of it */
+    const float *confidence_count;     /* [height][width] number of observations; NULL until known: */
+    const float *confidence_spread;    /* [height][width] their spread; then there is no preview of it */
     const bool *is_emitter;            /* [segment_count] */
     const struct image *environment;   /* R G B; NULL: no distant light; */
-    const struct image *environment_confidence; /* count, spread; NULL as the former */
+    const struct image *environment_confidence; /* count, spread; NULL together with environment */
     size_t comparison_count;
     const struct export_comparison *comparison;
-    /* An object. report.json is this plus "segments" (one entry each) and "files". The page draws
-     * these members when they are there, and shows all others as tables:
+    /* An object. report.json is this plus "segments" (one entry each) and "files". The HTML page draws these members
+     * if they exist, and shows all others as tables:
      *   "series": {"loss": [[step, value], ...], ...}   one curve each
      *   "stages": [{"name": "refine", "seconds": 12.3}, ...]
      *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */

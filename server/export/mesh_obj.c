@@ -5,7 +5,7 @@
 #include "server/export/emission_texture.h"
 #include "server/export/sink.h"
 
-#define NS_MOST 1000.0 /* of a surface of roughness 0 */
+#define MAX_NS 1000.0 /* of a surface of roughness 0 */
 
 static void put_corner(struct sink *out, uint32_t vertex, uint32_t uv, bool has_normal) {
     if (has_normal)
@@ -53,16 +53,16 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
     enum status status = sink_open(&out, path, UINT32_MAX, err);
     if (status != STATUS_OK)
         return status;
-    float *whites = emission_texture_whites(input);
+    float *scales = emission_texture_scales(input);
     for (size_t p = 0; p < parts->count; p++) {
         uint32_t s = parts->part[p].segment;
         double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
         double smooth = 1.0 - roughness;
         sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
                     "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n", s, base_color, specular, specular,
-                    specular, NS_MOST * smooth * smooth, roughness);
-        bool varies = whites && whites[s] > 0.0f;
-        rgb e = varies ? rgb_gray(whites[s]) : m->emission[s];
+                    specular, MAX_NS * smooth * smooth, roughness);
+        bool varies = scales && scales[s] > 0.0f;
+        rgb e = varies ? rgb_gray(scales[s]) : m->emission[s];
         if (rgb_max(e) > 0.0f)
             sink_printf(&out, "Ke " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)e.r, (double)e.g,
                         (double)e.b);
@@ -70,6 +70,6 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
             sink_printf(&out, "map_Ke %s\n", emission);
         sink_printf(&out, "illum 2\n\n");
     }
-    mem_free(whites);
+    mem_free(scales);
     return sink_close(&out, STATUS_OK, err);
 }

@@ -1,6 +1,5 @@
-/* mitsuba.c -- see mitsuba.h. The layout of scene.serialized (version 4) is said in the documentation
- * of Mitsuba's plugin `serialized`: each mesh is a head and a zlib stream, and the places of all of
- * them follow at the end. */
+/* mitsuba.c -- see mitsuba.h. The layout of scene.serialized (version 4) is in the documentation of Mitsuba's plugin
+ * `serialized`: per mesh a header and a zlib stream, then a table of their offsets. */
 #include "server/export/mitsuba.h"
 
 #include <endian.h>
@@ -18,7 +17,7 @@
 
 /* --- scene.xml ------------------------------------------------------------------------------ */
 
-/* Ours: x right, y down, z forward; theirs: x left, y up, z forward. */
+/* Our camera: x right, y down, z forward; Mitsuba's: x left, y up, z forward. */
 static void put_sensor(struct sink *out, size_t number, const struct camera *c) {
     const float(*r)[3] = c->world_from_camera.rotation;
     const vec3 at = c->world_from_camera.translation;
@@ -99,15 +98,15 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
                 "    <string name=\"filename\" value=\"base_color.exr\"/>\n"
                 "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
                 "  </texture>\n");
-    float *whites = emission_texture_whites(in);
-    if (whites)
+    float *scales = emission_texture_scales(in);
+    if (scales)
         sink_printf(&out, "  <texture type=\"bitmap\" id=\"emission\">\n"
                     "    <string name=\"filename\" value=\"emission.exr\"/>\n"
                     "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
                     "  </texture>\n");
     for (size_t p = 0; p < parts->count; p++)
-        put_shape(&out, in, shapes, p, parts->part[p].segment, whites && whites[parts->part[p].segment] > 0.0f);
-    mem_free(whites);
+        put_shape(&out, in, shapes, p, parts->part[p].segment, scales && scales[parts->part[p].segment] > 0.0f);
+    mem_free(scales);
     if (in->environment)
         sink_printf(&out, "  <emitter type=\"envmap\"><string name=\"filename\" value=\"environment.exr\"/>"
                     "</emitter>\n");
@@ -122,10 +121,10 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
 #define HAS_NORMALS 0x0001
 #define HAS_TEXCOORDS 0x0002
 #define SINGLE_PRECISION 0x1000
-#define LEVEL 4 /* half the time of 6 for a few percent more */
+#define LEVEL 4 /* half the time of level 6 for a few percent more bytes */
 #define BLOCK (1 << 16)
 
-/* What is put in goes through zlib to the sink. */
+/* Compresses its input with zlib and writes it to the sink. */
 struct packer {
     z_stream zlib;
     struct sink *out;

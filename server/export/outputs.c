@@ -1,5 +1,5 @@
-/* outputs.c -- see outputs.h. Owns the order of the files and how each is put in place; the
- * pictures themselves are made in pictures.c, the page in report_html.c. */
+/* outputs.c -- see outputs.h. Order of the files, and atomic replacement of each; pictures are made in pictures.c,
+ * the page in report_html.c. */
 #include "server/export/outputs.h"
 
 #include <errno.h>
@@ -31,7 +31,7 @@ struct output_kind {
     enum picture_kind kind;
     const char *stem;
     enum image_exr_type type;
-    const char *title, *about; /* about: for report.json and the page */
+    const char *title, *about; /* `about` is for report.json and the page */
 };
 
 static const struct output_kind kinds[] = {
@@ -55,19 +55,19 @@ struct export {
     const struct export_input *input;
     export_announce *announce;
     void *user;
-    cJSON *files;    /* array: what was written; NULL for previews alone */
-    cJSON *left_out; /* array: what could not be, and why */
+    cJSON *files;    /* array of written files; NULL when only previews are written */
+    cJSON *left_out; /* array of {"name", "reason"} of files that were not written */
 };
 
 /* --- putting files in place --------------------------------------------------------------- */
 
-static enum status pass_on(const struct export *e, const char *type, const char *name,
+static enum status announce_file(const struct export *e, const char *type, const char *name,
                            const char *content_type, struct error *err) {
     return e->announce ? e->announce(e->user, type, name, content_type, err) : STATUS_OK;
 }
 
-/* Lists a file that is in place, then tells of it. */
-static enum status tell(struct export *e, const char *type, const char *name,
+/* Lists a finished file in the report and announces it. */
+static enum status list_file(struct export *e, const char *type, const char *name,
                         const char *content_type, const char *about, struct error *err) {
     if (e->files) {
         cJSON *file = cJSON_CreateObject();
@@ -76,7 +76,7 @@ static enum status tell(struct export *e, const char *type, const char *name,
         json_add_string(file, "about", about);
         cJSON_AddItemToArray(e->files, file);
     }
-    return pass_on(e, type, name, content_type, err);
+    return announce_file(e, type, name, content_type, err);
 }
 
 enum image_format { FORMAT_PNG, FORMAT_EXR_HALF, FORMAT_EXR_FLOAT };
@@ -96,13 +96,13 @@ static enum status put_image(struct export *e, const char *type, const char *nam
     else
         unlink(temporary);
     if (status == STATUS_OK)
-        status = tell(e, type, name, format == FORMAT_PNG ? MIME_PNG : MIME_EXR, about, err);
+        status = list_file(e, type, name, format == FORMAT_PNG ? MIME_PNG : MIME_EXR, about, err);
     mem_free(temporary);
     mem_free(path);
     return status;
 }
 
-static bool holds(FILE *file, const char *data, size_t length) {
+static bool file_holds(FILE *file, const char *data, size_t length) {
     char block[1 << 16];
     size_t done = 0, got;
     while ((got = fread(block, 1, sizeof block, file)) > 0) {
@@ -113,15 +113,15 @@ static bool holds(FILE *file, const char *data, size_t length) {
     return done == length;
 }
 
-/* As file_replace, and reads it back. */
-static enum status replace(const char *path, const void *data, size_t length, struct error *err) {
+/* file_replace, then reads the file back. */
+static enum status replace_checked(const char *path, const void *data, size_t length, struct error *err) {
     enum status status = file_replace(path, data, length, err);
     if (status != STATUS_OK)
         return status;
     FILE *file = fopen(path, "rbe");
     if (!file)
         return error_set_errno(err, errno, "cannot read back %s", path);
-    if (!holds(file, data, length))
+    if (!file_holds(file, data, length))
         status = ferror(file) ? error_set_errno(err, errno, "cannot read back %s", path)
                               : error_set(err, STATUS_CORRUPT, "%s: read back, it is not what was written", path);
     fclose(file);
@@ -131,9 +131,9 @@ static enum status replace(const char *path, const void *data, size_t length, st
 static enum status put_bytes(struct export *e, const char *name, const char *content_type,
                              const void *data, size_t length, struct error *err) {
     char *path = file_join(e->dir, name);
-    enum status status = replace(path, data, length, err);
+    enum status status = replace_checked(path, data, length, err);
     if (status == STATUS_OK)
-        status = pass_on(e, EVENT_OUTPUT, name, content_type, err);
+        status = announce_file(e, EVENT_OUTPUT, name, content_type, err);
     mem_free(path);
     return status;
 }
@@ -209,16 +209,16 @@ static enum status put_previews(struct export *e, struct error *err) {
 
 /* Of rooms in which an emitter has a pattern. */
 static enum status put_emission_png(struct export *e, const uint32_t *source, struct error *err) {
-    float *whites = emission_texture_whites(e->input);
+    float *scales = emission_texture_scales(e->input);
     struct image image;
-    if (!whites)
+    if (!scales)
         return STATUS_OK;
-    emission_texture(e->input, source, whites, &image);
+    emission_texture(e->input, source, scales, &image);
     enum status status = put_image(e, EVENT_OUTPUT, FORMATS_EMISSION, &image, FORMAT_PNG,
                                    "what emitters show that are not equally bright all over, each over the brightest of "
                                    "it, in 8 bits, sRGB", err);
     image_release(&image);
-    mem_free(whites);
+    mem_free(scales);
     return status;
 }
 
@@ -249,7 +249,7 @@ static enum status put_mesh(struct export *e, struct error *err) {
     char *path = file_join(e->dir, "scene.ply");
     enum status status = mesh_ply_write(path, in->mesh, in->segments, in->atlas, err);
     if (status == STATUS_OK)
-        status = tell(e, EVENT_OUTPUT, "scene.ply", MIME_PLY,
+        status = list_file(e, EVENT_OUTPUT, "scene.ply", MIME_PLY,
                           "the mesh with its atlas coordinates s, t and its segments", err);
     mem_free(path);
     return status;
@@ -257,8 +257,8 @@ static enum status put_mesh(struct export *e, struct error *err) {
 
 /* --- for other programs --------------------------------------------------------------------- */
 
-/* Notes that a file is too large to be made, which does not make the others worse. */
-static void leave_out(struct export *e, const char *name, const struct error *err) {
+/* Records that a file exceeds a limit of its format; the other files are still written. */
+static void skip_file(struct export *e, const char *name, const struct error *err) {
     cJSON *entry = cJSON_CreateObject();
     json_add_string(entry, "name", name);
     json_add_string(entry, "reason", err->message);
@@ -273,9 +273,9 @@ static enum status put_format(struct export *e, const struct format *format, con
     struct error own = {0};
     enum status status = format->write(e->dir, e->input, parts, &own);
     if (status == STATUS_OK)
-        return tell(e, EVENT_OUTPUT, format->name, format->content_type, format->about, err);
+        return list_file(e, EVENT_OUTPUT, format->name, format->content_type, format->about, err);
     if (status == STATUS_LIMIT) {
-        leave_out(e, format->name, &own);
+        skip_file(e, format->name, &own);
         return STATUS_OK;
     }
     if (err)
@@ -290,7 +290,7 @@ static enum status put_formats(struct export *e, struct error *err) {
     enum status status = STATUS_OK;
     if (parts_make(&parts, in->mesh, in->segments, in->atlas, &own) != STATUS_OK) {
         for (size_t f = 0; f < FORMATS_COUNT; f++)
-            leave_out(e, formats[f].name, &own);
+            skip_file(e, formats[f].name, &own);
         return STATUS_OK;
     }
     for (size_t f = 0; f < FORMATS_COUNT && status == STATUS_OK; f++)
@@ -304,9 +304,9 @@ static enum status put_formats(struct export *e, struct error *err) {
 static enum status put_views(struct export *e, struct error *err) {
     cJSON *views = views_json(e->input->comparison, e->input->comparison_count);
     char *text = json_page(views), *path = file_join(e->dir, "views.json");
-    enum status status = replace(path, text, strlen(text), err);
+    enum status status = replace_checked(path, text, strlen(text), err);
     if (status == STATUS_OK)
-        status = tell(e, EVENT_OUTPUT, "views.json", MIME_JSON,
+        status = list_file(e, EVENT_OUTPUT, "views.json", MIME_JSON,
                       "the cameras of the held-out views, as transforms.json has them", err);
     mem_free(path);
     mem_free(text);
@@ -335,8 +335,8 @@ static enum status put_comparisons(struct export *e, struct error *err) {
 
 /* --- the report --------------------------------------------------------------------------- */
 
-/* Fills color[segment_count]: the mean base colour over the texels that photographs show, or, of a segment of which they
- * show none, over all, which were filled in. texels[segment_count] gets how many a segment has. */
+/* Fills color[segment_count], the mean base colour over observed texels (over all texels if none is observed), and
+ * texels[segment_count], the number of a segment's texels. */
 static void average_segments(const struct export_input *in, double (*color)[3], size_t *texels) {
     size_t *seen = mem_calloc(in->segments->count, sizeof *seen);
     double(*seen_color)[3] = mem_calloc(in->segments->count, sizeof *seen_color);
@@ -358,14 +358,14 @@ static void average_segments(const struct export_input *in, double (*color)[3], 
     mem_free(seen);
 }
 
-/* One entry a segment: what was found, over how much surface. */
+/* One entry per segment: parameters and area. */
 static cJSON *describe_segments(const struct export_input *in) {
     size_t count = in->segments->count;
     double *area = mem_calloc(count, sizeof *area);
     double(*color)[3] = mem_calloc(count, sizeof *color);
     size_t *triangles = mem_calloc(count, sizeof *triangles);
     size_t *texels = mem_calloc(count, sizeof *texels);
-    float *whites = emission_texture_whites(in);
+    float *scales = emission_texture_scales(in);
     for (size_t t = 0; t < in->mesh->triangle_count; t++) {
         uint32_t s = in->segments->of_triangle[t];
         triangles[s]++;
@@ -376,7 +376,7 @@ static cJSON *describe_segments(const struct export_input *in) {
     for (size_t s = 0; s < count; s++) {
         rgb e = in->materials->emission[s];
         cJSON *entry = cJSON_CreateObject();
-        json_add_int(entry, "segment", (int64_t)s); /* as scene.ply numbers it */
+        json_add_int(entry, "segment", (int64_t)s); /* the same number as in scene.ply */
         json_add_int(entry, "id", in->segments->id[s]);
         json_add_int(entry, "triangles", (int64_t)triangles[s]);
         json_add_int(entry, "texels", (int64_t)texels[s]);
@@ -387,10 +387,10 @@ static cJSON *describe_segments(const struct export_input *in) {
         json_add_bool(entry, "emitter", in->is_emitter[s]);
         json_add(entry, "emission",
                  cJSON_CreateDoubleArray((double[]){(double)e.r, (double)e.g, (double)e.b}, 3));
-        json_add_bool(entry, "emission_varies", whites && whites[s] > 0.0f);
+        json_add_bool(entry, "emission_varies", scales && scales[s] > 0.0f);
         cJSON_AddItemToArray(list, entry);
     }
-    mem_free(whites);
+    mem_free(scales);
     mem_free(texels);
     mem_free(triangles);
     mem_free(color);

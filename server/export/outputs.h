@@ -37,8 +37,8 @@
 #include "common/error.h"
 #include "server/export/input.h"
 
-/* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or
- * EVENT_OUTPUT, `name` is relative to the folder. A failure ends the export. NULL: nobody is told. */
+/* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or EVENT_OUTPUT, `name` is
+ * relative to the folder. A failure ends the export. NULL: no announcements. */
 typedef enum status export_announce(void *user, const char *type, const char *name,
                                     const char *content_type, struct error *err);
 
@@ -46,7 +46,7 @@ typedef enum status export_announce(void *user, const char *type, const char *na
 enum status export_preview(const char *dir, const struct export_input *input,
                            export_announce *announce, void *user, struct error *err);
 
-/* Writes everything, previews first and the report last. */
+/* Writes all files, previews first and the report last. */
 enum status export_outputs(const char *dir, const struct export_input *input,
                            export_announce *announce, void *user, struct error *err);
 

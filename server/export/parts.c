@@ -42,7 +42,7 @@ void seams_release(struct seams *s) {
     *s = (struct seams){0};
 }
 
-/* Where each segment's triangles begin in the order by segment; [count + 1], the caller's. */
+/* First triangle of each segment in the order by segment; [count + 1], the caller's. */
 static size_t *sort_by_segment(const struct mesh *mesh, const struct segments *segments, uint32_t *order) {
     size_t *begin = mem_calloc(segments->count + 2, sizeof *begin);
     for (size_t t = 0; t < mesh->triangle_count; t++)
@@ -54,7 +54,7 @@ static size_t *sort_by_segment(const struct mesh *mesh, const struct segments *s
     return begin;
 }
 
-/* Vertices were numbered in the order of triangles, so a part's follow the former part's. */
+/* Vertices are numbered in the order of triangles, so those of a part follow those of the previous one. */
 static void measure(struct parts *p, const struct mesh *mesh, struct part *part, size_t first_vertex) {
     part->first_vertex = first_vertex;
     part->lower = (vec3){INFINITY, INFINITY, INFINITY};

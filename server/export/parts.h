@@ -1,5 +1,5 @@
-/* parts.h -- the mesh as files have it: with one vertex for each pair of vertex and chart, since a
- * vertex on the seam of charts has several atlas coordinates; and cut into its segments. */
+/* parts.h -- the mesh divided for export: vertices split at chart seams, where they have several atlas coordinates,
+ * and triangles grouped by segment. */
 #ifndef UNBAKE_EXPORT_PARTS_H
 #define UNBAKE_EXPORT_PARTS_H
 
@@ -11,21 +11,21 @@
 #include "server/scene/mesh.h"
 #include "server/scene/segment.h"
 
-#define PARTS_MAX 16384 /* objects of one file */
+#define PARTS_MAX 16384 /* objects per file */
 
 /* Vertices in order of first use. */
 struct seams {
     size_t vertex_count;
-    uint32_t *corner;     /* [vertex_count] corner 3 t + c that a vertex is taken from; owned */
+    uint32_t *corner;     /* [vertex_count] corner 3 t + c that defines a vertex; owned */
     uint32_t (*index)[3]; /* [triangle_count] vertices of each triangle of the mesh; owned */
 };
 
-/* `order` is a permutation of the triangles in which they use their vertices; NULL: as they come. */
+/* `order` is a permutation of the triangles that defines the order of vertices; NULL: identity. */
 void seams_make(struct seams *seams, const struct mesh *mesh, const struct atlas *atlas,
                 const uint32_t *order);
 void seams_release(struct seams *seams);
 
-/* A segment that has triangles. Charts are of one segment each, so no vertex is of two parts. */
+/* A non-empty segment. Charts belong to one segment, so parts share no vertices. */
 struct part {
     uint32_t segment;
     size_t first_vertex, vertex_count;
@@ -35,18 +35,18 @@ struct part {
 
 struct parts {
     struct seams seams;
-    uint32_t *order;   /* [triangle_count] triangles by segment, then as they come; owned */
+    uint32_t *order;   /* [triangle_count] triangles grouped by segment, otherwise in order; owned */
     size_t count;
     struct part *part; /* [count] in order of segments; owned */
 };
 
-/* STATUS_LIMIT where there would be more than PARTS_MAX. */
+/* STATUS_LIMIT for more than PARTS_MAX. */
 enum status parts_make(struct parts *parts, const struct mesh *mesh, const struct segments *segments,
                        const struct atlas *atlas, struct error *err);
 void parts_release(struct parts *parts);
 
-/* Of a vertex: where it is, its normal (the mesh must have them), and where in the atlas, in parts of
- * its width and height from the top left corner. */
+/* Position, normal (the mesh must have normals) and texture coordinates (0 to 1 from the top left corner) of a
+ * vertex. */
 static inline vec3 seams_position(const struct seams *s, const struct mesh *mesh, size_t vertex) {
     uint32_t corner = s->corner[vertex];
     return mesh->position[mesh->index[corner / 3][corner % 3]];

@@ -11,14 +11,14 @@
 
 #define COMPARISON_GAP 4 /* pixels between the pictures */
 
-/* --- the margin: nearest valid texel ------------------------------------------------------ */
+/* --- margin: nearest valid texel -------------------------------------------------------------- */
 
 struct margin {
     uint32_t width, height;
     uint32_t *source;
 };
 
-/* Takes the source of the neighbour at (x + dx, y + dy) over if it is nearer than the present. */
+/* Takes the neighbour's source at (x + dx, y + dy) if it is nearer. */
 static void margin_offer(struct margin *m, uint32_t x, uint32_t y, int dx, int dy) {
     int64_t nx = (int64_t)x + dx, ny = (int64_t)y + dy;
     if (nx < 0 || ny < 0 || nx >= m->width || ny >= m->height)
@@ -40,8 +40,8 @@ static void margin_offer(struct margin *m, uint32_t x, uint32_t y, int dx, int d
     m->source[here] = offered;
 }
 
-/* Two raster sweeps of vector distance propagation (Danielsson 1980): the nearest texel but for
- * rare near-ties, which do no harm here. */
+/* Vector distance propagation in two raster sweeps (Danielsson 1980): exact except for rare near-ties, which are
+ * harmless. */
 uint32_t *picture_margin(const struct inverse_uv *inverse) {
     size_t count = (size_t)inverse->width * inverse->height;
     struct margin m = {inverse->width, inverse->height, mem_array(count, sizeof *m.source)};
@@ -76,7 +76,7 @@ static uint32_t segment_of_texel(const struct export_input *input, size_t texel)
     return input->segments->of_triangle[input->inverse->triangle[texel]];
 }
 
-/* The value of a valid texel; grey kinds fill all three channels. */
+/* Value of a valid texel; scalar kinds fill all three channels. */
 static rgb value_at(const struct export_input *input, enum picture_kind kind, size_t texel) {
     const struct materials *m = input->materials;
     switch (kind) {
@@ -133,7 +133,7 @@ static rgb ramp(float t) {
                     image_srgb_to_linear(c.b));
 }
 
-/* Linear colour with which a mean value is shown. */
+/* Display colour of a mean value. */
 static rgb show(enum picture_kind kind, rgb value, float count_max) {
     switch (kind) {
     case PICTURE_BASE_COLOR: return value;
@@ -242,7 +242,7 @@ void picture_radiance(const struct export_input *input, struct image *image) {
 void picture_environment(const struct export_input *input, struct image *image) {
     const struct image *map = input->environment, *known = input->environment_confidence;
     uint32_t step = (map->width + EXPORT_PREVIEW_SIZE - 1) / EXPORT_PREVIEW_SIZE;
-    double roots = 0.0, seen = 0.0; /* the mean root is little moved by a sun */
+    double roots = 0.0, seen = 0.0; /* mean of square roots: robust to the sun */
     for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
         const float *p = map->pixel + i * map->channel_count;
         if (known->pixel[i * known->channel_count] > 0.0f) {

@@ -1,4 +1,4 @@
-/* report_html.c -- see report_html.h. Every text that came from outside goes through html.h. */
+/* report_html.c -- see report_html.h. All text from outside is escaped by html.h. */
 #include "server/export/report_html.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "common/mem.h"
 #include "server/export/html.h"
 
-#define CURVE_POINTS 480 /* more are thinned */
+#define CURVE_POINTS 480 /* more are subsampled */
 #define SEGMENT_ROWS 60  /* the rest is in report.json */
 
 static const char style[] =
@@ -57,8 +57,7 @@ static struct curve_point *read_series(const cJSON *series, size_t *count) {
     return point;
 }
 
-/* A curve and the frame that it is drawn in. Logarithmic in y where all values are positive and span a
- * factor of 8. */
+/* A curve and its axes. The y axis is logarithmic if all values are positive and span a factor of 8. */
 enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
 
 struct curve {
@@ -106,7 +105,7 @@ static void put_path(struct buf *out, const struct curve *c) {
                    LEFT + (WIDTH - LEFT - RIGHT) * (p->step - c->point[0].step) / c->steps,
                    TOP + (HEIGHT - TOP - BOTTOM) * (c->top - value) / c->range);
         bool is_last = i + 1 == c->count;
-        i = is_last || i + stride < c->count ? i + stride : c->count - 1; /* the last is never thinned out */
+        i = is_last || i + stride < c->count ? i + stride : c->count - 1; /* the last point is always drawn */
     }
     buf_puts(out, "\"/>");
 }
@@ -299,7 +298,7 @@ static void put_segments(struct buf *out, const cJSON *segments) {
     buf_puts(out, "</div>");
 }
 
-/* Plain members make the summary at the top, objects a section each. */
+/* Scalar members form the summary at the top, objects a section each. */
 static void put_others(struct buf *out, const cJSON *report, bool plain) {
     static const char *const drawn[] = {"title", "series", "stages", "views", "segments", "files"};
     for (const cJSON *member = report->child; member; member = member->next) {

@@ -1,4 +1,4 @@
-/* report_html.h -- the report as one page that needs no other file, no script and no network. */
+/* report_html.h -- the report as one HTML page without external files, scripts or network access. */
 #ifndef UNBAKE_EXPORT_REPORT_HTML_H
 #define UNBAKE_EXPORT_REPORT_HTML_H
 
@@ -7,19 +7,19 @@
 #include "common/json.h"
 
 struct report_picture {
-    const char *path;    /* of a PNG, embedded into the page */
+    const char *path;    /* of a PNG to embed */
     const char *title;
     const char *caption; /* may be NULL */
 };
 
 struct report_page {
     const char *title;
-    const cJSON *report; /* as report.json; see outputs.h for the members that are drawn */
+    const cJSON *report; /* as report.json; see input.h for the members that are drawn */
     size_t texture_count, comparison_count;
     const struct report_picture *texture, *comparison;
 };
 
-/* Appends the page to `out`; fails when a picture cannot be read or out's limit is too small. */
+/* Appends the page to `out`; fails when a picture cannot be read or out's limit is exceeded. */
 enum status report_html(const struct report_page *page, struct buf *out, struct error *err);
 
 #endif

@@ -24,13 +24,13 @@ enum status sink_open(struct sink *s, const char *path, uint64_t limit, struct e
     return status;
 }
 
-static void fail(struct sink *s, int number) {
+static void fail(struct sink *s, int error_number) {
     s->status = STATUS_IO;
-    s->number = number;
+    s->error_number = error_number;
 }
 
 /* Whether `length` more bytes may be written. */
-static bool admit(struct sink *s, uint64_t length) {
+static bool reserve(struct sink *s, uint64_t length) {
     if (s->status == STATUS_OK && length > s->limit - s->written)
         s->status = STATUS_LIMIT;
     if (s->status != STATUS_OK)
@@ -40,7 +40,7 @@ static bool admit(struct sink *s, uint64_t length) {
 }
 
 void sink_bytes(struct sink *s, const void *data, size_t length) {
-    if (!admit(s, length))
+    if (!reserve(s, length))
         return;
     s->checksum = (uint32_t)crc32_z(s->checksum, data, length);
     if (fwrite_unlocked(data, 1, length, s->file) != length)
@@ -106,7 +106,7 @@ void sink_copy(struct sink *s, const char *path, uint64_t length) {
         fclose(from);
 }
 
-/* What the page cache has is what is read: that the disk keeps it is not known. */
+/* Reads through the page cache; does not prove that the data is on disk. */
 static enum status read_back(const struct sink *s, struct error *err) {
     char block[1 << 16];
     uint64_t length = 0;
@@ -135,7 +135,7 @@ enum status sink_close(struct sink *s, enum status status, struct error *err) {
         status = error_set(err, STATUS_LIMIT, "%s would be larger than %llu bytes", s->path,
                            (unsigned long long)s->limit);
     else if (status == STATUS_OK && s->status != STATUS_OK)
-        status = error_set_errno(err, s->number, "cannot write %s", s->path);
+        status = error_set_errno(err, s->error_number, "cannot write %s", s->path);
     if (status == STATUS_OK)
         status = read_back(s, err);
     if (status == STATUS_OK)

@@ -1,8 +1,7 @@
-/* sink.h -- a file that is written from front to back: buffered, little-endian, put in place when
- * whole.
+/* sink.h -- sequential file writer: buffered, little-endian, moved into place when complete.
  *
- * A failure is kept, what follows it goes nowhere, and sink_close tells of it. It reads the file back, too: what is put in
- * place is what was given. */
+ * Errors are sticky: later writes do nothing, and sink_close reports the first one. Before the file is moved into
+ * place it is read back and compared by checksum. */
 #ifndef UNBAKE_EXPORT_SINK_H
 #define UNBAKE_EXPORT_SINK_H
 
@@ -19,11 +18,11 @@ struct sink {
     FILE *file;
     uint64_t written, limit; /* bytes */
     uint32_t checksum;       /* CRC-32 of the bytes so far */
-    enum status status;     /* of what was written so far */
-    int number;             /* errno of the failure; STATUS_LIMIT has none */
+    enum status status;     /* of the writes so far */
+    int error_number;             /* errno of the failure; 0 for STATUS_LIMIT */
 };
 
-/* A file of more than `limit` bytes is STATUS_LIMIT; 0: any size will do. */
+/* `limit` is the maximum size in bytes (beyond it STATUS_LIMIT); 0: none. */
 enum status sink_open(struct sink *s, const char *path, uint64_t limit, struct error *err);
 
 void sink_bytes(struct sink *s, const void *data, size_t length);
@@ -32,11 +31,11 @@ void sink_u64(struct sink *s, uint64_t value);
 void sink_float(struct sink *s, float value);
 void sink_vec3(struct sink *s, vec3 v);
 void sink_printf(struct sink *s, const char *format, ...) __attribute__((format(printf, 2, 3)));
-/* Appends the file at `path`, which must have `length` bytes. */
+/* Appends the file at `path`, of `length` bytes. */
 void sink_copy(struct sink *s, const char *path, uint64_t length);
 
-/* Ends it. With `status` (of the caller, *err set) and all that was written OK the file gets its
- * name, else it is removed; returns what went wrong first. */
+/* Closes the file. If `status` (the caller's, with *err set) and all writes are OK the file is moved into place, else
+ * it is removed. Returns the first error. */
 enum status sink_close(struct sink *s, enum status status, struct error *err);
 
 #endif

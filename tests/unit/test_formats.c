@@ -337,10 +337,10 @@ static void test_picture(const char *dir, struct room *room, const struct export
     CHECK(formats[0].write(dir, &in, parts, &err) != STATUS_OK && strstr(err.message, FORMATS_EMISSION));
     struct image picture;
     uint32_t *source = picture_margin(&room->inverse);
-    float *whites = emission_texture_whites(&in), white = 1.5f * rgb_max(m->emission[ROOM_WALL_EMITTER]);
-    CHECK_NEAR(whites[ROOM_WALL_EMITTER], white, 2e-3f * white);
-    CHECK(whites[ROOM_CEILING_EMITTER] == 0.0f && whites[ROOM_FLOOR] == 0.0f);
-    emission_texture(&in, source, whites, &picture);
+    float *scales = emission_texture_scales(&in), white = 1.5f * rgb_max(m->emission[ROOM_WALL_EMITTER]);
+    CHECK_NEAR(scales[ROOM_WALL_EMITTER], white, 2e-3f * white);
+    CHECK(scales[ROOM_CEILING_EMITTER] == 0.0f && scales[ROOM_FLOOR] == 0.0f);
+    emission_texture(&in, source, scales, &picture);
     CHECK(image_write_png(png, &picture, 1.0f, &err) == STATUS_OK);
     for (size_t f = 0; f < FORMATS_COUNT; f++)
         CHECK(formats[f].write(dir, &in, parts, &err) == STATUS_OK);
@@ -360,7 +360,7 @@ static void test_picture(const char *dir, struct room *room, const struct export
     materials_drop_emission_pattern(m);
     release_glb(&g);
     image_release(&picture);
-    mem_free(whites);
+    mem_free(scales);
     mem_free(source);
     mem_free(path);
     mem_free(png);
