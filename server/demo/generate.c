@@ -16,8 +16,8 @@
 #include "server/scene/camera_json.h"
 
 #define TRUTH_SAMPLES 64 /* first hits per pixel; no light is traced for them */
-/* Ordinary photographs: the first exposure shows the median at this value, the others are
- * shorter by these factors, so that the lamps are below the clip in the last. */
+/* For 8-bit photographs: the first exposure maps the median to this value; the other exposures are shorter by these
+ * factors, so that the lamps are not clipped in the last. */
 #define SHOWN_MEDIAN 0.2f
 static const float exposure_factor[3] = {1.0f, 1.0f / 6.0f, 1.0f / 36.0f};
 
@@ -29,7 +29,7 @@ struct generator {
     uint32_t frame_count;
     struct camera *camera;  /* [frame_count] training first */
     struct image *picture;  /* [frame_count] R G B radiance */
-    float base_exposure;    /* of ordinary photographs */
+    float base_exposure;    /* of 8-bit photographs */
 };
 
 struct demo_settings demo_default_settings(void) {
@@ -95,7 +95,7 @@ static enum status write_truth_view(struct generator *g, uint32_t frame, struct 
     struct image image;
     film_render_first_hits(&g->room.world, &g->camera[frame], TRUTH_SAMPLES, g->settings->seed,
                            g->pool, &image);
-    /* The room's segments are numbered by object. */
+    /* segment numbers equal object_id */
     snprintf(image.channel[image_channel(&image, "segment")], sizeof *image.channel, "object_id");
     char *path = frame_path(g, "truth", frame, "exr");
     enum status status = image_write_exr(path, &image, IMAGE_FLOAT, false, err);
@@ -197,7 +197,7 @@ static enum status write_bundle(struct generator *g, struct error *err) {
         status = write_truth_view(g, f, err);
     if (status == STATUS_OK)
         status = write_objects(g, err);
-    if (status == STATUS_OK) /* last: a folder with it is whole */
+    if (status == STATUS_OK) /* last: the folder is complete when this file exists */
         status = write_transforms(g, err);
     return status;
 }

@@ -29,7 +29,7 @@ struct demo_settings {
 
 struct demo_settings demo_default_settings(void);
 
-/* The folder is made where it is missing. `progress` (may be NULL) hears after each view. */
+/* Creates the folder if needed. `progress` (may be NULL) is called after each view. */
 enum status demo_generate(const char *dir, const struct demo_settings *settings,
                           struct parallel *pool,
                           void (*progress)(void *user, uint32_t done, uint32_t total), void *user,

@@ -1,4 +1,4 @@
-/* objects.h -- what stands in the demo room, by object_id, and how large the room is. */
+/* objects.h -- the objects of the demo room, by object_id, and the room's size. */
 #ifndef UNBAKE_DEMO_OBJECTS_H
 #define UNBAKE_DEMO_OBJECTS_H
 

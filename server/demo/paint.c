@@ -1,5 +1,5 @@
-/* paint.c -- see paint.h. Lengths are in metres; features are a few centimetres at least, so that
- * textures of moderate size hold them. */
+/* paint.c -- see paint.h. Lengths are in metres. Features are at least a few centimetres wide, so that textures of
+ * moderate size resolve them. */
 #include "server/demo/paint.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "common/image.h"
 #include "common/rng.h"
 
-/* A colour as painters write it: 0xRRGGBB, sRGB. */
+/* A colour 0xRRGGBB, sRGB. */
 static rgb hex(uint32_t code) {
     return rgb_make(image_srgb_to_linear((float)(code >> 16 & 255) / 255.0f),
                     image_srgb_to_linear((float)(code >> 8 & 255) / 255.0f),
@@ -158,7 +158,7 @@ static rgb globe(vec3 p) {
     if (y < -0.118f)
         return hex(0x6a4a2c);
     float longitude = atan2f(z, x), latitude = asinf(clampf(y / 0.13f, -1.0f, 1.0f));
-    /* Noise of the direction, so that it closes around. */
+    /* Noise of the direction, so that it is periodic. */
     float land = clouds(2.2f * cosf(longitude) + 4.0f * latitude, 2.2f * sinf(longitude) + 9.0f, 41);
     rgb c = mix(hex(0x2d6a9f), hex(0x8a9a4a), smooth(0.5f, 0.54f, land));
     return fabsf(latitude) > 1.15f ? hex(0xe8eef0) : c;
@@ -187,7 +187,7 @@ static rgb tartan(float u, float v) {
     return c;
 }
 
-/* The two coordinates of the plane that the normal is most nearly perpendicular to. */
+/* The two coordinates of the plane most nearly perpendicular to the normal. */
 static vec2 in_plane(vec3 p, vec3 n) {
     float x = fabsf(n.x), y = fabsf(n.y), z = fabsf(n.z);
     if (y >= x && y >= z)

@@ -1,4 +1,4 @@
-/* paint.h -- the base colours of the demo room, as functions of the place. */
+/* paint.h -- base colours of the demo room as functions of position. */
 #ifndef UNBAKE_DEMO_PAINT_H
 #define UNBAKE_DEMO_PAINT_H
 

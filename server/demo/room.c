@@ -1,4 +1,4 @@
-/* room.c -- see room.h. The table of objects, where they stand, and their textures. */
+/* room.c -- see room.h. The table of objects, their geometry and their textures. */
 #include "server/demo/room.h"
 
 #include <assert.h>
@@ -7,7 +7,7 @@
 #include "common/mem.h"
 #include "server/demo/paint.h"
 
-/* Metres, radiance 1 and roughness as they are; emission is filled in by room_init. */
+/* Metres; radiance 1 stands for an emitter, whose emission room_init sets. */
 static const struct {
     const char *name;
     float roughness, specular;
@@ -130,8 +130,8 @@ static void add_shelves(struct shapes *s) {
     box(s, ROOM_CHEST, 4.0f, 0.38f, 0.04f, 4.5f, 0.68f, 0.27f, SHAPE_BOTTOM);
 }
 
-/* A rectangular frame of width `wide` around the panel from `lower` to `upper`, which lies in the
- * plane of the axes u and v; `without` leaves out the side that lies on the wall. */
+/* A rectangular frame of width `wide` around the panel from `lower` to `upper` in the plane of axes u and v;
+ * `without` omits the side on the wall. */
 static void add_frame(struct shapes *s, enum room_object o, vec3 lower, vec3 upper, vec3 u, vec3 v,
                       float wide, int without) {
     vec3 span = vec3_sub(upper, lower);
@@ -185,7 +185,7 @@ struct painting {
     struct room *room;
 };
 
-/* One row of the texture: the mean of four places in each valid texel. */
+/* One row of the texture: the mean of four samples per valid texel. */
 static void paint_row(void *user, size_t y, int thread) {
     static const float place[4][2] = {
         {0.125f, 0.375f}, {0.625f, 0.125f}, {0.375f, 0.875f}, {0.875f, 0.625f}};
@@ -226,7 +226,7 @@ static void make_materials(struct room *room, float wall_radiance, float ceiling
         room->materials.roughness[i] = object[i].roughness;
         room->materials.specular[i] = object[i].specular;
     }
-    /* A warm lamp on the ceiling, daylight through the wall. */
+    /* The ceiling lamp is warm, the wall emitter daylight. */
     room->materials.emission[ROOM_WALL_EMITTER] = rgb_scale(rgb_make(0.92f, 1.0f, 1.08f),
                                                             wall_radiance);
     room->materials.emission[ROOM_CEILING_EMITTER] = rgb_scale(rgb_make(1.1f, 1.0f, 0.85f),

@@ -1,9 +1,8 @@
-/* room.h -- the demo room: a closed, furnished room whose materials and lights are known.
+/* room.h -- the demo room: a closed, furnished room with known materials and lights.
  *
- * It is the controlled scene of Nimier-David et al. 2021, section 6, built by us: walls, floor
- * and ceiling with texture, a table with legs, a door panel, shelves with things on them, a
- * glossy vase, a patterned carpet, pictures, an emitter on a wall and one at the ceiling whose
- * radiances are parameters. 5 x 2.8 x 4 m, y up, one object_id for each object. */
+ * Modelled after the controlled scene of Nimier-David et al. 2021, section 6: textured walls, floor and ceiling, a
+ * table, a door panel, shelves with objects, a glossy vase, a patterned carpet, pictures, an emitter on a wall and
+ * one at the ceiling with adjustable radiances. 5 x 2.8 x 4 m, y up, one object_id per object. */
 #ifndef UNBAKE_DEMO_ROOM_H
 #define UNBAKE_DEMO_ROOM_H
 
@@ -32,7 +31,7 @@ struct room {
 /* Static storage. */
 const char *room_object_name(enum room_object object);
 
-/* The furniture as boxes that a camera keeps clear of; [*count], static storage. */
+/* Bounding boxes of the furniture, which cameras avoid; [*count], static storage. */
 const vec3 (*room_obstacles(size_t *count))[2];
 
 /* Builds geometry, textures of texture_size texels a side, and the acceleration structure. */

@@ -76,7 +76,7 @@ void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int wi
     }
 }
 
-/* Outward normal of the profile at point i: across the mean direction of its two edges. */
+/* Outward normal of the profile at point i, from the mean direction of its two edges. */
 static vec2 profile_normal(const vec2 *profile, size_t count, size_t i) {
     vec2 before = profile[i > 0 ? i - 1 : i], after = profile[i + 1 < count ? i + 1 : i];
     vec2 along = vec2_sub(after, before);

@@ -1,7 +1,7 @@
-/* shapes.h -- putting a mesh together from boxes and turned bodies.
+/* shapes.h -- builds meshes from boxes and surfaces of revolution.
  *
- * Faces have vertices of their own with the face's normal, turned bodies share smooth ones. Every
- * triangle is counter-clockwise as seen from outside. */
+ * Box faces have their own vertices with face normals; surfaces of revolution share vertices with smooth normals. All
+ * triangles are counter-clockwise seen from outside. */
 #ifndef UNBAKE_DEMO_SHAPES_H
 #define UNBAKE_DEMO_SHAPES_H
 
@@ -17,7 +17,7 @@ struct shapes {
     size_t vertex_capacity, triangle_capacity;
 };
 
-/* Faces of a box, to be left out where they lie on something. */
+/* Faces of a box to omit, where they rest on something. */
 enum {
     SHAPE_LEFT = 1,    /* -x */
     SHAPE_RIGHT = 2,   /* +x */
@@ -25,16 +25,16 @@ enum {
     SHAPE_TOP = 8,     /* +y */
     SHAPE_BACK = 16,   /* -z */
     SHAPE_FRONT = 32,  /* +z */
-    SHAPE_INWARD = 64  /* a room: its faces look inside */
+    SHAPE_INWARD = 64  /* a room: faces point inwards */
 };
 
 void shapes_init(struct shapes *s);
 
-/* The faces of an axis-aligned box, but for those in `without`. */
+/* The faces of an axis-aligned box, except those in `without`. */
 void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without);
 
-/* The profile (x = radius, y = height, from below to above), turned about the vertical axis
- * through `base` in `sides` steps. A radius of 0 at an end closes the body. */
+/* Surface of revolution: the profile (x = radius, y = height, from bottom to top), rotated about the vertical axis
+ * through `base` in `sides` steps. A radius of 0 at an end closes it. */
 void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count,
                   int sides);
 

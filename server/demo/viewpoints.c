@@ -1,5 +1,5 @@
-/* viewpoints.c -- see viewpoints.h. A greedy cover: each surface point's worth falls with the
- * views that already see it, as 1 / (1 + count)^2. */
+/* viewpoints.c -- see viewpoints.h. Greedy cover: the gain of a surface point falls with the number of views that
+ * already see it, as 1 / (1 + count)^2. */
 #include "server/demo/viewpoints.h"
 
 #include <assert.h>
@@ -10,11 +10,11 @@
 #include "common/rng.h"
 
 #define CANDIDATES 480
-#define POINTS 3000           /* on the surface, at which coverage is counted */
+#define POINTS 3000           /* surface points for measuring coverage */
 #define CLEARANCE_M 0.3f      /* to walls and furniture */
-#define NEAREST_M 0.7f        /* what a camera looks at is farther than this, mostly */
+#define NEAREST_M 0.7f        /* minimum distance of most of what a camera sees */
 #define HALF_ANGLE_TANGENT 0.7673f /* 75 degrees across */
-#define TEST_APART_M 0.25f    /* of a test camera to every training camera */
+#define TEST_APART_M 0.25f    /* minimum distance of a test camera from all training cameras */
 
 struct demo_point {
     vec3 position, normal;
@@ -35,8 +35,8 @@ static float uniform(const struct viewpoint_chooser *c, uint64_t stream, uint64_
     return rng_to_float((uint32_t)(bits >> 32));
 }
 
-/* Points spread by area: triangles are walked with a fixed step over their summed areas. */
-static void spread_points(struct viewpoint_chooser *c) {
+/* Surface points spread evenly by area. */
+static void sample_surface(struct viewpoint_chooser *c) {
     const struct mesh *mesh = &c->room->mesh;
     double step = mesh_area(mesh) / POINTS, next = 0.5 * step, walked = 0.0;
     size_t i = 0;
@@ -83,7 +83,7 @@ static void aim(struct camera *camera, vec3 eye, vec3 forward, uint32_t width, u
     camera->camera_from_world = rigid_inverse(&camera->world_from_camera);
 }
 
-/* True when most of the picture's rays (a 5 x 5 grid) run farther than NEAREST_M. */
+/* Whether most rays of a 5 x 5 grid over the picture are longer than NEAREST_M. */
 static bool has_room_ahead(const struct viewpoint_chooser *c, const struct camera *camera) {
     int far = 0;
     for (int i = 0; i < 25; i++) {
@@ -127,7 +127,7 @@ static bool sees(const struct viewpoint_chooser *c, const struct camera *camera,
 }
 
 /* Chooses one more training camera. */
-static size_t take_best(struct viewpoint_chooser *c) {
+static size_t choose_next(struct viewpoint_chooser *c) {
     size_t best = CANDIDATES;
     double best_gain = -1.0;
     for (size_t i = 0; i < CANDIDATES; i++) {
@@ -156,9 +156,9 @@ static bool is_apart(const struct camera *camera, const struct camera *others, s
     return true;
 }
 
-/* Before the tests are chosen: counts from 0 again, candidates near a training camera set aside
- * where enough others remain. */
-static void start_over(struct viewpoint_chooser *c, const struct camera *train, size_t train_count,
+/* Before test cameras are chosen: resets the counts and excludes candidates near a training camera where enough
+ * others remain. */
+static void prepare_tests(struct viewpoint_chooser *c, const struct camera *train, size_t train_count,
                        size_t wanted) {
     size_t free_count = CANDIDATES - train_count;
     memset(c->count, 0, POINTS * sizeof *c->count);
@@ -180,17 +180,17 @@ void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
     c.sees = mem_array((size_t)CANDIDATES * POINTS, sizeof *c.sees);
     c.taken = mem_calloc(CANDIDATES, sizeof *c.taken);
     c.count = mem_calloc(POINTS, sizeof *c.count);
-    spread_points(&c);
+    sample_surface(&c);
     for (size_t i = 0; i < CANDIDATES; i++) {
         draw_candidate(&c, i, width, height);
         for (size_t p = 0; p < POINTS; p++)
             c.sees[i * POINTS + p] = sees(&c, &c.candidate[i], &c.point[p]);
     }
     for (size_t i = 0; i < train_count; i++)
-        camera[i] = c.candidate[take_best(&c)];
-    start_over(&c, camera, train_count, test_count);
+        camera[i] = c.candidate[choose_next(&c)];
+    prepare_tests(&c, camera, train_count, test_count);
     for (size_t i = 0; i < test_count; i++)
-        camera[train_count + i] = c.candidate[take_best(&c)];
+        camera[train_count + i] = c.candidate[choose_next(&c)];
     mem_free(c.count);
     mem_free(c.taken);
     mem_free(c.sees);

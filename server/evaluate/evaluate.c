@@ -20,7 +20,7 @@
 #define ROULETTE_DEPTH 5
 #define OBJECTS_LIMIT ((size_t)1 << 26) /* bytes of objects.json */
 
-/* All that the views share. */
+/* State shared by all views. */
 struct evaluator {
     const struct evaluate_settings *settings;
     struct parallel *pool;
@@ -38,14 +38,13 @@ struct evaluate_settings evaluate_default_settings(void) {
 
 /* --- the truth by object ------------------------------------------------------------------ */
 
-/* What the recovered room says about one object. */
+/* Areas of one object in the recovered room. */
 struct object {
     double area, emitting_area;
 };
 
-/* Areas of the object's triangles, all and those whose segment was found to emit; marks its
- * triangles when it does emit. */
-static struct object look_at_object(struct evaluator *e, int64_t id, bool emits) {
+/* Areas of the object's triangles, all and emitting ones; sets e->emits of its triangles to `emits`. */
+static struct object measure_object(struct evaluator *e, int64_t id, bool emits) {
     const struct mesh *mesh = &e->scene.mesh;
     struct object object = {0.0, 0.0};
     for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -76,9 +75,9 @@ static enum status score_objects(struct evaluator *e, struct evaluation *v, stru
         for (const cJSON *c = emission ? emission->child : NULL; c; c = c->next)
             emits = emits || c->valuedouble > 0.0;
         status = json_number(o, "id", "truth/objects.json", -1.0, &id, err);
-        struct object found = look_at_object(e, (int64_t)id, emits);
+        struct object found = measure_object(e, (int64_t)id, emits);
         if (found.area == 0.0)
-            continue; /* of an object whose triangles all were degenerate */
+            continue; /* all triangles of the object are degenerate */
         bool mostly = found.emitting_area > 0.5 * found.area;
         v->emitters += emits;
         v->emitters_found += emits && mostly;
@@ -92,7 +91,7 @@ static enum status score_objects(struct evaluator *e, struct evaluation *v, stru
 
 /* --- photographs -------------------------------------------------------------------------- */
 
-/* Radiance of a pixel's channels; false where it is masked or not finite. */
+/* Radiance of a pixel's channels; false when it is masked or not finite. */
 static bool pixel_radiance(const struct photograph *p, uint32_t x, uint32_t y,
                            struct photograph_sample *sample) {
     return photograph_sample(p, (float)x + 0.5f, (float)y + 0.5f, sample);
@@ -123,8 +122,7 @@ static double training_median(const struct scene *scene) {
     return median;
 }
 
-/* The photograph's radiance and, in the same way clipped, what the recovered room shows there.
- * Masked pixels are NaN, which metrics_msre leaves out. */
+/* The photograph's radiance and the re-render, clipped alike. Masked pixels are NaN, which metrics_msre leaves out. */
 static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
                       struct image *photograph, struct image *render) {
     struct path_settings path = {.max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
@@ -223,7 +221,7 @@ static enum status read_truth(const struct evaluator *e, const struct photograph
     return status;
 }
 
-/* The truth's own samples may have met what ours did not. */
+/* Clears the flags of pixels where the truth's own samples hit an emitter or nothing. */
 static void mark_by_truth(const struct image *truth, uint8_t *flags) {
     struct rgb_columns emission = find_rgb(truth, "emission.");
     int object = image_channel(truth, "object_id");
@@ -242,7 +240,7 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
     struct image photograph, render;
     make_pair(e, p, view, &photograph, &render);
     *msre = metrics_msre(&photograph, &render, e->median);
-    even_add(&v->even, &photograph, &render, truth, e->median);
+    smooth_areas_add(&v->smooth, &photograph, &render, truth, e->median);
     char *path = mem_printf("%s/truth/flat_%s.exr", e->room, stem);
     enum status status = noise_floor_add(&v->floor, path, &photograph, *msre, e->median, err);
     mem_free(path);
@@ -289,7 +287,7 @@ static enum status score_views(struct evaluator *e, struct evaluation *v, struct
             continue;
         status = score_view(e, p, (uint32_t)i, v, &msre, err);
         v->view_count++;
-        if (!isfinite(msre)) /* not asked for, or no pixel of it can be used */
+        if (!isfinite(msre)) /* no re-render, or no usable pixel */
             continue;
         sum += msre;
         squares += msre * msre;
@@ -325,7 +323,8 @@ enum status evaluate_outputs(const char *room, const char *outputs,
     enum status status = load_room(&e, err);
     if (status != STATUS_OK)
         return status;
-    status = orient_mesh(&e.scene, pool, &turned, err); /* emitters shine where the outputs have their front */
+    status = orient_mesh(&e.scene, pool, &turned, err); /* turn the mesh as the outputs are: emitters emit from the
+                                                         * front */
     if (status != STATUS_OK)
         goto out;
     status = recovered_load(outputs, &e.scene.mesh, pool, &e.recovered, err);
@@ -366,10 +365,10 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_int(root, "emitters_false", (int64_t)v->emitters_false);
     json_add_number(root, "msre", v->msre);
     json_add_number(root, "msre_deviation", v->msre_deviation);
-    if (v->even.count > 0) {
-        json_add_number(root, "even_share", (double)v->even.count / (double)s->pixels);
-        json_add_number(root, "msre_even", v->even.render / (double)v->even.count);
-        json_add_number(root, "msre_even_noise", v->even.noise / (double)v->even.count);
+    if (v->smooth.count > 0) {
+        json_add_number(root, "even_share", (double)v->smooth.count / (double)s->pixels);
+        json_add_number(root, "msre_even", v->smooth.render / (double)v->smooth.count);
+        json_add_number(root, "msre_even_noise", v->smooth.noise / (double)v->smooth.count);
     }
     if (v->floor.count > 0) {
         json_add_int(root, "floor_views", (int64_t)v->floor.count);

@@ -1,10 +1,9 @@
-/* evaluate.h -- a finished job's outputs against the truth of its room.
+/* evaluate.h -- compares a finished job's outputs with the ground truth of its room.
  *
- * The room is a bundle with truth/ beside its photographs: objects.json, and for each test view
- * the picture of its parameters (see demo/generate.h; the demo room writes one). Parameters are
- * compared as test cameras see them (score.h), emitters by object, and the test views are
- * re-rendered from the recovered room and compared with their photographs:
- * MSRE = mean of (I - R)^2 / (R^2 + 0.01 m^2), m the median of the training pixels' radiance. */
+ * The room is a bundle with truth/ beside its photographs: objects.json, and a picture of the parameters of each test
+ * view (see demo/generate.h). Parameters are compared as the test cameras see them (score.h), emitters by object, and
+ * the test views are re-rendered from the recovered room and compared with their photographs: MSRE = mean of (I -
+ * R)^2 / (R^2 + 0.01 m^2), with m the median radiance of the training pixels. */
 #ifndef UNBAKE_EVALUATE_EVALUATE_H
 #define UNBAKE_EVALUATE_EVALUATE_H
 
@@ -14,7 +13,7 @@
 #include "common/error.h"
 #include "common/json.h"
 #include "common/parallel.h"
-#include "server/evaluate/even.h"
+#include "server/evaluate/smooth_areas.h"
 #include "server/evaluate/noise_floor.h"
 #include "server/evaluate/score.h"
 
@@ -31,12 +30,12 @@ struct evaluate_settings evaluate_default_settings(void);
 struct evaluation {
     struct score score;
     size_t view_count;
-    /* By object of the truth. An emitter is found when more than half of its area emits; an
-     * object that does not emit is a false emitter when any of it does. */
+    /* By object of the truth. An emitter is found if more than half of its area emits; a non-emitting object any part
+     * of which emits is a false emitter. */
     size_t emitters, emitters_found, emitters_missed, emitters_false;
-    double msre, msre_deviation; /* mean over the views, and how they spread; NaN without re-renders */
-    struct even even;            /* places whose photographs tell their own noise; nothing without re-renders */
-    struct noise_floor floor;    /* views whose photographs' noise the truth tells; none without re-renders */
+    double msre, msre_deviation; /* mean over views and standard deviation; NaN without re-renders */
+    struct smooth_areas smooth; /* needs re-renders */
+    struct noise_floor floor;    /* views with a flat render in the truth; needs re-renders */
 };
 
 /* `room` and `outputs` are folders. */

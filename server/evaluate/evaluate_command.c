@@ -36,10 +36,10 @@ static void print_table(const struct evaluation *v) {
            score_mean(s->emission_log));
     if (isfinite(v->msre))
         printf("  %-22s %6.4f +- %.4f\n", "MSRE of re-renders", v->msre, v->msre_deviation);
-    if (v->even.count > 0)
+    if (v->smooth.count > 0)
         printf("  %-22s %6.4f of which the photographs' own noise is %.4f (%.1f %% of the pixels)\n",
-               "  where all is even", v->even.render / (double)v->even.count,
-               v->even.noise / (double)v->even.count, 100.0 * (double)v->even.count / (double)s->pixels);
+               "  in smooth areas", v->smooth.render / (double)v->smooth.count,
+               v->smooth.noise / (double)v->smooth.count, 100.0 * (double)v->smooth.count / (double)s->pixels);
     if (v->floor.count > 0)
         printf("  %-22s %6.4f of which the photographs' own noise is %.4f (by the errors of the truth's renders)\n",
                v->floor.count == 1 ? "  in one view" : "  in some views", v->floor.msre / (double)v->floor.count,

@@ -4,11 +4,11 @@
 #include <math.h>
 #include <unistd.h>
 
-/* Variance of a photograph of 256 samples over that of a flat render. How many samples those had is not told; where
- * all is even (even.h) photographs of the two test rooms have 4.1 to 4.5 times their variance, so they had 1,024 at
- * least. */
+/* Variance of a photograph of 256 samples over that of a flat render. The sample count of the flat renders is not
+ * published; in smooth areas (smooth_areas.h) photographs of the two test rooms have 4.1 to 4.5 times their variance,
+ * so it was at least 1,024. */
 #define VARIANCE_RATIO 4.0
-#define RELATIVE_FLOOR 0.01 /* times the median squared, in MSRE's denominator */
+#define RELATIVE_FLOOR 0.01 /* times the squared median, in the denominator of MSRE */
 
 static const char *const shown[3] = {"R", "G", "B"}, *const error_of[3] = {"err.R", "err.G", "err.B"};
 

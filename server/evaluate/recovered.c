@@ -15,7 +15,7 @@
 
 /* --- scene.ply ---------------------------------------------------------------------------- */
 
-/* The body of scene.ply, as far as it matters here. */
+/* What is used of scene.ply's body. */
 struct charted {
     size_t vertex_count, triangle_count;
     vec3 *position;
@@ -31,8 +31,7 @@ static void charted_release(struct charted *c) {
     mem_free(c->segment);
 }
 
-/* Byte offset of a property within its element; false when it is not there with that type or
- * when a list comes before it. */
+/* Byte offset of a property within its element; false when there is none of that type or a list precedes it. */
 static bool find_property(const struct ply_header *h, const struct ply_element *e,
                           const char *name, enum ply_type type, size_t *offset) {
     *offset = 0;
@@ -77,7 +76,7 @@ static enum status read_vertices(struct charted *c, const struct ply_header *h,
     return STATUS_OK;
 }
 
-/* Faces as our writer makes them: a list of three corners, first; then fixed-size properties. */
+/* Faces as mesh_ply.c writes them: a list of three corners, then properties of fixed size. */
 static enum status read_faces(struct charted *c, const struct ply_header *h, struct ply_cursor *at,
                               struct error *err) {
     const struct ply_element *e = &h->element[1];
@@ -131,8 +130,8 @@ static enum status read_scene_ply(const char *dir, struct charted *c, struct err
     return status;
 }
 
-/* Whether corner k of a triangle of scene.ply is where `mesh` has its corner (k, or with the second and
- * third swapped) for all k: outputs may have turned what the room has inside out, and the other way round. */
+/* Whether the corners of a triangle of scene.ply coincide with those of `mesh`, optionally with the second and third
+ * swapped: reconstruction may have flipped triangles. */
 static bool is_there(const struct charted *c, const struct mesh *mesh, size_t t, bool swapped) {
     for (size_t k = 0; k < 3; k++) {
         vec3 a = c->position[c->index[t][k]], b = mesh->position[mesh->index[t][swapped ? (3 - k) % 3 : k]];
@@ -143,7 +142,7 @@ static bool is_there(const struct charted *c, const struct mesh *mesh, size_t t,
 }
 
 /* The atlas and the segments of `mesh` from scene.ply. */
-static enum status take_charts(struct recovered *r, const struct charted *c, const struct mesh *mesh,
+static enum status read_charts(struct recovered *r, const struct charted *c, const struct mesh *mesh,
                                uint32_t width, uint32_t height, struct error *err) {
     if (c->triangle_count != mesh->triangle_count)
         return error_set(err, STATUS_INPUT, "scene.ply has %zu triangles, the room %zu: the outputs "
@@ -318,7 +317,7 @@ enum status recovered_load(const char *dir, const struct mesh *mesh, struct para
         return status;
     status = read_scene_ply(dir, &charted, err);
     if (status == STATUS_OK)
-        status = take_charts(r, &charted, mesh, base_color.width, base_color.height, err);
+        status = read_charts(r, &charted, mesh, base_color.width, base_color.height, err);
     charted_release(&charted);
     if (status != STATUS_OK)
         goto out;

@@ -1,8 +1,7 @@
-/* recovered.h -- a finished job's outputs, read back as something to render.
+/* recovered.h -- a finished job's outputs, read back for rendering.
  *
- * Only the files that a user gets are read: scene.ply for the atlas coordinates and the segments,
- * the EXR textures for the values, environment.exr, where it is there, for distant light. Geometry
- * comes from the room itself: scene.ply must list the same triangles. */
+ * Reads only files that a user gets: scene.ply for atlas coordinates and segments, the EXR textures, and
+ * environment.exr if it exists. Geometry comes from the room itself: scene.ply must list the same triangles. */
 #ifndef UNBAKE_EVALUATE_RECOVERED_H
 #define UNBAKE_EVALUATE_RECOVERED_H
 
@@ -23,8 +22,8 @@ struct recovered {
     struct world world;
 };
 
-/* `mesh` is borrowed until recovered_release. Roughness and specular are one value a segment: each segment's is
- * read where a texel of it is. Emission is the mean of its texels, and a pattern where these differ. */
+/* `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and read at one of its
+ * texels. Emission is the mean over a segment's texels, with a pattern where they differ. */
 enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
                            struct recovered *recovered, struct error *err);
 void recovered_release(struct recovered *recovered);

@@ -108,7 +108,7 @@ static enum status read_environment(const char *path, struct image *picture, str
     return status;
 }
 
-/* Puts the wanted environment around the world. What was recovered is in the room's frame already. */
+/* Sets the requested environment. The recovered one is already in the room's frame. */
 static enum status change_environment(struct world *world, const char *outputs,
                                       const struct relight_settings *settings, struct parallel *pool,
                                       struct error *err) {

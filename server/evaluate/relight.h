@@ -1,4 +1,4 @@
-/* relight.h -- a finished job's room from any camera under any light. */
+/* relight.h -- renders a finished job's room from any camera under any light. */
 #ifndef UNBAKE_EVALUATE_RELIGHT_H
 #define UNBAKE_EVALUATE_RELIGHT_H
 
@@ -11,9 +11,9 @@
 
 struct relight_settings {
     const char *cameras;     /* a transforms.json; NULL: the outputs' views.json */
-    const char *view;        /* number in that file, from 0, or the name of its picture */
-    const char *environment; /* a latitude-longitude picture in the place of the recovered distant
-                              * light; NULL: keep that; "none": darkness */
+    const char *view;        /* index in that file, from 0, or name of its picture */
+    const char *environment; /* a latitude-longitude map that replaces the recovered environment; NULL: keep it;
+                              * "none": dark */
     float environment_scale; /* factor on its radiance */
     float turn_deg;          /* turns it around the upward axis, counter-clockwise from above */
     char up;                 /* axis of the room that is the picture's top: 'x', 'y' or 'z' */
@@ -24,13 +24,12 @@ struct relight_settings {
 
 struct relight_settings relight_default_settings(void);
 
-/* Renders the room of the folder `outputs`; nothing else of the job is needed. *image: R G B, linear
- * radiance; the caller's. */
+/* Renders the room in folder `outputs`; needs nothing else of the job. *image: R G B, linear radiance; the caller's. */
 enum status relight(const char *outputs, const struct relight_settings *settings, struct parallel *pool,
                     struct image *image, struct error *err);
 
-/* Puts a picture whose layout is that of world.h but whose top is the axis `up` into the room's frame,
- * turned and scaled. *out, of the same size, is the caller's. */
+/* Resamples an environment map whose top is the axis `up` into the room's frame (layout of latlong.h), turned and
+ * scaled. *out, of the same size, is the caller's. */
 void relight_orient(const struct image *picture, char up, float turn_deg, float scale, struct image *out);
 
 #endif

@@ -31,7 +31,7 @@ static void add_square(struct score_sum *s, float found, float truth) {
     s->count++;
 }
 
-/* True when the pixels around (x, y), as far as there are any, show one object. */
+/* Whether the 3 x 3 neighbourhood of (x, y), clipped to the picture, shows one object. */
 static bool one_object(const struct image *truth, size_t object, uint32_t x, uint32_t y) {
     size_t stride = truth->channel_count;
     float id = truth->pixel[((size_t)y * truth->width + x) * stride + object];

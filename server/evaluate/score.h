@@ -1,16 +1,15 @@
-/* score.h -- how near recovered materials are to the true ones, as seen by test cameras.
+/* score.h -- errors of recovered materials against ground truth, as seen by test cameras.
  *
- * Pixel measures over pictures of parameters (channels base_color.R G B, roughness, specular,
- * emission.R G B; truth also object_id, -1 where nothing is), summed over views:
+ * Per-pixel measures over parameter pictures (channels base_color.R G B, roughness, specular, emission.R G B; truth
+ * also object_id, -1 for background), summed over views:
  *
- *   base colour  10 log10(1 / mean squared error) over channels and pixels in which no sample
- *                meets an emitter or nothing, values clamped to [0, 1]; once over pixels all of
- *                whose samples land on surface that a training view sees (seen.h; the
- *                headline), once over all
+ *   base colour  10 log10(1 / mean squared error) over channels and pixels without an emitter or background sample,
+ *                values clamped to [0, 1]; once over pixels all of whose samples are seen by a training view (seen.h;
+ *                the headline figure), once over all
  *   roughness,   the same over seen pixels whose 3 x 3 neighbourhood is one object of the truth
  *   specular
- *   emission     intersection over union of the pixels that emit; mean over pixels and channels
- *                of (log(1 + a) - log(1 + b))^2 */
+ *   emission     intersection over union of the emitting pixels; mean over pixels and channels of
+ *                (log(1 + a) - log(1 + b))^2 */
 #ifndef UNBAKE_EVALUATE_SCORE_H
 #define UNBAKE_EVALUATE_SCORE_H
 
@@ -19,13 +18,13 @@
 
 #include "common/image.h"
 
-/* What a pixel's samples met. */
+/* Flags of a pixel, by its samples. */
 enum {
-    SCORE_PLAIN = 1, /* neither an emitter nor nothing */
-    SCORE_SEEN = 2   /* only surface that some training view sees */
+    SCORE_PLAIN = 1, /* no sample hits an emitter or misses the room */
+    SCORE_SEEN = 2   /* every sample hits surface that a training view sees */
 };
 
-/* A sum of squared errors and what it was taken over. */
+/* A sum of squared errors and its number of terms. */
 struct score_sum {
     double sum;
     size_t count;
@@ -41,8 +40,8 @@ struct score {
 void score_add(struct score *score, const struct image *found, const struct image *truth,
                const uint8_t *flags);
 
-double score_mean(struct score_sum sum);    /* NaN for nothing */
-double score_psnr_db(struct score_sum sum); /* infinite without error, NaN for nothing */
+double score_mean(struct score_sum sum);    /* NaN when empty */
+double score_psnr_db(struct score_sum sum); /* infinite without error, NaN when empty */
 double score_emission_iou(const struct score *score); /* 1 when neither emits anywhere */
 
 #endif

@@ -7,16 +7,16 @@
 #include "common/rng.h"
 #include "server/evaluate/score.h"
 
-/* Where a corner ray of a pixel meets the room. */
+/* First hit of the ray through a pixel's corner. */
 struct seen_corner {
     vec3 point, normal;
     float distance_m;
-    int64_t object; /* NOTHING: it meets no surface */
+    int64_t object; /* NOTHING: a miss */
 };
 #define NOTHING INT64_MIN
 
-/* How far a corner's point may lie from the plane of another's before an edge of depth is between
- * them: in sizes of a pixel there, and as a share of the distance, for rounding. */
+/* Distance of one corner's point from the plane of another beyond which there is a depth discontinuity: in pixel
+ * sizes at that distance, plus a share of the distance for rounding. */
 #define EDGE_PIXELS 3.0f
 #define EDGE_SHARE 0.002f
 
@@ -95,7 +95,7 @@ struct flag_job {
     uint8_t *flags;
 };
 
-/* Whether one of the four pixels around a place lies on an edge. */
+/* Whether one of the four pixels of a lookup lies on an edge. */
 static bool on_edge(const struct seen *s, size_t train, float x, float y) {
     const struct camera *camera = &s->scene->photograph[s->train[train]].camera;
     long x0 = (long)floorf(x - 0.5f), y0 = (long)floorf(y - 0.5f);
@@ -119,8 +119,8 @@ static bool view_sees(const struct seen *s, size_t train, vec3 point, vec3 norma
                            distance);
 }
 
-/* Starts with the view that saw the last point: the next is near it. */
-static bool any_sees(const struct seen *s, vec3 point, vec3 normal, size_t *last) {
+/* Starts with the view that saw the previous point, which is close. */
+static bool is_seen(const struct seen *s, vec3 point, vec3 normal, size_t *last) {
     for (size_t i = 0; i < s->train_count; i++) {
         size_t train = (*last + i) % s->train_count;
         if (view_sees(s, train, point, normal)) {
@@ -131,7 +131,7 @@ static bool any_sees(const struct seen *s, vec3 point, vec3 normal, size_t *last
     return false;
 }
 
-/* A 4 x 4 grid of jittered places. */
+/* Sample position on a jittered 4 x 4 grid. */
 static vec2 sample_place(uint32_t x, uint32_t y, uint32_t sample) {
     uint64_t bits = rng_key(x, y, sample);
     return vec2_make((float)x + ((float)(sample % 4) + rng_to_float((uint32_t)bits)) / 4.0f,
@@ -154,7 +154,7 @@ static uint8_t pixel_flags(const struct flag_job *job, uint32_t x, uint32_t y, s
         if (flags & SCORE_SEEN) {
             vec3 point = mesh_point(mesh, hit.triangle, hit.b1, hit.b2);
             vec3 normal = vec3_normalize(mesh_cross(mesh, hit.triangle));
-            if (!any_sees(s, point, normal, last))
+            if (!is_seen(s, point, normal, last))
                 flags = SCORE_PLAIN;
         }
     }

@@ -1,12 +1,11 @@
-/* seen.h -- which pixels of a test view show surface that some training view sees.
+/* seen.h -- which pixels of a test view show surface that a training view sees.
  *
- * A view sees a point when it projects into the picture, nothing lies between, and none of the
- * four pixels that a look-up there reads straddles an edge: its four corners meet one object, and
- * no depth edge of it. What a pixel on an edge shows belongs to no surface, and surface that shows
- * in no other pixel is not measured. From which side it is seen does not matter.
+ * A view sees a point if it projects into the picture, is not occluded, and none of the four pixels of the bilinear
+ * lookup straddles an edge: the four corners of each must hit one object without a depth discontinuity. Pixels on
+ * edges mix surfaces, so surface that appears in no other pixel is not measured. Which side is seen does not matter.
  *
- * On purpose this shares nothing with how the reconstruction chooses what it trusts (views.h): a
- * measure stays as it is when the method changes. */
+ * Deliberately shares no code with the reconstruction's own selection (views.h): the measure must not change with the
+ * method. */
 #ifndef UNBAKE_EVALUATE_SEEN_H
 #define UNBAKE_EVALUATE_SEEN_H
 

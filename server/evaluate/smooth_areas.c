@@ -1,20 +1,21 @@
-/* even.c -- see even.h. */
-#include "server/evaluate/even.h"
+/* smooth_areas.c -- see smooth_areas.h. */
+#include "server/evaluate/smooth_areas.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "server/reconstruct/metrics.h"
 
-#define REACH 3 /* pixels around, along each side: 7 x 7 */
-/* Weights of these by least squares, for the value in the middle of a quadratic: 1/49 - 4 (u^2 + v^2 - 8) / 588, 4 being
- * the mean of u^2 and 588 the sum of (u^2 - 4)^2. Noise of which the middle one has a part is left by 1 less its weight. */
+#define RADIUS 3 /* pixels, of the 7 x 7 window */
+/* Least-squares weights for the value of a quadratic at the window's centre: 1/49 - 4 (u^2 + v^2 - 8) / 588, with 4
+ * the mean of u^2 and 588 the sum of (u^2 - 4)^2. The centre pixel contributes to its own estimate, so 1 - WEIGHT(0,
+ * 0) of its noise variance remains in the difference. */
 #define WEIGHT(u, v) (1.0 / 49.0 - 4.0 * ((u) * (u) + (v) * (v) - 8.0) / 588.0)
-#define SAME_COLOR 0.005f /* base colours no further apart are the same */
-#define LEAST_ROUGHNESS 0.5f
+#define MAX_COLOR_DIFFERENCE 0.005f /* base colours that differ less are the same */
+#define MIN_ROUGHNESS 0.5f
 
-/* Where the channels of the truth are. */
-struct even_columns {
+/* Indices of the truth's channels. */
+struct truth_channels {
     int color[3], roughness, object;
 };
 
@@ -22,67 +23,68 @@ static const float *pixel_at(const struct image *image, uint32_t x, uint32_t y) 
     return image->pixel + ((size_t)y * image->width + x) * image->channel_count;
 }
 
-static bool is_same(const float *a, const float *b, const struct even_columns *at) {
+static bool same_surface(const float *a, const float *b, const struct truth_channels *at) {
     for (int c = 0; c < 3; c++) {
-        if (fabsf(a[at->color[c]] - b[at->color[c]]) > SAME_COLOR)
+        if (fabsf(a[at->color[c]] - b[at->color[c]]) > MAX_COLOR_DIFFERENCE)
             return false;
     }
     return a[at->object] == b[at->object];
 }
 
-/* What a pixel should show by those around it; false where that is not even. */
-static bool told_around(const struct image *photograph, const struct image *truth, const struct even_columns *at, uint32_t x,
-                        uint32_t y, float told[3]) {
-    const float *middle = pixel_at(truth, x, y);
+/* Expected value of a pixel from its window; false when the window is not smooth. */
+static bool smoothed_pixel(const struct image *photograph, const struct image *truth, const struct truth_channels *at,
+                           uint32_t x, uint32_t y, float smoothed[3]) {
+    const float *centre = pixel_at(truth, x, y);
     double sum[3] = {0.0, 0.0, 0.0};
-    if (middle[at->object] < 0.0f || middle[at->roughness] < LEAST_ROUGHNESS)
+    if (centre[at->object] < 0.0f || centre[at->roughness] < MIN_ROUGHNESS)
         return false;
-    for (int v = -REACH; v <= REACH; v++) {
-        for (int u = -REACH; u <= REACH; u++) {
+    for (int v = -RADIUS; v <= RADIUS; v++) {
+        for (int u = -RADIUS; u <= RADIUS; u++) {
             uint32_t column = (uint32_t)((int)x + u), row = (uint32_t)((int)y + v);
-            if (!is_same(pixel_at(truth, column, row), middle, at))
+            if (!same_surface(pixel_at(truth, column, row), centre, at))
                 return false;
             for (int c = 0; c < 3; c++)
                 sum[c] += WEIGHT(u, v) * (double)pixel_at(photograph, column, row)[c];
         }
     }
     for (int c = 0; c < 3; c++)
-        told[c] = (float)sum[c];
+        smoothed[c] = (float)sum[c];
     return isfinite(sum[0]) && isfinite(sum[1]) && isfinite(sum[2]);
 }
 
-/* Makes a picture of what pixels should show where all is even, and NaN elsewhere, which metrics leave out. Returns the
- * number of the former. */
-static size_t tell(const struct image *photograph, const struct image *truth, struct image *told) {
-    const struct even_columns at = {
-        {image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"), image_channel(truth, "base_color.B")},
+/* Makes a picture of expected values, NaN where the scene is not smooth, which metrics leave out. Returns the number
+ * of smooth pixels. */
+static size_t smooth_picture(const struct image *photograph, const struct image *truth, struct image *smoothed) {
+    const struct truth_channels at = {
+        {image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"),
+         image_channel(truth, "base_color.B")},
         image_channel(truth, "roughness"), image_channel(truth, "object_id")};
     size_t count = 0;
-    image_init_rgb(told, truth->width, truth->height);
+    image_init_rgb(smoothed, truth->width, truth->height);
     for (size_t i = 0; i < 3 * (size_t)truth->width * truth->height; i++)
-        told->pixel[i] = NAN;
-    for (uint32_t y = REACH; y + REACH < truth->height; y++) {
-        for (uint32_t x = REACH; x + REACH < truth->width; x++) {
-            float around[3];
-            if (!told_around(photograph, truth, &at, x, y, around))
+        smoothed->pixel[i] = NAN;
+    for (uint32_t y = RADIUS; y + RADIUS < truth->height; y++) {
+        for (uint32_t x = RADIUS; x + RADIUS < truth->width; x++) {
+            float value[3];
+            if (!smoothed_pixel(photograph, truth, &at, x, y, value))
                 continue;
-            memcpy(told->pixel + 3 * ((size_t)y * truth->width + x), around, sizeof around);
+            memcpy(smoothed->pixel + 3 * ((size_t)y * truth->width + x), value, sizeof value);
             count++;
         }
     }
     return count;
 }
 
-void even_add(struct even *even, const struct image *photograph, const struct image *render, const struct image *truth,
-              double median_radiance) {
-    struct image shown;
-    size_t count = tell(photograph, truth, &shown);
+void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *render,
+                      const struct image *truth, double median_radiance) {
+    struct image expected;
+    size_t count = smooth_picture(photograph, truth, &expected);
     if (count > 0) {
-        even->noise += (double)count * metrics_msre(photograph, &shown, median_radiance) / (1.0 - WEIGHT(0, 0));
+        areas->noise += (double)count * metrics_msre(photograph, &expected, median_radiance) / (1.0 - WEIGHT(0, 0));
         for (size_t i = 0; i < 3 * (size_t)truth->width * truth->height; i++)
-            shown.pixel[i] = isfinite(shown.pixel[i]) ? render->pixel[i] : NAN;
-        even->render += (double)count * metrics_msre(photograph, &shown, median_radiance);
-        even->count += count;
+            expected.pixel[i] = isfinite(expected.pixel[i]) ? render->pixel[i] : NAN;
+        areas->render += (double)count * metrics_msre(photograph, &expected, median_radiance);
+        areas->count += count;
     }
-    image_release(&shown);
+    image_release(&expected);
 }

@@ -1,23 +1,23 @@
-/* even.h -- how much of MSRE is the photographs' own noise, told without a renderer.
+/* smooth_areas.h -- the share of MSRE that is the photographs' own noise, estimated without a renderer.
  *
- * Where all pixels around one show the same object in the same base colour, and it is rough, light changes slowly from
- * one to the next: what a pixel should show is told by the quadratic through 7 x 7 of them (Savitzky and Golay 1964). By
- * what it is off from that it is off from any re-render, however right. */
-#ifndef UNBAKE_EVALUATE_EVEN_H
-#define UNBAKE_EVALUATE_EVEN_H
+ * Where the neighbourhood of a pixel shows one rough object of one base colour, radiance varies slowly: its expected
+ * value is that of a quadratic fitted to 7 x 7 pixels (Savitzky and Golay 1964). The pixel's deviation from it is
+ * noise, which no re-render can match. */
+#ifndef UNBAKE_EVALUATE_SMOOTH_AREAS_H
+#define UNBAKE_EVALUATE_SMOOTH_AREAS_H
 
 #include <stddef.h>
 
 #include "common/image.h"
 
-struct even {
-    double render, noise; /* sums over pixels: what the re-render adds to MSRE, and what the photograph's noise does */
+struct smooth_areas {
+    double render, noise; /* sums over pixels: MSRE of the re-render, and of the photograph's noise */
     size_t count;         /* pixels */
 };
 
-/* Adds the even places of a view. Pictures are of one size: photograph and render as metrics.h has them, truth with the
- * channels base_color.R G B, roughness and object_id. */
-void even_add(struct even *even, const struct image *photograph, const struct image *render, const struct image *truth,
-              double median_radiance);
+/* Adds the smooth areas of a view. All pictures are of one size: photograph and render as in metrics.h, truth with
+ * the channels base_color.R G B, roughness and object_id. */
+void smooth_areas_add(struct smooth_areas *areas, const struct image *photograph, const struct image *render,
+                      const struct image *truth, double median_radiance);
 
 #endif
