@@ -24,10 +24,10 @@
 /* --- model selection --------------------------------------------------------------------------- */
 
 /* Robust cost of each held-out point, with residuals in units of `scale`. Returns their number. */
-static size_t held_back_costs(const struct light_fit *f, const double *x, double scale, double *cost) {
+static size_t held_out_costs(const struct light_fit *f, const double *x, double scale, double *cost) {
     size_t used = 0;
     for (size_t p = 0; p < f->o->point_count; p++) {
-        if (!light_fit_is_held_back(f, p))
+        if (!light_fit_is_held_out(f, p))
             continue;
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         double weight[OVERLAP_OBSERVATIONS_MAX], square[OVERLAP_OBSERVATIONS_MAX];
@@ -71,7 +71,7 @@ static double drift_of(const struct light_fit *f, const double *x) {
 /* Forward selection: accepts faults one by one, the one with the largest gain first. Returns the model; x is its
  * solution. */
 static int choose_model(struct light_fit *f, double *x) {
-    size_t n = light_fit_parameter_count(f), points = f->o->point_count / LIGHT_HELD_BACK_EVERY + 1, used;
+    size_t n = light_fit_parameter_count(f), points = f->o->point_count / LIGHT_HELD_OUT_EVERY + 1, used;
     double *base = mem_array(points, sizeof *base), *cost = mem_array(points, sizeof *cost);
     double *trial = mem_array(n, sizeof *trial), *best = mem_array(n, sizeof *best);
     int model = 0;
@@ -80,13 +80,13 @@ static int choose_model(struct light_fit *f, double *x) {
         double most = MIN_GAIN, scale;
         light_fit_solve(f, model, x);
         scale = f->scale;
-        held_back_costs(f, x, scale, base);
+        held_out_costs(f, x, scale, base);
         for (int fault = LIGHT_DRIFT; fault < LIGHT_FAULTS; fault *= 2) {
             if ((model & fault) || (fault == LIGHT_DRIFT && f->unknown_exposure_count == f->frames))
                 continue;
             memcpy(trial, x, n * sizeof *trial);
             light_fit_solve(f, model | fault, trial);
-            used = held_back_costs(f, trial, scale, cost);
+            used = held_out_costs(f, trial, scale, cost);
             double gain = gain_of(base, cost, used);
             if (gain > most && (fault != LIGHT_DRIFT || drift_of(f, trial) > MIN_DRIFT)) {
                 most = gain;

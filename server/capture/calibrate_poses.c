@@ -41,7 +41,7 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
 /* --- judgement ------------------------------------------------------------------------------------ */
 
 static void collect_evidence(const struct pose_solver *s, struct pose_evidence *evidence) {
-    for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
+    for (size_t i = 0; i < s->track_count; i += POSE_HELD_OUT_EVERY) {
         struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
         for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
             const struct pose_frame *frame = &s->frame[observation[k].frame];
@@ -89,9 +89,9 @@ static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost
     run_rounds(s, 0, 2, pool); /* offsets only: all frames are fixed */
     for (size_t f = 0; f < s->frames; f++)
         s->frame[f].is_fixed = is_fixed[f];
-    for (size_t i = 0; i < s->track_count; i += POSE_HELD_BACK_EVERY) {
+    for (size_t i = 0; i < s->track_count; i += POSE_HELD_OUT_EVERY) {
         const struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
-        double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, *sum = &cost[i / POSE_HELD_BACK_EVERY];
+        double consensus, weight[POSE_OBSERVATIONS_MAX], count = 0.0, *sum = &cost[i / POSE_HELD_OUT_EVERY];
         pose_weigh_track(s, i, &consensus, weight);
         *sum = 0.0;
         for (size_t k = 0; k < pose_observation_count(s->track[i]) && isfinite(consensus); k++) {
@@ -133,13 +133,13 @@ void calibrate_poses(struct scene *scene, const struct tracks *tracks, struct pa
     struct pose_solver s;
     const struct views *views = tracks->views;
     pose_solver_init(&s, tracks);
-    size_t held_back = s.track_count / POSE_HELD_BACK_EVERY + 1;
-    double *before = mem_calloc(2 * held_back, sizeof *before), *now = before + held_back;
+    size_t held_out_count = s.track_count / POSE_HELD_OUT_EVERY + 1;
+    double *before = mem_calloc(2 * held_out_count, sizeof *before), *now = before + held_out_count;
     costs_now(&s, pool, before);
     for (int level = coarsest_level(tracks); level >= 0; level--)
         run_rounds(&s, level, POSE_ROUNDS, pool);
     costs_now(&s, pool, now);
-    bool convincing = all_improved(before, now, held_back - 1);
+    bool convincing = all_improved(before, now, held_out_count - 1);
     mem_free(before);
     for (size_t f = 0; f < s.frames && !convincing; f++)
         pose_reset(&s, f);

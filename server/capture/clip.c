@@ -6,10 +6,10 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define WINDOW_RADIUS 2       /* pixels to either side */
-#define WINDOW_MIN_PIXELS 9 /* pixels that must show the same surface */
-#define SATURATED_SHARE 0.3f
-#define NOISE_DEVIATIONS 3.0f /* noise goes so far */
+#define WINDOW_RADIUS 2 /* pixels to either side; by hand */
+#define WINDOW_MIN_PIXELS 9 /* pixels that must show the same surface; by hand */
+#define SATURATED_SHARE 0.3f /* measured: with a tenth, bathroom loses .13 dB (8 bits) */
+#define NOISE_DEVIATIONS 3.0f /* standard deviations that noise reaches below the clip; by hand */
 
 struct clip_job {
     const struct views *views;
@@ -18,9 +18,9 @@ struct clip_job {
     uint32_t train;
 };
 
-/* What the pixels around one, which show the same surface and nothing else, tell of a channel. */
+/* Statistics of one channel over the pixels around one that show the same surface. */
 struct neighbourhood {
-    float count, saturated, unsaturated_sum; /* `below`: the sum of the values that do not saturate */
+    float count, saturated, unsaturated_sum;
 };
 
 static struct neighbourhood count_neighbourhood(const struct clip_job *job, long x0, long y0, int channel) {

@@ -1,17 +1,17 @@
-/* clip.h -- which pixels of 8 bits saturate, told by those around them.
+/* clip.h -- which pixels of 8-bit photographs are saturated, judged with their neighbourhood.
  *
- * Of a surface about as bright as a photograph can show, noise takes some pixels over the clip and leaves others below it.
- * The mean of those left is too dark, and as a long exposure counts for most elsewhere, it would there, too. Whether a
- * surface is beyond the clip is therefore asked of all pixels around that show it, and not of each by itself: where
- * three tenths of them saturate, all do that noise may have left below; where fewer do, none does, and a pixel at the
- * clip reads as the clip. What is farther below the clip than noise goes, black tiles between white ones, stays as it is. */
+ * Where a surface is about as bright as the clip value, noise takes some pixels over it and leaves others below. The
+ * mean of those below is too dark, and a long exposure has the largest weight. So saturation is decided for the surface
+ * around a pixel: where three tenths of the pixels that show it are saturated, all within the noise of the clip are;
+ * where fewer are, none is, and a pixel at the clip reads as the clip value. Values farther below the clip than noise
+ * reaches (black tiles between white ones) stay as they are. */
 #ifndef UNBAKE_CAPTURE_CLIP_H
 #define UNBAKE_CAPTURE_CLIP_H
 
 #include "server/capture/noise.h"
 
-/* Fills photograph.white of the photographs of `scene`, which are those of `views`, that are of 8 bits and not held out.
- * The same for any number of threads. */
+/* Fills photograph.saturated of the 8-bit training photographs of `scene`, which are those of `views`. The same for any
+ * number of threads. */
 void clip_mark(struct scene *scene, const struct views *views, const struct noise *noise, struct parallel *pool);
 
 #endif

@@ -1,11 +1,9 @@
 /* environment.c -- see environment.h.
  *
- * Gathered, not scattered: each direction of the map asks every photograph that may look there,
- * at several places over its cell where the photograph is finer than the map. What the photographs
- * say is combined channel by channel: the median that a saturated value, a lower bound, moves only
- * upwards (censored.h), then the mean of what agrees with it. A photograph weighs by its exposure, as
- * the precision of a count of photons does; by the value itself it would favour the noise that is too
- * bright. */
+ * Gathers rather than scatters: each direction of the map asks every photograph that may show it, at several points of
+ * the pixel where the photograph is finer than the map. Observations are combined for each channel: the median, with
+ * saturated values as lower bounds (censored.h), then the mean of the inliers. A photograph weighs by its exposure, the
+ * precision of a photon count; weights by the value itself would favour noise that is too bright. */
 #include "server/capture/environment.h"
 
 #include <math.h>
@@ -17,25 +15,24 @@
 #include "server/scene/latlong.h"
 
 /* A point so far away that every camera of a room sees it in the same direction, in metres. */
-#define FAR_M 1e6f
+#define FAR_M 1e6f /* metres: distance of a point that every camera of a room sees in the same direction */
 /* Places over a cell, along each side, at most. */
-#define MAX_GRID 4
-/* Weight of a look-up within a pixel of the opening's rim, where poses that are a little wrong mix
- * light and frame. */
+#define MAX_GRID 4 /* sample points along each side of a pixel of the map, at most; by hand */
+/* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame. By hand. */
 #define RIM_WEIGHT 0.1f
-/* Values this many deviations from the median take no part in the mean. */
+/* Outliers: standard deviations from the median. By hand. */
 #define OUTLIER_DEVIATIONS 3.0f
-/* The least deviation, as a part of the median: two photographs that agree by chance must not make
- * a third one an outlier. */
+/* Least standard deviation, as a share of the median: when two photographs agree by chance, a third is no outlier. By
+ * hand. */
 #define MIN_DEVIATION 0.05f
 
-/* A photograph that looks out somewhere. */
+/* A photograph with open pixels. */
 struct window {
     uint32_t train;
-    size_t pixel_count; /* open ones */
+    size_t pixel_count; /* open pixels */
     vec3 axis;          /* a cone around their directions */
     float cosine;
-    int grid;           /* places over a cell, along each side */
+    int grid;           /* sample points along each side of a pixel of the map */
 };
 
 struct environment_gather {
@@ -43,10 +40,10 @@ struct environment_gather {
     struct environment *e;
     size_t window_count;
     struct window *window; /* [window_count] */
-    struct censored *scratch; /* [threads][3][window_count] what photographs show in a direction */
+    struct censored *scratch; /* [threads][3][window_count] observations of one direction */
 };
 
-/* --- photographs that look out -------------------------------------------------------------- */
+/* --- photographs with open pixels ------------------------------------------------------------ */
 
 static void find_window(void *user, size_t train, int thread) {
     (void)thread;
@@ -71,7 +68,7 @@ static void find_window(void *user, size_t train, int thread) {
         }
         w->axis = vec3_normalize(w->axis);
     }
-    /* The pixels' own extent, twice. */
+    /* Plus two pixels: their own extent. */
     float angle = acosf(clampf(w->cosine, -1.0f, 1.0f)) + 2.0f / camera->fx;
     w->cosine = angle < (float)PI ? cosf(angle) : -1.0f;
 }
@@ -80,7 +77,7 @@ static const struct camera *camera_of(const struct environment_gather *g, const 
     return &g->views->scene->photograph[g->views->train[w->train]].camera;
 }
 
-/* Keeps the photographs that look out and returns the width of the map; 0: there are none. */
+/* Keeps the photographs with open pixels and returns the width of the map; 0: there are none. */
 static uint32_t find_windows(struct environment_gather *g, struct parallel *pool) {
     size_t train_count = g->views->train_count;
     g->window = mem_calloc(train_count + 1, sizeof *g->window);
@@ -107,14 +104,14 @@ static uint32_t find_windows(struct environment_gather *g, struct parallel *pool
     return width;
 }
 
-/* --- what they say ---------------------------------------------------------------------------- */
+/* --- combining observations ----------------------------------------------------------------------- */
 
-/* The mean of what agrees with the median. Sorts the values. */
+/* The mean of the inliers about the median. Sorts the values. */
 static float combine(struct censored *value, size_t count, bool *is_bound) {
     float median = censored_quantile(value, count, 0.5f, is_bound);
     if (*is_bound || count < 3)
         return median;
-    /* The median absolute deviation is the farthest when the farther half is gone. */
+    /* Median absolute deviation: removes the farthest values until half of the weight is left. */
     size_t first = 0, end = count;
     float half = 0.0f, removed = 0.0f, deviation = 0.0f, weight = 0.0f, sum = 0.0f;
     for (size_t i = 0; i < count; i++)
@@ -140,7 +137,7 @@ static double cell_solid_angle(const struct environment *e, size_t row) {
     return latlong_pixel_angle(e->map.width, e->map.height, (uint32_t)row);
 }
 
-/* A cell of the map, around a pixel: the direction of its centre, and the ways across it along row and column. */
+/* A pixel of the map: direction of its centre, and its extent along row and column. */
 struct cell {
     vec3 centre, along, down;
 };
@@ -155,7 +152,7 @@ static struct cell cell_at(const struct image *map, size_t column, size_t row) {
     };
 }
 
-/* What a photograph shows of a cell, by channel; false: nothing. */
+/* A photograph's observation of a pixel, for each channel; false: none. */
 static bool sample_window(const struct environment_gather *g, const struct window *w, const struct cell *cell,
                      struct censored value[3]) {
     const struct views *v = g->views;
@@ -187,7 +184,7 @@ static bool sample_window(const struct environment_gather *g, const struct windo
     return tap_weight_sum > 0.0f;
 }
 
-/* Standard deviation of the logarithm of the channels' mean. */
+/* Running sums for the standard deviation of the logarithm of the channels' mean. */
 struct environment_spread {
     double count, sum, square;
 };
@@ -241,7 +238,7 @@ static void gather_row(void *user, size_t row, int thread) {
         gather_cell(g, column, row, g->scratch + (size_t)thread * 3 * g->window_count);
 }
 
-/* All columns of the first and of the last row are one direction: the mean of those that were seen. */
+/* A pole is one direction: all its columns get the mean of those seen. */
 static void join_pole(struct environment *e, size_t row) {
     size_t width = e->map.width, seen = 0;
     float *pixel = e->map.pixel + 3 * row * width, *confidence = e->confidence.pixel + 2 * row * width;
@@ -267,7 +264,7 @@ static bool is_seen(const struct environment *e, size_t cell) {
     return e->confidence.pixel[2 * cell] > 0.0f;
 }
 
-/* Median over directions whose light is told, the mean of the channels; 0 where none is. */
+/* Median of the channels' mean over measured directions; 0 where there is none. */
 static float median_measured(const struct environment *e) {
     size_t cells = (size_t)e->map.width * e->map.height, count = 0;
     float *measured = mem_array(cells, sizeof *measured);
@@ -281,8 +278,8 @@ static float median_measured(const struct environment *e) {
     return median;
 }
 
-/* Where only frames of long exposure look out, their bound lies below what shorter ones show elsewhere, and tells less
- * than that does: such directions count as unseen. Under one exposure no bound is below what is told. */
+/* Where only long exposures look out, their lower bound is below the radiance measured elsewhere and carries no
+ * information: such directions count as unseen. With a single exposure no bound is below measured values. */
 static void drop_weak_bounds(struct environment *e) {
     float median = median_measured(e);
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
@@ -294,7 +291,7 @@ static void drop_weak_bounds(struct environment *e) {
     }
 }
 
-/* The share of what is seen, by solid angle, of which only a lower bound is known; negative where nothing is seen. */
+/* Share of the seen solid angle with a lower bound only; negative where nothing is seen. */
 static double saturated_share(const struct environment *e) {
     double seen = 0.0, saturated = 0.0;
     for (size_t i = 0; i < (size_t)e->map.width * e->map.height; i++) {
@@ -352,7 +349,7 @@ bool environment_make(struct environment *e, const struct views *views, struct p
         drop_weak_bounds(e);
         saturated = saturated_share(e);
     }
-    bool any = saturated >= 0.0; /* pixels may be open and yet masked */
+    bool any = saturated >= 0.0; /* open pixels may all be masked */
     if (any) {
         fill_sphere(&e->map, &e->confidence);
         environment_update_figures(e);

@@ -8,10 +8,11 @@
 #include "common/vec.h"
 #include "server/scene/latlong.h"
 
-/* What spreads is at most this many times the typical known luminance. */
+/* Luminance that is propagated is clamped to this many times the typical one; by hand. */
 #define LUMINANCE_LIMIT 4.0
-#define SWEEPS 32
-/* A row counts for another by the distance to the power of minus this: a tenth farther than the nearest a tenth of it. */
+#define SWEEPS 32 /* of Gauss-Seidel after pull-push: removes its blockiness; by hand */
+/* Weight of a row for another: distance to the power of minus this; by hand. At 1.1 times the distance of the nearest
+ * row, a tenth of its weight. */
 #define ROW_FALLOFF 24.0
 
 /* Solid angle of a pixel, by its index. */
@@ -19,7 +20,7 @@ static double angle_of(const struct image *map, size_t pixel) {
     return latlong_pixel_angle(map->width, map->height, (uint32_t)(pixel / map->width));
 }
 
-/* The square of the mean square root: a mean that a sun hardly moves. */
+/* Squared mean of square roots: robust to a sun. */
 static double typical_luminance(const struct image *map, const struct image *known) {
     double sum = 0.0, weight = 0.0;
     for (size_t i = 0; i < (size_t)map->width * map->height; i++) {
@@ -33,7 +34,7 @@ static double typical_luminance(const struct image *map, const struct image *kno
     return (sum / weight) * (sum / weight);
 }
 
-/* A colour, no brighter than the limit. */
+/* A colour, clamped to a luminance. */
 static rgb below_limit(const struct image *map, size_t pixel, double limit) {
     const float *p = map->pixel + 3 * pixel;
     rgb color = rgb_make(p[0], p[1], p[2]);
@@ -41,10 +42,10 @@ static rgb below_limit(const struct image *map, size_t pixel, double limit) {
     return luminance > limit ? rgb_scale(color, (float)(limit / luminance)) : color;
 }
 
-/* --- what is alike around the horizon --------------------------------------------------------------- */
+/* --- means of rows ---------------------------------------------------------------------------------- */
 
-/* Of each row a colour: the mean of what is known in it and, where little or nothing is, in the rows around it, by
- * their distance (Shepard 1968). [height]; the caller's. */
+/* Row means: of the known pixels of a row and, where there are few or none, of the rows around it by inverse distance
+ * (Shepard 1968). [height]; the caller's. */
 static rgb *row_colors(const struct image *map, const struct image *known, double limit) {
     uint32_t width = map->width, height = map->height;
     double(*sum)[4] = mem_calloc(height, sizeof *sum); /* by solid angle: red, green, blue, all */
@@ -72,9 +73,9 @@ static rgb *row_colors(const struct image *map, const struct image *known, doubl
     return color;
 }
 
-/* --- the rest --------------------------------------------------------------------------------------- */
+/* --- pull-push and diffusion ------------------------------------------------------------------------ */
 
-/* One level of the pyramid: by how much colours differ from their row's, and how well that is known, 0 to 1. */
+/* A pyramid level: difference from the row mean, and confidence from 0 to 1. */
 struct fill_level {
     uint32_t width, height;
     float (*value)[4]; /* [height][width]; owned */
@@ -98,7 +99,7 @@ static void start_finest(struct fill_level *l, const struct image *map, const st
     }
 }
 
-/* Half the size: means by solid angle and knowledge. One known cell of four makes a known one. */
+/* Next coarser level: means by solid angle and confidence. One known pixel of four makes a known one. */
 static void pull(const struct fill_level *fine, struct fill_level *coarse) {
     *coarse = (struct fill_level){.width = fine->width / 2, .height = fine->height / 2};
     coarse->value = mem_calloc((size_t)coarse->width * coarse->height, sizeof *coarse->value);
@@ -124,7 +125,7 @@ static void pull(const struct fill_level *fine, struct fill_level *coarse) {
     }
 }
 
-/* Mixes the coarser level, interpolated, into what is not known. */
+/* Blends the interpolated coarser level into unknown pixels. */
 static void push(const struct fill_level *coarse, struct fill_level *fine) {
     for (uint32_t y = 0; y < fine->height; y++) {
         float row = clampf(0.5f * ((float)y + 0.5f) - 0.5f, 0.0f, (float)(coarse->height - 1));
@@ -148,7 +149,7 @@ static void push(const struct fill_level *coarse, struct fill_level *fine) {
     }
 }
 
-/* One Gauss-Seidel sweep of the Laplace equation over the inner rows; known cells hold still. */
+/* One Gauss-Seidel sweep of the Laplace equation over the inner rows; known pixels are fixed. */
 static void diffuse(struct fill_level *l) {
     uint32_t w = l->width;
     double step_x = 2.0 * PI / w, step_y = latlong_polar(l->height, 1.0);
@@ -169,7 +170,7 @@ static void diffuse(struct fill_level *l) {
     }
 }
 
-/* A pole is one direction: the mean of the row beside it. */
+/* A pole is one direction: it gets the mean of the adjacent row. */
 static void join_pole(struct fill_level *l, uint32_t pole, uint32_t neighbour) {
     float(*row)[4] = l->value + (size_t)pole * l->width;
     double sum[3] = {0};
@@ -181,7 +182,7 @@ static void join_pole(struct fill_level *l, uint32_t pole, uint32_t neighbour) {
             row[x][c] = (float)sum[c];
 }
 
-/* Two cells: what is not known of either is their mean. */
+/* Two pixels: unknown ones get their mean. */
 static void fill_coarsest(struct fill_level *l) {
     float(*v)[4] = l->value;
     float weight = v[0][3] + v[1][3];
@@ -218,14 +219,14 @@ void fill_sphere(struct image *map, const struct image *known) {
     mem_free(row_color);
 }
 
-/* --- how far what is known is ----------------------------------------------------------------------- */
+/* --- distance to the nearest known pixel ------------------------------------------------------------- */
 
 #define UNKNOWN UINT32_MAX
 
-/* Of each pixel the nearest known one, as its neighbours tell it (Danielsson 1980). */
+/* Nearest known pixel of each pixel, propagated by neighbours (Danielsson 1980). */
 struct nearest_known {
     uint32_t width, height;
-    uint32_t *of; /* [height][width] NONE: not told yet */
+    uint32_t *of; /* [height][width] index of the nearest known pixel, or UNKNOWN */
     vec2 *row;    /* [height] sine and cosine of the polar angle */
     vec2 *column; /* [width] of the azimuth */
 };
@@ -243,7 +244,7 @@ static void propagate(struct nearest_known *n, uint32_t from, uint32_t to) {
         n->of[to] = known;
 }
 
-/* One row of a sweep: from the row before it, then along it both ways. */
+/* One row of a sweep: from the row before it, then along it in both directions. */
 static void propagate_row(struct nearest_known *n, uint32_t y, uint32_t before) {
     uint32_t w = n->width, here = y * w, there = before * w;
     for (uint32_t x = 0; x < w && before != y; x++) {
@@ -251,7 +252,7 @@ static void propagate_row(struct nearest_known *n, uint32_t y, uint32_t before) 
         propagate(n, there + (x + 1) % w, here + x);
         propagate(n, there + (x + w - 1) % w, here + x);
     }
-    for (uint32_t i = 0; i < 2 * w; i++) /* twice: around the seam */
+    for (uint32_t i = 0; i < 2 * w; i++) /* twice: across the seam */
         propagate(n, here + i % w, here + (i + 1) % w);
     for (uint32_t i = 2 * w; i > 0; i--)
         propagate(n, here + i % w, here + (i - 1) % w);

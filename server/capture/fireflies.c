@@ -6,8 +6,8 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define MIN_RATIO 2.0f   /* than the brightest pixel around */
-#define NOISE_DEVIATIONS 4.0f /* of noise, by which it is brighter */
+#define MIN_RATIO 2.0f /* to the brightest of the eight neighbours; by hand */
+#define NOISE_DEVIATIONS 4.0f /* standard deviations above that neighbour; by hand */
 
 struct fireflies_job {
     const struct noise *noise;
@@ -21,7 +21,7 @@ static float value_at(const struct photograph *photo, size_t at) {
     return (image_float_from_half(pixel[0]) + image_float_from_half(pixel[1]) + image_float_from_half(pixel[2])) / 3.0f;
 }
 
-/* The brightest pixel around one. */
+/* The brightest of the eight neighbours. */
 static float brightest_neighbour(const struct photograph *photo, long x0, long y0) {
     long width = (long)photo->camera.width, height = (long)photo->camera.height;
     float brightest = 0.0f;
@@ -32,7 +32,7 @@ static float brightest_neighbour(const struct photograph *photo, long x0, long y
     return brightest;
 }
 
-/* Standard deviation of a pixel that should show a value; of 8 bits it is no less than that of black. */
+/* Standard deviation of a pixel whose true value is `value`; of 8 bits at least that of black. */
 static float deviation_of(const struct fireflies_job *job, long x, long y, float value) {
     const struct photograph *photo = job->photo;
     float of_value = noise_deviation_of_value(job->noise, job->train, &photo->camera, (float)x, (float)y, value);

@@ -9,13 +9,14 @@
 #include "server/capture/robust.h"
 #include "server/scene/surface.h"
 
-/* Radiance that is added before a logarithm, as a share of the median: black stays finite. */
+/* Radiance added before a logarithm, as a share of the median: keeps black finite. By hand. */
 #define LOG_FLOOR 0.01f
-/* Difference of logarithms from the median at which a look-up has half its weight. */
+/* Scale of the Cauchy weight: difference of log radiance from the median that halves a weight. By hand. */
 #define OUTLIER_SCALE 0.3f
-/* Noise of a look-up between four pixels over that of one, on average. */
+/* Noise of a bilinear look-up over that of a pixel, on average: the root of the mean sum of squared weights, 2/3, for
+ * independent noise. */
 #define BILINEAR_DEVIATION 0.67f
-/* Photographs of which the mean is taken, those of the greatest weights: 24 KiB a thread, however many there are. */
+/* Observations that a mean uses at most, those of the greatest weights; bounds the stack of a thread. By hand. */
 #define MAX_OBSERVATIONS 256
 #define CHUNK 1024 /* valid texels a work item */
 
@@ -27,7 +28,7 @@ struct fuse_job {
     const struct inverse_uv *inverse;
 };
 
-/* What the photographs show of a texel: the best of those that measured it or, where none did, of the bounds. */
+/* Observations of a texel: the best of those that measured it or, where none did, of the lower bounds. */
 struct fuse_observations {
     bool is_measured;
     struct best best;
@@ -35,11 +36,11 @@ struct fuse_observations {
     struct robust_sample observation[MAX_OBSERVATIONS];
     struct view view[MAX_OBSERVATIONS];
     float mixing[MAX_OBSERVATIONS];          /* see views_mixing */
-    size_t seen, clean;               /* of all photographs, as the next */
+    size_t seen, clean;               /* over all photographs, as the next */
     double gray_sum, gray_square_sum;
 };
 
-/* The first that measured makes what bounds were met worthless. */
+/* Adds an observation; the first measured one discards the lower bounds before it. */
 static void add_observation(const struct fuse_job *job, struct fuse_observations *l, const struct photograph_sample *s,
                             const struct view *view, uint32_t triangle) {
     const struct views *v = job->views;
@@ -55,7 +56,7 @@ static void add_observation(const struct fuse_job *job, struct fuse_observations
     l->is_measured |= is_measured;
     if (is_measured != l->is_measured)
         return;
-    /* The noise of the same radiance in all photographs: by its own, what noise made bright would be preferred. */
+    /* Noise at the same radiance for all photographs: by their own values bright noise would be preferred. */
     float weight = view->weight * views_trust(v, view, triangle);
     size_t slot = best_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f),
                            view->train);
@@ -66,8 +67,8 @@ static void add_observation(const struct fuse_job *job, struct fuse_observations
     l->mixing[slot] = views_mixing(v, view, triangle, s->radiance);
 }
 
-/* Weighs the looks by their noise, which depends on how bright the texel is: that is
- * told by all together, each by the light it had. */
+/* Weighs observations by their noise, which depends on the texel's brightness: the mean of all, weighted by exposure.
+ */
 static void weigh_by_noise(const struct fuse_job *job, struct fuse_observations *l) {
     size_t count = l->best.count;
     rgb sum = {0.0f, 0.0f, 0.0f};

@@ -1,10 +1,9 @@
-/* fuse.h -- the measured light: what the photographs show of each texel, taken together.
+/* fuse.h -- the observed radiance of each texel, over all photographs.
  *
- * The mean of all clean look-ups, weighted by the solid angle that a patch of the surface fills in
- * the photograph, by its noise, and by how well a look-up agrees with the others: a highlight that
- * one photograph has caught, or a pose that is off, counts little. Of a few hundred the best are taken, by their weights
- * before brightness is known; all are counted. A saturated value is a lower bound: it is left
- * out where others measured, and stands in where none did. Held-out photographs are never asked. */
+ * Robust weighted mean of all clean look-ups: by the solid angle of a surface patch in the photograph, by noise, and by
+ * agreement with the others (a highlight in one photograph or a wrong pose counts little). Of several hundred
+ * observations those of the greatest prior weight are used; all are counted. A saturated value is a lower bound: it is
+ * left out where others measured, and used where none did. Held-out photographs take no part. */
 #ifndef UNBAKE_CAPTURE_FUSE_H
 #define UNBAKE_CAPTURE_FUSE_H
 
@@ -20,9 +19,9 @@
 
 struct fused {
     uint32_t width, height;
-    uint16_t (*radiance)[3]; /* [height][width] half precision; 0 where nothing was seen; owned */
+    uint16_t (*radiance)[3]; /* [height][width] half precision; 0 where unseen; owned */
     float *count;            /* [height][width] photographs that see the texel cleanly; owned */
-    float *spread;           /* [height][width] standard deviation of the logarithm of what they show; owned */
+    float *spread;           /* [height][width] standard deviation of log radiance among them; owned */
     bool *is_bound;          /* [height][width] all of them saturate there: radiance is a lower bound; owned */
 };
 
@@ -34,8 +33,8 @@ static inline rgb fused_radiance(const struct fused *f, uint32_t texel) {
     return rgb_from_half(f->radiance[texel]);
 }
 
-/* The mean of those texels of its chart at most `around` texels away each way that photographs measured, by their
- * count: of one texel alone noise may be a third. 0 where there are none. */
+/* Mean of the measured texels of the same chart at most `around` texels away in each axis, weighted by their count; 0
+ * where there are none. A single texel may have a third of noise. */
 rgb fused_around(const struct fused *f, const struct atlas *atlas, const struct inverse_uv *inverse, uint32_t texel,
                  uint32_t around);
 

@@ -15,13 +15,13 @@ struct held_out {
     struct pyramid pyramid;
     struct pose_frame frame;
     size_t count;
-    uint32_t *track;  /* tracks that it sees, by index; owned */
+    uint32_t *track;  /* [count] tracks that it sees, by index; owned */
 };
 
 struct held_out_set {
     const struct pose_solver *solver;
     struct held_out *held_out;
-    double *consensus;     /* consensus of each track at this level; NAN: unknown */
+    double *consensus;     /* [track_count] consensus of each track at this level; NAN: unknown */
     int level;
 };
 
@@ -29,7 +29,7 @@ struct held_out_set {
 struct track_sample {
     float d[POSE_UNKNOWNS];
     double residual;       /* observed minus consensus */
-    bool held_back;
+    bool is_held_out;
 };
 
 /* --- visible tracks ------------------------------------------------------------------------------ */
@@ -77,7 +77,7 @@ static size_t evaluate_tracks(const struct held_out_set *all, const struct held_
         sample[count].residual = (double)pyramid_value(&h->pyramid, all->level, x, y) - consensus;
         if (isnan(sample[count].residual))
             continue;
-        sample[count++].held_back = pose_is_held_back(h->track[k]);
+        sample[count++].is_held_out = pose_is_held_out(h->track[k]);
     }
     return count;
 }
@@ -105,7 +105,7 @@ static void step(const struct held_out_set *all, struct held_out *h, const struc
     h->frame.scale = scale_of(sample, count, offset, scratch);
     for (size_t k = 0; k < count; k++) {
         double scale = h->frame.scale, r = sample[k].residual - offset, w = 1.0 / (scale * scale + r * r);
-        if (sample[k].held_back)
+        if (sample[k].is_held_out)
             continue;
         weights += w;
         residual_sum += w * r;
@@ -163,7 +163,7 @@ static size_t costs(const struct held_out_set *all, const struct held_out *h, co
     }
     double offset = count > 0 ? quantile_double(scratch, count, 0.5) : 0.0;
     for (size_t k = 0; k < h->count; k++)
-        cost[k] = pose_is_held_back(h->track[k]) ? pose_robust_cost(residual[k] - offset, scale) : NAN;
+        cost[k] = pose_is_held_out(h->track[k]) ? pose_robust_cost(residual[k] - offset, scale) : NAN;
     mem_free(residual);
     return count;
 }

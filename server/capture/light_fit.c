@@ -120,7 +120,7 @@ static void multiply(const void *user, const double *x, double *out) {
         out[k] = x[k] / (VIGNETTE_SIGMA * VIGNETTE_SIGMA);
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
-        for (int c = 0; c < 3 && !light_fit_is_held_back(f, p); c++) {
+        for (int c = 0; c < 3 && !light_fit_is_held_out(f, p); c++) {
             double z[OVERLAP_OBSERVATIONS_MAX];
             for (size_t i = 0; i < count; i++)
                 z[i] = light_fit_predict(f, x, first + i, c);
@@ -136,7 +136,7 @@ static void make_preconditioner(const struct light_fit *f, double *inverse) {
     for (size_t i = 0; i < n; i++)
         inverse[i] = 1.0;
     for (size_t p = 0; p < f->o->point_count; p++) {
-        for (size_t i = f->o->start[p]; i < f->o->start[p + 1] && !light_fit_is_held_back(f, p); i++) {
+        for (size_t i = f->o->start[p]; i < f->o->start[p + 1] && !light_fit_is_held_out(f, p); i++) {
             for (size_t c = 0; c < 3; c++) {
                 inverse[3 * f->o->observation[i].train + c] += f->weight[i];
                 inverse[3 * f->frames + c] += 3.0 * f->weight[i] * f->radius[i][c] * f->radius[i][c];
@@ -162,7 +162,7 @@ static void solve_linear(const struct light_fit *f, int model, double *x) {
     make_preconditioner(f, light.inverse);
     for (size_t point = 0; point < f->o->point_count; point++) {
         size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
-        for (int c = 0; c < 3 && !light_fit_is_held_back(f, point); c++) {
+        for (int c = 0; c < 3 && !light_fit_is_held_out(f, point); c++) {
             double y[OVERLAP_OBSERVATIONS_MAX];
             for (size_t i = 0; i < count; i++)
                 y[i] = (double)f->o->observation[first + i].value[c];
@@ -208,7 +208,7 @@ static void reweight(struct light_fit *f, const double *x, bool is_convex) {
     for (size_t p = 0; p < f->o->point_count; p++) {
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         light_fit_residuals(f, x, p, f->weight + first, square + first);
-        for (size_t i = 0; i < count && !light_fit_is_held_back(f, p); i++) {
+        for (size_t i = 0; i < count && !light_fit_is_held_out(f, p); i++) {
             if (isfinite(square[first + i]))
                 known[used++] = square[first + i];
         }

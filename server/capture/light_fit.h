@@ -12,7 +12,7 @@
 #include "server/capture/overlap.h"
 #include "server/capture/views.h"
 
-#define LIGHT_HELD_BACK_EVERY 4 /* one point in so many is held out; by hand */
+#define LIGHT_HELD_OUT_EVERY 4 /* one point in so many is held out; by hand */
 
 /* A model is a set of faults; parameters of the others are held at 0. */
 enum { LIGHT_DRIFT = 1, LIGHT_COLOR = 2, LIGHT_VIGNETTE = 4, LIGHT_FAULTS = 8 };
@@ -22,10 +22,10 @@ struct light_fit {
     const struct views *views;
     size_t frames;                /* parameters are 3 a frame and 3 of the vignette */
     size_t unknown_exposure_count;          /* whose exposure is unknown */
-    bool *exposure_known;                   /* owned, as all below */
-    double (*radius)[3];          /* [looks] s, s^2, s^3 */
-    double *trust;                /* [looks] inverse variance by contrast and angle */
-    double *weight;               /* trust times the robust weight; 0: held out */
+    bool *exposure_known;                   /* [frames]; owned, as all below */
+    double (*radius)[3];          /* [observations] s, s^2, s^3 */
+    double *trust;                /* [observations] inverse variance by contrast and angle */
+    double *weight;               /* [observations] trust times the robust weight; 0: held out */
     double scale;                 /* of residuals, over what `trust` expects */
     bool all_points;              /* no point is held out */
 };
@@ -37,8 +37,8 @@ static inline size_t light_fit_parameter_count(const struct light_fit *f) {
     return 3 * f->frames + 3;
 }
 
-static inline bool light_fit_is_held_back(const struct light_fit *f, size_t point) {
-    return !f->all_points && point % LIGHT_HELD_BACK_EVERY == 0;
+static inline bool light_fit_is_held_out(const struct light_fit *f, size_t point) {
+    return !f->all_points && point % LIGHT_HELD_OUT_EVERY == 0;
 }
 
 /* Solves the model, starting from x; sets weights and scale. */

@@ -8,28 +8,27 @@
 #include "common/quantile.h"
 #include "common/rng.h"
 
-#define MIN_EXPONENT (-24) /* the first octave begins at 2^-24, a half's smallest number */
-#define SAMPLES 8192         /* differences kept of each octave */
-#define MIN_SAMPLES 512    /* of fewer an octave tells nothing */
-#define QUANTILE 0.25
-#define QUANTILE_DEVIATIONS 0.3186f /* the quantile of the distance of normal noise from its mean */
+#define MIN_EXPONENT (-24) /* first octave: from 2^-24, the smallest half */
+#define SAMPLES 8192 /* differences kept for each octave; by hand */
+#define MIN_SAMPLES 512 /* an octave with fewer takes the share of the one below; by hand */
+#define QUANTILE 0.25 /* of the differences: below the median, which texture raises; by hand */
+#define QUANTILE_DEVIATIONS 0.3186f /* that quantile of |x| for standard normal x */
 /* Var(b - (a + c) / 2) over that of one pixel. */
 #define DIFFERENCE_VARIANCE 1.5f
-#define MAX_SHARE 1.0f
-/* A share that is this near to MOST_SHARE is that of values lost in noise. */
+#define MAX_SHARE 1.0f /* noise as large as the value: nothing is known */
+/* Above this share of MAX_SHARE, values are lost in noise; by hand. */
 #define LOST_SHARE 0.97f
-/* Normal noise of deviation 1 that is cut off at 0 comes out too bright by .4 where the true value is 0, and by .08
- * where it is 1; if what was cut off, or rounded down to 0, reads as minus this, by .1 at most either way. */
+/* Normal noise of deviation 1 clipped at 0 has a mean .4 too bright where the true value is 0, and .08 where it is 1.
+ * With clipped values read as minus this, the error is .1 at most in both directions. */
 #define BLACK_DEVIATIONS 0.6f
-#define MIN_SHARE 0.01f /* poses and colours are off by as much */
-/* Of a block of pixels: differences that it takes, and bounds of its noise over the octaves'. */
+#define MIN_SHARE 0.01f /* floor of the relative deviation: errors of poses and colours; by hand */
+/* Blocks: least number of differences, and bounds of the factor; by hand. */
 #define MIN_DIFFERENCES 64
-#define MEDIAN_DEVIATIONS 0.6745f /* as QUANTILE_DEVIATIONS */
+#define MEDIAN_DEVIATIONS 0.6745f /* median of |x| for standard normal x */
 #define SCALE_MIN 0.5f
 #define SCALE_MAX 4.0f
 
-/* Differences met so far, of one octave; a later one takes a random place, so that those kept are an
- * even sample (reservoir sampling, Vitter 1985). */
+/* Differences of one octave: an even sample of those offered (reservoir sampling, Vitter 1985). */
 struct octave {
     uint64_t offered;
     float sample[SAMPLES];
@@ -55,15 +54,15 @@ static void offer(struct octave *octave, float difference) {
         octave->sample[at] = difference;
 }
 
-/* What rounding to 8 bits of sRGB adds to a linear value, as a share of it: a difference of 0 between
- * two pixels of such a picture does not tell that there is no noise. */
+/* Deviation of rounding to 8-bit sRGB, as a share of the linear value: equal neighbouring pixels do not mean that there
+ * is no noise. */
 static float rounding_share(float value) {
     float slope = value < 0.0031308f ? 1.0f / 12.92f : 2.4f / 1.055f * powf(value, 1.4f / 2.4f);
     return slope / (255.0f * sqrtf(12.0f) * value);
 }
 
-/* Differences, as shares of the mean, of the pixels `lag` to the left and right of (x, y) from it, of the
- * channels that have one; returns how many. Pixels that mix surfaces, are masked or clipped have none. */
+/* Differences of pixel (x, y) from the mean of those `lag` to its left and right, as shares of the mean of the three,
+ * for each usable channel; returns how many. None where a pixel mixes surfaces, is masked or clipped. */
 static int differences(const struct photograph *photo, const uint8_t *edge, uint32_t x, uint32_t y, uint32_t lag,
                        float mean[3], float difference[3]) {
     size_t at = (size_t)y * photo->camera.width + x;
@@ -97,7 +96,7 @@ static void add_row(struct octave *octaves, const struct photograph *photo, cons
     }
 }
 
-/* Of the values of 8 bits that are not lost in noise, the darkest has this deviation. */
+/* Deviation of the darkest 8-bit values that are not lost in noise. */
 static float darkest_deviation(const struct noise *noise) {
     for (int k = 0; k < NOISE_OCTAVES; k++)
         if (noise->share[k] < LOST_SHARE * MAX_SHARE)
@@ -136,8 +135,7 @@ static uint32_t blocks(uint32_t pixels) {
     return (pixels + NOISE_BLOCK - 1) / NOISE_BLOCK;
 }
 
-/* The median square of the differences at a lag over those that the octaves' shares lead to expect; 0
- * where there are too few. */
+/* Squared median of the differences at a lag, over that expected from the octaves; 0 where there are too few. */
 static float block_variance(const struct noise *noise, const struct photograph *photo, const uint8_t *edge,
                             uint32_t x0, uint32_t y0, uint32_t lag) {
     float ratio[3 * NOISE_BLOCK * NOISE_BLOCK];
@@ -194,7 +192,7 @@ void noise_release(struct noise *noise) {
     *noise = (struct noise){0};
 }
 
-/* --- what a look-up is worth -------------------------------------------------------------------- */
+/* --- deviation and weight of a look-up ---------------------------------------------------------- */
 
 static float share_of(const struct noise *noise, const struct photograph *photo, float radiance, float gain) {
     return noise->share[octave_of(radiance * photo->exposure * gain)];

@@ -9,9 +9,9 @@
 #include "server/render/accel.h"
 #include "server/scene/adjacency.h"
 
-#define PIXEL_STRIDE 2 /* of the pixels that are asked, along both axes */
+#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced; by hand */
 
-/* --- what photographs see ------------------------------------------------------------------------- */
+/* --- sides seen by photographs --------------------------------------------------------------------- */
 
 struct trace_job {
     const struct accel *accel;
@@ -59,14 +59,13 @@ static uint32_t root_of(uint32_t *parent, uint32_t t) {
     return t;
 }
 
-/* Whether two triangles that share an edge run along it in opposite directions, as those of one surface
- * with one front do. */
+/* Whether two triangles that share an edge have the same orientation: they run along it in opposite directions. */
 static bool same_front(const struct mesh *mesh, const uint32_t *weld, size_t half_edge, size_t other) {
     return weld[mesh->index[half_edge / 3][half_edge % 3]] == weld[mesh->index[other / 3][(other + 1) % 3]];
 }
 
-/* Gives each triangle the representative of its piece: triangles of one object joined by edges that two
- * of them share. [triangle_count], the caller's. */
+/* Representative triangle of each triangle's piece: those of one object joined by edges that exactly two share.
+ * [triangle_count], the caller's. */
 static uint32_t *find_pieces(const struct mesh *mesh) {
     struct adjacency adjacency;
     adjacency_make(&adjacency, mesh);
@@ -90,7 +89,7 @@ static uint32_t *find_pieces(const struct mesh *mesh) {
 
 /* --- turning -------------------------------------------------------------------------------------- */
 
-/* Shading normals of turned triangles point to the new front, unless others share them. */
+/* Flips shading normals of flipped triangles, unless others share them. */
 static void turn_normals(struct mesh *mesh, const bool *turned) {
     enum { KEPT = 1, TO_TURN = 2 };
     uint8_t *use = mem_calloc(mesh->vertex_count, 1);

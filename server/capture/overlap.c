@@ -6,12 +6,12 @@
 
 #include "common/mem.h"
 
-#define CHUNK 64
-/* Stored value of an ordinary photograph below which a pixel is mostly noise, and the one that
- * noise may lower it to. */
+#define CHUNK 64 /* points a work item */
+/* Stored values of 8-bit photographs: below the first a pixel is mostly noise; the second is as far as noise may lower
+ * such a pixel. By hand. */
 #define DARK_VALUE 0.02f
 #define BLACK_VALUE 0.005f
-/* Share of the clip above which some of a noisy surface's pixels are clipped. */
+/* Share of the clip above which a noisy surface may have clipped pixels; by hand. */
 #define BRIGHT_SHARE 0.8f
 
 struct overlap_gathering {

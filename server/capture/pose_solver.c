@@ -261,7 +261,7 @@ void pose_reweight(struct pose_solver *s) {
         double consensus, weight[POSE_OBSERVATIONS_MAX];
         pose_weigh_track(s, i, &consensus, weight);
         for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
-            observation[k].weight = pose_is_held_back(i) ? 0.0f : (float)weight[k];
+            observation[k].weight = pose_is_held_out(i) ? 0.0f : (float)weight[k];
             if (weight[k] <= 0.0)
                 continue;
             double r = fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
@@ -278,7 +278,7 @@ void pose_reweight(struct pose_solver *s) {
 
 bool pose_is_improved(const struct pose_evidence *e) {
     double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
-    return e->count >= POSE_MIN_OBSERVATIONS / POSE_HELD_BACK_EVERY &&
+    return e->count >= POSE_MIN_OBSERVATIONS / POSE_HELD_OUT_EVERY &&
            e->sum > MIN_SIGNIFICANCE * error && e->sum > MIN_GAIN * e->total;
 }
 

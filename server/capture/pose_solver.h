@@ -26,7 +26,7 @@
 #define POSE_CELL_ROWS 6
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1)
-#define POSE_HELD_BACK_EVERY 3 /* one track in so many is held out; by hand */
+#define POSE_HELD_OUT_EVERY 3 /* one track in so many is held out; by hand */
 #define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
 #define POSE_ROUNDS 12 /* Gauss-Newton steps at each level; by hand */
 #define POSE_STEP_PX 1.5 /* pixels of a level: largest step; by hand */
@@ -64,7 +64,7 @@ struct pose_solver {
     const struct track **track; /* [track_count] */
     uint32_t *owner;            /* [track_count] the photograph it comes from */
     struct pose_observation *observation;        /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
-    float (*along)[2];          /* mean change of the value per `right` and `down`, at this level */
+    float (*along)[2];          /* [track_count] mean change of the value per `right` and `down`, at this level */
     struct pose_frame *frame;        /* [frames] */
     double *x;                  /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
     int level;
@@ -130,8 +130,8 @@ static inline size_t pose_observation_count(const struct track *track) {
 }
 
 /* Held-out tracks take part in no solve: they judge it. */
-static inline bool pose_is_held_back(size_t track) {
-    return track % POSE_HELD_BACK_EVERY == 0;
+static inline bool pose_is_held_out(size_t track) {
+    return track % POSE_HELD_OUT_EVERY == 0;
 }
 
 static inline double pose_robust_cost(double residual, double scale) {

@@ -74,7 +74,7 @@ static void multiply(const void *user, const double *x, double *out) {
     for (size_t t = 0; t < s->track_count; t++) {
         const struct pose_observation *observation = s->observation + t * POSE_OBSERVATIONS_MAX;
         double z[POSE_OBSERVATIONS_MAX];
-        if (pose_is_held_back(t))
+        if (pose_is_held_out(t))
             continue;
         for (size_t k = 0; k < pose_observation_count(s->track[t]); k++) {
             const double *twist = x + POSE_UNKNOWNS * observation[k].frame;
@@ -142,7 +142,7 @@ void pose_solve(struct pose_solver *s) {
         double y[POSE_OBSERVATIONS_MAX];
         for (size_t k = 0; k < pose_observation_count(s->track[t]); k++)
             y[k] = -(double)s->observation[t * POSE_OBSERVATIONS_MAX + k].value;
-        if (!pose_is_held_back(t))
+        if (!pose_is_held_out(t))
             scatter(s, t, y, r);
     }
     memset(x, 0, twists * sizeof *x);

@@ -6,10 +6,10 @@
 #include "common/mem.h"
 #include "server/capture/views.h"
 
-/* Stored value below which an ordinary photograph's pixel is mostly noise. */
+/* Stored value of 8-bit photographs below which a pixel is mostly noise; by hand. */
 #define DARK_VALUE 0.005f
 
-#define EDGE_DISTANCE 2 /* pixels around a depth edge that are not used: poses may be wrong */
+#define EDGE_DISTANCE 2 /* pixels around a depth edge that are masked, for wrong poses; by hand */
 
 static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, float floor) {
     struct photograph_sample s;
@@ -110,7 +110,7 @@ void pyramid_release(struct pyramid *p) {
     *p = (struct pyramid){0};
 }
 
-/* Bilinear look-up at place (x, y) of a level; NaN outside. */
+/* Bilinear look-up at position (x, y) of a level; NaN outside. */
 static float bilinear(const struct pyramid *p, int level, float x, float y) {
     float u = x - 0.5f, v = y - 0.5f;
     uint32_t w = p->width[level], h = p->height[level];

@@ -6,8 +6,8 @@
 #include "server/scene/rgb_half.h"
 #include "server/scene/surface.h"
 
-#define BLOCK 4 /* texels a side: a sixteenth of the work */
-/* Photographs that are asked at most: evenly over all, the first ones would show one end of the room. */
+#define BLOCK 4 /* texels a side: a sixteenth of the work of fuse.c */
+/* Photographs used at most, evenly spaced: the first ones alone would show one end of the room. By hand. */
 #define MAX_PHOTOGRAPHS 64
 
 struct preview_job {
@@ -33,7 +33,7 @@ static rgb mean_observed(const struct views *v, const struct surface_point *p) {
     return weights > 0.0f ? rgb_scale(sum, 1.0f / weights) : sum;
 }
 
-/* The block's first valid texel speaks for all of it. */
+/* The first valid texel gives the value of its block. */
 static void preview_block(const struct preview_job *job, uint32_t x0, uint32_t y0) {
     const struct inverse_uv *inverse = job->inverse;
     uint16_t value[3];

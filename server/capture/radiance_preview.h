@@ -1,5 +1,7 @@
-/* radiance_preview.h -- a first, coarse picture of the measured light, for the eye alone: one texel of each square block, the
- * plain mean of what photographs show there. A small part of the work of fuse.h, before exposures are solved. */
+/* radiance_preview.h -- a first, coarse picture of the observed radiance, for display only.
+ *
+ * One texel of each square block, the plain mean of its observations, before exposures are solved; a fraction of the
+ * work of fuse.h. */
 #ifndef UNBAKE_CAPTURE_RADIANCE_PREVIEW_H
 #define UNBAKE_CAPTURE_RADIANCE_PREVIEW_H
 

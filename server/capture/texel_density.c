@@ -1,4 +1,4 @@
-/* texel_density.c -- see shown.h. */
+/* texel_density.c -- see texel_density.h. */
 #include "server/capture/texel_density.h"
 
 #include <math.h>
@@ -6,8 +6,9 @@
 
 #include "common/mem.h"
 
-#define PIXEL_STRIDE 2 /* pixels, of those that are asked */
-/* Texels a metre of what nobody sees: it has to send out light, which takes no detail. */
+#define PIXEL_STRIDE 2 /* along both axes, of the pixels traced; by hand */
+/* Linear texel density of unseen surfaces relative to seen ones: they emit indirect light, which needs no detail. By
+ * hand. */
 #define UNSEEN_DENSITY 0.25f
 
 struct density_job {

@@ -1,4 +1,4 @@
-/* texel_density.h -- which charts of the surface photographs show: an atlas need not hold the others as finely. */
+/* texel_density.h -- which charts photographs see; an atlas needs fewer texels for the others. */
 #ifndef UNBAKE_CAPTURE_TEXEL_DENSITY_H
 #define UNBAKE_CAPTURE_TEXEL_DENSITY_H
 
@@ -6,7 +6,7 @@
 #include "server/capture/views.h"
 #include "server/scene/atlas.h"
 
-/* Fills density[triangle_count], for atlas_make_uneven: 1 where a photograph shows any of the triangle's chart,
+/* Fills density[triangle_count], for atlas_make_uneven: 1 where a photograph sees any part of the triangle's chart,
  * less where none does. */
 void texel_density_from_views(const struct views *views, const struct atlas *atlas, struct parallel *pool,
                               float *density);

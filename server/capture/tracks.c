@@ -7,17 +7,18 @@
 #include "common/rng.h"
 #include "server/capture/choose.h"
 
+/* Tracks in all, and bounds for each photograph; by hand (time and memory). */
 #define TRACKS_TOTAL 50000
 #define TRACKS_MIN 150
 #define TRACKS_MAX 600
-#define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0 together, held-out photographs' too */
-#define PYRAMID_MAX ((size_t)640 * 480)
-#define PLACES_PER_CELL 8
-#define MIN_COSINE 0.2f
-#define DISTANCE_RATIO 1.7f
-/* Slope (logarithm per pixel) below which a place is not worth following. */
+#define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0, also of held-out photographs: 256 MiB */
+#define PYRAMID_MAX ((size_t)640 * 480) /* pixels of level 0, at most; by hand */
+#define PLACES_PER_CELL 8 /* random positions of which the strongest gradient is taken; by hand */
+#define MIN_COSINE 0.2f /* between normal and view; by hand */
+#define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: texture of similar scale; by hand */
+/* Least gradient of a track, log luminance per pixel; by hand. */
 #define MIN_SLOPE 0.01f
-/* Radiance added before logarithms, as a share of the median. */
+/* Radiance added before logarithms, as a share of the median; by hand. */
 #define FLOOR_SHARE 0.05f
 
 static void make_pyramid(void *user, size_t t, int thread) {
@@ -28,7 +29,7 @@ static void make_pyramid(void *user, size_t t, int thread) {
                  tracks->pyramid_pixels, FLOOR_SHARE * views->median_radiance);
 }
 
-/* The place of strongest slope among a few random ones of a cell; false when none will do. */
+/* Position of the strongest gradient among random ones of a cell; false when none suffices. */
 static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, size_t columns, size_t rows,
                          float *x, float *y) {
     const struct views *views = tracks->views;

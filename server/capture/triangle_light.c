@@ -7,25 +7,25 @@
 #include "server/capture/censored.h"
 #include "server/render/sampler.h"
 
-#define OBSERVATIONS_PER_POINT 6
-#define MAX_POINTS 8
-#define PIXELS_PER_POINT 16.0f /* larger triangles are asked at several places */
-#define BRIGHTER_SHARE 0.7f    /* share of the looks that show at least what is taken for shown */
-#define KEY_POINTS 29          /* keeps these random numbers apart from others of the triangle */
+#define OBSERVATIONS_PER_POINT 6 /* photographs a point, at most; by hand */
+#define MAX_POINTS 8 /* a triangle; by hand */
+#define PIXELS_PER_POINT 16.0f /* pixels of a triangle for each point: larger ones have several; by hand */
+#define BRIGHTER_SHARE 0.7f /* share of observations that reach the value; by hand */
+#define KEY_POINTS 29 /* separates these random numbers from others of the triangle */
 
 struct measure_job {
     const struct views *views;
     struct triangle_light *light;
 };
 
-/* The looks at one triangle. */
+/* Observations of one triangle. */
 struct triangle_observations {
     struct censored value[MAX_POINTS * OBSERVATIONS_PER_POINT];
     size_t count;
-    float pixels; /* sum over them of what the whole triangle fills */
+    float pixels; /* sum over observations of the pixels that the whole triangle fills */
 };
 
-/* The i-th place: the middle, then others evenly spread. */
+/* The i-th point: the centroid, then points evenly distributed by area. */
 static vec3 place(const struct mesh *mesh, uint32_t triangle, uint32_t i) {
     if (i == 0)
         return mesh_point(mesh, triangle, 1.0f / 3.0f, 1.0f / 3.0f);
@@ -51,7 +51,7 @@ static void observe_point(const struct views *views, uint32_t triangle, vec3 poi
     }
 }
 
-/* Of what was measured; of the bounds where nothing was. */
+/* Mean of measured values, or of lower bounds where there is none. */
 static float mean_of(const struct triangle_observations *observations, bool *is_bound) {
     float sum[2] = {0.0f, 0.0f}, count[2] = {0.0f, 0.0f};
     for (size_t i = 0; i < observations->count; i++) {

@@ -1,7 +1,6 @@
-/* triangle_light.h -- the light that each triangle sends out, as photographs show it, before there is a
- * texture to keep it in.
+/* triangle_light.h -- the observed radiance of each triangle, before there is a texture to hold it.
  *
- * Exposures must be known. One value a triangle: what is painted on a large one is lost. */
+ * Exposures must be known. One value a triangle: detail of large ones is lost. */
 #ifndef UNBAKE_CAPTURE_TRIANGLE_LIGHT_H
 #define UNBAKE_CAPTURE_TRIANGLE_LIGHT_H
 
@@ -12,11 +11,11 @@
 #include "server/capture/views.h"
 
 struct triangle_light {
-    float *observed;  /* [triangle_count] radiance, mean of the channels, that most looks show at least: a highlight
-                    * wanders with the camera, what shines itself does not; negative: no clean look; owned */
-    float *mean;   /* [triangle_count] the mean of what looks show; negative as above; owned */
-    bool *is_bound; /* [triangle_count] all of them saturate: it is more; owned */
-    float *pixels; /* [triangle_count] pixels that it fills in a photograph, about; owned */
+    float *observed;  /* [triangle_count] radiance (mean of the channels) that most observations reach: emission is seen
+                       * from everywhere, a highlight is not; negative: no clean observation; owned */
+    float *mean;   /* [triangle_count] mean over observations; negative as above; owned */
+    bool *is_bound; /* [triangle_count] all are saturated: a lower bound; owned */
+    float *pixels; /* [triangle_count] pixels that it fills in a photograph, mean; owned */
 };
 
 /* The same for any number of threads. */

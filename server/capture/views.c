@@ -9,25 +9,25 @@
 #include "common/rng.h"
 #include "server/capture/choose.h"
 
-/* Nearest cosine to grazing at which a photograph is still asked. */
+/* Least cosine between normal and view at which a photograph is used; by hand. */
 #define MIN_COSINE 0.1f
-/* A corner's hit may leave the plane of another's by this many pixel footprints, plus a
- * relative slack for rounding, before the pixel counts as a depth edge. */
+/* Depth edge: corner hits are off each other's plane by more than this many pixel footprints, plus a relative slack for
+ * rounding. By hand. */
 #define EDGE_FOOTPRINTS 3.0f
 #define EDGE_RELATIVE 0.002f
-/* Corners of a pixel that mixes surfaces lie no further apart where those meet. */
+/* Surfaces touch where the corner hits of a mixed pixel are no farther apart than this, in footprints. By hand. */
 #define SEAM_FOOTPRINTS 10.0f
 
-/* Surfaces that meet at an edge sharper than this (cosine between normals) are lit differently. */
+/* Crease: cosine between normals below which surfaces are lit differently. By hand. */
 #define CREASE_COSINE 0.8f
 
-/* How far from a look-up near an edge it is asked how bright the light is that may have got into it, and
- * how many times brighter than the look-up it must be to make a difference. */
+/* Light of other surfaces: pixels around a look-up that are searched for brighter ones, and the ratio up to which these
+ * do not count. By hand. */
 #define MIXING_PIXELS 2.0f
 #define MIXING_FREE_RATIO 2.0f
-/* No more can have been added than is shown. */
+/* bound of the relative variance: no more can have been added than is observed */
 #define MAX_MIXING 1.0f
-#define DARK_SHARE 1e-3f /* shown radiance, as a share of the median */
+#define DARK_SHARE 1e-3f /* least observed radiance in ratios, as a share of the median; by hand */
 
 #define NO_SURFACE UINT32_MAX
 
@@ -77,20 +77,20 @@ static bool differ(const struct corner *a, const struct corner *b, float focal) 
     return fabsf(vec3_dot(between, a->normal)) > slack && fabsf(vec3_dot(between, b->normal)) > slack;
 }
 
-/* Whether the difference of two corners, if there is any, is only that two surfaces meet. */
+/* Whether two corners that differ are on surfaces that touch. */
 static bool are_adjacent(const struct corner *a, const struct corner *b, float focal) {
     if (a->segment == NO_SURFACE || b->segment == NO_SURFACE)
         return a->segment == b->segment;
     return vec3_length(vec3_sub(b->point, a->point)) < a->distance_m * SEAM_FOOTPRINTS / focal;
 }
 
-/* A byte that tells most segments from most others. */
+/* 8-bit hash of a segment. */
 static uint8_t owner_mark(uint32_t segment) {
     return (uint8_t)(rng_mix32(segment) >> 24);
 }
 
-/* One row of pixels; the corners of a row are traced twice, which a parallel loop over rows
- * makes simpler than sharing them. */
+/* One row of pixels. Corners are traced twice, by the rows above and below: simpler than sharing them between threads.
+ */
 static void mark_row(void *user, size_t row, int thread) {
     (void)thread;
     const struct edge_job *job = user;
@@ -111,7 +111,7 @@ static void mark_row(void *user, size_t row, int thread) {
                     are_adjacent(&top, &left_low, camera->fx);
         out[x] = seam ? VIEWS_SEAM : mixed ? VIEWS_MIXED : VIEWS_SURFACE;
         owner[x] = owner_mark(low.segment);
-        /* What is thinner than a pixel may hide between the corners. */
+        /* geometry thinner than a pixel may hide between the corners */
         if (!mixed && low.segment == NO_SURFACE)
             out[x] = centre_meets(job, camera, x, y) ? VIEWS_MIXED : VIEWS_OPEN;
         left_top = top;
@@ -119,7 +119,7 @@ static void mark_row(void *user, size_t row, int thread) {
     }
 }
 
-/* Gives each pixel beside one of class `of` at least class of - 1. */
+/* Gives the neighbours of pixels of class `of` at least class of - 1. */
 static void spread_class(uint8_t *edge, long width, long height, uint8_t of) {
     for (long y = 0; y < height; y++) {
         for (long x = 0; x < width; x++) {
@@ -143,7 +143,7 @@ static void make_edges(uint8_t *edge, const uint8_t *shows, uint32_t width, uint
 }
 
 void views_update_median(struct views *v) {
-    const size_t per_photo = 4096; /* an even sample */
+    const size_t per_photo = 4096; /* random pixels */
     float *value = mem_array(v->train_count * per_photo + 1, sizeof *value);
     size_t count = 0;
     for (size_t t = 0; t < v->train_count; t++) {
@@ -277,8 +277,7 @@ float views_mixing(const struct views *v, const struct view *view, uint32_t tria
     return fminf(variance[edge] * times * times, MAX_MIXING);
 }
 
-/* Whether all pixels that a look-up at (x, y) reads, and those within `margin` of them, show
- * `wanted`. */
+/* Whether all pixels of a look-up at (x, y), and those within `margin` of them, have class `wanted`. */
 static bool all_show(const struct views *v, uint32_t train, float x, float y, int margin, uint8_t wanted) {
     const struct camera *camera = &v->scene->photograph[v->train[train]].camera;
     const uint8_t *shows = v->shows[train];

@@ -27,9 +27,9 @@ struct incident_lobe {
 /* Where rays look up radiance. Emitters have `world->materials->emission`. */
 struct light_field {
     const struct world *world;        /* borrowed, all */
-    const uint16_t (*radiance)[3];    /* exitant radiance of texels */
-    const struct incident_lobe *lobe; /* specular lobes, none of emitters; NULL: no reflections */
-    const bool *specular_only;        /* seen by reflected rays only, black to direct ones; NULL: no such segment */
+    const uint16_t (*radiance)[3];    /* [atlas height][width] half precision: exitant radiance of texels */
+    const struct incident_lobe *lobe; /* [segment_count] specular lobes, none of emitters; NULL: no reflections */
+    const bool *specular_only;        /* [segment_count] black but to reflected rays; NULL: none */
 };
 
 /* Directions of arriving light at one point and what comes from there; scratch of one thread. */

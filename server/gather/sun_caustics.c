@@ -32,7 +32,7 @@ struct caustics {
     const struct mesh *mesh;
     const struct inverse_uv *inverse;
     uint64_t seed;
-    bool *lit;               /* polished and sunlit */
+    bool *lit;               /* [valid_count] polished and sunlit */
     size_t count, rays;      /* source texels, and photons of each */
     uint32_t *texel;         /* [count] */
     float texels_per_source;        /* sunlit texels that each source represents */
