@@ -7,6 +7,7 @@
 #include "common/mem.h"
 #include "server/capture/light_fit.h"
 #include "server/capture/overlap.h"
+#include "server/capture/validation.h"
 
 /* Surface points compared: so many a photograph, within these bounds (time and memory); by hand. */
 #define POINTS_PER_FRAME 60
@@ -48,15 +49,10 @@ static size_t held_out_costs(const struct light_fit *f, const double *x, double 
 
 /* The share of the cost that `better` saves over `base`; 0 when that is not significant. */
 static double gain_of(const double *base, const double *better, size_t count) {
-    double sum = 0.0, squares = 0.0, total = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        double d = base[i] - better[i];
-        sum += d;
-        squares += d * d;
-        total += base[i];
-    }
-    double error = sqrt(fmax(squares - sum * sum / fmax((double)count, 1.0), 0.0));
-    return sum > MIN_SIGNIFICANCE * error && total > 0.0 ? sum / total : 0.0;
+    struct validation v = {0};
+    for (size_t i = 0; i < count; i++)
+        validation_add(&v, base[i], better[i]);
+    return validation_is_significant(&v, MIN_SIGNIFICANCE) && v.total > 0.0 ? v.saved / v.total : 0.0;
 }
 
 static double drift_of(const struct light_fit *f, const double *x) {

@@ -40,7 +40,7 @@ static void run_rounds(struct pose_solver *s, int level, int rounds, struct para
 
 /* --- judgement ------------------------------------------------------------------------------------ */
 
-static void collect_evidence(const struct pose_solver *s, struct pose_evidence *evidence) {
+static void validate_frames(const struct pose_solver *s, struct validation *validation) {
     for (size_t i = 0; i < s->track_count; i += POSE_HELD_OUT_EVERY) {
         struct pose_observation *observation = s->observation + i * POSE_OBSERVATIONS_MAX;
         for (size_t k = 0; k < pose_observation_count(s->track[i]); k++) {
@@ -56,7 +56,7 @@ static void collect_evidence(const struct pose_solver *s, struct pose_evidence *
             if (!isfinite(old) || !isfinite(consensus))
                 continue;
             double cost = pose_robust_cost((double)old - s->x[observation[k].offset] - consensus, frame->scale);
-            pose_evidence_add(&evidence[observation[k].frame], cost,
+            validation_add(&validation[observation[k].frame], cost,
                               pose_robust_cost((double)value - s->x[observation[k].offset] - consensus, frame->scale));
         }
     }
@@ -64,19 +64,19 @@ static void collect_evidence(const struct pose_solver *s, struct pose_evidence *
 
 /* Resets frames whose correction is small or not significant. */
 static void judge(struct pose_solver *s, struct parallel *pool) {
-    struct pose_evidence *evidence = mem_calloc(s->frames + 1, sizeof *evidence);
+    struct validation *validation = mem_calloc(s->frames + 1, sizeof *validation);
     s->level = 0;
     pose_linearise(s, pool);
     pose_reweight(s);
-    collect_evidence(s, evidence);
+    validate_frames(s, validation);
     for (size_t f = 0; f < s->frames; f++) {
         struct pose_frame *frame = &s->frame[f];
         frame->shift_px = frame->is_fixed ? 0.0 : shift_of(s, f, &frame->before, &frame->now);
-        if (frame->shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&evidence[f]))
+        if (frame->shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&validation[f]))
             pose_reset(s, f);
         frame->shift_px = frame->is_fixed ? 0.0 : frame->shift_px;
     }
-    mem_free(evidence);
+    mem_free(validation);
 }
 
 /* Robust cost of each held-out track with all frames where they are now and offsets fitted to that. */
@@ -108,13 +108,13 @@ static void costs_now(struct pose_solver *s, struct parallel *pool, double *cost
 
 /* Whether all photographs together agree significantly better than before. */
 static bool all_improved(const double *before, const double *now, size_t count) {
-    struct pose_evidence e = {0};
+    struct validation v = {0};
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(before[i]) || !isfinite(now[i]))
             continue;
-        pose_evidence_add(&e, before[i], now[i]);
+        validation_add(&v, before[i], now[i]);
     }
-    return pose_is_improved(&e);
+    return pose_is_improved(&v);
 }
 
 /* --- the whole -------------------------------------------------------------------------------- */

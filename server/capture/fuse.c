@@ -44,7 +44,7 @@ struct fuse_observations {
 static void add_observation(const struct fuse_job *job, struct fuse_observations *l, const struct photograph_sample *s,
                             const struct view *view, uint32_t triangle) {
     const struct views *v = job->views;
-    bool is_measured = !s->saturated[0] && !s->saturated[1] && !s->saturated[2];
+    bool is_measured = !photograph_sample_saturates(s);
     float gray = logf(fmaxf(rgb_mean(s->radiance), 0.0f) + LOG_FLOOR * v->median_radiance);
     int edge = views_edge(v, view, triangle);
     l->seen++;

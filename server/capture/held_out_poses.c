@@ -186,14 +186,14 @@ static void judge(void *user, size_t index, int thread) {
     const struct held_out_set *all = user;
     struct held_out *h = &all->held_out[index];
     double *before = mem_array(2 * h->count + 1, sizeof *before), *now = before + h->count;
-    struct pose_evidence e = {0};
+    struct validation v = {0};
     size_t seen = costs(all, h, &h->frame.before, h->frame.scale, before);
     costs(all, h, &h->frame.now, h->frame.scale, now);
     for (size_t k = 0; k < h->count && seen >= POSE_MIN_OBSERVATIONS; k++)
         if (isfinite(before[k]) && isfinite(now[k]))
-            pose_evidence_add(&e, before[k], now[k]);
+            validation_add(&v, before[k], now[k]);
     h->frame.shift_px = shift_of(all, h);
-    h->frame.is_fixed = h->frame.shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&e);
+    h->frame.is_fixed = h->frame.shift_px < POSE_MIN_SHIFT_PX || !pose_is_improved(&v);
     mem_free(before);
 }
 

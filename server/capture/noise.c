@@ -225,17 +225,20 @@ float noise_deviation_of_black(const struct noise *noise) {
     return noise->black / BLACK_DEVIATIONS;
 }
 
-float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
-                   float mixing) {
-    float deviation = rgb_mean(noise_deviation(noise, v, view, radiance)), mean = rgb_mean(radiance);
-    float share = mean > 0.0f ? fmaxf(deviation / mean, MIN_SHARE) : MAX_SHARE;
+/* The inverse of the relative variance of a look-up with such a deviation where the true radiance is `radiance`. */
+static float weight_of(rgb deviation, rgb radiance, float mixing) {
+    float mean = rgb_mean(radiance);
+    float share = mean > 0.0f ? fmaxf(rgb_mean(deviation) / mean, MIN_SHARE) : MAX_SHARE;
     return 1.0f / (share * share + mixing);
 }
 
+float noise_weight(const struct noise *noise, const struct views *v, const struct view *view, rgb radiance,
+                   float mixing) {
+    return weight_of(noise_deviation(noise, v, view, radiance), radiance, mixing);
+}
+
 float noise_weight_of_brightness(const struct noise *noise, const struct photograph *photo, rgb radiance) {
-    float deviation = rgb_mean(deviation_by_brightness(noise, photo, radiance)), mean = rgb_mean(radiance);
-    float share = mean > 0.0f ? fmaxf(deviation / mean, MIN_SHARE) : MAX_SHARE;
-    return 1.0f / (share * share);
+    return weight_of(deviation_by_brightness(noise, photo, radiance), radiance, 0.0f);
 }
 
 /* Plus or minus 1 with equal chances: as good as normal noise for second moments. */

@@ -32,7 +32,7 @@ static bool observe_cross(const struct photograph *photo, struct overlap_observa
         float x = observation->x + offset[i][0], y = observation->y + offset[i][1];
         struct photograph_sample s;
         if (x < 0.0f || y < 0.0f || x >= w || y >= h || !photograph_sample(photo, x, y, &s) ||
-            s.saturated[0] || s.saturated[1] || s.saturated[2])
+            photograph_sample_saturates(&s))
             return false;
         double mean = (double)rgb_mean(s.radiance);
         sum[0] += (double)s.radiance.r;

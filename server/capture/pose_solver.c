@@ -276,10 +276,9 @@ void pose_reweight(struct pose_solver *s) {
     mem_free(sum);
 }
 
-bool pose_is_improved(const struct pose_evidence *e) {
-    double error = sqrt(fmax(e->squares - e->sum * e->sum / fmax(1.0, (double)e->count), 0.0));
-    return e->count >= POSE_MIN_OBSERVATIONS / POSE_HELD_OUT_EVERY &&
-           e->sum > MIN_SIGNIFICANCE * error && e->sum > MIN_GAIN * e->total;
+bool pose_is_improved(const struct validation *v) {
+    return v->count >= POSE_MIN_OBSERVATIONS / POSE_HELD_OUT_EVERY && validation_is_significant(v, MIN_SIGNIFICANCE) &&
+           v->saved > MIN_GAIN * v->total;
 }
 
 /* --- the whole ---------------------------------------------------------------------------- */

@@ -20,6 +20,7 @@
 #include "common/cholesky.h"
 #include "common/parallel.h"
 #include "server/capture/tracks.h"
+#include "server/capture/validation.h"
 
 #define POSE_UNKNOWNS 6
 #define POSE_CELL_COLUMNS 8 /* of the grid of offsets; by hand */
@@ -119,12 +120,6 @@ void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], dou
 void pose_move(struct pose_solver *s, size_t f, double most);
 void pose_reset(struct pose_solver *s, size_t f);
 
-/* Evidence for a frame's correction: savings of robust cost at held-out tracks. */
-struct pose_evidence {
-    double sum, squares, total;
-    size_t count;
-};
-
 static inline size_t pose_observation_count(const struct track *track) {
     return (size_t)track->other_count + 1;
 }
@@ -139,15 +134,7 @@ static inline double pose_robust_cost(double residual, double scale) {
     return log1p(e * e);
 }
 
-/* Adds one cost before and after a correction. */
-static inline void pose_evidence_add(struct pose_evidence *e, double before, double now) {
-    e->sum += before - now;
-    e->squares += (before - now) * (before - now);
-    e->total += before;
-    e->count++;
-}
-
 /* Whether the saving is large enough, and significant. */
-bool pose_is_improved(const struct pose_evidence *e);
+bool pose_is_improved(const struct validation *v);
 
 #endif

@@ -14,7 +14,7 @@
 static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, float floor) {
     struct photograph_sample s;
     float px = (float)x + 0.5f, py = (float)y + 0.5f;
-    if (!photograph_sample(photo, px, py, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
+    if (!photograph_sample(photo, px, py, &s) || photograph_sample_saturates(&s))
         return NAN;
     float gray = rgb_luminance(s.radiance);
     if (!photo->is_hdr && gray * photo->exposure * photograph_falloff(photo, px, py) < DARK_VALUE)

@@ -44,7 +44,7 @@ static void observe_point(const struct views *views, uint32_t triangle, vec3 poi
         struct photograph_sample s;
         if (!views_clean(views, &view[k]) || !photograph_sample(photo, view[k].x, view[k].y, &s))
             continue;
-        bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
+        bool saturated = photograph_sample_saturates(&s);
         observations->value[observations->count++] =
             (struct censored){fmaxf(rgb_mean(s.radiance), 0.0f), 1.0f, saturated};
         observations->pixels += area * view[k].weight * photo->camera.fx * photo->camera.fy;

@@ -57,7 +57,7 @@ static bool outshines(const struct photograph *photo, const struct view *view, c
     struct photograph_ring ring = photograph_ring(photo, view->x, view->y, RING_PIXELS);
     if (edge == VIEWS_EDGE)
         return own > OUTSHINES * ring.brightest;
-    bool is_white = sample->saturated[0] || sample->saturated[1] || sample->saturated[2];
+    bool is_white = photograph_sample_saturates(sample);
     return own * ring.count >= (is_white ? OUTSHINES_WHITE : 1.0f) * ring.sum;
 }
 

@@ -94,7 +94,7 @@ static uint32_t pixel_triangle(const struct detail *d, uint32_t train, uint32_t 
     struct footprint f;
     float cx = (float)x + 0.5f, cy = (float)y + 0.5f;
     if (d->views->edge[train][(size_t)y * photo->camera.width + x] > 0 || photograph_has_firefly(photo, cx, cy) ||
-        !photograph_sample(photo, cx, cy, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2] ||
+        !photograph_sample(photo, cx, cy, &s) || photograph_sample_saturates(&s) ||
         !footprint_find(&f, &r->scene->mesh, &r->atlas, d->views->accel, &photo->camera, x, y) ||
         r->is_emitter[r->segments.of_triangle[f.triangle]])
         return NONE;

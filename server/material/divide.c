@@ -117,7 +117,7 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
         photograph_has_firefly(photo, c.view.x, c.view.y) ||
-        !photograph_sample(photo, c.view.x, c.view.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
+        !photograph_sample(photo, c.view.x, c.view.y, &s) || photograph_sample_saturates(&s))
         return;
     c.observed = s.radiance;
     c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);

@@ -100,7 +100,7 @@ static void observe_all(const struct emitter *e, uint32_t texel, struct measured
             !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
             continue;
         float mixing = views_mixing(views, &view, at.triangle, s.radiance);
-        bool saturated = s.saturated[0] || s.saturated[1] || s.saturated[2];
+        bool saturated = photograph_sample_saturates(&s);
         bool sharp = !saturated && photograph_sample_cubic(photo, view.x, view.y, &s.radiance);
         struct robust_sample observation = observation_of(e, &view, mixing, s.radiance, sharp, fused);
         size_t slot = saturated ? BEST_NONE : best_put(&best, observation.weight, t);

@@ -76,7 +76,7 @@ static bool patch_observed(const struct views *views, const struct view *view, c
         if (vec3_dot(at->shading, views_direction(views, view->train, at->position)) < MIN_VIEW_COSINE ||
             !camera_project(&photo->camera, at->position, &place.x, &place.y, &depth_m) ||
             views_edge(views, &place, at->triangle) > edge || photograph_has_firefly(photo, place.x, place.y) ||
-            !photograph_sample(photo, place.x, place.y, &s) || s.saturated[0] || s.saturated[1] || s.saturated[2])
+            !photograph_sample(photo, place.x, place.y, &s) || photograph_sample_saturates(&s))
             return false;
         *observed = rgb_mad(*observed, 1.0f / (float)patch->count, s.radiance);
     }

@@ -47,6 +47,11 @@ struct photograph_sample {
     rgb clip_radiance;      /* radiance at which this frame saturates; INFINITY for HDR */
 };
 
+/* Whether any channel is a lower bound. */
+static inline bool photograph_sample_saturates(const struct photograph_sample *sample) {
+    return sample->saturated[0] || sample->saturated[1] || sample->saturated[2];
+}
+
 void photograph_release(struct photograph *photo);
 
 /* Whether the file clips this channel of pixel number `at`, given its value. */

@@ -235,8 +235,7 @@ static inline double painted_error(const struct painted *room) {
             struct photograph_sample s;
             const struct photograph *photo = &room->scene.photograph[room->views.train[t]];
             if (!views_sees(&room->views, t, point, normal, &view) || !views_clean(&room->views, &view) ||
-                !photograph_sample(photo, view.x, view.y, &s) || s.saturated[0] || s.saturated[1] ||
-                s.saturated[2])
+                !photograph_sample(photo, view.x, view.y, &s) || photograph_sample_saturates(&s))
                 continue;
             double w = (double)view.weight;
             fused[0] += w * log((double)s.radiance.r);
