@@ -6,6 +6,7 @@
 
 #include "common/mem.h"
 
+#define MIN_PHOTOGRAPHS 4 /* that show a track, to compare one with the median of the others; by hand */
 #define MIN_OBSERVATIONS 60 /* of tracks, for a photograph to be judged; by hand */
 /* Standard deviation of a sharp photograph's blur at level 0, pixels of that level: pixel area, lens and the pyramid's
  * binomial. */
@@ -65,7 +66,7 @@ static void compare_others(const struct tracks *tracks, const struct track *trac
         frame[known] = track->other[k];
         known += slopes_of(tracks, track->other[k], track, step, slope[known]);
     }
-    for (size_t k = 0; k < known && known >= 4; k++) {
+    for (size_t k = 0; k < known && known >= MIN_PHOTOGRAPHS; k++) {
         struct sharpness *s = &sharpness[frame[k]];
         s->count++;
         for (int d = 0; d < 2; d++) {

@@ -14,6 +14,8 @@
 #define POINTS_MIN 4000
 #define POINTS_MAX 24000
 
+#define COST_ROUNDS 6 /* of reweighting for the robust mean of a held-out point; by hand */
+
 /* A fault is accepted when it lowers the robust cost of held-out points by this share, and the gain is this many
  * standard errors above 0. Drift must also have this rms (in logarithms): glossy surfaces look brighter in some
  * photographs, which imitates a drift of 0.018 in staircase2 and bathroom, where there is none. Nothing imitates white
@@ -33,15 +35,15 @@ static size_t held_out_costs(const struct light_fit *f, const double *x, double 
         size_t first = f->o->start[p], count = f->o->start[p + 1] - first;
         double weight[OVERLAP_OBSERVATIONS_MAX], square[OVERLAP_OBSERVATIONS_MAX];
         memcpy(weight, f->trust + first, count * sizeof *weight);
-        for (int round = 0; round < 6; round++) {
+        for (int round = 0; round < COST_ROUNDS; round++) {
             light_fit_residuals(f, x, p, weight, square);
             for (size_t i = 0; i < count; i++)
-                weight[i] = f->trust[first + i] / (1.0 + 0.25 * square[i] / (scale * scale));
+                weight[i] = f->trust[first + i] / (1.0 + LIGHT_CAUCHY * square[i] / (scale * scale));
         }
         cost[used] = 0.0;
         for (size_t i = 0; i < count; i++)
             if (isfinite(square[i]))
-                cost[used] += log1p(0.25 * square[i] / (scale * scale)) / (double)count;
+                cost[used] += log1p(LIGHT_CAUCHY * square[i] / (scale * scale)) / (double)count;
         used++;
     }
     return used;

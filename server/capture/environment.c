@@ -20,6 +20,7 @@
 #define MAX_GRID 4 /* sample points along each side of a pixel of the map, at most; by hand */
 /* Weight of a look-up within a pixel of the opening's rim, where slightly wrong poses mix light and frame. By hand. */
 #define RIM_WEIGHT 0.1f
+#define DEVIATIONS_PER_MAD 1.4826f /* standard deviations of normal values in their median absolute deviation */
 /* Outliers: standard deviations from the median. By hand. */
 #define OUTLIER_DEVIATIONS 3.0f
 /* Least standard deviation, as a share of the median: when two photographs agree by chance, a third is no outlier. By
@@ -122,7 +123,7 @@ static float combine(struct censored *value, size_t count, bool *is_bound) {
         removed += far->is_bound ? 0.0f : far->weight;
         deviation = fabsf(far->value - median);
     }
-    float limit = OUTLIER_DEVIATIONS * fmaxf(1.4826f * deviation, MIN_DEVIATION * fabsf(median));
+    float limit = OUTLIER_DEVIATIONS * fmaxf(DEVIATIONS_PER_MAD * deviation, MIN_DEVIATION * fabsf(median));
     for (size_t i = 0; i < count; i++) {
         if (value[i].is_bound || fabsf(value[i].value - median) > limit)
             continue;

@@ -6,7 +6,7 @@
 #include "common/mem.h"
 #include "common/quantile.h"
 
-#define MIN_COSINE 0.2f /* to the normal, for a surface to count as visible; by hand */
+#define DEVIATIONS_PER_MAD 1.5 /* standard deviations of normal residuals in their median absolute deviation, about */
 #define OCCLUSION_MARGIN 0.01f   /* an occluder is nearer than the point by this share of its distance; by hand */
 
 /* A held-out photograph. */
@@ -40,7 +40,7 @@ static bool sees(const struct held_out *h, const struct accel *accel, const stru
     vec3 normal = vec3_normalize(vec3_cross(track->right, track->down));
     float x, y, distance = vec3_length(to);
     return camera_project(camera, track->point, &x, &y, depth_m) &&
-           fabsf(vec3_dot(to, normal)) > MIN_COSINE * distance &&
+           fabsf(vec3_dot(to, normal)) > TRACK_MIN_COSINE * distance &&
            !accel_occluded(accel, origin, vec3_scale(to, 1.0f / distance), 0.0f, (1.0f - OCCLUSION_MARGIN) * distance);
 }
 
@@ -83,7 +83,7 @@ static size_t evaluate_tracks(const struct held_out_set *all, const struct held_
 }
 
 /* Offset of the photograph in log radiance: the median residual, since its exposure may be unknown. */
-static double brightness(const struct track_sample *sample, size_t count, double *scratch) {
+static double offset_of(const struct track_sample *sample, size_t count, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = sample[k].residual;
     return quantile_double(scratch, count, 0.5);
@@ -93,14 +93,14 @@ static double brightness(const struct track_sample *sample, size_t count, double
 static double scale_of(const struct track_sample *sample, size_t count, double offset, double *scratch) {
     for (size_t k = 0; k < count; k++)
         scratch[k] = fabs(sample[k].residual - offset);
-    return fmax(POSE_MIN_SCALE, 1.5 * quantile_double(scratch, count, 0.5));
+    return fmax(POSE_MIN_SCALE, DEVIATIONS_PER_MAD * quantile_double(scratch, count, 0.5));
 }
 
 /* One step of the robust least squares, from which the offset is eliminated. */
 static void step(const struct held_out_set *all, struct held_out *h, const struct track_sample *sample, size_t count,
                  double *scratch) {
     double a[POSE_UNKNOWNS][POSE_UNKNOWNS] = {{0.0}}, b[POSE_UNKNOWNS] = {0.0}, d[POSE_UNKNOWNS] = {0.0};
-    double offset = brightness(sample, count, scratch), weights = 0.0, residual_sum = 0.0;
+    double offset = offset_of(sample, count, scratch), weights = 0.0, residual_sum = 0.0;
     const double prior = pose_prior(&h->frame);
     h->frame.scale = scale_of(sample, count, offset, scratch);
     for (size_t k = 0; k < count; k++) {

@@ -28,6 +28,8 @@
 #define VIGNETTE_SIGMA 0.5
 
 #define ROUNDS 12 /* of reweighting; by hand */
+#define CONVEX_ROUNDS 4 /* the first of them, with convex weights; by hand */
+#define DEVIATIONS_PER_MAD 1.48 /* standard deviations of normal residuals in their median absolute deviation */
 #define CG_STEPS 60 /* of conjugate gradients a round, at most */
 #define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
 
@@ -213,10 +215,10 @@ static void reweight(struct light_fit *f, const double *x, bool is_convex) {
                 known[used++] = square[first + i];
         }
     }
-    f->scale = fmax(1.0, 1.48 * sqrt(quantile_double(known, used, 0.5)));
+    f->scale = fmax(1.0, DEVIATIONS_PER_MAD * sqrt(quantile_double(known, used, 0.5)));
     for (size_t i = 0; i < observations; i++) {
         double e = square[i] / (f->scale * f->scale);
-        double robust = is_convex ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + 0.25 * e);
+        double robust = is_convex ? 1.0 / sqrt(1.0 + e) : 1.0 / (1.0 + LIGHT_CAUCHY * e);
         f->weight[i] = f->trust[i] * robust / (f->scale * f->scale);
     }
     mem_free(known);
@@ -228,7 +230,7 @@ void light_fit_solve(struct light_fit *f, int model, double *x) {
     for (size_t i = 0; i < observations; i++)
         f->weight[i] = f->trust[i];
     for (int round = 0; round < ROUNDS; round++) {
-        reweight(f, x, round < 4);
+        reweight(f, x, round < CONVEX_ROUNDS);
         solve_linear(f, model, x);
     }
 }

@@ -14,6 +14,8 @@
 
 #define LIGHT_HELD_OUT_EVERY 4 /* one point in so many is held out; by hand */
 
+#define LIGHT_CAUCHY 0.25 /* inverse square of the Cauchy scale: two standard deviations; by hand */
+
 /* A model is a set of faults; parameters of the others are held at 0. */
 enum { LIGHT_DRIFT = 1, LIGHT_COLOR = 2, LIGHT_VIGNETTE = 4, LIGHT_FAULTS = 8 };
 

@@ -7,10 +7,8 @@
 #include "common/mem.h"
 
 #define CHUNK 64 /* points a work item */
-/* Stored values of 8-bit photographs: below the first a pixel is mostly noise; the second is as far as noise may lower
- * such a pixel. By hand. */
+/* Stored value of 8-bit photographs below which values are so noisy that selection by them would be biased; by hand. */
 #define DARK_VALUE 0.02f
-#define BLACK_VALUE 0.005f
 /* Share of the clip above which a noisy surface may have clipped pixels; by hand. */
 #define BRIGHT_SHARE 0.8f
 
@@ -42,7 +40,7 @@ static bool observe_cross(const struct photograph *photo, struct overlap_observa
         squares += mean * mean;
     }
     float stored = photo->exposure * photograph_falloff(photo, observation->x, observation->y);
-    float black = photo->is_hdr ? 0.0f : BLACK_VALUE, dark = photo->is_hdr ? 0.0f : DARK_VALUE;
+    float black = photo->is_hdr ? 0.0f : VIEWS_NOISE_VALUE, dark = photo->is_hdr ? 0.0f : DARK_VALUE;
     const float gain[3] = {photo->gain.r, photo->gain.g, photo->gain.b};
     for (int c = 0; c < 3; c++) {
         if (!(sum[c] > 0.0) || (float)(sum[c] / 5.0) * stored * gain[c] < black)

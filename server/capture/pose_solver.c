@@ -5,6 +5,11 @@
 
 #include "common/mem.h"
 
+/* Scale of a frame's residuals: so many times the mean absolute residual, each clamped to so many scales; by hand. */
+#define SCALE_PER_MEAN 2.5
+#define RESIDUAL_CLAMP 2.0
+#define CONSENSUS_ROUNDS 4 /* of reweighting; by hand */
+#define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong */
 #define FIRST_SCALE 0.1 /* of log residuals, until they are known; by hand */
 
 /* A correction is accepted when it lowers the robust cost at held-out tracks by this share, and by so many standard
@@ -229,7 +234,7 @@ static bool track_consensus(const struct pose_solver *s, size_t track, const dou
         count++;
     }
     *consensus = sum / total;
-    return count >= 3;
+    return count >= MIN_CONSENSUS;
 }
 
 void pose_weigh_track(const struct pose_solver *s, size_t track, double *consensus,
@@ -241,7 +246,7 @@ void pose_weigh_track(const struct pose_solver *s, size_t track, double *consens
         weight[k] = 1.0 / (scale * scale);
     }
     *consensus = NAN;
-    for (int round = 0; round < 4; round++) {
+    for (int round = 0; round < CONSENSUS_ROUNDS; round++) {
         if (!track_consensus(s, track, weight, consensus)) {
             memset(weight, 0, count * sizeof *weight);
             return;
@@ -265,13 +270,13 @@ void pose_reweight(struct pose_solver *s) {
             if (weight[k] <= 0.0)
                 continue;
             double r = fabs((double)observation[k].value - s->x[observation[k].offset] - consensus);
-            sum[observation[k].frame] += fmin(r, 2.0 * s->frame[observation[k].frame].scale);
+            sum[observation[k].frame] += fmin(r, RESIDUAL_CLAMP * s->frame[observation[k].frame].scale);
             count[observation[k].frame] += 1.0;
         }
     }
     for (size_t f = 0; f < s->frames; f++) {
         if (count[f] > 0.0)
-            s->frame[f].scale = fmax(POSE_MIN_SCALE, 2.5 * sum[f] / count[f]);
+            s->frame[f].scale = fmax(POSE_MIN_SCALE, SCALE_PER_MEAN * sum[f] / count[f]);
     }
     mem_free(sum);
 }

@@ -6,9 +6,6 @@
 #include "common/mem.h"
 #include "server/capture/views.h"
 
-/* Stored value of 8-bit photographs below which a pixel is mostly noise; by hand. */
-#define DARK_VALUE 0.005f
-
 #define EDGE_DISTANCE 2 /* pixels around a depth edge that are masked, for wrong poses; by hand */
 
 static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, float floor) {
@@ -17,7 +14,7 @@ static float gray_of(const struct photograph *photo, uint32_t x, uint32_t y, flo
     if (!photograph_sample(photo, px, py, &s) || photograph_sample_saturates(&s))
         return NAN;
     float gray = rgb_luminance(s.radiance);
-    if (!photo->is_hdr && gray * photo->exposure * photograph_falloff(photo, px, py) < DARK_VALUE)
+    if (!photo->is_hdr && gray * photo->exposure * photograph_falloff(photo, px, py) < VIEWS_NOISE_VALUE)
         return NAN;
     return logf(fmaxf(gray, 0.0f) + floor);
 }

@@ -14,7 +14,6 @@
 #define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0, also of held-out photographs: 256 MiB */
 #define PYRAMID_MAX ((size_t)640 * 480) /* pixels of level 0, at most; by hand */
 #define PLACES_PER_CELL 8 /* random positions of which the strongest gradient is taken; by hand */
-#define MIN_COSINE 0.2f /* between normal and view; by hand */
 #define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: texture of similar scale; by hand */
 /* Least gradient of a track, log luminance per pixel; by hand. */
 #define MIN_SLOPE 0.01f
@@ -73,7 +72,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
         !accel_intersect(views->accel, origin, direction, 0.0f, INFINITY, &hit))
         return false;
     vec3 normal = vec3_normalize(mesh_cross(&views->scene->mesh, hit.triangle));
-    if (-vec3_dot(normal, direction) < MIN_COSINE)
+    if (-vec3_dot(normal, direction) < TRACK_MIN_COSINE)
         return false;
     *track = (struct track){.x = x, .y = y, .point = vec3_mad(origin, hit.distance_m, direction)};
     track->right = to_pixel(camera, x + 1.0f, y, track->point, normal);
@@ -86,7 +85,7 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
                            track->point);
         float distance = vec3_length(to);
         if (other != t && distance < DISTANCE_RATIO * hit.distance_m &&
-            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > MIN_COSINE * distance &&
+            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > TRACK_MIN_COSINE * distance &&
             views_sees(views, other, track->point, normal, &view))
             track->other[track->other_count++] = other;
     }

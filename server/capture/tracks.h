@@ -10,6 +10,7 @@
 #include "server/capture/views.h"
 
 #define TRACK_OTHERS 10 /* photographs a track besides its own, at most; by hand */
+#define TRACK_MIN_COSINE 0.2f /* between normal and view, for a photograph to be used; by hand */
 
 struct track {
     float x, y;                   /* position in its own photograph, pixels */

@@ -261,12 +261,12 @@ int views_edge(const struct views *v, const struct view *view, uint32_t triangle
 }
 
 float views_trust(const struct views *v, const struct view *view, uint32_t triangle) {
-    static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f};
+    static const float trust[VIEWS_EDGE + 1] = {1.0f, 0.5f, 0.05f, 0.001f}; /* by distance to the edge; by hand */
     return trust[views_edge(v, view, triangle)];
 }
 
 float views_mixing(const struct views *v, const struct view *view, uint32_t triangle, rgb observed) {
-    static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f};
+    static const float variance[VIEWS_EDGE + 1] = {0.0f, 0.001f, 0.01f, 0.25f}; /* as above; by hand */
     int edge = views_edge(v, view, triangle);
     if (edge == 0)
         return 0.0f;

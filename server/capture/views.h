@@ -16,6 +16,8 @@
 #include "server/scene/segment.h"
 
 #define VIEWS_PICK_MAX 64 /* views that views_pick returns at most; bounds its stack */
+/* Stored value of 8-bit photographs below which a pixel is mostly noise; by hand. */
+#define VIEWS_NOISE_VALUE 0.005f
 
 /* Class of a pixel: one surface; several with a depth edge; none (open); several that touch. */
 enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };

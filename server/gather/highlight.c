@@ -10,6 +10,7 @@
 #include "server/render/sampler.h"
 
 enum { PAIR_HALF = 8 }; /* sample dimension of the lobes, after those of incident.c */
+#define MIN_COSINE 1e-3f /* between view and shading normal; more grazing views have no highlight; by hand */
 #define ALBEDO_SAMPLES 1024 /* pairs of a view direction and a lobe sample; by hand */
 #define KEY_ALBEDO 11
 
@@ -41,7 +42,7 @@ void highlight_gather(struct highlight *h, struct incident *in, const struct lig
     frame[2] = at->shading;
     vec3_frame(at->shading, &frame[0], &frame[1]);
     vec3 wo = vec3_to_frame(frame, wo_world);
-    if (!(wo.z > 1e-3f))
+    if (!(wo.z > MIN_COSINE))
         return;
     if (!lights_any(field->world->lights))
         light_samples = 0;

@@ -103,9 +103,9 @@ struct wavefront {
 };
 
 /* Appends a ray of the next bounce; the normal points to the side that it leaves on. */
-static void spawn_ray(struct wavefront *u, vec3 position, vec3 normal, vec3 direction, struct incident_path path) {
-    u->in->ray[u->ray_count] = (struct accel_ray){accel_offset(position, normal, direction), 0.0f, direction, INFINITY};
-    u->in->path[u->ray_count++] = path;
+static void spawn_ray(struct wavefront *w, vec3 position, vec3 normal, vec3 direction, struct incident_path path) {
+    w->in->ray[w->ray_count] = (struct accel_ray){accel_offset(position, normal, direction), 0.0f, direction, INFINITY};
+    w->in->path[w->ray_count++] = path;
 }
 
 static vec3 position_at(const struct world_triangle *t, const struct accel_ray *ray, const struct accel_hit *hit) {
@@ -114,16 +114,16 @@ static vec3 position_at(const struct world_triangle *t, const struct accel_ray *
 }
 
 /* Continues from a back by a cosine-distributed direction. */
-static void spawn_from_back(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
+static void spawn_from_back(struct wavefront *w, const struct accel_ray *ray, const struct accel_hit *hit,
                       struct incident_path path) {
-    const struct world *world = u->field->world;
+    const struct world *world = w->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
     vec3 frame[3] = {[2] = vec3_neg(t->normal)};
     vec3_frame(frame[2], &frame[0], &frame[1]);
-    vec2 random = sampler_pair(u->key, u->first_sample + path.index, PAIR_CONTINUE + u->bounce);
+    vec2 random = sampler_pair(w->key, w->first_sample + path.index, PAIR_CONTINUE + w->bounce);
     spawn_ray(
-        u, position_at(t, ray, hit), frame[2], incident_cosine_direction(frame, random),
+        w, position_at(t, ray, hit), frame[2], incident_cosine_direction(frame, random),
         (struct incident_path){path.index, rgb_mul(path.beta, rgb_make(base[0], base[1], base[2])), .is_first = false});
 }
 
@@ -152,36 +152,36 @@ static vec3 sample_reflection(const struct reflection *m, vec2 u) {
 }
 
 /* Samples a light to be reflected; added later unless it is occluded. */
-static void sample_light(struct wavefront *u, const struct reflection *m, struct incident_path path) {
-    uint32_t sample = u->first_sample + path.index;
-    vec2 pick = sampler_pair(u->key, sample, PAIR_REFLECTED_PICK + u->bounce);
-    vec2 place = sampler_pair(u->key, sample, PAIR_REFLECTED_LIGHT + u->bounce);
+static void sample_light(struct wavefront *w, const struct reflection *m, struct incident_path path) {
+    uint32_t sample = w->first_sample + path.index;
+    vec2 pick = sampler_pair(w->key, sample, PAIR_REFLECTED_PICK + w->bounce);
+    vec2 place = sampler_pair(w->key, sample, PAIR_REFLECTED_LIGHT + w->bounce);
     struct light_sample light = {.pdf = 0.0f};
-    if (lights_any(u->field->world->lights))
-        lights_sample(u->field->world->lights, m->position, pick.x, place.x, place.y, &light);
+    if (lights_any(w->field->world->lights))
+        lights_sample(w->field->world->lights, m->position, pick.x, place.x, place.y, &light);
     if (!(light.pdf > 0.0f) || !(vec3_dot(light.direction, m->normal) > 0.0f))
         return;
     struct lobe_values r = reflect(m, vec3_to_frame(m->frame, light.direction));
     rgb weight = rgb_scale(path.beta, r.wide / (light.pdf + r.pdf));
-    u->in->shadow[u->light_count] = shadow_ray(m->position, m->normal, &light);
-    u->in->light_sample[u->light_count++] = (struct incident_light_sample){path.index, rgb_mul(weight, light.radiance)};
+    w->in->shadow[w->light_count] = shadow_ray(m->position, m->normal, &light);
+    w->in->light_sample[w->light_count++] = (struct incident_light_sample){path.index, rgb_mul(weight, light.radiance)};
 }
 
 /* Russian roulette: the probability to continue, small where the specular share of the reflected light is. */
-static float specular_probability(const struct world *world, const struct incident_lobe *lobe,
+static float continuation_probability(const struct world *world, const struct incident_lobe *lobe,
                                   const struct accel_hit *hit, float cosine) {
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
-    float diffuse = (base[0] + base[1] + base[2]) * (1.0f / 3.0f),
-          fresnel = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
+    float diffuse = (base[0] + base[1] + base[2]) * (1.0f / 3.0f);
+    float fresnel = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
     return fminf(1.0f, ROULETTE_FACTOR * fresnel / (fresnel + diffuse));
 }
 
 /* Continues from a front by its specular lobe. */
-static void spawn_specular(struct wavefront *u, const struct accel_ray *ray, const struct accel_hit *hit,
+static void spawn_specular(struct wavefront *w, const struct accel_ray *ray, const struct accel_hit *hit,
                         struct incident_path path) {
-    const struct world *world = u->field->world;
+    const struct world *world = w->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
-    const struct incident_lobe *lobe = &u->field->lobe[t->segment];
+    const struct incident_lobe *lobe = &w->field->lobe[t->segment];
     struct reflection m = {position_at(t, ray, hit), t->normal,
                        .frame[2] = surface_shading(world->mesh, hit->triangle, hit->b1, hit->b2, t->normal),
                        .lobe = bsdf_lobe(lobe->roughness, lobe->specular),
@@ -190,31 +190,31 @@ static void spawn_specular(struct wavefront *u, const struct accel_ray *ray, con
     m.wo = vec3_to_frame(m.frame, vec3_neg(ray->direction));
     if (!(m.wo.z > MIN_COSINE))
         return;
-    float probability = specular_probability(world, lobe, hit, m.wo.z);
-    if (!(sampler_pair(u->key, u->first_sample + path.index, PAIR_ROULETTE + u->bounce).x < probability))
+    float probability = continuation_probability(world, lobe, hit, m.wo.z);
+    if (!(sampler_pair(w->key, w->first_sample + path.index, PAIR_ROULETTE + w->bounce).x < probability))
         return;
     path.beta = rgb_scale(path.beta, 1.0f / probability);
-    sample_light(u, &m, path);
-    vec3 wi = sample_reflection(&m, sampler_pair(u->key, u->first_sample + path.index, PAIR_CONTINUE + u->bounce));
+    sample_light(w, &m, path);
+    vec3 wi = sample_reflection(&m, sampler_pair(w->key, w->first_sample + path.index, PAIR_CONTINUE + w->bounce));
     vec3 direction = vec3_from_frame(m.frame, wi);
     struct lobe_values r = reflect(&m, wi);
     if (r.pdf > 0.0f && vec3_dot(direction, m.normal) > 0.0f)
-        spawn_ray(u, m.position, m.normal, direction,
+        spawn_ray(w, m.position, m.normal, direction,
               (struct incident_path){path.index, rgb_scale(path.beta, r.lobe / r.pdf), false, true,
                                     rgb_scale(path.beta, r.wide), r.pdf});
 }
 
 /* Adds the radiance that ray `k` finds and continues it; escapes and light_pdf are those of the first hit. */
-static void shade_hit(struct wavefront *u, size_t k) {
-    const struct light_field *field = u->field;
+static void shade_hit(struct wavefront *w, size_t k) {
+    const struct light_field *field = w->field;
     const struct world *world = field->world;
-    struct incident *in = u->in;
+    struct incident *in = w->in;
     const struct accel_ray ray = in->ray[k];
     const struct accel_hit hit = in->hit[k];
     const struct incident_path path = in->path[k];
     const struct world_triangle *t = hit.triangle == ACCEL_NONE ? NULL : &world->triangle[hit.triangle];
     if (t && !(vec3_dot(t->normal, ray.direction) < 0.0f)) {
-        spawn_from_back(u, &ray, &hit, path);
+        spawn_from_back(w, &ray, &hit, path);
         return;
     }
     float light_pdf;
@@ -225,14 +225,14 @@ static void shade_hit(struct wavefront *u, size_t k) {
         in->escapes[path.index] = !t;
     }
     if (t && field->lobe && field->lobe[t->segment].specular > 0.0f)
-        spawn_specular(u, &ray, &hit, path);
+        spawn_specular(w, &ray, &hit, path);
 }
 
 /* Adds the lights that are not occluded. */
-static void add_unoccluded_lights(const struct wavefront *u) {
-    struct incident *in = u->in;
-    accel_occluded_many(u->field->world->accel, u->light_count, in->shadow, in->occluded);
-    for (size_t i = 0; i < u->light_count; i++) {
+static void add_unoccluded_lights(const struct wavefront *w) {
+    struct incident *in = w->in;
+    accel_occluded_many(w->field->world->accel, w->light_count, in->shadow, in->occluded);
+    for (size_t i = 0; i < w->light_count; i++) {
         rgb *to = &in->radiance[in->light_sample[i].index];
         if (!in->occluded[i])
             *to = rgb_add(*to, in->light_sample[i].radiance);
@@ -241,21 +241,21 @@ static void add_unoccluded_lights(const struct wavefront *u) {
 
 void incident_trace(struct incident *in, const struct light_field *field,
                     const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count) {
-    struct wavefront u = {in, field, key, first_sample, 0, 0, 0};
+    struct wavefront w = {in, field, key, first_sample, 0, 0, 0};
     for (size_t i = 0; i < count; i++) {
-        spawn_ray(&u, at->position, at->normal, in->direction[i],
+        spawn_ray(&w, at->position, at->normal, in->direction[i],
               (struct incident_path){(uint32_t)i, rgb_gray(1.0f), .is_first = true});
         in->radiance[i] = rgb_gray(0.0f);
         in->light_pdf[i] = 0.0f;
         in->escapes[i] = false;
     }
-    for (; u.bounce <= MAX_BOUNCES && u.ray_count > 0; u.bounce++) {
-        size_t ray_count = u.ray_count;
+    for (; w.bounce <= MAX_BOUNCES && w.ray_count > 0; w.bounce++) {
+        size_t ray_count = w.ray_count;
         accel_intersect_many(field->world->accel, ray_count, in->ray, in->hit);
-        u.ray_count = u.light_count = 0;
+        w.ray_count = w.light_count = 0;
         for (size_t k = 0; k < ray_count; k++)
-            shade_hit(&u, k);
-        add_unoccluded_lights(&u);
+            shade_hit(&w, k);
+        add_unoccluded_lights(&w);
     }
 }
 
