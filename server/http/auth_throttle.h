@@ -1,9 +1,9 @@
 /* auth_throttle.h -- how often an address may present wrong tokens.
  *
- * Each address has room for AUTH_THROTTLE_BURST failures, which comes back at AUTH_THROTTLE_PER_SEC; without room, a failure is told
- * apart from the others, answered with 429 and the end of the connection, and no line in the log. Tokens are 192 random
- * bits, which nobody guesses at any rate: the limit keeps such attempts from filling the log and loading the store. A good token is always
- * let in, so that nobody behind the same address (a proxy that is not trusted, a lab's gateway) can lock the others out.
+ * A token bucket for each address: AUTH_THROTTLE_BURST failures, refilled at AUTH_THROTTLE_PER_SEC. A failure beyond it is
+ * answered with 429 and the end of the connection, and not logged. Tokens are 192 random bits, which nobody guesses at any
+ * rate: the limit keeps such attempts from filling the log and loading the store. A valid token is always accepted, so
+ * nobody behind the same address (a proxy that is not trusted, a lab's gateway) can lock the others out.
  *
  * An IPv6 address stands for its /64, which is one customer's. Memory is bounded: the address with most room left makes
  * place for a new one. Thread-safe. */

@@ -30,15 +30,16 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
     if (api->config.user_pledge_percent == 0)
         return NULL;
     if (file_free_bytes(api->config.data_dir, &room, &err) != STATUS_OK ||
-        store_user_pledged(api->store, r->caller.user_id, clock_unix_ms() - api->config.empty_upload_ms, &pledged, &err) != STATUS_OK)
+        store_user_pledged(api->store, r->caller.user_id, clock_unix_ms() - api->config.empty_upload_ms, &pledged,
+                           &err) != STATUS_OK)
         return problem_from(r, &err);
     /* What is pledged has its blocks already: it is not free any more. */
     uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;
     if (pledged + bytes <= share)
         return NULL;
     return refuse(r, 507, "user_pledge_percent", "finish or remove an upload that is under way",
-                  mem_printf("your uploads under way reserve %llu MiB, and %llu MiB more are needed: the limit of one user is"
-                             " %u %% of the free space, %llu MiB",
+                  mem_printf("your uploads under way reserve %llu MiB, and %llu MiB more are needed: the limit of one user"
+                             " is %u %% of the free space, %llu MiB",
                              (unsigned long long)(pledged >> 20), (unsigned long long)(bytes >> 20),
                              api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
 }
@@ -52,7 +53,8 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
         return problem_from(r, &err);
     if (most > 0 && checks >= most)
         return refuse(r, 429, "user_max_checks", "wait until some of them are checked",
-                      mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks, most));
+                      mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks,
+                                 most));
     return check_pledge(api, r, bytes);
 }
 

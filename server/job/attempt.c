@@ -186,7 +186,8 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     struct error why = {0};
     const char *scene_id = scene->id;
     *a = (struct attempt){.owner_id = scene->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = layout_scene(config->data_dir, scene_id), .user_max_bytes = config->user_max_bytes, .problems = cJSON_CreateArray()};
+                          .dir = layout_scene(config->data_dir, scene_id), .user_max_bytes = config->user_max_bytes,
+                          .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);

@@ -25,10 +25,10 @@
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
 /* The file is, or was about to be, at its place among the scenes. */
-static enum status place(struct resumables *p, const struct upload_row *row, const char *scene_id,
+static enum status place(struct resumables *r, const struct upload_row *row, const char *scene_id,
                          struct error *err) {
-    struct folder *folder = p->config.folder;
-    char *path = upload_session_path(p, row->id);
+    struct folder *folder = r->config.folder;
+    char *path = upload_session_path(r, row->id);
     bool existed;
     pthread_mutex_lock(&folder->scene_mutex);
     enum status status = STATUS_OK;
@@ -37,16 +37,16 @@ static enum status place(struct resumables *p, const struct upload_row *row, con
     else /* there, but is that on disk? */
         status = upload_sync_place(folder->dir, scene_id, err);
     if (status == STATUS_OK)
-        status = store_scene_add(p->config.store, scene_id, row->name, row->length, row->owner_id,
+        status = store_scene_add(r->config.store, scene_id, row->name, row->length, row->owner_id,
                                  &existed, err);
     pthread_mutex_unlock(&folder->scene_mutex);
     mem_free(path);
-    return status == STATUS_OK ? store_upload_finish(p->config.store, row->id, scene_id, err) : status;
+    return status == STATUS_OK ? store_upload_finish(r->config.store, row->id, scene_id, err) : status;
 }
 
 /* It is not what was announced. */
-static enum status reject(struct resumables *p, const struct upload_row *row, const char *scene_id, struct error *err) {
-    enum status status = resumable_remove(p, row->id, err);
+static enum status reject(struct resumables *r, const struct upload_row *row, const char *scene_id, struct error *err) {
+    enum status status = resumable_remove(r, row->id, err);
     if (status != STATUS_OK)
         return status;
     error_set(err, STATUS_INPUT, "the upload's SHA-256 is %s, and its metadata says %s", scene_id, row->sha256);
@@ -54,81 +54,81 @@ static enum status reject(struct resumables *p, const struct upload_row *row, co
 }
 
 /* The upload `id` is whole and counted: makes its scene, once. */
-static enum status finish(struct resumables *p, const char *id, struct error *err) {
+static enum status finish(struct resumables *r, const char *id, struct error *err) {
     struct upload_row row;
     struct sha256 hash;
     char scene_id[SHA256_HEX_SIZE];
-    pthread_mutex_lock(&p->finishing);
-    enum status status = store_upload_get(p->config.store, id, &row, &hash, sizeof hash, err);
+    pthread_mutex_lock(&r->finishing);
+    enum status status = store_upload_get(r->config.store, id, &row, &hash, sizeof hash, err);
     if (status == STATUS_OK && !*row.scene_id) {
         sha256_hex(&hash, scene_id);
         bool is_as_said = !*row.sha256 || strcmp(row.sha256, scene_id) == 0;
-        status = is_as_said ? place(p, &row, scene_id, err) : reject(p, &row, scene_id, err);
+        status = is_as_said ? place(r, &row, scene_id, err) : reject(r, &row, scene_id, err);
         if (status == STATUS_OK)
-            p->config.scene_added(p->config.user);
+            r->config.scene_added(r->config.user);
     }
-    pthread_mutex_unlock(&p->finishing);
+    pthread_mutex_unlock(&r->finishing);
     upload_row_release(&row);
     return status;
 }
 
 /* Commits; finishes what is whole. */
-static enum status settle(struct upload_session *e, struct error *err) {
-    enum status status = upload_session_commit(e, err);
-    if (status != STATUS_OK || !upload_session_is_whole(e))
+static enum status settle(struct upload_session *s, struct error *err) {
+    enum status status = upload_session_commit(s, err);
+    if (status != STATUS_OK || !upload_session_is_whole(s))
         return status;
-    status = finish(e->resumables, e->id, err);
+    status = finish(s->resumables, s->id, err);
     if (status == STATUS_OK)
-        upload_session_close(e);
+        upload_session_close(s);
     return status;
 }
 
 /* --- all of them ------------------------------------------------------------------------- */
 
 struct resumables *resumables_new(const struct resumables_config *config) {
-    struct resumables *p = mem_calloc(1, sizeof *p);
-    p->config = *config;
-    pthread_mutex_init(&p->mutex, NULL);
-    pthread_mutex_init(&p->finishing, NULL);
-    boot_id(p->boot);
-    if (!*p->boot)
+    struct resumables *r = mem_calloc(1, sizeof *r);
+    r->config = *config;
+    pthread_mutex_init(&r->mutex, NULL);
+    pthread_mutex_init(&r->finishing, NULL);
+    boot_id(r->boot);
+    if (!*r->boot)
         log_warning("the kernel's boot id cannot be read: what a daemon that is killed has received of an upload and not "
                     "yet counted is sent again");
-    return p;
+    return r;
 }
 
 /* Whether the file has blocks beyond its end. */
-static bool holds_space(const struct resumables *p, const char *id) {
-    char *path = upload_session_path(p, id);
+static bool holds_space(const struct resumables *r, const char *id) {
+    char *path = upload_session_path(r, id);
     struct stat info;
     bool holds = stat(path, &info) == 0 && (uint64_t)info.st_blocks * 512 > (uint64_t)info.st_size + SPARE_BYTES;
     mem_free(path);
     return holds;
 }
 
-static void give_space_back(struct resumables *p, const char *id) {
-    struct upload_session *e;
+static void give_space_back(struct resumables *r, const char *id) {
+    struct upload_session *s;
     struct error err;
-    if (upload_session_get(p, id, &e, &err) != STATUS_OK)
+    if (upload_session_get(r, id, &s, &err) != STATUS_OK)
         return; /* finished or removed just now */
-    if (upload_session_shrink(e, &err) != STATUS_OK)
+    if (upload_session_shrink(s, &err) != STATUS_OK)
         log_warning("upload %s: %s", id, err.message);
-    upload_session_put(e);
+    upload_session_put(s);
 }
 
 /* What has not grown for idle_ms needs no room. */
-static enum status give_idle_space_back(struct resumables *p, struct error *err) {
-    int64_t since_ms = clock_unix_ms() - p->config.idle_ms;
+static enum status give_idle_space_back(struct resumables *r, struct error *err) {
+    int64_t since_ms = clock_unix_ms() - r->config.idle_ms;
     char cursor[128] = "";
     enum status status;
     do {
         struct upload_row rows[64];
         size_t count;
         char next[128];
-        status = store_upload_list(p->config.store, NULL, "", cursor, 64, rows, &count, next, err);
+        status = store_upload_list(r->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
-            if (!*rows[i].scene_id && rows[i].updated_ms < since_ms && holds_space(p, rows[i].id))
-                give_space_back(p, rows[i].id);
+            if (!*rows[i].scene_id && rows[i].updated_ms < since_ms && holds_space(r, rows[i].id))
+                give_space_back(r, rows[i].id);
             upload_row_release(&rows[i]);
         }
         memcpy(cursor, next, sizeof cursor);
@@ -136,45 +136,45 @@ static enum status give_idle_space_back(struct resumables *p, struct error *err)
     return status;
 }
 
-void resumables_maintain(struct resumables *p) {
-    struct upload_session *e;
-    pthread_mutex_lock(&p->mutex);
-    unsigned long round = ++p->round;
-    pthread_mutex_unlock(&p->mutex);
-    while ((e = upload_session_next(p, round)) != NULL) { /* nobody uses it: it is there because it is dirty */
+void resumables_maintain(struct resumables *r) {
+    struct upload_session *s;
+    pthread_mutex_lock(&r->mutex);
+    unsigned long round = ++r->round;
+    pthread_mutex_unlock(&r->mutex);
+    while ((s = upload_session_next(r, round)) != NULL) { /* nobody uses it: it is there because it is dirty */
         struct error err;
-        if (settle(e, &err) != STATUS_OK)
-            log_warning("upload %s: %s", e->id, err.message);
-        upload_session_put(e);
+        if (settle(s, &err) != STATUS_OK)
+            log_warning("upload %s: %s", s->id, err.message);
+        upload_session_put(s);
     }
     struct error why;
-    if (give_idle_space_back(p, &why) != STATUS_OK)
+    if (give_idle_space_back(r, &why) != STATUS_OK)
         log_warning("cannot look for idle uploads: %s", why.message);
 }
 
-void resumables_free(struct resumables *p) {
-    if (!p)
+void resumables_free(struct resumables *r) {
+    if (!r)
         return;
-    resumables_maintain(p);
-    while (p->first)
-        upload_session_drop(p->first);
-    pthread_mutex_destroy(&p->finishing);
-    pthread_mutex_destroy(&p->mutex);
-    mem_free(p);
+    resumables_maintain(r);
+    while (r->first)
+        upload_session_drop(r->first);
+    pthread_mutex_destroy(&r->finishing);
+    pthread_mutex_destroy(&r->mutex);
+    mem_free(r);
 }
 
-enum status resumables_recover(struct resumables *p, struct error *err) {
+enum status resumables_recover(struct resumables *r, struct error *err) {
     char cursor[128] = "";
     enum status status;
     do {
         struct upload_row rows[64];
         size_t count;
         char next[128];
-        status = store_upload_list(p->config.store, NULL, "", cursor, 64, rows, &count, next, err);
+        status = store_upload_list(r->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
             struct error why;
             if (!*rows[i].scene_id && rows[i].received == rows[i].length &&
-                finish(p, rows[i].id, &why) != STATUS_OK)
+                finish(r, rows[i].id, &why) != STATUS_OK)
                 log_warning("upload %s: %s", rows[i].id, why.message);
             upload_row_release(&rows[i]);
         }
@@ -194,15 +194,15 @@ static enum status new_id(char id[UPLOAD_ID_SIZE], struct error *err) {
     return STATUS_OK;
 }
 
-enum status resumable_create(struct resumables *p, struct upload_row *row, size_t user_max, struct error *err) {
+enum status resumable_create(struct resumables *r, struct upload_row *row, size_t user_max, struct error *err) {
     struct sha256 hash;
     memset(&hash, 0, sizeof hash); /* all of it is stored */
     sha256_init(&hash);
     enum status status = new_id(row->id, err);
     if (status != STATUS_OK)
         return status;
-    snprintf(row->boot, sizeof row->boot, "%s", p->boot);
-    char *path = upload_session_path(p, row->id);
+    snprintf(row->boot, sizeof row->boot, "%s", r->boot);
+    char *path = upload_session_path(r, row->id);
     int fd = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0)
         status = error_set_errno(err, errno, "cannot create %s", path);
@@ -215,7 +215,7 @@ enum status resumable_create(struct resumables *p, struct upload_row *row, size_
         status = file_sync_parent(path, err);
     const struct count_limits limits = {.all = UNFINISHED_MAX, .one_user = user_max};
     if (status == STATUS_OK)
-        status = store_upload_add(p->config.store, row, &hash, sizeof hash, &limits, err);
+        status = store_upload_add(r->config.store, row, &hash, sizeof hash, &limits, err);
     if (fd >= 0)
         close(fd);
     if (fd >= 0 && status != STATUS_OK)
@@ -224,31 +224,31 @@ enum status resumable_create(struct resumables *p, struct upload_row *row, size_
     return status;
 }
 
-enum status resumable_status(struct resumables *p, const char *id, struct upload_row *row, struct error *err) {
-    struct upload_session *e;
-    enum status status = store_upload_get(p->config.store, id, row, NULL, 0, err);
+enum status resumable_status(struct resumables *r, const char *id, struct upload_row *row, struct error *err) {
+    struct upload_session *s;
+    enum status status = store_upload_get(r->config.store, id, row, NULL, 0, err);
     if (status != STATUS_OK || *row->scene_id)
         return status;
     upload_row_release(row);
-    status = upload_session_get(p, id, &e, err);
+    status = upload_session_get(r, id, &s, err);
     if (status == STATUS_OK) {
-        status = settle(e, err);
-        upload_session_put(e);
+        status = settle(s, err);
+        upload_session_put(s);
     } else if (status == STATUS_CONFLICT) {
         status = STATUS_OK; /* finished just now */
     }
-    return status == STATUS_OK ? store_upload_get(p->config.store, id, row, NULL, 0, err) : status;
+    return status == STATUS_OK ? store_upload_get(r->config.store, id, row, NULL, 0, err) : status;
 }
 
-enum status resumable_forget(struct resumables *p, const char *id, struct error *err) {
+enum status resumable_forget(struct resumables *r, const char *id, struct error *err) {
     char *path = layout_upload(NULL, id);
-    upload_session_mark_gone(p, id);
-    enum status status = trash_take(p->config.folder->trash, path, err);
+    upload_session_mark_gone(r, id);
+    enum status status = trash_take(r->config.folder->trash, path, err);
     mem_free(path);
     return status;
 }
 
-enum status resumable_remove(struct resumables *p, const char *id, struct error *err) {
-    enum status status = store_upload_delete(p->config.store, id, err);
-    return status == STATUS_OK ? resumable_forget(p, id, err) : status;
+enum status resumable_remove(struct resumables *r, const char *id, struct error *err) {
+    enum status status = store_upload_delete(r->config.store, id, err);
+    return status == STATUS_OK ? resumable_forget(r, id, err) : status;
 }

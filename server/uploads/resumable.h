@@ -29,23 +29,23 @@
 struct resumables; /* the uploads that are being written or looked at; opaque */
 
 struct resumables *resumables_new(const struct resumables_config *config);
-void resumables_free(struct resumables *p); /* what is in files but not yet counted is counted */
+void resumables_free(struct resumables *r); /* what is in files but not yet counted is counted */
 /* Puts in order what an earlier life left: finishes what is whole. Before the folders are swept. */
-enum status resumables_recover(struct resumables *p, struct error *err);
+enum status resumables_recover(struct resumables *r, struct error *err);
 /* Counts what was written by requests that were cut off; gives back the space that idle uploads hold beyond what has
  * arrived. From time to time. */
-void resumables_maintain(struct resumables *p);
+void resumables_maintain(struct resumables *r);
 
 /* Takes owner_id, name, metadata, sha256 and length of *row; fills the rest but for times. Reserves the
  * space: STATUS_NO_SPACE. user_max: uploads that one user may have under way; 0: no limit. */
-enum status resumable_create(struct resumables *p, struct upload_row *row, size_t user_max, struct error *err);
+enum status resumable_create(struct resumables *r, struct upload_row *row, size_t user_max, struct error *err);
 
 /* The row as it is now, everything received on disk and counted, and finished if it is whole. */
-enum status resumable_status(struct resumables *p, const char *id, struct upload_row *row, struct error *err);
+enum status resumable_status(struct resumables *r, const char *id, struct upload_row *row, struct error *err);
 
 /* Removes the upload with what it holds, also while somebody writes to it. */
-enum status resumable_remove(struct resumables *p, const char *id, struct error *err);
+enum status resumable_remove(struct resumables *r, const char *id, struct error *err);
 /* The same for one whose row is gone already. */
-enum status resumable_forget(struct resumables *p, const char *id, struct error *err);
+enum status resumable_forget(struct resumables *r, const char *id, struct error *err);
 
 #endif

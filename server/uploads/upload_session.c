@@ -16,41 +16,41 @@
 
 #define CHUNK_BYTES ((size_t)256 << 10)
 
-char *upload_session_path(const struct resumables *p, const char *id) {
-    return layout_upload(p->config.folder->dir, id);
+char *upload_session_path(const struct resumables *r, const char *id) {
+    return layout_upload(r->config.folder->dir, id);
 }
 
 /* --- loading ------------------------------------------------------------------------------- */
 
-static enum status open_file(struct upload_session *e, struct error *err) {
-    if (e->fd >= 0)
+static enum status open_file(struct upload_session *s, struct error *err) {
+    if (s->fd >= 0)
         return STATUS_OK;
     enum status status = STATUS_OK;
-    char *path = upload_session_path(e->resumables, e->id);
-    e->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+    char *path = upload_session_path(s->resumables, s->id);
+    s->fd = open(path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
     /* Whole, it may be on its way to be a scene: see place in resumable.c. */
-    if (e->fd < 0 && (errno != ENOENT || e->received < e->length))
+    if (s->fd < 0 && (errno != ENOENT || s->received < s->length))
         status = error_set_errno(err, errno, "cannot open %s", path);
     mem_free(path);
     return status;
 }
 
-/* Hashes what lies in the file from e->received to its end: written, but never counted. */
-static enum status count_tail(struct upload_session *e, struct error *err) {
+/* Hashes what lies in the file from s->received to its end: written, but never counted. */
+static enum status count_tail(struct upload_session *s, struct error *err) {
     char *chunk = mem_alloc(CHUNK_BYTES);
     enum status status = STATUS_OK;
     ssize_t got = 1;
-    while (got != 0 && e->received < e->length) {
-        uint64_t left = e->length - e->received;
-        got = pread(e->fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)e->received);
+    while (got != 0 && s->received < s->length) {
+        uint64_t left = s->length - s->received;
+        got = pread(s->fd, chunk, left < CHUNK_BYTES ? (size_t)left : CHUNK_BYTES, (off_t)s->received);
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0) {
-            status = error_set_errno(err, errno, "cannot read upload %s", e->id);
+            status = error_set_errno(err, errno, "cannot read upload %s", s->id);
             break;
         }
-        sha256_update(&e->hash, chunk, (size_t)got);
-        e->received += (uint64_t)got;
+        sha256_update(&s->hash, chunk, (size_t)got);
+        s->received += (uint64_t)got;
     }
     mem_free(chunk);
     return status;
@@ -58,31 +58,31 @@ static enum status count_tail(struct upload_session *e, struct error *err) {
 
 /* What lies beyond the counted bytes may be anything: the machine was started anew since, or its disk
  * has failed. */
-static enum status cut_tail(struct upload_session *e, struct error *err) {
-    if (ftruncate(e->fd, (off_t)e->received) != 0)
-        return error_set_errno(err, errno, "cannot cut upload %s", e->id);
-    if (fallocate(e->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)e->length) != 0 && errno != EOPNOTSUPP)
+static enum status cut_tail(struct upload_session *s, struct error *err) {
+    if (ftruncate(s->fd, (off_t)s->received) != 0)
+        return error_set_errno(err, errno, "cannot cut upload %s", s->id);
+    if (fallocate(s->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)s->length) != 0 && errno != EOPNOTSUPP)
         return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s",
-                               (unsigned long long)e->length, e->id);
-    return store_upload_begin(e->resumables->config.store, e->id, e->resumables->boot, err);
+                               (unsigned long long)s->length, s->id);
+    return store_upload_begin(s->resumables->config.store, s->id, s->resumables->boot, err);
 }
 
-static enum status load(struct upload_session *e, struct error *err) {
-    struct resumables *p = e->resumables;
+static enum status load(struct upload_session *s, struct error *err) {
+    struct resumables *r = s->resumables;
     struct upload_row row;
-    enum status status = store_upload_get(p->config.store, e->id, &row, &e->hash, sizeof e->hash, err);
+    enum status status = store_upload_get(r->config.store, s->id, &row, &s->hash, sizeof s->hash, err);
     if (status != STATUS_OK)
         return status;
-    bool is_same_boot = strcmp(row.boot, p->boot) == 0;
-    e->length = row.length;
-    e->received = e->counted = e->hinted = row.received;
-    e->tail_is_trusted = *row.boot != '\0';
-    status = *row.scene_id ? error_set(err, STATUS_CONFLICT, "upload %s is finished", e->id) : open_file(e, err);
-    if (status == STATUS_OK && e->fd >= 0 && e->tail_is_trusted)
-        status = is_same_boot && !e->needs_truncation ? count_tail(e, err) : cut_tail(e, err);
+    bool is_same_boot = strcmp(row.boot, r->boot) == 0;
+    s->length = row.length;
+    s->received = s->counted = s->hinted = row.received;
+    s->tail_is_trusted = *row.boot != '\0';
+    status = *row.scene_id ? error_set(err, STATUS_CONFLICT, "upload %s is finished", s->id) : open_file(s, err);
+    if (status == STATUS_OK && s->fd >= 0 && s->tail_is_trusted)
+        status = is_same_boot && !s->needs_truncation ? count_tail(s, err) : cut_tail(s, err);
     if (status == STATUS_OK) {
-        e->needs_truncation = false;
-        e->is_loaded = true;
+        s->needs_truncation = false;
+        s->is_loaded = true;
     }
     upload_row_release(&row);
     return status;
@@ -90,178 +90,178 @@ static enum status load(struct upload_session *e, struct error *err) {
 
 /* --- while it is in use -------------------------------------------------------------------- */
 
-void upload_session_drop(struct upload_session *e) {
-    struct upload_session **link = &e->resumables->first;
-    while (*link != e)
+void upload_session_drop(struct upload_session *s) {
+    struct upload_session **link = &s->resumables->first;
+    while (*link != s)
         link = &(*link)->next;
-    *link = e->next;
-    if (e->fd >= 0)
-        close(e->fd);
-    pthread_mutex_destroy(&e->mutex);
-    pthread_mutex_destroy(&e->syncing);
-    mem_free(e);
+    *link = s->next;
+    if (s->fd >= 0)
+        close(s->fd);
+    pthread_mutex_destroy(&s->mutex);
+    pthread_mutex_destroy(&s->syncing);
+    mem_free(s);
 }
 
-static bool is_clean(struct upload_session *e) {
-    pthread_mutex_lock(&e->mutex);
-    bool clean = e->is_gone || (!e->needs_truncation && (!e->is_loaded || e->received == e->counted));
-    pthread_mutex_unlock(&e->mutex);
+static bool is_clean(struct upload_session *s) {
+    pthread_mutex_lock(&s->mutex);
+    bool clean = s->is_gone || (!s->needs_truncation && (!s->is_loaded || s->received == s->counted));
+    pthread_mutex_unlock(&s->mutex);
     return clean;
 }
 
-void upload_session_put(struct upload_session *e) {
-    struct resumables *p = e->resumables;
-    pthread_mutex_lock(&p->mutex);
-    if (--e->users == 0 && is_clean(e))
-        upload_session_drop(e);
-    pthread_mutex_unlock(&p->mutex);
+void upload_session_put(struct upload_session *s) {
+    struct resumables *r = s->resumables;
+    pthread_mutex_lock(&r->mutex);
+    if (--s->users == 0 && is_clean(s))
+        upload_session_drop(s);
+    pthread_mutex_unlock(&r->mutex);
 }
 
-static struct upload_session *find(struct resumables *p, const char *id) {
-    struct upload_session *e = p->first;
-    while (e && strcmp(e->id, id) != 0)
-        e = e->next;
-    return e;
+static struct upload_session *find(struct resumables *r, const char *id) {
+    struct upload_session *s = r->first;
+    while (s && strcmp(s->id, id) != 0)
+        s = s->next;
+    return s;
 }
 
-static struct upload_session *add(struct resumables *p, const char *id) {
-    struct upload_session *e = mem_calloc(1, sizeof *e);
-    snprintf(e->id, sizeof e->id, "%s", id);
-    e->resumables = p;
-    e->fd = -1;
-    pthread_mutex_init(&e->syncing, NULL);
-    pthread_mutex_init(&e->mutex, NULL);
-    e->next = p->first;
-    p->first = e;
-    return e;
+static struct upload_session *add(struct resumables *r, const char *id) {
+    struct upload_session *s = mem_calloc(1, sizeof *s);
+    snprintf(s->id, sizeof s->id, "%s", id);
+    s->resumables = r;
+    s->fd = -1;
+    pthread_mutex_init(&s->syncing, NULL);
+    pthread_mutex_init(&s->mutex, NULL);
+    s->next = r->first;
+    r->first = s;
+    return s;
 }
 
-enum status upload_session_get(struct resumables *p, const char *id, struct upload_session **out, struct error *err) {
-    pthread_mutex_lock(&p->mutex);
-    struct upload_session *e = find(p, id);
-    if (!e)
-        e = add(p, id);
-    e->users++;
-    pthread_mutex_unlock(&p->mutex);
+enum status upload_session_get(struct resumables *r, const char *id, struct upload_session **out, struct error *err) {
+    pthread_mutex_lock(&r->mutex);
+    struct upload_session *s = find(r, id);
+    if (!s)
+        s = add(r, id);
+    s->users++;
+    pthread_mutex_unlock(&r->mutex);
     enum status status = STATUS_OK;
-    pthread_mutex_lock(&e->mutex);
-    if (e->is_gone)
+    pthread_mutex_lock(&s->mutex);
+    if (s->is_gone)
         status = error_set(err, STATUS_NOT_FOUND, "there is no upload %s", id);
-    else if (!e->is_loaded)
-        status = load(e, err);
-    pthread_mutex_unlock(&e->mutex);
+    else if (!s->is_loaded)
+        status = load(s, err);
+    pthread_mutex_unlock(&s->mutex);
     if (status != STATUS_OK)
-        upload_session_put(e);
-    *out = status == STATUS_OK ? e : NULL;
+        upload_session_put(s);
+    *out = status == STATUS_OK ? s : NULL;
     return status;
 }
 
-struct upload_session *upload_session_next(struct resumables *p, unsigned long round) {
-    pthread_mutex_lock(&p->mutex);
-    struct upload_session *e = p->first;
-    while (e && (e->users > 0 || e->visited == round))
-        e = e->next;
-    if (e) {
-        e->users++;
-        e->visited = round;
+struct upload_session *upload_session_next(struct resumables *r, unsigned long round) {
+    pthread_mutex_lock(&r->mutex);
+    struct upload_session *s = r->first;
+    while (s && (s->users > 0 || s->visited == round))
+        s = s->next;
+    if (s) {
+        s->users++;
+        s->visited = round;
     }
-    pthread_mutex_unlock(&p->mutex);
-    return e;
+    pthread_mutex_unlock(&r->mutex);
+    return s;
 }
 
-void upload_session_mark_gone(struct resumables *p, const char *id) {
-    pthread_mutex_lock(&p->mutex);
-    struct upload_session *e = find(p, id);
-    if (e)
-        e->users++;
-    pthread_mutex_unlock(&p->mutex);
-    if (!e)
+void upload_session_mark_gone(struct resumables *r, const char *id) {
+    pthread_mutex_lock(&r->mutex);
+    struct upload_session *s = find(r, id);
+    if (s)
+        s->users++;
+    pthread_mutex_unlock(&r->mutex);
+    if (!s)
         return;
-    pthread_mutex_lock(&e->mutex);
-    e->is_gone = true;
-    pthread_mutex_unlock(&e->mutex);
-    upload_session_put(e);
+    pthread_mutex_lock(&s->mutex);
+    s->is_gone = true;
+    pthread_mutex_unlock(&s->mutex);
+    upload_session_put(s);
 }
 
-bool upload_session_is_whole(struct upload_session *e) {
-    pthread_mutex_lock(&e->mutex);
-    bool is_whole = !e->is_gone && e->counted == e->length;
-    pthread_mutex_unlock(&e->mutex);
+bool upload_session_is_whole(struct upload_session *s) {
+    pthread_mutex_lock(&s->mutex);
+    bool is_whole = !s->is_gone && s->counted == s->length;
+    pthread_mutex_unlock(&s->mutex);
     return is_whole;
 }
 
-enum status upload_session_shrink(struct upload_session *e, struct error *err) {
+enum status upload_session_shrink(struct upload_session *s, struct error *err) {
     enum status status = STATUS_OK;
-    pthread_mutex_lock(&e->mutex);
+    pthread_mutex_lock(&s->mutex);
     /* To the size that it has: what fallocate has set aside beyond it goes. */
-    if (!e->is_gone && !e->holder && e->fd >= 0 && ftruncate(e->fd, (off_t)e->received) != 0)
-        status = error_set_errno(err, errno, "cannot give back the space of upload %s", e->id);
-    pthread_mutex_unlock(&e->mutex);
+    if (!s->is_gone && !s->writer && s->fd >= 0 && ftruncate(s->fd, (off_t)s->received) != 0)
+        status = error_set_errno(err, errno, "cannot give back the space of upload %s", s->id);
+    pthread_mutex_unlock(&s->mutex);
     return status;
 }
 
-void upload_session_close(struct upload_session *e) {
-    pthread_mutex_lock(&e->mutex);
-    e->is_loaded = false; /* the next to come reads its row */
-    e->holder = NULL;
-    pthread_mutex_unlock(&e->mutex);
+void upload_session_close(struct upload_session *s) {
+    pthread_mutex_lock(&s->mutex);
+    s->is_loaded = false; /* the next to come reads its row */
+    s->writer = NULL;
+    pthread_mutex_unlock(&s->mutex);
 }
 
 /* --- counting ------------------------------------------------------------------------------ */
 
 /* What was received since the last commit may be lost: where a sync has failed, the kernel can have
- * dropped it, and the next sync would say that all is well. It is to be sent again. e->syncing is held. */
-static void forget_tail(struct upload_session *e) {
+ * dropped it, and the next sync would say that all is well. It is to be sent again. s->syncing is held. */
+static void forget_tail(struct upload_session *s) {
     struct error err;
-    pthread_mutex_lock(&e->mutex);
-    e->received = e->counted;
-    e->is_loaded = false; /* the next to come reads row and hash again */
-    e->holder = NULL;
-    e->needs_truncation = ftruncate(e->fd, (off_t)e->counted) != 0 &&
-                    store_upload_begin(e->resumables->config.store, e->id, "", &err) != STATUS_OK;
-    if (e->needs_truncation)
-        log_warning("upload %s: %s", e->id, err.message);
-    pthread_mutex_unlock(&e->mutex);
+    pthread_mutex_lock(&s->mutex);
+    s->received = s->counted;
+    s->is_loaded = false; /* the next to come reads row and hash again */
+    s->writer = NULL;
+    s->needs_truncation = ftruncate(s->fd, (off_t)s->counted) != 0 &&
+                    store_upload_begin(s->resumables->config.store, s->id, "", &err) != STATUS_OK;
+    if (s->needs_truncation)
+        log_warning("upload %s: %s", s->id, err.message);
+    pthread_mutex_unlock(&s->mutex);
 }
 
-/* e->syncing is held, so nothing else counts or forgets. */
-static enum status commit_alone(struct upload_session *e, struct error *err) {
-    pthread_mutex_lock(&e->mutex);
-    uint64_t received = e->received;
-    struct sha256 hash = e->hash;
-    bool needs_truncation = e->needs_truncation && !e->is_gone, has_news = !e->is_gone && received > e->counted;
-    pthread_mutex_unlock(&e->mutex);
+/* s->syncing is held, so nothing else counts or forgets. */
+static enum status commit_alone(struct upload_session *s, struct error *err) {
+    pthread_mutex_lock(&s->mutex);
+    uint64_t received = s->received;
+    struct sha256 hash = s->hash;
+    bool needs_truncation = s->needs_truncation && !s->is_gone, has_news = !s->is_gone && received > s->counted;
+    pthread_mutex_unlock(&s->mutex);
     if (needs_truncation)
-        forget_tail(e);
+        forget_tail(s);
     if (needs_truncation || !has_news)
         return STATUS_OK;
-    if (fdatasync(e->fd) != 0) {
-        enum status failed = error_set_errno(err, errno, "cannot sync upload %s", e->id);
-        forget_tail(e);
+    if (fdatasync(s->fd) != 0) {
+        enum status failed = error_set_errno(err, errno, "cannot sync upload %s", s->id);
+        forget_tail(s);
         return failed;
     }
-    pthread_mutex_lock(&e->mutex);
-    enum status status = store_upload_advance(e->resumables->config.store, e->id, received, &hash, sizeof hash, err);
+    pthread_mutex_lock(&s->mutex);
+    enum status status = store_upload_advance(s->resumables->config.store, s->id, received, &hash, sizeof hash, err);
     if (status == STATUS_OK)
-        e->counted = received;
-    pthread_mutex_unlock(&e->mutex);
+        s->counted = received;
+    pthread_mutex_unlock(&s->mutex);
     return status;
 }
 
-enum status upload_session_commit(struct upload_session *e, struct error *err) {
-    pthread_mutex_lock(&e->syncing);
-    enum status status = commit_alone(e, err);
-    pthread_mutex_unlock(&e->syncing);
+enum status upload_session_commit(struct upload_session *s, struct error *err) {
+    pthread_mutex_lock(&s->syncing);
+    enum status status = commit_alone(s, err);
+    pthread_mutex_unlock(&s->syncing);
     return status;
 }
 
-enum status upload_session_distrust_tail(struct upload_session *e, struct error *err) {
-    enum status status = upload_session_commit(e, err);
+enum status upload_session_distrust_tail(struct upload_session *s, struct error *err) {
+    enum status status = upload_session_commit(s, err);
     if (status == STATUS_OK)
-        status = store_upload_begin(e->resumables->config.store, e->id, "", err);
-    pthread_mutex_lock(&e->mutex);
+        status = store_upload_begin(s->resumables->config.store, s->id, "", err);
+    pthread_mutex_lock(&s->mutex);
     if (status == STATUS_OK)
-        e->tail_is_trusted = false;
-    pthread_mutex_unlock(&e->mutex);
+        s->tail_is_trusted = false;
+    pthread_mutex_unlock(&s->mutex);
     return status;
 }

@@ -32,7 +32,7 @@ struct upload_session {
     uint64_t hinted;            /* writing out has begun up to here */
     struct sha256 hash;         /* of what was received */
     bool tail_is_trusted;           /* see resumable.h, invariant 3 */
-    const struct upload_writer *holder; /* NULL: nobody writes */
+    const struct upload_writer *writer; /* NULL: nobody writes */
 };
 
 struct resumables {
@@ -44,25 +44,25 @@ struct resumables {
     pthread_mutex_t finishing; /* one upload becomes a scene at a time */
 };
 
-char *upload_session_path(const struct resumables *p, const char *id); /* of the upload's file; the caller's */
+char *upload_session_path(const struct resumables *r, const char *id); /* of the upload's file; the caller's */
 
 /* The upload's session, loaded, for one more user. STATUS_CONFLICT: it is finished. */
-enum status upload_session_get(struct resumables *p, const char *id, struct upload_session **out, struct error *err);
+enum status upload_session_get(struct resumables *r, const char *id, struct upload_session **out, struct error *err);
 /* One that nobody uses and that was not given in this round yet, for one more user; NULL: there is none. */
-struct upload_session *upload_session_next(struct resumables *p, unsigned long round);
-void upload_session_put(struct upload_session *e); /* one user less */
-void upload_session_drop(struct upload_session *e); /* nobody uses it */
+struct upload_session *upload_session_next(struct resumables *r, unsigned long round);
+void upload_session_put(struct upload_session *s); /* one user less */
+void upload_session_drop(struct upload_session *s); /* nobody uses it */
 /* The upload is removed: whoever still uses it finds it gone. */
-void upload_session_mark_gone(struct resumables *p, const char *id);
+void upload_session_mark_gone(struct resumables *r, const char *id);
 
 /* What was received is on disk and counted. Where the disk fails, what is not counted is forgotten. */
-enum status upload_session_commit(struct upload_session *e, struct error *err);
-bool upload_session_is_whole(struct upload_session *e); /* and counted */
+enum status upload_session_commit(struct upload_session *s, struct error *err);
+bool upload_session_is_whole(struct upload_session *s); /* and counted */
 /* Gives back the blocks beyond what has arrived, unless somebody writes. */
-enum status upload_session_shrink(struct upload_session *e, struct error *err);
+enum status upload_session_shrink(struct upload_session *s, struct error *err);
 /* It has become a scene: the next to come finds it so. */
-void upload_session_close(struct upload_session *e);
+void upload_session_close(struct upload_session *s);
 /* From now on what the file holds beyond the counted bytes does not count after a restart: unchecked bytes come. */
-enum status upload_session_distrust_tail(struct upload_session *e, struct error *err);
+enum status upload_session_distrust_tail(struct upload_session *s, struct error *err);
 
 #endif

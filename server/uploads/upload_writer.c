@@ -27,60 +27,60 @@ static enum status lost(struct error *err) {
 /* --- who writes ---------------------------------------------------------------------------- */
 
 /* The session's mutex is held. */
-static enum status check_offset(const struct upload_session *e, uint64_t offset, struct error *err) {
-    if (!e->is_loaded) /* e->hash is still that of what was forgotten */
+static enum status check_offset(const struct upload_session *s, uint64_t offset, struct error *err) {
+    if (!s->is_loaded) /* s->hash is still that of what was forgotten */
         return lost(err);
-    if (e->received != offset)
+    if (s->received != offset)
         return error_set(err, STATUS_CONFLICT, "the upload's offset is %llu, not %llu",
-                         (unsigned long long)e->received, (unsigned long long)offset);
+                         (unsigned long long)s->received, (unsigned long long)offset);
     return STATUS_OK;
 }
 
-enum status upload_writer_take(struct resumables *p, const char *id, uint64_t offset, bool is_checked, struct upload_writer **out,
-                       struct error *err) {
-    struct upload_session *e;
+enum status upload_writer_take(struct resumables *r, const char *id, uint64_t offset, bool is_checked,
+                               struct upload_writer **out, struct error *err) {
+    struct upload_session *s;
     *out = NULL;
-    enum status status = upload_session_get(p, id, &e, err);
+    enum status status = upload_session_get(r, id, &s, err);
     if (status != STATUS_OK)
         return status;
-    pthread_mutex_lock(&e->mutex);
-    bool must_distrust = is_checked && e->tail_is_trusted;
-    pthread_mutex_unlock(&e->mutex);
+    pthread_mutex_lock(&s->mutex);
+    bool must_distrust = is_checked && s->tail_is_trusted;
+    pthread_mutex_unlock(&s->mutex);
     if (must_distrust)
-        status = upload_session_distrust_tail(e, err);
-    pthread_mutex_lock(&e->mutex);
+        status = upload_session_distrust_tail(s, err);
+    pthread_mutex_lock(&s->mutex);
     if (status == STATUS_OK)
-        status = check_offset(e, offset, err);
+        status = check_offset(s, offset, err);
     if (status == STATUS_OK) {
-        struct upload_writer *c = *out = mem_calloc(1, sizeof *c);
-        *c = (struct upload_writer){e, is_checked, offset, e->hash};
-        e->holder = c;
+        struct upload_writer *w = *out = mem_calloc(1, sizeof *w);
+        *w = (struct upload_writer){s, is_checked, offset, s->hash};
+        s->writer = w;
     }
-    pthread_mutex_unlock(&e->mutex);
+    pthread_mutex_unlock(&s->mutex);
     if (status != STATUS_OK)
-        upload_session_put(e);
+        upload_session_put(s);
     return status;
 }
 
 /* The session's mutex is held. */
-static enum status check_holder(const struct upload_writer *c, struct error *err) {
-    if (c->session->is_gone)
+static enum status check_is_writer(const struct upload_writer *w, struct error *err) {
+    if (w->session->is_gone)
         return error_set(err, STATUS_NOT_FOUND, "the upload was removed");
-    if (c->session->holder != c)
+    if (w->session->writer != w)
         return error_set(err, STATUS_CONFLICT, "another request continues this upload");
     return STATUS_OK;
 }
 
-void upload_writer_release(struct upload_writer *c) {
-    if (!c)
+void upload_writer_release(struct upload_writer *w) {
+    if (!w)
         return;
-    struct upload_session *e = c->session;
-    pthread_mutex_lock(&e->mutex);
-    if (e->holder == c)
-        e->holder = NULL;
-    pthread_mutex_unlock(&e->mutex);
-    upload_session_put(e);
-    mem_free(c);
+    struct upload_session *s = w->session;
+    pthread_mutex_lock(&s->mutex);
+    if (s->writer == w)
+        s->writer = NULL;
+    pthread_mutex_unlock(&s->mutex);
+    upload_session_put(s);
+    mem_free(w);
 }
 
 /* --- writing ------------------------------------------------------------------------------- */
@@ -100,79 +100,79 @@ static enum status write_at(int fd, const char *data, uint64_t length, uint64_t 
 }
 
 /* Now and then: the kernel begins to write out what has come up to `at`. Only a hint to it. */
-static void hint(struct upload_session *e, uint64_t at) {
-    if (at >= e->hinted && at - e->hinted < HINT_BYTES)
+static void hint(struct upload_session *s, uint64_t at) {
+    if (at >= s->hinted && at - s->hinted < HINT_BYTES)
         return;
-    if (at > e->hinted)
-        (void)sync_file_range(e->fd, (off_t)e->hinted, (off_t)(at - e->hinted), SYNC_FILE_RANGE_WRITE);
-    e->hinted = at;
+    if (at > s->hinted)
+        (void)sync_file_range(s->fd, (off_t)s->hinted, (off_t)(at - s->hinted), SYNC_FILE_RANGE_WRITE);
+    s->hinted = at;
 }
 
-enum status upload_writer_write(struct upload_writer *c, const void *data, uint64_t length, struct error *err) {
-    struct upload_session *e = c->session;
-    pthread_mutex_lock(&e->mutex);
-    enum status status = check_holder(c, err);
-    if (status == STATUS_OK && length > e->length - c->at)
+enum status upload_writer_write(struct upload_writer *w, const void *data, uint64_t length, struct error *err) {
+    struct upload_session *s = w->session;
+    pthread_mutex_lock(&s->mutex);
+    enum status status = check_is_writer(w, err);
+    if (status == STATUS_OK && length > s->length - w->at)
         status = error_set(err, STATUS_LIMIT, "the upload has %llu bytes, and more were sent",
-                           (unsigned long long)e->length);
+                           (unsigned long long)s->length);
     if (status == STATUS_OK)
-        status = write_at(e->fd, data, length, c->at, err);
+        status = write_at(s->fd, data, length, w->at, err);
     if (status == STATUS_OK) {
-        sha256_update(&c->hash, data, length);
-        c->at += length;
-        if (!c->is_checked) {
-            e->hash = c->hash;
-            e->received = c->at;
+        sha256_update(&w->hash, data, length);
+        w->at += length;
+        if (!w->is_checked) {
+            s->hash = w->hash;
+            s->received = w->at;
         }
-        hint(e, c->at);
+        hint(s, w->at);
     }
-    pthread_mutex_unlock(&e->mutex);
+    pthread_mutex_unlock(&s->mutex);
     return status;
 }
 
-uint64_t upload_writer_room(const struct upload_writer *c) {
-    return c->session->length - c->at; /* the length never changes */
+uint64_t upload_writer_room(const struct upload_writer *w) {
+    return w->session->length - w->at; /* the length never changes */
 }
 
-uint64_t upload_writer_unreserved(const struct upload_writer *c) {
+uint64_t upload_writer_unreserved(const struct upload_writer *w) {
     struct stat info;
-    uint64_t length = c->session->length;
-    if (fstat(c->session->fd, &info) != 0)
-        return upload_writer_room(c);
+    uint64_t length = w->session->length;
+    if (fstat(w->session->fd, &info) != 0)
+        return upload_writer_room(w);
     uint64_t has = (uint64_t)info.st_blocks * 512;
     return has < length ? length - has : 0;
 }
 
 /* --- counting ------------------------------------------------------------------------------ */
 
-bool upload_writer_is_due(const struct upload_writer *c) {
-    struct upload_session *e = c->session;
-    pthread_mutex_lock(&e->mutex);
-    bool due = e->received - e->counted >= COMMIT_BYTES;
-    pthread_mutex_unlock(&e->mutex);
+bool upload_writer_is_due(const struct upload_writer *w) {
+    struct upload_session *s = w->session;
+    pthread_mutex_lock(&s->mutex);
+    bool due = s->received - s->counted >= COMMIT_BYTES;
+    pthread_mutex_unlock(&s->mutex);
     return due;
 }
 
-enum status upload_writer_accept(struct upload_writer *c, struct error *err) {
-    struct upload_session *e = c->session;
-    pthread_mutex_lock(&e->mutex);
-    enum status status = check_holder(c, err);
+enum status upload_writer_accept(struct upload_writer *w, struct error *err) {
+    struct upload_session *s = w->session;
+    pthread_mutex_lock(&s->mutex);
+    enum status status = check_is_writer(w, err);
     if (status == STATUS_OK) {
-        e->hash = c->hash;
-        e->received = c->at;
+        s->hash = w->hash;
+        s->received = w->at;
     }
-    pthread_mutex_unlock(&e->mutex);
+    pthread_mutex_unlock(&s->mutex);
     return status;
 }
 
-enum status upload_writer_commit(struct upload_writer *c, struct error *err) {
-    return upload_session_commit(c->session, err);
+enum status upload_writer_commit(struct upload_writer *w, struct error *err) {
+    return upload_session_commit(w->session, err);
 }
 
-enum status upload_writer_finish(struct upload_writer *c, struct upload_row *row, struct error *err) {
-    struct upload_session *e = c->session;
-    enum status status = resumable_status(e->resumables, e->id, row, err);
-    if (status != STATUS_OK || row->received >= c->at)
+enum status upload_writer_finish(struct upload_writer *w, struct upload_row *row, struct error *err) {
+    struct upload_session *s = w->session;
+    enum status status = resumable_status(s->resumables, s->id, row, err);
+    if (status != STATUS_OK || row->received >= w->at)
         return status;
     upload_row_release(row); /* another thread's sync has failed */
     return lost(err);

@@ -53,7 +53,7 @@ as "$alice" GET /v1/jobs; expect 401 "after its revocation"
 unbaked token revoke 2 --data "$data" >/dev/null; as "$admin" GET /v1/jobs; expect 401
 unbaked token revoke wall --data "$data" >/dev/null; call GET /v1/jobs; expect 401 "when no token is left"
 
-# --- wrong tokens: logged with their address, braked, and nobody else with them ---
+# --- wrong tokens: logged with their address, throttled, and nobody else with them ---
 carl=$(unbaked token add carl --data "$data")
 wrong=unbake_4_000000000000000000000000000000000000000000000000
 from() { local address=$1; shift; as "$@" -H "X-Forwarded-For: 192.0.2.99, $address"; }
@@ -62,8 +62,8 @@ found=$(for i in $(seq 24); do from 192.0.2.1 "$wrong" GET /v1/jobs; echo "$stat
 equal "$found" "20 401 4 429" "24 wrong tokens"
 from 192.0.2.1 "$wrong" GET /v1/jobs; expect 429
 [[ $(header retry-after) =~ ^[12]$ ]] || fail "Retry-After is '$(header retry-after)'"
-equal "$(header connection)" close "Connection of a braked reply"
-equal "$(field .type)" urn:unbake:too-many-tokens "type of a braked reply"
+equal "$(header connection)" close "Connection of a throttled reply"
+equal "$(field .type)" urn:unbake:too-many-tokens "type of a throttled reply"
 call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$wrong\"}"; expect 429 "by the page"
 from 192.0.2.1 "$carl" GET /v1/jobs; expect 200 "a good token, from the same address"
 call POST /v1/session -H 'Content-Type: application/json' -H 'X-Forwarded-For: 192.0.2.1' -d "{\"token\":\"$carl\"}"; expect 200 "a login, from there"

@@ -58,7 +58,7 @@ run 0 rm 1
 [ ! -e "$data/jobs/1/out" ] || fail "job 1 is still there"
 daemon_end TERM
 refused 1 'is not empty' unbaked restore "$work/copy1" "$data"
-refused 2 'is no folder that' unbaked restore "$work/copy1/state.db" "$work/new"
+refused 2 'is not a folder that' unbaked restore "$work/copy1/state.db" "$work/new"
 refused 2 'usage' unbaked restore "$work/copy1"
 unbaked restore "$work/copy1" "$work/restored" || fail "restore: $(cat "$work/err")"
 grep -q 'all digests match' "$work/out" || fail "restore says: $(cat "$work/out")"

@@ -47,7 +47,7 @@ static int64_t make_job(enum thing thing, int64_t owner) {
     return id;
 }
 
-/* Each request comes from another address, by the word of a proxy: so many wrong tokens from one would be braked. */
+/* Each request comes from another address, by the word of a proxy: so many wrong tokens from one would be throttled. */
 static int ask(enum who who, const char *method, const char *path, const char *fields, const char *body,
                struct buf *reply) {
     static unsigned count;

@@ -8,7 +8,7 @@ number = itertools.count()
 
 @schemathesis.hook
 def before_call(context, case, kwargs):
-    """Each request comes from another address, by the word of a proxy: many wrong tokens from one are braked.
+    """Each request comes from another address, by the word of a proxy: many wrong tokens from one are throttled.
     Long polls are short."""
     n = next(number)
     case.headers["X-Forwarded-For"] = f"10.{n >> 16 & 255}.{n >> 8 & 255}.{n & 255}"

@@ -1,4 +1,4 @@
-/* test_address.c -- where requests come from, with proxies that are trusted and words that are not; and the brake on
+/* test_address.c -- where requests come from, with proxies that are trusted and words that are not; and the throttle on
  * wrong tokens that goes by it. */
 #include "server/http/address.h"
 
@@ -115,7 +115,7 @@ static void check_requests(void) {
     REQUEST(f, "10.0.0.1", "10.0.0.1", "\"");
 }
 
-/* --- the brake --------------------------------------------------------------------------- */
+/* --- the throttle --------------------------------------------------------------------------- */
 
 static void check_brake(void) {
     struct auth_throttle *b = auth_throttle_new();
@@ -145,7 +145,7 @@ static void check_brake(void) {
     auth_throttle_free(b);
 }
 
-/* Whoever has very many addresses does not free one that is braked by using the others once each. */
+/* Whoever has very many addresses does not free one that is throttled by using the others once each. */
 static void check_flood(void) {
     struct auth_throttle *b = auth_throttle_new();
     struct address one = at("192.0.2.1"), many = at("2001:db8::");
