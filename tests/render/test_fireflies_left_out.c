@@ -1,14 +1,14 @@
-/* fireflies.h, in a whole reconstruction: pixels that shine by chance, in each photograph at other places, leave no spots,
- * and without its noise taken out no more error than without them. */
+/* fireflies.h, in a whole reconstruction: pixels that shine by chance, in each photograph at other places, leave no
+ * spots, and without its noise taken out no more error than without them. */
 #include "server/reconstruct/reconstruct.h"
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define STEP 9        /* pixels from a spark to the next, in a row and of rows */
+#define STEP 9        /* pixels from a firefly to the next, in a row and of rows */
 #define TIMES 30.0f   /* as bright as it should be */
 #define SPOT 0.25f    /* so far off a texel's colour is seen */
 
-static void add_sparks(struct scene *scene) {
+static void add_fireflies(struct scene *scene) {
     for (size_t f = 0; f < scene->photograph_count; f++) {
         for (size_t i = 0; i < WIDTH * HEIGHT; i++) {
             uint16_t *pixel = scene->photograph[f].pixel[i];
@@ -25,11 +25,11 @@ struct off {
     size_t spots;
 };
 
-static struct off reconstruct(bool with_sparks, struct parallel *pool) {
+static struct off reconstruct(bool with_fireflies, struct parallel *pool) {
     struct scene scene = {0};
     make_scene(&scene, pool);
-    if (with_sparks)
-        add_sparks(&scene);
+    if (with_fireflies)
+        add_fireflies(&scene);
     struct settings s = shell_settings("{\"texture_size\":256,\"report_samples\":1,\"gather_samples\":128,"
                                        "\"denoise\":false,\"iterations\":40}");
     struct shell shell = {.polls_until_stop = -1};
@@ -48,7 +48,7 @@ static struct off reconstruct(bool with_sparks, struct parallel *pool) {
         count += 1.0;
     }
     off.error = sqrt(off.error / count);
-    printf("%s sparks: error %.4f, %zu spots\n", with_sparks ? "with" : "without", off.error, off.spots);
+    printf("%s fireflies: error %.4f, %zu spots\n", with_fireflies ? "with" : "without", off.error, off.spots);
     reconstruct_release(&r);
     shell_release(&shell);
     settings_release(&s);

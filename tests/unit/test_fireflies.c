@@ -1,5 +1,5 @@
-/* fireflies.h: single pixels that are far too bright are told from noise, from lines, edges and lamps of two pixels, also
- * in corners; no look-up that reads one is used. */
+/* fireflies.h: single pixels that are far too bright are told from noise, from lines, edges and lamps of two pixels,
+ * also in corners; no look-up that reads one is used. */
 #include "server/capture/fireflies.h"
 
 #include "common/image.h"
@@ -80,7 +80,7 @@ static void test_lookups(const struct photograph *photo) {
     CHECK_THAT(!photograph_has_firefly(&photograph[1], 40.5f, 40.5f), "nobody asked of this photograph");
 }
 
-/* Of 8 bits what should be black is not for its noise; what is brighter by far more than that still is a spark. */
+/* Of 8 bits what should be black is not for its noise; what is brighter by far more than that still is a firefly. */
 static void test_black(struct parallel *pool) {
     static struct photograph dark = {.camera = {.width = SIDE, .height = SIDE}, .exposure = 1.0f,
                                      .gain = {1.0f, 1.0f, 1.0f}, .clip = 1.0f};
