@@ -135,9 +135,11 @@ void lamps_add_sky(struct lamps *l) {
 void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field,
                   const struct fused *shown) {
     struct survey survey;
-    survey_init(&survey, l->r, views, field, l->without, LIGHT_PLACES);
+    survey_lights_on(l->r, views, l->without);
+    survey_init(&survey, l->r, field, l->without, LIGHT_PLACES);
     light_places_init(&l->places, &survey, shown);
     survey_release(&survey);
+    survey_lights_off(l->r);
     for (size_t i = 0; i < l->places.count; i++) {
         struct light_place *p = &l->places.place[i];
         p->weight = rgb_mean(p->shown) / (rgb_mean(p->shown) + l->median_radiance);

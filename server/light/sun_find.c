@@ -244,9 +244,11 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     struct search s = {.r = r, .median_radiance = views->median_radiance};
     double explains = 0.0;
     struct survey survey;
-    survey_init(&survey, r, views, NULL, NULL, LIGHT_PLACES);
+    survey_lights_on(r, views, NULL);
+    survey_init(&survey, r, NULL, NULL, LIGHT_PLACES);
     light_places_init(&s.places, &survey, NULL);
     survey_release(&survey);
+    survey_lights_off(r);
     light_places_leave_out_lamps(&s.places);
     missing_light_init(&s.missing, &s.places, PLACE_WHITE, true);
     if (light_places_odder(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)

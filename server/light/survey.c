@@ -33,8 +33,7 @@ static void fill_radiance(struct survey *s) {
     mem_free(sum);
 }
 
-/* Makes lights of what outshines the room. */
-static void light_bright(struct reconstruction *r, const struct views *views, const bool *without) {
+void survey_lights_on(struct reconstruction *r, const struct views *views, const bool *without) {
     struct emitter_evidence *evidence = mem_array(r->segments.count, sizeof *evidence);
     memcpy(evidence, r->evidence, r->segments.count * sizeof *evidence);
     emitters_observe(r, views, evidence);
@@ -44,6 +43,11 @@ static void light_bright(struct reconstruction *r, const struct views *views, co
     }
     emitters_light_bright(r, views, evidence);
     mem_free(evidence);
+}
+
+void survey_lights_off(struct reconstruction *r) {
+    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
+    world_update_lights(&r->world);
 }
 
 /* Segments of `without` are as bright as they are by now, to those who see them in a mirror. */
@@ -78,8 +82,8 @@ static void choose_points(struct survey *s, const bool *without, size_t points) 
     }
 }
 
-void survey_init(struct survey *s, struct reconstruction *r, const struct views *views,
-                 const struct light_field *field, const bool *without, size_t points) {
+void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field,
+                 const bool *without, size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
     memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance,
@@ -91,15 +95,11 @@ void survey_init(struct survey *s, struct reconstruction *r, const struct views 
         s->field.lobe = field->lobe;
     if (without)
         leave_out(s, without);
-    light_bright(r, views, without);
     choose_points(s, without, points);
     s->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->scratch);
 }
 
 void survey_release(struct survey *s) {
-    struct reconstruction *r = s->r;
-    memset(r->materials.emission, 0, r->segments.count * sizeof *r->materials.emission);
-    world_update_lights(&r->world);
     mem_free(s->scratch);
     mem_free(s->texel);
     mem_free(s->radiance);

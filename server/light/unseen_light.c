@@ -112,12 +112,14 @@ static void fill_in(const struct unseen *u) {
 /* Fills the points: what they show, and what is around them. */
 static void gather_points(struct unseen *u, const struct views *views) {
     struct survey survey;
-    survey_init(&survey, u->r, views, NULL, NULL, POINTS);
+    survey_lights_on(u->r, views, NULL);
+    survey_init(&survey, u->r, NULL, NULL, POINTS);
     u->survey = &survey;
     u->count = survey.count;
     u->point = mem_array(u->count + 1, sizeof *u->point);
     parallel_for(u->r->pool, u->count, look_around, u);
     survey_release(&survey);
+    survey_lights_off(u->r);
 }
 
 static void relight(struct unseen *u) {

@@ -10,7 +10,7 @@
 #include "server/capture/calibrate_light.h"
 #include "server/capture/calibrate_poses.h"
 
-static void say_light(const struct reconstruction *r, const struct light_found *found,
+static void log_light(const struct reconstruction *r, const struct light_found *found,
                       const struct reconstruct_hooks *hooks) {
     char line[256], vignette[80] = "";
     if (found->exposures_solved == 0 && !found->drift && !found->white_balance && !found->vignette)
@@ -33,28 +33,27 @@ static cJSON *gain_array(rgb gain) {
     return cJSON_CreateDoubleArray((double[]){(double)gain.r, (double)gain.g, (double)gain.b}, 3);
 }
 
-/* One entry for each training photograph that is not as it was claimed. `shift` is in pixels,
- * or NULL. */
+/* One entry for each training photograph that was changed. `shift`: change of its pose, pixels, or NULL. */
 static cJSON *photographs_found(const struct views *views, const float *shift) {
     cJSON *list = cJSON_CreateArray();
     for (size_t t = 0; t < views->train_count; t++) {
         const struct photograph *photo = &views->scene->photograph[views->train[t]];
         bool gained = photo->gain.r != 1.0f || photo->gain.g != 1.0f || photo->gain.b != 1.0f;
-        float moved = shift ? shift[t] : 0.0f;
-        if (photo->exposure_known && !gained && moved == 0.0f && photo->blur_px == 0.0f)
+        float shift_px = shift ? shift[t] : 0.0f;
+        if (photo->exposure_known && !gained && shift_px == 0.0f && photo->blur_px == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_string(entry, "name", photo->name);
         json_add_number(entry, "exposure", (double)photo->exposure);
         json_add(entry, "gain", gain_array(photo->gain));
-        json_add_number(entry, "shift_px", (double)moved);
+        json_add_number(entry, "shift_px", (double)shift_px);
         json_add_number(entry, "blur_px", (double)photo->blur_px);
         cJSON_AddItemToArray(list, entry);
     }
     return list;
 }
 
-/* Exposure, gain, vignette and camera as the capture claims them. */
+/* Copies of the photographs with exposure, gain, vignette and camera as given. */
 static struct photograph *save_claims(const struct scene *scene) {
     struct photograph *claim = mem_array(scene->photograph_count + 1, sizeof *claim);
     memcpy(claim, scene->photograph, scene->photograph_count * sizeof *claim);
@@ -81,9 +80,8 @@ static void update_edges(struct reconstruction *r, struct views *views, const st
     }
 }
 
-/* Moves the cameras whose poses are wrong and finds the light anew: points that were mixed up told
- * lies about it. Points that had no say in the poses have the last word: unless photographs agree
- * better there too, all cameras stay. */
+/* Corrects poses and calibrates light again, which wrong correspondences had biased. Cross-validated: all cameras stay
+ * unless photographs agree better at surface points that were not used for the poses. */
 static void find_poses(struct reconstruction *r, struct views *views, const struct tracks *tracks,
                        const struct photograph *claim, struct light_found *light,
                        struct poses_found *found) {
@@ -104,7 +102,7 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
     found->shift_px = found->held_out_shift_px = 0.0;
 }
 
-static void say_places(const struct poses_found *poses, const struct blur_found *blur,
+static void log_poses(const struct poses_found *poses, const struct blur_found *blur,
                        const struct reconstruct_hooks *hooks) {
     char line[240], held_out[80] = "";
     if (poses->held_out_moved_count > 0)
@@ -150,8 +148,8 @@ void calibrate(struct reconstruction *r, struct views *views, const struct recon
     light.spread_before = spread_before;
     r->exposures_drift = light.drift;
     r->colors_drift = light.white_balance;
-    say_light(r, &light, hooks);
-    say_places(&poses, &blur, hooks);
+    log_light(r, &light, hooks);
+    log_poses(&poses, &blur, hooks);
     cJSON *report = cJSON_AddObjectToObject(r->report, "calibration");
     report_light(r, &light, report);
     json_add_int(report, "poses_moved", (int64_t)poses.moved_count);

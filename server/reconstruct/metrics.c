@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#define WINDOW 8
+#define WINDOW 8 /* pixels a side of SSIM's windows, which overlap by half */
 
 static bool pixel_is_finite(const float *a, const float *b) {
     for (int c = 0; c < 3; c++) {
@@ -13,7 +13,7 @@ static bool pixel_is_finite(const float *a, const float *b) {
     return true;
 }
 
-/* The mean over the channels of usable pixels of what `square` makes of them. */
+/* Mean of `square` over the channels of valid pixels. */
 static double mean_square(const struct image *photograph, const struct image *render,
                           double (*square)(float photograph, float render, double parameter),
                           double parameter) {
@@ -48,23 +48,23 @@ double metrics_msre_noise(const struct image *photograph, const struct image *de
     return mean_square(photograph, deviation, relative_noise, median);
 }
 
-static double shown(float radiance, double exposure) {
+static double displayed(float radiance, double exposure) {
     return (double)image_linear_to_srgb(fminf(fmaxf(radiance * (float)exposure, 0.0f), 1.0f));
 }
 
-static double shown_square(float photograph, float render, double exposure) {
-    double difference = shown(render, exposure) - shown(photograph, exposure);
+static double displayed_square(float photograph, float render, double exposure) {
+    double difference = displayed(render, exposure) - displayed(photograph, exposure);
     return difference * difference;
 }
 
 double metrics_psnr_db(const struct image *photograph, const struct image *render, double exposure) {
-    return 10.0 * log10(1.0 / mean_square(photograph, render, shown_square, exposure));
+    return 10.0 * log10(1.0 / mean_square(photograph, render, displayed_square, exposure));
 }
 
 static double luminance(const struct image *image, size_t pixel, double exposure) {
     const float *p = image->pixel + 3 * pixel;
-    return 0.2126 * shown(p[0], exposure) + 0.7152 * shown(p[1], exposure) +
-           0.0722 * shown(p[2], exposure);
+    return 0.2126 * displayed(p[0], exposure) + 0.7152 * displayed(p[1], exposure) +
+           0.0722 * displayed(p[2], exposure);
 }
 
 /* Similarity of one window; NaN when it holds a non-finite pixel. */

@@ -30,33 +30,33 @@
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
 
-/* Where every surface starts, with a neutral base colour: half rough, half glossy. */
+/* Initial material, with NEUTRAL_BASE_COLOR. By hand. */
 #define NEUTRAL_ROUGHNESS 0.5f
 #define NEUTRAL_SPECULAR 0.5f
 
-#define HOLD_OUT_LEAST 16
+#define MIN_TRAINING 16 /* training photographs that must remain for any to be held out */
 
-/* Of the time of prepare, about, in staircase2 at 2048 x 2048: mapping the surface; what photographs see of it;
- * what they tell of themselves. The rest maps it anew. */
+/* Parts of the time of prepare, measured on staircase2 at 2048 x 2048: atlas; visibility; calibration. The rest is the
+ * second atlas. */
 #define MAP_SHARE 0.08
 #define VIEWS_SHARE 0.06
 #define CALIBRATE_SHARE 0.72
 
-struct run {
+struct stage_run {
     struct reconstruction *r;
     const struct reconstruct_hooks *hooks;
     struct views views;
     struct optimiser *optimiser; /* of listing1 or refine; owned */
-    size_t turned;               /* triangles whose back was taken for the front */
-    const char *normals;         /* where they come from: given, estimated, none */
-    float mesh_noise_m;          /* deviation of its vertices, 0 where none was moved */
-    float roughness;             /* of the mesh whose normals are estimated */
+    size_t flipped;               /* flipped triangles */
+    const char *normals;         /* their source: given, estimated, none */
+    float mesh_noise_m;          /* standard deviation of the vertices' noise; 0: not denoised */
+    float roughness;             /* of a mesh whose normals are estimated */
     cJSON *stages;               /* owned by the report */
 };
 
-/* Announces a stage, runs it, notes its time. */
-static enum status run_stage(struct run *run, const char *name,
-                             enum status (*stage)(struct run *, struct error *), struct error *err) {
+/* Announces a stage, runs it, records its time. */
+static enum status run_stage(struct stage_run *run, const char *name,
+                             enum status (*stage)(struct stage_run *, struct error *), struct error *err) {
     double begin = clock_sec();
     run->hooks->stage(run->hooks->user, name);
     pace_begin_stage(run->r, run->hooks, name);
@@ -70,8 +70,8 @@ static enum status run_stage(struct run *run, const char *name,
     return status;
 }
 
-/* Holds frames out for the report where the capture itself holds out none; never so many that
- * fewer than HOLD_OUT_LEAST train. */
+/* Holds photographs out for the report if the capture itself holds out none, and if MIN_TRAINING remain for
+ * training. */
 static void hold_out(struct reconstruction *r) {
     struct scene *scene = r->scene;
     size_t every = (size_t)settings_number(r->settings, "hold_out_every");
@@ -79,7 +79,7 @@ static void hold_out(struct reconstruction *r) {
         if (scene->photograph[i].is_test)
             return;
     }
-    if (every == 0 || scene->photograph_count - scene->photograph_count / every < HOLD_OUT_LEAST)
+    if (every == 0 || scene->photograph_count - scene->photograph_count / every < MIN_TRAINING)
         return;
     for (size_t i = every - 1; i < scene->photograph_count; i += every)
         scene->photograph[i].is_test = true;
@@ -95,14 +95,14 @@ static void make_segments(struct reconstruction *r) {
     json_add_string(r->report, "segmentation", given ? "given" : "automatic");
 }
 
-static void add_prepare_figures(const struct run *run) {
+static void add_prepare_figures(const struct stage_run *run) {
     const struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
     cJSON *figures = cJSON_AddObjectToObject(r->report, "prepare");
     json_add_int(figures, "triangles", (int64_t)mesh->triangle_count);
     json_add_int(figures, "degenerate_triangles_dropped", (int64_t)r->scene->mesh_report.degenerate_count);
     json_add_int(figures, "duplicate_triangles_dropped", (int64_t)r->scene->mesh_report.duplicate_count);
-    json_add_int(figures, "triangles_turned", (int64_t)run->turned);
+    json_add_int(figures, "triangles_turned", (int64_t)run->flipped);
     json_add_string(figures, "normals", run->normals);
     json_add_number(figures, "mesh_noise_m", (double)run->mesh_noise_m);
     json_add_number(figures, "mesh_roughness", (double)run->roughness);
@@ -118,8 +118,8 @@ static void add_prepare_figures(const struct run *run) {
     json_add_number(figures, "median_radiance", (double)run->views.median_radiance);
 }
 
-/* All that follows from the segments. density[triangle_count] says how much of the texture each part should
- * have (atlas_make_uneven), or is NULL. */
+/* Makes everything that depends on the segments. density[triangle_count]: texture density (atlas_make_uneven), or
+ * NULL. */
 static enum status map_surface(struct reconstruction *r, const float *density, struct error *err) {
     const struct mesh *mesh = &r->scene->mesh;
     uint32_t size = (uint32_t)settings_number(r->settings, "texture_size");
@@ -136,7 +136,7 @@ static enum status map_surface(struct reconstruction *r, const float *density, s
     return world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
 }
 
-static void forget_surface(struct reconstruction *r) {
+static void release_surface(struct reconstruction *r) {
     world_release(&r->world);
     mem_free(r->evidence);
     mem_free(r->is_emitter);
@@ -152,7 +152,7 @@ static void light_by_environment(struct reconstruction *r) {
         world_set_environment(&r->world, &r->environment.map, r->pool);
 }
 
-static void report_split(const struct run *run, const struct split *split) {
+static void report_split(const struct stage_run *run, const struct split *split) {
     cJSON *list = cJSON_AddArrayToObject(run->r->report, "parts_that_shine");
     for (size_t i = 0; i < split->part_count; i++) {
         cJSON *entry = cJSON_CreateObject();
@@ -167,8 +167,8 @@ static void report_split(const struct run *run, const struct split *split) {
         run->hooks->log(run->hooks->user, line);
 }
 
-/* Splits off what shines; true when anything was. */
-static bool split_shining(struct run *run) {
+/* Splits bright parts off their segments; true when there were any. */
+static bool split_bright_parts(struct stage_run *run) {
     struct split split;
     split_segments(&split, run->r, &run->views);
     report_split(run, &split);
@@ -177,8 +177,8 @@ static bool split_shining(struct run *run) {
     return any;
 }
 
-/* Maps the surface anew, now that it is known what shines and what is seen. */
-static enum status remap_surface(struct run *run, bool has_split, struct error *err) {
+/* Makes the atlas again, with the split segments and a density by visibility. */
+static enum status remap_surface(struct stage_run *run, bool has_split, struct error *err) {
     struct reconstruction *r = run->r;
     bool even = settings_number(r->settings, "texels_per_metre") > 0.0;
     if (even && !has_split)
@@ -186,7 +186,7 @@ static enum status remap_surface(struct run *run, bool has_split, struct error *
     float *density = even ? NULL : mem_array(r->scene->mesh.triangle_count, sizeof *density);
     if (density)
         texel_density_from_views(&run->views, &r->atlas, r->pool, density);
-    forget_surface(r);
+    release_surface(r);
     mem_free(r->radiance_preview); /* of the former atlas */
     r->radiance_preview = NULL;
     enum status status = map_surface(r, density, err);
@@ -198,7 +198,7 @@ static enum status remap_surface(struct run *run, bool has_split, struct error *
     return STATUS_OK;
 }
 
-static void denoise_mesh(struct run *run) {
+static void denoise_mesh(struct stage_run *run) {
     char line[128];
     if (settings_bool(run->r->settings, "denoise_mesh"))
         run->mesh_noise_m = mesh_denoise(&run->r->scene->mesh, run->r->pool);
@@ -209,7 +209,7 @@ static void denoise_mesh(struct run *run) {
     run->hooks->log(run->hooks->user, line);
 }
 
-static void estimate_normals(struct run *run) {
+static void estimate_normals(struct stage_run *run) {
     struct mesh *mesh = &run->r->scene->mesh;
     bool had_some = mesh->normal != NULL;
     if (normals_estimate(mesh, run->r->pool, &run->roughness) && !had_some)
@@ -217,13 +217,13 @@ static void estimate_normals(struct run *run) {
     run->normals = had_some ? "given" : mesh->normal ? "estimated" : "none";
 }
 
-static enum status preview_if_due(struct run *run, struct error *err) {
+static enum status preview_if_due(struct stage_run *run, struct error *err) {
     const struct reconstruct_hooks *hooks = run->hooks;
     return hooks->preview_due(hooks->user) ? hooks->preview(hooks->user, run->r, err) : STATUS_OK;
 }
 
-/* A first picture, before what takes longer. */
-static enum status show_glance(struct run *run, struct error *err) {
+/* A first preview, before the slow steps. */
+static enum status show_radiance(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     if (!run->hooks->preview_due(run->hooks->user))
         return STATUS_OK;
@@ -231,19 +231,19 @@ static enum status show_glance(struct run *run, struct error *err) {
     return preview_if_due(run, err);
 }
 
-/* So much more of prepare is done. */
-static void prepared(struct run *run, double share) {
+/* Reports a part of prepare as done. */
+static void prepare_advance(struct stage_run *run, double share) {
     pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share);
 }
 
-static enum status prepare(struct run *run, struct error *err) {
+static enum status prepare(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
     if (settings_is(r->settings, "segmentation", "given") && !mesh->object_id)
         return error_set(err, STATUS_INPUT,
                          "segmentation=given, but the mesh has no object_id per face");
     hold_out(r);
-    enum status status = orient_mesh(r->scene, r->pool, &run->turned, err);
+    enum status status = orient_mesh(r->scene, r->pool, &run->flipped, err);
     if (status != STATUS_OK)
         return status;
     denoise_mesh(run);
@@ -252,10 +252,10 @@ static enum status prepare(struct run *run, struct error *err) {
     status = map_surface(r, NULL, err);
     if (status != STATUS_OK)
         return status;
-    prepared(run, MAP_SHARE);
+    prepare_advance(run, MAP_SHARE);
     views_init(&run->views, r->scene, &r->segments, r->world.accel, r->pool);
-    prepared(run, VIEWS_SHARE);
-    status = show_glance(run, err);
+    prepare_advance(run, VIEWS_SHARE);
+    status = show_radiance(run, err);
     if (status != STATUS_OK)
         return status;
     calibrate(r, &run->views, run->hooks);
@@ -265,16 +265,16 @@ static enum status prepare(struct run *run, struct error *err) {
     fireflies_mark(r->scene, &run->views, &r->noise, r->pool);
     environment_make(&r->environment, &run->views, r->pool);
     light_by_environment(r);
-    prepared(run, CALIBRATE_SHARE);
-    status = remap_surface(run, split_shining(run), err);
+    prepare_advance(run, CALIBRATE_SHARE);
+    status = remap_surface(run, split_bright_parts(run), err);
     add_prepare_figures(run);
     pace_measure_room(r);
-    prepared(run, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
+    prepare_advance(run, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
     return status;
 }
 
-/* Says what was found that no photograph shows. */
-static void log_unseen(const struct run *run) {
+/* Logs the hidden lamps and the sun. */
+static void log_hidden_lights(const struct stage_run *run) {
     const struct reconstruction *r = run->r;
     size_t lamps = 0;
     char line[128];
@@ -287,15 +287,15 @@ static void log_unseen(const struct run *run) {
         run->hooks->log(run->hooks->user, "light: a sun that no photograph shows was found by what it lights");
 }
 
-static enum status fuse_photographs(struct run *run, struct error *err) {
+static enum status fuse_photographs(struct stage_run *run, struct error *err) {
     fuse(&run->r->fused, &run->views, &run->r->noise, &run->r->atlas, &run->r->inverse, run->r->pool);
     saturated_light_estimate(run->r, &run->views);
     lamp_find(run->r, &run->views);
     unseen_light_estimate(run->r, &run->views);
     sun_find(run->r, &run->views);
-    log_unseen(run);
+    log_hidden_lights(run);
     if (run->r->sun.is_there && !run->r->environment.map.pixel)
-        environment_make_unseen(&run->r->environment); /* it is drawn there when solve is done */
+        environment_make_unseen(&run->r->environment); /* the sun is drawn there after solve */
     if (run->r->environment.map.pixel)
         json_add(run->r->report, "environment", environment_figures(&run->r->environment));
     mem_free(run->r->radiance_preview);
@@ -304,17 +304,17 @@ static enum status fuse_photographs(struct run *run, struct error *err) {
     return preview_if_due(run, err);
 }
 
-static enum status solve(struct run *run, struct error *err) {
+static enum status solve(struct stage_run *run, struct error *err) {
     enum status status = solve_run(run->r, &run->views, run->hooks, err);
     return status == STATUS_OK ? refine_start(run->optimiser, err) : status;
 }
 
-static enum status optimise(struct run *run, struct error *err) {
+static enum status optimise(struct stage_run *run, struct error *err) {
     return optimiser_run(run->optimiser, err);
 }
 
-/* The stages that a checkpoint holds: those that are done are not done again. */
-static enum status run_resumable(struct run *run, struct error *err) {
+/* The stages that checkpoints cover; those that are done are skipped. */
+static enum status run_resumable(struct stage_run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
     run->optimiser = solves ? refine_new(run->r, &run->views, run->hooks)
                             : listing1_new(run->r, &run->views, run->hooks);
@@ -323,7 +323,7 @@ static enum status run_resumable(struct run *run, struct error *err) {
         status = run_stage(run, "solve", solve, err);
     bool was_solved = status == STATUS_OK && solves && found;
     run->r->has_materials = status == STATUS_OK;
-    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* a checkpoint holds no map, only what solve did to it */
+    if (was_solved && rgb_mean(run->r->sky_factor) != 1.0f) /* checkpoints hold this factor instead of the map */
         lamps_brighten_sky(run->r, run->r->sky_factor);
     if (was_solved)
         emission_pattern_restore(run->r, &run->views);
@@ -338,7 +338,7 @@ static enum status run_resumable(struct run *run, struct error *err) {
     return status;
 }
 
-static enum status report(struct run *run, struct error *err) {
+static enum status report(struct stage_run *run, struct error *err) {
     world_update_lights(&run->r->world);
     report_emitters(run->r);
     enum status status = report_held_out(run->r, &run->views, run->hooks, err);
@@ -357,7 +357,7 @@ enum status reconstruct_run(struct scene *scene, const struct settings *settings
     json_add_string(r->report, "unbake_version", UNBAKE_VERSION);
     json_add_string(r->report, "ray_library", accel_library_version());
     json_add(r->report, "settings", settings_to_json(settings));
-    struct run run = {.r = r, .hooks = hooks};
+    struct stage_run run = {.r = r, .hooks = hooks};
     run.stages = cJSON_AddArrayToObject(r->report, "stages");
     pace_start(r, hooks);
     enum status status = run_stage(&run, "prepare", prepare, err);

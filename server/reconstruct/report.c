@@ -12,12 +12,12 @@
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
 
-/* HDR frames are shown with their median at this fraction of white. */
-#define SHOWN_MEDIAN 0.2
-/* Seed offset that keeps the report's random numbers apart from the optimiser's. */
+/* Display value of the median of HDR photographs, for PSNR and SSIM; white is 1. By convention. */
+#define DISPLAY_MEDIAN 0.2
+/* XORed with the seed: random numbers distinct from the optimiser's. */
 #define REPORT_SEED UINT64_C(0x7265706f7274)
-/* A segment whose emission explained this share at the decision came near it. */
-#define REPORTED_SHARE 0.05f
+/* Least emitted share of a segment that is listed though it does not emit. */
+#define MIN_REPORTED_SHARE 0.05f
 
 /* The photograph's radiance as an R G B picture; masked pixels become NaN. */
 static void photograph_radiance(const struct photograph *photo, struct image *image) {
@@ -34,8 +34,7 @@ static void photograph_radiance(const struct photograph *photo, struct image *im
     }
 }
 
-/* The factor by which the render is brighter than the photograph, in the sum of channels [first, end), by the median of
- * ratios. */
+/* Median ratio of render to photograph, in the sum of channels [first, end). */
 static double fit_gain(const struct image *photograph, const struct image *render, size_t first, size_t end) {
     size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
     double *ratio = mem_array(pixels, sizeof *ratio);
@@ -53,8 +52,7 @@ static double fit_gain(const struct image *photograph, const struct image *rende
     return gain;
 }
 
-/* Exposure and white balance of a held-out photograph, where its capture tells or keeps them as little as those of the
- * others: as they fit the render best. */
+/* Fits exposure and white balance of a held-out photograph to the render where they are unknown or drift. */
 static void fit_light(const struct reconstruction *r, struct photograph *photo, struct held_out *view) {
     double common = 1.0;
     if (!photo->exposure_known || r->exposures_drift)
@@ -68,7 +66,7 @@ static void fit_light(const struct reconstruction *r, struct photograph *photo, 
     }
 }
 
-/* A frame that saturates cannot tell how much brighter the room is than its clip. */
+/* Clips a render as its photograph is clipped. */
 static void clip_image(struct image *image, const struct photograph *photo) {
     const float gain[3] = {photo->gain.r, photo->gain.g, photo->gain.b};
     for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
@@ -79,8 +77,7 @@ static void clip_image(struct image *image, const struct photograph *photo) {
     }
 }
 
-/* Samples a pixel of the next view, of views that have so many pixels in all: those that are asked for, or what the plan
- * leaves. */
+/* Samples of each pixel of the next view: the setting, or what the plan leaves for the remaining pixels. */
 static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
     const struct plan_work *work = &r->plan.part[PLAN_REPORT];
     double samples = settings_number(r->settings, "report_samples");
@@ -89,12 +86,11 @@ static uint32_t samples_of(const struct reconstruction *r, double pixels_left) {
     return (uint32_t)samples;
 }
 
-/* The room as recovered, from a camera, as an R G B picture, and the standard errors of its values as another. */
+/* Renders the reconstruction from a camera: R G B radiance, and its standard errors. */
 static void render_radiance(struct reconstruction *r, const struct camera *camera, uint32_t samples,
                             const struct path_settings *path, struct image *image, struct image *error) {
     struct image film;
-    film_render(&r->world, camera, samples, path, 0,
-                r->pool, &film);
+    film_render(&r->world, camera, samples, path, 0, r->pool, &film);
     image_take_rgb(&film, image);
     image_init_rgb(error, film.width, film.height);
     for (size_t i = 0; i < (size_t)film.width * film.height; i++)
@@ -102,12 +98,12 @@ static void render_radiance(struct reconstruction *r, const struct camera *camer
     image_release(&film);
 }
 
-/* The standard deviation of the noise of a photograph, whose radiance is `shown`; NaN where that is. */
+/* Standard deviation of a photograph's noise, given its radiance `image`; NaN where that is. */
 static void photograph_noise(const struct reconstruction *r, const struct photograph *photo,
-                             const struct image *shown, struct image *noise) {
-    image_init_rgb(noise, shown->width, shown->height);
-    for (size_t i = 0; i < (size_t)shown->width * shown->height; i++) {
-        const float *p = shown->pixel + 3 * i;
+                             const struct image *image, struct image *noise) {
+    image_init_rgb(noise, image->width, image->height);
+    for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
+        const float *p = image->pixel + 3 * i;
         rgb radiance = {p[0], p[1], p[2]};
         bool usable = rgb_is_finite(radiance);
         float share = usable ? 1.0f / sqrtf(noise_weight_of_brightness(&r->noise, photo, radiance)) : NAN;
@@ -132,7 +128,7 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     fit_light(r, photo, view);
     if (!photo->is_hdr)
         clip_image(&view->render, photo);
-    double exposure = photo->is_hdr ? SHOWN_MEDIAN / median : (double)photo->exposure;
+    double exposure = photo->is_hdr ? DISPLAY_MEDIAN / median : (double)photo->exposure;
     photograph_noise(r, photo, &view->photograph, &noise);
     view->msre = metrics_msre(&view->photograph, &view->render, median);
     view->msre_render_noise = metrics_msre_noise(&view->photograph, &error, median);
@@ -143,7 +139,7 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
     image_release(&error);
 }
 
-/* Over the views that have a value: none of a view's pixels may be usable. */
+/* Mean over the views that have a value; a view without valid pixels has none. */
 struct mean {
     double sum, count;
 };
@@ -211,16 +207,17 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
 void report_emitters(struct reconstruction *r) {
     cJSON *list = cJSON_AddArrayToObject(r->report, "emitters");
     for (size_t s = 0; s < r->segments.count; s++) {
-        if (!r->is_emitter[s] && r->evidence[s].emitted_share < REPORTED_SHARE && r->evidence[s].changing_share == 0.0f)
+        const struct emitter_evidence *evidence = &r->evidence[s];
+        if (!r->is_emitter[s] && evidence->emitted_share < MIN_REPORTED_SHARE && evidence->changing_share == 0.0f)
             continue;
         cJSON *entry = cJSON_CreateObject();
         json_add_int(entry, "segment", (int64_t)s);
         json_add_int(entry, "object_id", r->segments.id[s]);
         json_add_bool(entry, "is_emitter", r->is_emitter[s]);
-        json_add_bool(entry, "hidden", r->evidence[s].is_hidden);
-        json_add_number(entry, "share_beyond_reflection", (double)r->evidence[s].emitted_share);
-        json_add_number(entry, "share_that_changed", (double)r->evidence[s].changing_share);
-        json_add_number(entry, "white_by_unseen_sky", (double)r->evidence[s].sky_lambert);
+        json_add_bool(entry, "hidden", evidence->is_hidden);
+        json_add_number(entry, "share_beyond_reflection", (double)evidence->emitted_share);
+        json_add_number(entry, "share_that_changed", (double)evidence->changing_share);
+        json_add_number(entry, "white_by_unseen_sky", (double)evidence->sky_lambert);
         const rgb *e = &r->materials.emission[s];
         const double radiance[3] = {(double)e->r, (double)e->g, (double)e->b};
         json_add(entry, "radiance", cJSON_CreateDoubleArray(radiance, 3));

@@ -20,68 +20,68 @@
 #include "server/state/evidence.h"
 #include "server/state/pace.h"
 
-/* The first tells what each place sends out, the second what is glossy in that light, the last all. The second is left
- * out where most light is an estimate (unseen_light.h), which is off by more than it puts right. */
-enum { PASS_LIGHT, PASS_GLOSS, PASS_ALL, PASSES };
-/* Probes stand this far apart in a texture of 2048 texels a side; in others as many blocks a side. */
+/* The first pass finds outgoing radiance, the second specular lobes in that light, the last everything. The second is
+ * skipped where most light is an estimate (unseen_light.h), whose error exceeds its gain. */
+enum { PASS_LIGHT, PASS_SPECULAR, PASS_ALL, PASSES };
+/* Probe spacing, texels, in a texture of 2048 texels a side; in proportion in others, and at least LEAST_SPACING. */
 #define SPACING_AT_2048 8
-#define LEAST_SPACING 4
-/* Part of gather_samples that all passes but the last take. */
+#define MIN_SPACING 4
+/* Part of gather_samples that passes before the last use. By hand. */
 #define EARLY_PASS_PART 0.25
-/* They measure one texel in so many squared of those that the last does: only what texels send out is taken from them.
- * So does the last where a time limit is too short for all of them. */
+/* Factor of measure_stride in passes before the last, which only need outgoing radiance, and in the last where a time
+ * limit is too short. */
 #define COARSE_STRIDE 2
-/* Share of the shown radiance beyond what base colour 1 could reflect that makes an emitter. White
- * walls stay near .1 by their reflectance of .9, and below .25 the bowls around lamps, whose pixels
- * have some of the lamp's light. More is asked where only pixels that mix surfaces speak. */
+/* Least part of a segment's radiance beyond the reflection of base colour 1 that makes an emitter. White walls of
+ * albedo .9 stay near .1; bowls around lamps, whose pixels mix with the lamp, stay below .25. Higher where all pixels
+ * are mixed. */
 #define EMITTER_SHARE 0.25f
 #define EMITTER_SHARE_MIXED 0.3f
-/* So much more is asked where all light that arrives is an estimate (unseen_light.h): it may be half. */
+/* Added where all incident light is an estimate (unseen_light.h), which may be half of the truth. */
 #define EMITTER_SHARE_UNSEEN 0.25f
-/* Where no photograph shows the sky it may be brighter than it was taken for by so many times that. */
+/* Unobserved sky may be brighter than assumed by this factor of its radiance. */
 #define SKY_DOUBT 1.0f
-/* Share of a segment whose light must have changed. */
+/* Part of a segment's surface whose light must have changed for it to be an emitter. */
 #define EMITTER_CHANGES 0.08f
-#define EVIDENCE_STRIDE 3 /* texels, when the light that arrives at a segment is averaged */
-#define SLICE_PROBES 1024 /* work between two questions whether to stop */
+#define EVIDENCE_STRIDE 3 /* every third valid texel is used for the mean incident light, for time */
+#define SLICE_PROBES 1024 /* work between two checks of stop_requested */
 #define SLICE_TEXELS 65536
 
 struct solve {
     struct reconstruction *r;
     const struct views *views;
     const struct reconstruct_hooks *hooks;
-    struct divide_outgoing outgoing;   /* by the last pass; at first what was fused; owned */
-    struct light_field field;  /* for light: rays that are mirrored go on */
-    struct light_field evenly; /* for highlights: all is sent alike in all directions */
+    struct divide_outgoing outgoing; /* by the last pass; at first fused radiance; owned */
+    struct light_field field;        /* of probes: rays continue from polished surfaces by their lobes */
+    struct light_field isotropic;    /* of highlights: radiance is taken as equal in all directions */
     struct probes probes;
     struct divide divide;
-    bool *patterned;         /* [segment_count] the emitters whose patterns were looked for; owned */
-    double texels_per_pixel;   /* detail_texels_per_pixel */
-    double mirrored_share;   /* of all light: the sun's that polished surfaces throw onto others */
-    size_t samples;          /* directions of each probe, in the newest pass */
-    bool is_shown;           /* the newest pass, by a preview */
+    bool *pattern_emitters;  /* [segment_count] is_emitter at the last search for patterns; owned */
+    double texels_per_pixel; /* detail_texels_per_pixel */
+    double mirrored_share;   /* part of all light that is sun reflected by polished surfaces */
+    size_t samples;          /* directions of each probe in the newest pass */
+    bool is_previewed;       /* a preview of the newest pass was made */
 };
 
 /* --- progress and stopping ---------------------------------------------------------------------- */
 
-/* Shows what the newest pass found, when it is time for that. */
-static enum status show(struct solve *s, struct error *err) {
-    if (s->is_shown || !s->hooks->preview_due(s->hooks->user))
+/* Makes a preview of the newest pass, when one is due. */
+static enum status preview_if_due(struct solve *s, struct error *err) {
+    if (s->is_previewed || !s->hooks->preview_due(s->hooks->user))
         return STATUS_OK;
-    s->is_shown = true;
+    s->is_previewed = true;
     return s->hooks->preview(s->hooks->user, s->r, err);
 }
 
-/* Notes a part of the work as done; STATUS_CANCELLED when the run is to stop. */
+/* Reports work as done; STATUS_CANCELLED when the run is to stop. */
 static enum status advance(struct solve *s, enum plan_part part, double work, struct error *err) {
     pace_advance(s->r, s->hooks, "solve", part, work);
     if (s->hooks->stop_requested(s->hooks->user))
         return error_set(err, STATUS_CANCELLED, "stopped while solving");
-    return show(s, err);
+    return preview_if_due(s, err);
 }
 
-static bool is_left_out(const struct solve *s, int pass) {
-    return pass == PASS_GLOSS && (s->r->sky_is_fitted || settings_number(s->r->settings, "gloss_passes") < 2.0);
+static bool is_skipped(const struct solve *s, int pass) {
+    return pass == PASS_SPECULAR && (s->r->sky_is_fitted || settings_number(s->r->settings, "gloss_passes") < 2.0);
 }
 
 static double wanted_samples(const struct solve *s, int pass) {
@@ -89,14 +89,14 @@ static double wanted_samples(const struct solve *s, int pass) {
     return pass == PASS_ALL ? samples : ceil(samples * EARLY_PASS_PART);
 }
 
-/* What the plan leaves of the directions of this pass and those after it. */
+/* Directions of a probe in pass `first`, as planned for it and those after it. */
 static size_t planned_samples(const struct solve *s, int first) {
     const struct plan_work *work = &s->r->plan.part[PLAN_GATHER];
     double left = 0.0;
     if (!plan_is_cut(&s->r->plan, PLAN_GATHER))
         return (size_t)wanted_samples(s, first);
     for (int pass = first; pass < PASSES; pass++)
-        left += is_left_out(s, pass) ? 0.0 : wanted_samples(s, pass) * (double)s->probes.count;
+        left += is_skipped(s, pass) ? 0.0 : wanted_samples(s, pass) * (double)s->probes.count;
     double share = left > 0.0 ? (work->now - work->done) / left : 1.0;
     return (size_t)ceil(fmin(fmax(share, PACE_LEAST_GATHER), 1.0) * wanted_samples(s, first));
 }
@@ -115,7 +115,7 @@ static void plan_work(struct solve *s) {
     double valid = (double)s->r->inverse.valid_count, directions = 0.0, early = 0.0;
     double last = (double)stride_of(s, PASS_ALL), coarse = (double)stride_of(s, PASS_LIGHT);
     for (int pass = 0; pass < PASSES; pass++) {
-        if (is_left_out(s, pass))
+        if (is_skipped(s, pass))
             continue;
         directions += (double)s->probes.count * wanted_samples(s, pass);
         early += pass == PASS_ALL ? 0.0 : valid / (coarse * coarse);
@@ -138,8 +138,7 @@ static enum status gather(struct solve *s, int pass, struct error *err) {
     return status;
 }
 
-/* Measures all texels; in the last pass one in COARSE_STRIDE squared of them, also of those before, from when the plan
- * has no time for more. */
+/* Measures all texels; in the last pass one in COARSE_STRIDE squared once the plan has no time for more. */
 static enum status divide_all(struct solve *s, int pass, struct error *err) {
     size_t valid = s->r->inverse.valid_count;
     enum status status = STATUS_OK;
@@ -155,39 +154,38 @@ static enum status divide_all(struct solve *s, int pass, struct error *err) {
     return status;
 }
 
-/* Sharpens what was measured of every texel. */
+/* Deconvolves the measured base colours (detail.h). */
 static enum status find_detail(struct solve *s, struct error *err) {
     const struct reconstruction *r = s->r;
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    uint16_t(*white)[3] = mem_calloc_large(texels, sizeof *white);
+    uint16_t(*lambert)[3] = mem_calloc_large(texels, sizeof *lambert);
     int steps = (int)settings_number(r->settings, "detail_steps");
     enum status status = STATUS_OK;
     struct detail detail;
-    divide_lambert_all(&s->divide, white);
-    detail_init(&detail, r, s->views, (const uint16_t(*)[3])white, s->divide.measured);
+    divide_lambert_all(&s->divide, lambert);
+    detail_init(&detail, r, s->views, (const uint16_t(*)[3])lambert, s->divide.measured);
     for (int i = 0; i < steps && status == STATUS_OK; i++) {
         detail_step(&detail);
         status = advance(s, PLAN_DETAIL, (double)r->inverse.valid_count, err);
     }
     detail_finish(&detail);
     detail_release(&detail);
-    mem_free(white);
+    mem_free(lambert);
     return status;
 }
 
 /* --- emitters ----------------------------------------------------------------------------------- */
 
-/* Finds what pictures the emitters show, unless they are those of the last time. */
+/* Finds emission patterns, unless the emitters are those of the last time. */
 static void find_patterns(struct solve *s) {
     struct reconstruction *r = s->r;
-    if (memcmp(s->patterned, r->is_emitter, r->segments.count * sizeof *s->patterned) == 0)
+    if (memcmp(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters) == 0)
         return;
-    memcpy(s->patterned, r->is_emitter, r->segments.count * sizeof *s->patterned);
+    memcpy(s->pattern_emitters, r->is_emitter, r->segments.count * sizeof *s->pattern_emitters);
     emission_pattern_find(r, s->views);
 }
 
-/* Lights are sampled by what is shown of them, own and reflected light together: that is what they
- * send out. */
+/* Makes lights of the emitters by their outgoing radiance, emitted and reflected. */
 static void set_lights(struct solve *s) {
     struct reconstruction *r = s->r;
     find_patterns(s);
@@ -196,34 +194,34 @@ static void set_lights(struct solve *s) {
     world_update_lights(&r->world);
 }
 
-/* What arrives at a segment, over the texels that show about what it was observed to show, if there are
- * any: beside a window light falls off steeply, and a dim end must not be held against a bright one. */
-struct arrived {
+/* Sums of Lambert radiance over a segment's texels: all, and those about as bright as the segment. The latter are used
+ * if there are any: next to a window light falls off steeply, and a dim end must not be compared with a bright one. */
+struct lambert_sums {
     double all[4], bright[4]; /* red, green, blue, texels */
 };
 
-static void add_arrived(double sum[4], rgb white) {
-    sum[0] += (double)white.r;
-    sum[1] += (double)white.g;
-    sum[2] += (double)white.b;
+static void add_lambert(double sum[4], rgb lambert) {
+    sum[0] += (double)lambert.r;
+    sum[1] += (double)lambert.g;
+    sum[2] += (double)lambert.b;
     sum[3] += 1.0;
 }
 
-/* Fills `arrived`: the mean over a segment's texels that are seen of what a white surface there would send out. Of a
- * lamp thinner than a pixel none is seen clean: all of them count. */
-static void average_arrived(const struct solve *s) {
+/* Fills evidence.lambert with means over the observed texels; all texels of a segment that was observed only in mixed
+ * pixels, such as a lamp thinner than a pixel. */
+static void average_lambert(const struct solve *s) {
     const struct reconstruction *r = s->r;
-    struct arrived *sum = mem_calloc(r->segments.count, sizeof *sum);
+    struct lambert_sums *sum = mem_calloc(r->segments.count, sizeof *sum);
     for (size_t i = 0; i < r->inverse.valid_count; i += EVIDENCE_STRIDE) {
         uint32_t texel = r->inverse.valid[i];
         size_t segment = reconstruction_segment(r, texel);
-        rgb white;
+        rgb lambert;
         bool is_seen = r->fused.count[texel] > 0.0f || r->evidence[segment].only_mixed;
-        if (!is_seen || !divide_lambert(&s->divide, texel, &white))
+        if (!is_seen || !divide_lambert(&s->divide, texel, &lambert))
             continue;
-        add_arrived(sum[segment].all, white);
+        add_lambert(sum[segment].all, lambert);
         if (evidence_is_bright(r, texel))
-            add_arrived(sum[segment].bright, white);
+            add_lambert(sum[segment].bright, lambert);
     }
     for (size_t i = 0; i < r->segments.count; i++) {
         struct emitter_evidence *e = &r->evidence[i];
@@ -246,38 +244,40 @@ static void decide(void *user, size_t segment, int thread) {
     struct reconstruction *r = d->solve->r;
     struct emitter_evidence *e = &r->evidence[segment];
     size_t first = d->texels.first[segment], count = d->texels.first[segment + 1] - first;
-    float shown = rgb_mean(e->radiance), arrived = rgb_mean(e->lambert);
-    float needed = (e->only_mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE) + EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
-    e->sky_lambert = e->emitted_share > needed && !r->sky_is_fitted ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
+    float radiance = rgb_mean(e->radiance), lambert = rgb_mean(e->lambert);
+    float needed = e->only_mixed ? EMITTER_SHARE_MIXED : EMITTER_SHARE;
+    needed += EMITTER_SHARE_UNSEEN * (float)r->unseen_share;
+    bool doubts_sky = e->emitted_share > needed && !r->sky_is_fitted;
+    e->sky_lambert = doubts_sky ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
     e->changing_share = changing_light(&d->solve->divide, d->texels.texel + first, count, thread);
     r->is_emitter[segment] = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
-                             shown - arrived - SKY_DOUBT * e->sky_lambert > needed * shown;
+                             radiance - lambert - SKY_DOUBT * e->sky_lambert > needed * radiance;
 }
 
 static void decide_emitters(struct solve *s) {
     struct reconstruction *r = s->r;
     struct decision decision = {.solve = s};
-    average_arrived(s);
+    average_lambert(s);
     by_segment_sort(&decision.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, decide, &decision);
     by_segment_release(&decision.texels);
 }
 
-/* Gives emitters their own light, and the base colour by which they reflect. */
+/* Sets emission and base colour of the emitters. */
 static void set_emission(struct solve *s) {
     struct reconstruction *r = s->r;
-    struct emitter_fit *own = mem_array(r->segments.count, sizeof *own);
+    struct emitter_fit *emitter = mem_array(r->segments.count, sizeof *emitter);
     find_patterns(s);
-    emission_pattern_separate(r, own);
+    emission_pattern_separate(r, emitter);
     for (size_t i = 0; i < r->segments.count; i++)
-        r->materials.emission[i] = own[i].radiance;
+        r->materials.emission[i] = emitter[i].radiance;
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i], segment = reconstruction_segment(r, texel);
         float *color = r->materials.base_color.texel[texel];
         for (int c = 0; c < 3 && r->is_emitter[segment]; c++)
-            color[c] = own[segment].base_color;
+            color[c] = emitter[segment].base_color;
     }
-    mem_free(own);
+    mem_free(emitter);
     world_update_lights(&r->world);
 }
 
@@ -286,25 +286,25 @@ static void set_emission(struct solve *s) {
 static uint32_t spacing_for(const struct atlas *atlas) {
     uint32_t side = atlas->width > atlas->height ? atlas->width : atlas->height;
     uint32_t spacing = side * SPACING_AT_2048 / 2048;
-    return spacing < LEAST_SPACING ? LEAST_SPACING : spacing;
+    return spacing < MIN_SPACING ? MIN_SPACING : spacing;
 }
 
 static void solve_init(struct solve *s, struct reconstruction *r, const struct views *views,
                        const struct reconstruct_hooks *hooks) {
     size_t texels = (size_t)r->atlas.width * r->atlas.height;
-    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .is_shown = true};
+    *s = (struct solve){.r = r, .views = views, .hooks = hooks, .is_previewed = true};
     s->outgoing = (struct divide_outgoing){mem_calloc_large(texels, sizeof *s->outgoing.total),
-                                   mem_calloc_large(texels, sizeof *s->outgoing.unmirrored),
-                                   mem_calloc(r->segments.count, sizeof *s->outgoing.lobe)};
+                                           mem_calloc_large(texels, sizeof *s->outgoing.unmirrored),
+                                           mem_calloc(r->segments.count, sizeof *s->outgoing.lobe)};
     memcpy(s->outgoing.total, r->fused.radiance, texels * sizeof *s->outgoing.total);
     memcpy(s->outgoing.unmirrored, r->fused.radiance, texels * sizeof *s->outgoing.unmirrored);
-    s->patterned = mem_calloc(r->segments.count, sizeof *s->patterned);
+    s->pattern_emitters = mem_calloc(r->segments.count, sizeof *s->pattern_emitters);
     s->field = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.unmirrored, s->outgoing.lobe, NULL};
-    s->evenly = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
+    s->isotropic = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_per_pixel = detail_texels_per_pixel(r, views);
     s->divide = (struct divide){
-        .r = r, .views = views, .probes = &s->probes, .field = &s->evenly, .noise = &r->noise,
+        .r = r, .views = views, .probes = &s->probes, .field = &s->isotropic, .noise = &r->noise,
         .denoises = settings_bool(r->settings, "denoise"),
         .highlight_samples = divide_highlight_samples(s->texels_per_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
@@ -323,17 +323,16 @@ static void solve_release(struct solve *s) {
     mem_free(s->divide.measured);
     mem_free(s->divide.scratch);
     probes_release(&s->probes);
-    mem_free(s->patterned);
+    mem_free(s->pattern_emitters);
     mem_free(s->outgoing.lobe);
     mem_free(s->outgoing.unmirrored);
     mem_free(s->outgoing.total);
 }
 
-/* Lamps that photographs do not tell, by what the last pass found texels to send out and to show: without highlights
- * once gloss is known. */
+/* Refits hidden and saturated lamps to outgoing radiance of the last pass; to its diffuse part once lobes are known. */
 static void refit_lamps(struct solve *s, int pass) {
     struct fused diffuse;
-    if (pass == PASS_GLOSS || is_left_out(s, PASS_GLOSS)) {
+    if (pass == PASS_SPECULAR || is_skipped(s, PASS_SPECULAR)) {
         lamps_refit(s->r, s->views, &s->field, NULL);
     } else if (lamps_are_estimated(s->r)) {
         divide_diffuse(&s->divide, &diffuse);
@@ -342,17 +341,17 @@ static void refit_lamps(struct solve *s, int pass) {
     }
 }
 
-/* What lies between gathering and measuring, as so much of the plan's part. */
+/* The fits between gathering and measuring. */
 static enum status fit(struct solve *s, int pass, struct error *err) {
     decide_emitters(s);
     if (pass != PASS_LIGHT) {
-        specular_fit(s->r, s->views, &s->probes, &s->evenly);
+        specular_fit(s->r, s->views, &s->probes, &s->isotropic);
         s->divide.stride = 1;
         sun_refit(&s->divide);
         s->mirrored_share = sun_caustics_add(&s->probes, &s->r->sun, &s->r->world, &s->r->scene->mesh, &s->r->inverse,
                                              (uint64_t)settings_number(s->r->settings, "seed"), s->r->pool);
     }
-    return advance(s, PLAN_FIT, 1.0 / (is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES), err);
+    return advance(s, PLAN_FIT, 1.0 / (is_skipped(s, PASS_SPECULAR) ? PASSES - 1 : PASSES), err);
 }
 
 static enum status solve_pass(struct solve *s, int pass, struct error *err) {
@@ -374,11 +373,11 @@ static enum status solve_pass(struct solve *s, int pass, struct error *err) {
         return status;
     divide_finish(&s->divide, &s->outgoing);
     s->r->has_materials = true;
-    s->is_shown = false;
-    return show(s, err);
+    s->is_previewed = false;
+    return preview_if_due(s, err);
 }
 
-/* What each segment was found to be. */
+/* Roughness and specular of each segment. */
 static cJSON *segment_list(const struct reconstruction *r) {
     cJSON *list = cJSON_CreateArray();
     for (size_t i = 0; i < r->segments.count; i++) {
@@ -396,7 +395,7 @@ static void report(const struct solve *s) {
     for (size_t i = 0; i < s->r->inverse.valid_count; i++)
         known += s->divide.measured[s->r->inverse.valid[i]].weight > 0.0f;
     cJSON *figures = cJSON_AddObjectToObject(s->r->report, "solve");
-    json_add_int(figures, "passes", is_left_out(s, PASS_GLOSS) ? PASSES - 1 : PASSES);
+    json_add_int(figures, "passes", is_skipped(s, PASS_SPECULAR) ? PASSES - 1 : PASSES);
     json_add_int(figures, "probes", (int64_t)s->probes.count);
     json_add_int(figures, "probe_spacing_texels", (int64_t)s->probes.spacing);
     json_add_int(figures, "directions_a_probe", (int64_t)s->samples);
@@ -413,7 +412,7 @@ enum status solve_run(struct reconstruction *r, const struct views *views,
     solve_init(&s, r, views, hooks);
     emitters_observe(r, views, r->evidence);
     for (int pass = 0; pass < PASSES && status == STATUS_OK; pass++)
-        status = is_left_out(&s, pass) ? STATUS_OK : solve_pass(&s, pass, err);
+        status = is_skipped(&s, pass) ? STATUS_OK : solve_pass(&s, pass, err);
     if (status == STATUS_OK) {
         set_emission(&s);
         report(&s);

@@ -1,8 +1,8 @@
 /* pace.c -- see pace.h.
  *
- * Priors are processor seconds of one core, measured on staircase2 at 2048 and on the demo room at 512 texels a side,
- * where they differ by up to twice, on a loaded virtual machine of two cores. They only make the first forecasts: what is
- * measured in a run replaces them (plan.h). */
+ * Priors are processor seconds of one core, measured on staircase2 at 2048 and on the demo room at 512 texels a side
+ * (which differ by up to a factor of 2), on a loaded virtual machine of two cores. They only serve the first forecasts;
+ * measurements of the run replace them (plan.h). */
 #include "server/state/pace.h"
 
 #include <math.h>
@@ -17,24 +17,23 @@
 #define FUSE_SEC 2.0
 #define FUSE_TEXEL_SEC 9.0e-6    /* a mapped texel, as all below */
 #define GATHER_SEC 0.45e-6       /* a direction */
-#define FIT_GLOSS_SEC 13.0       /* each time that gloss is fitted */
+#define FIT_SPECULAR_SEC 13.0    /* a specular fit */
 #define FIT_TEXEL_SEC 3.5e-6
 #define MEASURE_SEC 16.0e-6
 #define DETAIL_SEC 0.9e-6        /* a step */
-#define LOOK_SAMPLE_SEC 1.7e-6   /* a path of refine; listing1 walks it backwards as well: */
-#define LISTING1_TIMES 1.5
+#define REFINE_PATH_SEC 1.7e-6   /* a path of refine; listing1 walks it backwards as well: */
+#define LISTING1_FACTOR 1.5
 #define REPORT_SEC 1.2e-6        /* a path of a held-out re-render */
 #define EXPORT_TEXEL_SEC 3.0e-6
-/* Share of the square that charts usually cover, and blocks of the atlas that have a probe for each block of texels. */
+/* Usual part of the square that charts cover, and probes per block of mapped texels. */
 #define USUAL_COVER 0.75
 #define USUAL_PROBES 1.3
 
-/* Parts of the texture, by which looks are counted, that lie across it. */
-#define WINDOWS_ACROSS 64
-/* What a time limit leaves of each before it cuts the next (plan.h). */
-#define MODEST_LOOKS 0.1
+#define WINDOWS_ACROSS 64 /* windows along the texture's side by which observations are counted; part of the settings */
+/* Parts that a time limit leaves of each before it cuts the next (plan.h). By hand. */
+#define MODEST_OBSERVATIONS 0.1
 #define MODEST_REPORT 0.125
-#define LEAST_MEASURE 0.25 /* one texel in 2 x 2 */
+#define MIN_MEASURE 0.25 /* one texel in 2 x 2 */
 
 static double threads(const struct reconstruction *r) { return (double)parallel_thread_count(r->pool); }
 
@@ -44,20 +43,20 @@ static bool solves(const struct reconstruction *r) { return settings_is(r->setti
 
 double pace_observations_wanted(const struct reconstruction *r) {
     const char *name = solves(r) ? "refine_looks" : "listing1_looks";
-    double looks = settings_number(r->settings, name);
-    if (looks == 0.0)
-        looks = isinf(r->plan.limit_sec) ? settings_of_quality(r->settings, name) : (double)INFINITY;
+    double observations = settings_number(r->settings, name);
+    if (observations == 0.0)
+        observations = isinf(r->plan.limit_sec) ? settings_of_quality(r->settings, name) : (double)INFINITY;
     uint32_t larger = r->inverse.width > r->inverse.height ? r->inverse.width : r->inverse.height;
     double window = larger > WINDOWS_ACROSS ? (double)(larger / WINDOWS_ACROSS) : 1.0;
-    return looks * ceil((double)r->inverse.valid_count / (window * window));
+    return observations * ceil((double)r->inverse.valid_count / (window * window));
 }
 
 static void plan_refine(struct reconstruction *r, double wanted, double modest) {
-    double sec = settings_number(r->settings, "samples_per_camera") * LOOK_SAMPLE_SEC / threads(r);
-    plan_set(&r->plan, PLAN_REFINE, wanted, MODEST_LOOKS * modest, 0.0, solves(r) ? sec : LISTING1_TIMES * sec);
+    double sec = settings_number(r->settings, "samples_per_camera") * REFINE_PATH_SEC / threads(r);
+    plan_set(&r->plan, PLAN_REFINE, wanted, MODEST_OBSERVATIONS * modest, 0.0, solves(r) ? sec : LISTING1_FACTOR * sec);
 }
 
-void pace_plan_observations(struct reconstruction *r, double looks) { plan_refine(r, looks, looks); }
+void pace_plan_observations(struct reconstruction *r, double observations) { plan_refine(r, observations, observations); }
 
 static void plan_report(struct reconstruction *r, double pixels) {
     double samples = settings_number(r->settings, "report_samples");
@@ -70,14 +69,14 @@ void pace_plan_solve(struct reconstruction *r, double valid, double directions, 
     double n = threads(r);
     plan_set(&r->plan, PLAN_GATHER, directions, directions, PACE_LEAST_GATHER * directions, GATHER_SEC / n);
     plan_set(&r->plan, PLAN_MEASURE, early_texels + last_texels, early_texels + last_texels,
-             early_texels + LEAST_MEASURE * last_texels, MEASURE_SEC / n);
+             early_texels + MIN_MEASURE * last_texels, MEASURE_SEC / n);
     plan_set(&r->plan, PLAN_DETAIL, detail_steps, detail_steps, 0.0, DETAIL_SEC / n);
     plan_set_fixed(&r->plan, PLAN_FIT, 1.0,
-                   (FIT_GLOSS_SEC * settings_number(r->settings, "gloss_passes") + FIT_TEXEL_SEC * valid) / n);
+                   (FIT_SPECULAR_SEC * settings_number(r->settings, "gloss_passes") + FIT_TEXEL_SEC * valid) / n);
     plan_fit(&r->plan);
 }
 
-/* Of a room whose surface takes so many texels. */
+/* Plans everything that depends on the number of mapped texels. */
 static void plan_texels(struct reconstruction *r, double valid) {
     double n = threads(r), stride = settings_number(r->settings, "measure_stride");
     plan_set_fixed(&r->plan, PLAN_FUSE, 1.0, (FUSE_SEC + FUSE_TEXEL_SEC * valid) / n);
@@ -148,12 +147,12 @@ void pace_advance(struct reconstruction *r, const struct reconstruct_hooks *hook
                             plan_left_sec(&r->plan));
 }
 
-/* --- what became of it -------------------------------------------------------------------------- */
+/* --- report ------------------------------------------------------------------------------------- */
 
 static const struct {
     enum plan_part part;
-    const char *name, *unit, *of_all; /* what a cut leaves out, in words */
-} told[] = {
+    const char *name, *unit, *of_all; /* of_all: what a cut leaves out, in words; NULL: never cut */
+} report_parts[] = {
     {PLAN_PREPARE, "prepare", "whole", NULL},
     {PLAN_FUSE, "fuse", "whole", NULL},
     {PLAN_GATHER, "gather", "directions", "of the directions of gathered light"},
@@ -163,38 +162,40 @@ static const struct {
     {PLAN_REFINE, "refine", "observations", "of refine's observations"},
     {PLAN_REPORT, "report", "paths", "of the samples of the held-out re-renders"},
 };
-#define TOLD (sizeof told / sizeof *told)
+#define REPORT_PARTS (sizeof report_parts / sizeof *report_parts)
 
 static void report_work(struct reconstruction *r) {
     cJSON *work = cJSON_AddArrayToObject(r->report, "work");
-    for (size_t i = 0; i < TOLD; i++) {
-        const struct plan_work *w = &r->plan.part[told[i].part];
+    for (size_t i = 0; i < REPORT_PARTS; i++) {
+        const struct plan_work *w = &r->plan.part[report_parts[i].part];
         cJSON *entry = cJSON_CreateObject();
-        json_add_string(entry, "part", told[i].name);
-        json_add_string(entry, "unit", told[i].unit);
+        json_add_string(entry, "part", report_parts[i].name);
+        json_add_string(entry, "unit", report_parts[i].unit);
         json_add_number(entry, "done", w->done);
         json_add_number(entry, "working_seconds_this_attempt", w->spent_sec);
         cJSON_AddItemToArray(work, entry);
     }
 }
 
-static void say_left_out(struct reconstruction *r, cJSON *list) {
+static void report_left_out(struct reconstruction *r, cJSON *list) {
     char *text = r->left_out;
     size_t size = sizeof r->left_out, used = 0;
-    for (size_t i = 0; i < TOLD; i++) {
-        const struct plan_work *w = &r->plan.part[told[i].part];
-        if (!told[i].of_all || !plan_is_cut(&r->plan, told[i].part))
+    for (size_t i = 0; i < REPORT_PARTS; i++) {
+        const struct plan_work *w = &r->plan.part[report_parts[i].part];
+        if (!report_parts[i].of_all || !plan_is_cut(&r->plan, report_parts[i].part))
             continue;
         double share = 1.0 - w->now / w->wanted;
         cJSON *entry = cJSON_CreateObject();
-        json_add_string(entry, "part", told[i].name);
-        json_add_string(entry, "unit", told[i].unit);
+        json_add_string(entry, "part", report_parts[i].name);
+        json_add_string(entry, "unit", report_parts[i].unit);
         json_add_number(entry, "asked_for", w->wanted);
         json_add_number(entry, "done", w->now);
         cJSON_AddItemToArray(list, entry);
         if (used < size)
-            used += (size_t)snprintf(text + used, size - used, "%s%.0f %% %s", used ? ", " : "left out to keep time_limit_sec: ",
-                                     share < 1.0 ? fmin(fmax(100.0 * share, 1.0), 99.0) : 100.0, told[i].of_all);
+            used += (size_t)snprintf(text + used, size - used, "%s%.0f %% %s",
+                                     used ? ", " : "left out to keep time_limit_sec: ",
+                                     share < 1.0 ? fmin(fmax(100.0 * share, 1.0), 99.0) : 100.0,
+                                     report_parts[i].of_all);
     }
     if (!plan_is_kept(&r->plan) && used < size)
         snprintf(text + used, size - used, "%sthe job took %.0f s in place of time_limit_sec=%.0f", used ? "; " : "",
@@ -209,7 +210,7 @@ void pace_report(struct reconstruction *r, const struct reconstruct_hooks *hooks
     json_add_number(limit, "limit_sec", r->plan.limit_sec);
     json_add_number(limit, "used_sec", r->plan.used_sec);
     json_add_bool(limit, "kept", plan_is_kept(&r->plan));
-    say_left_out(r, cJSON_AddArrayToObject(limit, "left_out"));
+    report_left_out(r, cJSON_AddArrayToObject(limit, "left_out"));
     json_add_string(limit, "summary", r->left_out[0] ? r->left_out : "nothing was left out");
     if (r->left_out[0])
         hooks->warning(hooks->user, r->left_out);

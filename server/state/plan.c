@@ -4,20 +4,20 @@
 #include <math.h>
 #include <stddef.h>
 
-/* A part's own rate replaces the prior as it is done: the prior weighs as much as this share of the part. */
+/* Weight of the prior in a part's rate, as a part of its work. By hand. */
 #define PRIOR_SHARE 0.03
-/* The speed of the machine is taken from what was measured; seconds of priors that stand against that. */
+/* Weight of the prior in the machine's speed, seconds of measured work. By hand. */
 #define PRIOR_SPEED_SEC 5.0
-/* Of the time that is left so much is kept free: rates of what is to come are estimates. */
+/* Part of the time left that is not planned, since rates are estimates. By hand. */
 #define RESERVE 0.03
-/* Less than this share of a part is nothing: rounding of sums. */
+/* Parts below this are rounding of sums. */
 #define NOTHING 1e-9
 
 enum target { MODEST, LEAST };
 static const struct {
     enum plan_part part;
     enum target to;
-    bool whole; /* or not at all */
+    bool whole; /* cut entirely or not at all */
 } cuts[] = {
     {PLAN_REFINE, MODEST, false}, {PLAN_REPORT, MODEST, false}, {PLAN_DETAIL, LEAST, true}, {PLAN_MEASURE, LEAST, true},
     {PLAN_GATHER, LEAST, false},  {PLAN_REFINE, LEAST, false},  {PLAN_REPORT, LEAST, false},
@@ -65,7 +65,7 @@ void plan_close(struct plan *p, enum plan_part part) {
     p->part[part].now = p->part[part].done;
 }
 
-/* How many times longer everything has taken than its prior. */
+/* Measured over prior time of everything so far. */
 static double slowness(const struct plan *p) {
     double spent = 0.0, prior = 0.0;
     for (int i = 0; i < PLAN_PARTS; i++) {
@@ -105,10 +105,10 @@ double plan_share_done(const struct plan *p, enum plan_part first, enum plan_par
     return all > 0.0 ? fmin(done / all, 1.0) : 0.0;
 }
 
-/* Seconds that what is to come may take. */
-static double room(const struct plan *p) { return fmax(p->limit_sec - p->used_sec, 0.0) * (1.0 - RESERVE); }
+/* Seconds available for the work that is not done. */
+static double available_sec(const struct plan *p) { return fmax(p->limit_sec - p->used_sec, 0.0) * (1.0 - RESERVE); }
 
-/* Plans all that was asked for; of what has no end, what fits beside the rest. */
+/* Plans all work as asked for, and of an endless part what fits beside the rest. */
 static void want_all(struct plan *p) {
     int endless = -1;
     for (int i = 0; i < PLAN_PARTS; i++) {
@@ -122,7 +122,7 @@ static void want_all(struct plan *p) {
     if (endless < 0)
         return;
     struct plan_work *w = &p->part[endless];
-    double rate = plan_rate(p, (enum plan_part)endless), spare = room(p) - plan_left_sec(p);
+    double rate = plan_rate(p, (enum plan_part)endless), spare = available_sec(p) - plan_left_sec(p);
     w->now = fmax(w->modest, w->done + (rate > 0.0 ? fmax(spare, 0.0) / rate : 0.0));
 }
 
@@ -135,7 +135,7 @@ void plan_fit(struct plan *p) {
     want_all(p);
     if (isinf(p->limit_sec))
         return;
-    double over = plan_left_sec(p) - room(p);
+    double over = plan_left_sec(p) - available_sec(p);
     size_t made = 0;
     for (; made < CUTS && over > 0.0; made++) {
         struct plan_work *w = &p->part[cuts[made].part];
@@ -147,7 +147,7 @@ void plan_fit(struct plan *p) {
         w->now = saved <= over || cuts[made].whole ? target : w->now - over / rate;
         over -= saved <= over || cuts[made].whole ? saved : over;
     }
-    /* What was cut whole may have freed more than was needed: the last that was cut before has it. */
+    /* An entire cut may have freed more than needed: give it back to the cuts before. */
     while (made-- > 0 && over < 0.0) {
         struct plan_work *w = &p->part[cuts[made].part];
         double rate = plan_rate(p, cuts[made].part);

@@ -1,4 +1,4 @@
-/* reconstruction.h -- the state that the stages hand on, and what they may ask of the surroundings. */
+/* reconstruction.h -- the state that the stages share, and the callbacks to their caller. */
 #ifndef UNBAKE_STATE_RECONSTRUCTION_H
 #define UNBAKE_STATE_RECONSTRUCTION_H
 
@@ -20,13 +20,13 @@
 #include "server/state/plan.h"
 #include "server/state/state_array.h"
 
-/* Of a surface of which nothing is known, and of an emitter, whose own light hides it. */
+/* Base colour of unknown surfaces, and of emitters, whose own light hides it. */
 #define NEUTRAL_BASE_COLOR 0.5f
 
 struct reconstruction; /* the present state, for previews and outputs */
 struct emitter_evidence;
 
-/* What the surroundings offer. All are called from the thread that runs reconstruct_run. */
+/* Callbacks to the caller, made on the thread that runs reconstruct_run. */
 struct reconstruct_hooks {
     void *user;
     bool (*stop_requested)(void *user);
@@ -35,29 +35,29 @@ struct reconstruct_hooks {
     void (*metric)(void *user, const char *series, long step, double value);
     void (*log)(void *user, const char *message);
     void (*warning)(void *user, const char *message);
-    /* Seconds that this attempt has really had, from its start: other processes' shares, stops and sleep of the machine
-     * do not count. Nothing but forecasts and the time limit comes of it. */
+    /* Working seconds of this attempt, without time of other processes, stops and sleep of the machine. Used for
+     * forecasts and the time limit only. */
     double (*worked_sec)(void *user);
-    /* True when a checkpoint / preview is due (the surroundings keep the clock). */
+    /* True when a checkpoint / preview is due (the caller keeps the clock). */
     bool (*checkpoint_due)(void *user);
     bool (*preview_due)(void *user);
-    /* Commits all arrays as the newest checkpoint, or fails and leaves the one before. */
+    /* Commits all arrays as the newest checkpoint, or fails and keeps the previous one. */
     enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array,
                                    size_t count, struct error *err);
-    /* Fills the arrays from the newest complete checkpoint; *found false and arrays untouched when there
-     * is none. An array whose stored size differs is STATUS_CORRUPT. */
+    /* Fills the arrays from the newest complete checkpoint; *found is false and the arrays are untouched when there is
+     * none. STATUS_CORRUPT if a stored size differs. */
     enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found,
                                    struct error *err);
     enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
 };
 
-/* A held-out photograph and what the recovered room looks like from there. */
+/* A held-out photograph and its re-render. */
 struct held_out {
     const char *name;                /* borrowed from the scene, both */
     const struct camera *camera;
     struct image photograph, render; /* linear radiance, R G B, of one size; owned */
     double msre, psnr_db, ssim;
-    double msre_render_noise, msre_photograph_noise; /* about so much of msre is noise, each its part */
+    double msre_render_noise, msre_photograph_noise; /* expected contributions of noise to msre */
 };
 
 struct reconstruction {
@@ -65,27 +65,27 @@ struct reconstruction {
     const struct settings *settings; /* borrowed */
     struct plan plan;                /* of work and time (pace.h) */
     char left_out[512];              /* what a time limit left out, as a sentence; "": nothing */
-    bool has_materials;              /* materials are more than their neutral start */
+    bool has_materials;              /* materials are not the initial ones */
     struct parallel *pool;           /* borrowed */
     struct segments segments;
     struct atlas atlas;
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    struct environment environment;  /* distant light; map.pixel is NULL where no photograph looks out */
-    rgb sky_factor;                  /* by which solve made saturated directions of it brighter still, or 1 */
-    struct sun sun;                  /* that no photograph shows */
-    double unseen_share;             /* of rays from surfaces: those that go where nothing is known */
-    bool exposures_drift, colors_drift; /* told exposures, white balance (calibrate.h) */
-    bool sky_is_fitted;              /* what comes from there is told by surfaces (unseen_light.h), not filled in */
+    struct environment environment;  /* distant light; map.pixel is NULL where no photograph shows any */
+    rgb sky_factor;                  /* by which solve brightened its saturated directions, or 1 */
+    struct sun sun;                  /* a sun that no photograph shows */
+    double unseen_share;             /* part of the rays from surfaces that meet nothing observed */
+    bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
+    bool sky_is_fitted;              /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
     struct noise noise;              /* of the photographs' pixels */
     uint16_t (*radiance_preview)[3]; /* [height][width] a first picture of that (radiance_preview.h), or NULL; owned */
-    struct fused fused;              /* what the photographs show of each texel */
+    struct fused fused;              /* observed radiance of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
-    struct emitter_evidence *evidence; /* [segment_count] why; owned */
+    struct emitter_evidence *evidence; /* [segment_count] evidence for it; owned */
     size_t held_out_count;
     struct held_out *held_out;       /* [held_out_count]; owned */
-    cJSON *report;                   /* object: figures of each stage, filled as they are known; owned */
+    cJSON *report;                   /* object, filled by the stages; owned */
 };
 
 /* The segment of a valid texel. */

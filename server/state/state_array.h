@@ -1,20 +1,20 @@
-/* state_array.h -- what a reconstruction hands to whoever keeps its checkpoints. */
+/* state_array.h -- arrays of which checkpoints of a reconstruction consist. */
 #ifndef UNBAKE_STATE_STATE_ARRAY_H
 #define UNBAKE_STATE_STATE_ARRAY_H
 
 #include <stddef.h>
 
-/* The format of what is kept, whatever the version of the program. It grows when an array gets another meaning or layout
- * under its old name, or when one is added; whoever makes it grow has the format before read, too.
- *   1: the arrays as they are today but for the next two.
- *   2: "plan", what was planned and done of each part of the work; STATE_SURFACE. */
+/* Format of checkpoints, independent of the program's version. It grows when an array is added, or changes meaning or
+ * layout under its name; the format before must then still be read.
+ *   1: the present arrays without the following two.
+ *   2: adds "plan", the planned and done amounts of each part of the work, and STATE_SURFACE. */
 #define STATE_FORMAT 2
 
-/* The name of an array of eight bytes that say what the others are laid over. Where they differ a checkpoint is of
- * another surface (the atlas is made anew by each attempt, and not the same by each version): it is of no use. */
+/* Name of an array of eight bytes: a hash of the surface parametrisation. A checkpoint with another one cannot be used
+ * (each attempt makes the atlas again, and versions of the program may differ in it). */
 #define STATE_SURFACE "surface"
 
-/* A piece of state: plain memory that a checkpoint copies out and a resume copies in. */
+/* Plain memory that a checkpoint saves and a resume restores. */
 struct state_array {
     const char *name;
     void *data;
