@@ -24,8 +24,8 @@
  * changes. Within a picture it is darker here and there. */
 #define RING_PIXELS 6.0f
 #define RING_LIT 0.35f
-#define LOOKS_LEAST 2      /* of either kind */
-#define LOOKS_ASKED 4      /* whether they may be highlights */
+#define MIN_OBSERVATIONS 2      /* of either kind */
+#define OBSERVATIONS_TESTED 4      /* whether they may be highlights */
 /* The glossiest surface that is no metal; what is lit must be so many times brighter than its highlight. */
 #define SPECULAR 1.0f
 #define BRIGHTER 2.0f
@@ -34,7 +34,7 @@
 
 enum kind { TELLS_NOTHING, TELLS_BLACK, TELLS_LIT };
 
-/* What a photograph tells of a place where white paint would show `white`. */
+/* Classifies a photograph's observation of a place whose Lambert radiance at albedo 1 is `white`. */
 static enum kind kind_of(const struct divide *d, const struct view *view, uint32_t triangle, float white,
                          float *shown) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[view->train]];
@@ -65,7 +65,7 @@ static bool may_be_highlight(const struct divide *d, const struct surface_point 
     return shown < BRIGHTER * brightest;
 }
 
-/* A draw among those that show it lit: a film's first ones are taken from the same place, where one highlight is. */
+/* Random observations among the lit ones: consecutive frames of a film share a viewpoint, and its highlight. */
 static float drawn_weight(uint32_t texel, uint32_t train) {
     return 1.0f - rng_to_float((uint32_t)rng_key(KEY_CHANGING, texel, train));
 }
@@ -78,11 +78,11 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
     struct {
         uint32_t train;
         float shown;
-    } lit[LOOKS_ASKED];
+    } lit[OBSERVATIONS_TESTED];
     struct best drawn;
-    struct best_item item[LOOKS_ASKED];
+    struct best_item item[OBSERVATIONS_TESTED];
     size_t black_count = 0, own = 0;
-    best_init(&drawn, item, LOOKS_ASKED);
+    best_init(&drawn, item, OBSERVATIONS_TESTED);
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) || !divide_lambert(d, texel, &white))
         return false;
     for (uint32_t t = 0; t < d->views->train_count; t++) {
@@ -96,11 +96,11 @@ static bool changed(const struct divide *d, uint32_t texel, int thread) {
         if (slot != BEST_NONE)
             lit[slot].train = t, lit[slot].shown = shown;
     }
-    if (black_count < LOOKS_LEAST)
+    if (black_count < MIN_OBSERVATIONS)
         return false;
     for (size_t i = 0; i < drawn.count; i++)
         own += !may_be_highlight(d, &at, texel, lit[i].train, lit[i].shown, thread);
-    return own >= LOOKS_LEAST;
+    return own >= MIN_OBSERVATIONS;
 }
 
 float changing_light(const struct divide *d, const uint32_t *texel, size_t count, int thread) {

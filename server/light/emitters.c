@@ -10,16 +10,17 @@
 
 #define TEXELS_PER_SEGMENT 256
 #define VIEWS_PER_TEXEL 4
-/* Looks that a class of distance from an edge must have for its median to count. */
-#define LEAST_LOOKS 12
-/* Of a segment seen in mixed pixels alone, fewer than this are an accident of noise. */
-#define LEAST_LOOKS_MIXED 3
+/* Observations that an edge class must have for its median to be used. */
+#define MIN_OBSERVATIONS 12
+/* The same for a segment observed only in mixed pixels; fewer may be noise. */
+#define MIN_OBSERVATIONS_MIXED 3
 #define RING_PIXELS 4.0f
 #define OUTSHINES 1.3f
 /* A saturated pixel must be so much brighter than all around it: a bar before a white sky is as white as the sky. */
-#define OUTSHINES_WHITE 1.05f
-/* Part of the looks at a segment which must be the surface's own. Lamps in a row outshine each other in many. */
-#define OWN_PART 0.25f
+#define OUTSHINES_SATURATED 1.05f
+/* Least part of a segment's observations that are not outshone by their surroundings. Lamps in a row outshine each
+ * other in many. */
+#define MIN_OWN_PART 0.25f
 /* Segments this many times brighter than the median of the room outshine it. */
 #define BRIGHT 4.0f
 
@@ -46,9 +47,8 @@ static void add_value(struct channel_values *v, float radiance, bool saturated) 
     v->value[v->count++] = (struct bounded){radiance, saturated};
 }
 
-/* Whether what a look of this class of distance from an edge shows is the surface's own. A bright
- * window may stand behind a thin frame: a pixel that mixes surfaces speaks only when it is clearly
- * brighter than all around it, one near an edge when it is no darker than its surroundings. */
+/* Whether an observation of this edge class shows the surface itself. A bright window may be behind a thin frame: a
+ * mixed pixel counts only if it is clearly brighter than all around it, one near an edge if it is no darker. */
 static bool outshines(const struct photograph *photo, const struct view *view, const struct photograph_sample *sample,
                       int edge) {
     float own = rgb_mean(sample->radiance);
@@ -57,8 +57,8 @@ static bool outshines(const struct photograph *photo, const struct view *view, c
     struct photograph_ring ring = photograph_ring(photo, view->x, view->y, RING_PIXELS);
     if (edge == VIEWS_EDGE)
         return own > OUTSHINES * ring.brightest;
-    bool is_white = photograph_sample_saturates(sample);
-    return own * ring.count >= (is_white ? OUTSHINES_WHITE : 1.0f) * ring.sum;
+    bool is_saturated = photograph_sample_saturates(sample);
+    return own * ring.count >= (is_saturated ? OUTSHINES_SATURATED : 1.0f) * ring.sum;
 }
 
 static void observe_texel(const struct evidence_job *job, uint32_t texel, struct shown_values *shown) {
@@ -91,20 +91,21 @@ static void observe_segment(void *user, size_t segment, int thread) {
     if (job->evidence[segment].is_hidden)
         return; /* it is known from elsewhere */
     struct shown_values *shown = mem_calloc(VIEWS_EDGE + 1, sizeof *shown);
-    size_t count = by_segment_count(&job->texels, segment), wanted = count < TEXELS_PER_SEGMENT ? count : TEXELS_PER_SEGMENT;
+    size_t count = by_segment_count(&job->texels, segment);
+    size_t wanted = count < TEXELS_PER_SEGMENT ? count : TEXELS_PER_SEGMENT;
     for (size_t i = 0; i < wanted; i++)
         observe_texel(job, by_segment_spaced(&job->texels, segment, i, wanted), shown);
-    /* The looks farthest from edges, as soon as there are some. */
+    /* The class farthest from edges that has enough observations. */
     struct shown_values *best = shown;
     for (int edge = 1; edge <= VIEWS_EDGE; edge++) {
-        if (best->channel[0].count < LEAST_LOOKS)
+        if (best->channel[0].count < MIN_OBSERVATIONS)
             best = &shown[edge];
     }
     size_t told = best->channel[0].count;
-    size_t least = best == &shown[VIEWS_EDGE] ? LEAST_LOOKS_MIXED : 1;
-    bool is_own = told >= least && (float)told >= OWN_PART * (float)(told + best->outshone_count);
+    size_t least = best == &shown[VIEWS_EDGE] ? MIN_OBSERVATIONS_MIXED : 1;
+    bool is_own = told >= least && (float)told >= MIN_OWN_PART * (float)(told + best->outshone_count);
     if (!is_own)
-        best = &shown[0]; /* most often it is not what shines: nothing is known */
+        best = &shown[0]; /* mostly outshone: no value */
     struct emitter_evidence *e = &job->evidence[segment];
     e->is_seen = is_own;
     e->only_mixed = best == &shown[VIEWS_EDGE];

@@ -34,34 +34,34 @@
 #define MAINLY_PLACES 30.0
 #define LEAVES 0.3
 
-/* A segment of which nothing was seen. */
-struct candidate {
+/* A segment that no photograph shows. */
+struct lamp_candidate {
     uint32_t segment;
     float strength;
     double explained, brings; /* in places */
 };
 
-struct search {
+struct lamp_search {
     bool is_open;          /* one looks out of it to where no photograph does */
     struct lamps lamps;    /* that were found; and all places */
     struct light_places few;
     size_t candidate_count;
-    struct candidate *candidate; /* [candidate_count]; owned */
+    struct lamp_candidate *candidate; /* [candidate_count]; owned */
 };
 
 /* --- candidates -------------------------------------------------------------------------------------------- */
 
-static void find_candidates(struct search *s, const struct views *views) {
+static void find_candidates(struct lamp_search *s, const struct views *views) {
     const struct reconstruction *r = s->lamps.r;
     emitters_observe(r, views, r->evidence);
     s->candidate = mem_array(r->segments.count + 1, sizeof *s->candidate);
     for (size_t i = 0; i < r->segments.count; i++) {
         if (!r->evidence[i].is_seen && s->lamps.light.texels.first[i + 1] > s->lamps.light.texels.first[i])
-            s->candidate[s->candidate_count++] = (struct candidate){.segment = (uint32_t)i};
+            s->candidate[s->candidate_count++] = (struct lamp_candidate){.segment = (uint32_t)i};
     }
 }
 
-/* The sum over places of the share of their light that would come from one source. */
+/* Sum over places of the part of their light that would come from one source. */
 static double brought(const struct light_places *places, float strength) {
     double sum = 0.0;
     for (size_t i = 0; i < places->count; i++)
@@ -69,8 +69,8 @@ static double brought(const struct light_places *places, float strength) {
     return sum;
 }
 
-static void ask(const struct search *s, const struct missing_light *m, struct light_places *places,
-                struct candidate *c, size_t points) {
+static void ask(const struct lamp_search *s, const struct missing_light *m, struct light_places *places,
+                struct lamp_candidate *c, size_t points) {
     segment_light_places(&s->lamps.light, places, c->segment, points);
     c->strength = missing_light_strength(m, MISSING_MEAN, &c->explained);
     c->explained /= 1.0 + UNLIKELY * fmax(log10((double)(c->strength / s->lamps.median_radiance)), 0.0);
@@ -78,20 +78,20 @@ static void ask(const struct search *s, const struct missing_light *m, struct li
 }
 
 static int by_explained(const void *a, const void *b) {
-    const struct candidate *first = a, *second = b;
+    const struct lamp_candidate *first = a, *second = b;
     if (first->explained != second->explained)
         return first->explained < second->explained ? 1 : -1;
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-/* Of what the candidate lights most. */
-static bool puts_right(struct search *s, const struct candidate *c) {
+/* Misfit over the places that the candidate lights more than all others do. */
+static bool puts_right(struct lamp_search *s, const struct lamp_candidate *c) {
     segment_light_places(&s->lamps.light, &s->lamps.places, c->segment, SEGMENT_LIGHT_POINTS);
     struct missing_share mainly = missing_light_share(&s->lamps.missing, c->strength, MAINLY);
     return mainly.count > MAINLY_PLACES && mainly.after < LEAVES * mainly.before;
 }
 
-static bool is_lamp(struct search *s, const struct candidate *c) {
+static bool is_lamp(struct lamp_search *s, const struct lamp_candidate *c) {
     double weight = 0.0, share = c->explained / fmax(missing_light_misfit(&s->lamps.missing), 1e-30);
     for (size_t i = 0; i < s->lamps.places.count; i++)
         weight += (double)s->lamps.places.place[i].weight;
@@ -102,8 +102,8 @@ static bool is_lamp(struct search *s, const struct candidate *c) {
     return share > EXPLAINS || (share > EXPLAINS_ONE_OF_MANY && puts_right(s, c));
 }
 
-/* Puts the segment that explains most in the first place; false where it is not enough. */
-static bool find_best(struct search *s) {
+/* Moves the segment that reduces misfit most to the front; false if it is not enough. */
+static bool find_best(struct lamp_search *s) {
     struct missing_light few;
     missing_light_init(&few, &s->few, LAMPS_WHITEST, false);
     for (size_t i = 0; i < s->candidate_count; i++)
@@ -120,7 +120,7 @@ static bool find_best(struct search *s) {
 /* --- lamps ------------------------------------------------------------------------------------------------- */
 
 /* Makes a lamp of the first candidate. */
-static void add_lamp(struct search *s) {
+static void add_lamp(struct lamp_search *s) {
     struct lamp *lamp = lamps_add(&s->lamps, s->candidate[0].segment, rgb_gray(0.0f));
     s->candidate[0] = s->candidate[--s->candidate_count];
     lamps_fit_one(&s->lamps, lamp);
@@ -129,7 +129,7 @@ static void add_lamp(struct search *s) {
     lamps_shine(&s->few, lamp->radiance);
 }
 
-static void look_for_lamps(struct search *s) {
+static void look_for_lamps(struct lamp_search *s) {
     while (s->lamps.count < LAMPS_MOST && find_best(s))
         add_lamp(s);
     lamps_fit_all(&s->lamps, s->lamps.count);
@@ -144,7 +144,7 @@ static void report(const struct lamps *l) {
 }
 
 void lamp_find(struct reconstruction *r, const struct views *views) {
-    struct search s = {0};
+    struct lamp_search s = {0};
     lamps_init(&s.lamps, r, views);
     find_candidates(&s, views);
     if (s.candidate_count > 0) {

@@ -10,22 +10,22 @@
 #include "server/state/evidence.h"
 
 #define ROUNDS 2 /* in which each lamp's radiance is fitted again, the others being known */
-/* A room is open where one looks out of it in this share of directions in which no photograph does. */
+/* A room is open if at least this part of the rays from its surfaces leaves in unobserved directions. */
 #define OPEN 0.02
 #define OPEN_PLACES 2048
 #define OPEN_RAYS 16 /* a place */
 #define KEY_OPEN 31
 #define SKY_RAYS 128 /* a place */
 #define KEY_SKY 37   /* keeps these random numbers apart from others of the place */
-/* Segments may differ by such shares in area and in what photographs tell and still be alike. */
+/* Greatest relative differences, of area and of observed radiance, of similar segments. */
 #define ALIKE_AREA 0.02f
 #define ALIKE_RADIANCE 0.1f
-/* Where what is known of the sky is taken away, this part of a place's light stays at least. */
+/* Least part of a place's light that is left when the sky's is subtracted. */
 #define LEFT 0.01f
 
 /* --- what a lamp lights ------------------------------------------------------------------------------------ */
 
-/* Light of directions in which photographs do not tell it, as the map has them. */
+/* Lambert radiance by the saturated and filled-in directions of the map. */
 static void light_by_sky(void *user, size_t index, int thread) {
     (void)thread;
     const struct lamps *l = user;
@@ -50,7 +50,7 @@ void lamps_shine(struct light_places *places, rgb radiance) {
     }
 }
 
-/* Takes away what the survey has of the sky already. */
+/* Subtracts the light of the sky that the survey already contains. */
 static void darken(struct light_places *places) {
     for (size_t i = 0; i < places->count; i++) {
         struct light_place *p = &places->place[i];
@@ -97,14 +97,15 @@ static bool is_near(float a, float b, float share) {
     return fabsf(a - b) <= share * fmaxf(a, b);
 }
 
-/* Of one size, and photographs show about as much of both and tell as little of the rest. */
+/* Whether two lamps have the same size and observed radiance, and the same saturated channels. */
 static bool is_alike(const struct lamps *l, const struct lamp *lamp, uint32_t segment) {
     const struct emitter_evidence *e = &l->r->evidence[segment];
     if (lamps_is_sky(lamp) || rgb_is_black(lamp->least) || lamp->segment_count == LAMPS_ALIKE_MOST ||
         !is_near(l->light.area_m2[lamp->segment[0]], l->light.area_m2[segment], ALIKE_AREA))
         return false;
     for (int c = 0; c < 3; c++) {
-        if (lamp->told[c] == e->saturated[c] || !is_near((&lamp->least.r)[c], (&e->observed.r)[c], ALIKE_RADIANCE))
+        if (lamp->is_measured[c] == e->saturated[c] ||
+            !is_near((&lamp->least.r)[c], (&e->observed.r)[c], ALIKE_RADIANCE))
             return false;
     }
     return true;
@@ -123,7 +124,7 @@ void lamps_add_bound(struct lamps *l, uint32_t segment) {
     struct lamp *lamp = lamps_add(l, segment, e->radiance);
     lamp->least = e->observed;
     for (int c = 0; c < 3; c++)
-        lamp->told[c] = !e->saturated[c];
+        lamp->is_measured[c] = !e->saturated[c];
 }
 
 void lamps_add_sky(struct lamps *l) {
@@ -168,11 +169,11 @@ bool lamps_is_open(const struct lamps *l) {
 
 /* --- how bright they are ----------------------------------------------------------------------------------- */
 
-/* Makes it so much brighter than photographs tell, in the channels in which they do not. */
+/* Adds missing radiance to the observed one, in the saturated channels. */
 static void set_radiance(struct lamp *lamp, rgb more) {
     lamp->radiance = lamp->least;
     for (int c = 0; c < 3; c++)
-        (&lamp->radiance.r)[c] += lamp->told[c] ? 0.0f : (&more.r)[c];
+        (&lamp->radiance.r)[c] += lamp->is_measured[c] ? 0.0f : (&more.r)[c];
 }
 
 void lamps_fit_one(struct lamps *l, struct lamp *lamp) {
@@ -223,7 +224,7 @@ static void hand_over_segment(struct reconstruction *r, const struct lamp *lamp,
     e->is_hidden = !e->is_unbounded;
     rgb radiance = lamp->radiance;
     for (int c = 0; c < 3; c++)
-        (&radiance.r)[c] = lamp->told[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
+        (&radiance.r)[c] = lamp->is_measured[c] ? (&e->observed.r)[c] : (&radiance.r)[c];
     evidence_set_radiance(e, radiance);
 }
 

@@ -1,10 +1,9 @@
-/* lamps.h -- lights whose radiance photographs do not tell, and how bright they must be by what they light.
+/* lamps.h -- radiance of lamps that photographs do not measure, from the surfaces that they light.
  *
- * Places all over the room are lit by what is known, and by these lamps: those that no photograph shows
- * (lamp_find.h), and those at which every photograph saturates (saturated_light.h). Each in turn, the others being as
- * bright as they are by now, gets the radiance with which the places are least odd (missing_light.h). Segments at which
- * photographs saturate and which are alike, a row of bulbs or panels, are one lamp: what they light hardly tells
- * which of them it is. Which lamps there are is not decided here. */
+ * These are lamps that no photograph shows (lamp_find.h) and lamps at which every photograph saturates
+ * (saturated_light.h). By coordinate descent each gets the radiance of least misfit over sample places of the room
+ * (missing_light.h). Similar saturated segments, a row of bulbs or panels, share one radiance, since the places hardly
+ * separate them. Which lamps there are is decided elsewhere. */
 #ifndef UNBAKE_LIGHT_LAMPS_H
 #define UNBAKE_LIGHT_LAMPS_H
 
@@ -14,10 +13,10 @@
 #include "server/state/reconstruction.h"
 
 #define LAMPS_MOST 16
-/* What all is white to, for all one knows of the light by now: reflected light is read off few rays. */
+/* Albedo above this is implausible; loose because indirect light is noisy. */
 #define LAMPS_WHITEST 1.2f
-/* In the place of a segment: the directions of the environment in which all photographs saturate, and those that none
- * shows, which were filled in from them. Its radiance is a factor to what the map has. */
+/* In place of a segment: the saturated directions of the environment, and the unobserved ones filled in from them. The
+ * radiance of such a lamp is a factor of the map's. */
 #define LAMPS_SKY UINT32_MAX
 
 /* Segments that are one lamp. */
@@ -27,9 +26,9 @@ struct lamp {
     size_t segment_count;
     uint32_t segment[LAMPS_ALIKE_MOST];
     rgb radiance;
-    rgb least;    /* what photographs tell */
-    bool told[3]; /* by channel: it is no more than that */
-    float *lit;   /* [places.count] what a white surface at each place shows of a radiance of 1; owned */
+    rgb least;    /* observed radiance, a lower bound */
+    bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
+    float *lit;   /* [places.count] Lambert radiance at albedo 1 by a lamp of radiance 1; owned */
 };
 
 struct lamps {
@@ -46,7 +45,7 @@ struct lamps {
 void lamps_init(struct lamps *l, struct reconstruction *r, const struct views *views);
 void lamps_release(struct lamps *l);
 
-/* Adds a segment of which photographs tell nothing; there must be room for it. After the survey it lights the places
+/* Adds a segment that no photograph shows; there must be room for it. If added after the survey it lights the places
  * from then on. */
 struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance);
 /* Before the survey: a segment at which photographs saturate, as r->evidence has it, to a lamp that is alike or as
@@ -55,18 +54,18 @@ void lamps_add_bound(struct lamps *l, uint32_t segment);
 void lamps_add_sky(struct lamps *l);
 static inline bool lamps_is_sky(const struct lamp *lamp) { return lamp->segment[0] == LAMPS_SKY; }
 
-/* Fills the places: what is known, as survey_init has it, and the lamps that were added. Dim places count less.
- * `shown` is as in light_places_init. */
-void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field, const struct fused *shown);
+/* Makes the places (survey_init, light_places_init), lit by known light and by the lamps added so far. Dim places have
+ * a lower weight. */
+void lamps_survey(struct lamps *l, const struct views *views, const struct light_field *field,
+                  const struct fused *shown);
 
-/* Whether one looks out of the room from the places in directions that no photograph shows: the sky may as well be what
- * is missing there (unseen_light.h). */
+/* Whether places see out of the room in unobserved directions: missing light may then be sky (unseen_light.h). */
 bool lamps_is_open(const struct lamps *l);
 
-/* By how much it should be brighter, and how much less odd places would be then. */
+/* Missing radiance of a lamp, and the reduction of misfit by it. */
 float lamps_missing(struct lamps *l, const struct lamp *lamp, double *explained);
 
-/* Gives a lamp the radiance that explains most, no less than photographs tell. `missing` is to be renewed after it. */
+/* Sets a lamp to the radiance of least misfit, at least its observed one. `missing` must be renewed after it. */
 void lamps_fit_one(struct lamps *l, struct lamp *lamp);
 /* The same for the first `count` in turn, twice; renews `missing`. */
 void lamps_fit_all(struct lamps *l, size_t count);

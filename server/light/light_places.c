@@ -9,22 +9,22 @@
 #include "server/gather/sun.h"
 #include "server/render/sampler.h"
 
-#define WAYS 128 /* directions a point */
+#define RAYS_PER_POINT 128 /* directions a point */
 #define AROUND 640 /* the texels around one, each way as far as this part of the atlas's width, tell what it shows */
 #define KEY_SUN 29 /* keeps these random numbers apart from others of the texel */
-/* Logarithms of base colour: what of it is odd counts up to this much. */
-#define ODD_MOST 1.0f
-/* Light beside which this share of the room's median is nothing. */
+/* Bound of a residual, logarithm of base colour. */
+#define MAX_RESIDUAL 1.0f
+/* Light added everywhere, part of the room's median. */
 #define DARK 0.01f
 
-struct gathering {
+struct places_gathering {
     const struct survey *survey;
     const struct fused *shown; /* or NULL */
     struct light_place *place; /* [survey->count] */
 };
 
-/* What photographs show of a point. */
-static rgb shown_of(const struct gathering *g, size_t index) {
+/* Observed radiance of a point. */
+static rgb shown_of(const struct places_gathering *g, size_t index) {
     const struct reconstruction *r = g->survey->r;
     uint32_t texel = g->survey->texel[index], around = r->atlas.width / AROUND;
     rgb shown = g->shown ? fused_around(g->shown, &r->atlas, &r->inverse, texel, around) : rgb_gray(0.0f);
@@ -32,7 +32,7 @@ static rgb shown_of(const struct gathering *g, size_t index) {
 }
 
 static void gather_place(void *user, size_t index, int thread) {
-    const struct gathering *g = user;
+    const struct places_gathering *g = user;
     const struct survey *survey = g->survey;
     const struct reconstruction *r = survey->r;
     struct light_place *p = &g->place[index];
@@ -42,7 +42,8 @@ static void gather_place(void *user, size_t index, int thread) {
         .segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
-    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0), WAYS);
+    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at,
+                      sampler_key(KEY_SUN, texel, 0), RAYS_PER_POINT);
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
 }
@@ -61,14 +62,14 @@ size_t light_places_end(const struct light_places *s, size_t first) {
     return end;
 }
 
-size_t light_places_odder(const struct light_places *s, float odd) {
+size_t light_places_above(const struct light_places *s, float residual) {
     size_t count = 0;
     for (size_t i = 0; i < s->count; i++)
-        count += s->place[i].odd > odd;
+        count += s->place[i].residual > residual;
     return count;
 }
 
-/* Keeps light from being nothing. */
+/* Adds a little light everywhere, which keeps logarithms finite. */
 static void floor_light(struct light_places *s) {
     float *mean = mem_array(s->count + 1, sizeof *mean);
     for (size_t i = 0; i < s->count; i++)
@@ -107,7 +108,7 @@ static void find_odd(struct light_places *s) {
         float median = quantile(sorted, end - first, 0.5);
         for (size_t i = first; i < end; i++) {
             float log = log_base(&s->place[i]);
-            s->place[i].odd = clampf(fmaxf(log - median, log - logf(PLACE_WHITE)), -ODD_MOST, ODD_MOST);
+            s->place[i].residual = clampf(fmaxf(log - median, log - logf(PLACE_WHITE)), -MAX_RESIDUAL, MAX_RESIDUAL);
         }
     }
     mem_free(sorted);
@@ -122,7 +123,7 @@ void light_places_take(struct light_places *s, struct light_place *place, size_t
 
 void light_places_init(struct light_places *s, const struct survey *survey, const struct fused *shown) {
     struct light_place *place = mem_array(survey->count + 1, sizeof *place);
-    parallel_for(survey->r->pool, survey->count, gather_place, &(struct gathering){survey, shown, place});
+    parallel_for(survey->r->pool, survey->count, gather_place, &(struct places_gathering){survey, shown, place});
     light_places_take(s, place, survey->count);
 }
 

@@ -1,6 +1,5 @@
-/* light_places.h -- what is known of places all over the surface before missing light is looked for: what
- * photographs show, what a white surface would show by the light that is known, and how odd the base colour between
- * them is. */
+/* light_places.h -- sample places of the surface for the search of missing light: observed radiance, Lambert radiance
+ * at albedo 1 by known light, and the residual of their ratio, base colour. */
 #ifndef UNBAKE_LIGHT_LIGHT_PLACES_H
 #define UNBAKE_LIGHT_LIGHT_PLACES_H
 
@@ -18,11 +17,11 @@ struct light_place {
     uint32_t segment;
     struct surface_point at;
     rgb shown, white;
-    float odd;    /* logarithm of base colour, without more light, over the median of the segment or over white */
-    /* For whoever looks for light: */
-    float weight; /* 1, or less */
-    float lit;    /* what a white surface would show of a strength of 1 of the light that is tried */
-    float open;   /* the part of the disc of the sun that is tried which it sees */
+    float residual;    /* log(base colour / (median of the segment, or that of white paint)), without missing light */
+    /* Of the search: */
+    float weight; /* at most 1 */
+    float lit;    /* Lambert radiance at albedo 1 by the hypothetical light at strength 1 */
+    float open;   /* visible part of the disc of the hypothetical sun */
 };
 
 struct light_places {
@@ -30,22 +29,22 @@ struct light_places {
     struct light_place *place; /* [count] by segment; owned */
 };
 
-/* Takes over what a survey tells, of so many points at best. What photographs show of them is what `shown` has around
- * each or, where it has nothing or is NULL, what was fused there. */
+/* Makes the places from a survey. Observed radiance is that of `shown` around each, or fused radiance where that has
+ * none or is NULL. */
 #define LIGHT_PLACES 16384
 void light_places_init(struct light_places *places, const struct survey *survey, const struct fused *shown);
 /* From place[count] of which segment, at, shown, white and weight are known, in any order; takes it over. */
 void light_places_take(struct light_places *places, struct light_place *place, size_t count);
 /* `most` of them, evenly spread. */
 void light_places_thin(struct light_places *thin, const struct light_places *places, size_t most);
-/* Leaves out segments of which most is brighter than white: lamps, for all one knows. */
+/* Drops segments of which most is brighter than white paint could be: probably lamps. */
 void light_places_leave_out_lamps(struct light_places *places);
 void light_places_release(struct light_places *places);
 
 /* Where the segment of place `first` ends. */
 size_t light_places_end(const struct light_places *places, size_t first);
 
-/* So many are odder than that. */
-size_t light_places_odder(const struct light_places *places, float odd);
+/* Number of places of a greater residual. */
+size_t light_places_above(const struct light_places *places, float residual);
 
 #endif

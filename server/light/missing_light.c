@@ -10,7 +10,7 @@
  * known yet, may add to base colour, which makes dark surfaces less alike. */
 #define SPREAD_WITHIN 0.3f
 #define SPREAD_BEYOND 0.15f
-#define GLOSS 0.04f
+#define HIGHLIGHT_ALLOWANCE 0.04f
 /* Strengths tried: from one on that adds this share of the light that is known to what is lit, on average, each so
  * much stronger; then nearer and nearer to the best. */
 #define FAINTEST 0.01
@@ -28,7 +28,7 @@ static void ask_all(struct missing_light *m) {
 }
 
 void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches) {
-    *m = (struct missing_light){.places = places, .white = white, .in_patches = in_patches};
+    *m = (struct missing_light){.places = places, .max_albedo = white, .in_patches = in_patches};
     m->base = mem_array(places->count + 1, sizeof *m->base);
     m->sorted = mem_array(places->count + 1, sizeof *m->sorted);
     m->spread = mem_array(places->count + 1, sizeof *m->spread);
@@ -59,13 +59,13 @@ float missing_light_part(const struct light_place *p, float strength) {
     return part_of(p, strength, MISSING_MEAN);
 }
 
-/* From 0, as usual, to 1, not to be explained (Geman and McClure). */
+/* Robust loss in [0, 1) (Geman and McClure). */
 static double oddity(float off, float spread) {
     double e = (double)(off / spread);
     return e * e / (1.0 + e * e);
 }
 
-/* The median of base[first, end), of not too many of them. */
+/* Median of base[first, end), of MEDIAN_POINTS of them at most. */
 static float median_of(const struct missing_light *m, size_t first, size_t end) {
     size_t stride = (end - first + MEDIAN_POINTS - 1) / MEDIAN_POINTS, count = 0;
     for (size_t i = first; i < end; i += stride)
@@ -73,7 +73,7 @@ static float median_of(const struct missing_light *m, size_t first, size_t end) 
     return quantile(m->sorted, count, 0.5);
 }
 
-/* Fills base[first, end): logarithms. */
+/* Fills base[first, end) with logarithms. */
 static void find_base(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
     for (size_t i = first; i < end; i++) {
         const struct light_place *p = &m->places->place[i];
@@ -81,9 +81,9 @@ static void find_base(const struct missing_light *m, size_t first, size_t end, f
     }
 }
 
-/* Of base colours about a median. */
+/* Spread of base colours about a median. */
 static float spread_about(float median) {
-    return SPREAD_WITHIN + GLOSS * expf(-median);
+    return SPREAD_WITHIN + HIGHLIGHT_ALLOWANCE * expf(-median);
 }
 
 void missing_light_renew(struct missing_light *m) {
@@ -94,14 +94,14 @@ void missing_light_renew(struct missing_light *m) {
     }
 }
 
-/* How odd place i is, of whose segment's base colours that is the median. */
+/* Misfit of place i, given the median base colour of its segment. */
 static double place_misfit(const struct missing_light *m, size_t i, float median, float spread) {
     double within = oddity(m->base[i] - median, spread);
-    double beyond = oddity(fmaxf(m->base[i] - logf(m->white), 0.0f), SPREAD_BEYOND);
+    double beyond = oddity(fmaxf(m->base[i] - logf(m->max_albedo), 0.0f), SPREAD_BEYOND);
     return (double)(m->weight[i] * m->places->place[i].weight) * (within + beyond);
 }
 
-/* How odd the base colours of a segment are. */
+/* Misfit of a segment. */
 static double segment_misfit(const struct missing_light *m, size_t first, size_t end, float strength, int channel) {
     double sum = 0.0;
     find_base(m, first, end, strength, channel);
@@ -111,7 +111,7 @@ static double segment_misfit(const struct missing_light *m, size_t first, size_t
     return sum;
 }
 
-/* The same for all segments that the light reaches. */
+/* Misfit of all segments that the light reaches. */
 static double misfit(const struct missing_light *m, float strength, int channel) {
     double sum = 0.0;
     for (size_t first = 0, end; first < m->places->count; first = end) {
@@ -125,7 +125,7 @@ static double misfit(const struct missing_light *m, float strength, int channel)
     return sum;
 }
 
-/* Adds the places of a segment in question, with the light or without. */
+/* Adds the misfit of a segment's places, with the light or without. */
 static double share_misfit(const struct missing_light *m, size_t first, size_t end, float strength, float share,
                            bool with) {
     double sum = 0.0;

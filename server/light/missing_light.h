@@ -1,8 +1,8 @@
-/* missing_light.h -- how much less odd places would be if light came from somewhere that no photograph shows.
+/* missing_light.h -- misfit of the places' base colours, and how much a hypothetical light reduces it.
  *
- * At each place what photographs show is base colour times (light that is known + light that is missing). Base
- * colours differ little within a segment and are never above that of white paint: the right light, in the right
- * strength, makes them so. Both are judged robustly: a texture, or a lamp, is odd whatever is done about it. */
+ * A place's observed radiance is base colour times known plus missing light. Base colours vary little within a segment
+ * and do not exceed that of white paint; the right light at the right strength makes them so. The misfit is robust,
+ * since textures and lamps remain outliers under any light. */
 #ifndef UNBAKE_LIGHT_MISSING_LIGHT_H
 #define UNBAKE_LIGHT_MISSING_LIGHT_H
 
@@ -13,7 +13,7 @@
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
-    float white;                       /* base colours beyond it are odd */
+    float max_albedo;                       /* base colours beyond it are odd */
     bool in_patches;                   /* see missing_light_init */
     float *spread;                     /* [places->count] of a segment, at its first place; owned */
     float *weight;                     /* [places->count] 1, or how far a place is asked; owned */
@@ -26,11 +26,11 @@ struct missing_light {
 void missing_light_init(struct missing_light *m, const struct light_places *places, float white, bool in_patches);
 void missing_light_release(struct missing_light *m);
 
-/* Takes over places that changed. */
+/* To be called after the places changed. */
 void missing_light_renew(struct missing_light *m);
 
-/* The strength, times which its `lit` is added to a place's light, that explains most; 0: none does. How much less
- * odd the places of all segments that are lit at all are with it goes to *explained, in places. */
+/* Strength of the light with which misfit is least, `lit` times strength being added to a place's light; 0: no strength
+ * helps. *explained: reduction of misfit over all lit segments, in places. */
 float missing_light_strength(const struct missing_light *m, int channel, double *explained);
 
 /* The strength by channel of light that is known to be missing. A place counts by the square of the share of its light
@@ -38,17 +38,16 @@ float missing_light_strength(const struct missing_light *m, int channel, double 
  * a lamp in a corner brings a hundredth of their light, would agree about it. */
 rgb missing_light_color(struct missing_light *m);
 
-/* The share of a place's light that a strength of the one that is tried would be. */
+/* Part of a place's light that the hypothetical light would be. */
 float missing_light_part(const struct light_place *p, float strength);
 
-/* How odd the places are of whose light it would be such a share at least: without it and with it, in places, `count`
- * of them. */
+/* Misfit without and with the light, in places, over the `count` places of whose light it would be at least `share`. */
 struct missing_share {
     double count, before, after;
 };
 struct missing_share missing_light_share(const struct missing_light *m, float strength, float share);
 
-/* How odd all places are as they are, in places. */
+/* Misfit of all places without it, in places. */
 double missing_light_misfit(const struct missing_light *m);
 
 #endif

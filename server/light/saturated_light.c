@@ -9,18 +9,17 @@
 #include "server/light/lamps.h"
 #include "server/state/evidence.h"
 
-/* That a lamp is brighter than photographs tell must explain this share of what is odd in the room; more where one looks
- * out of it to where no photograph does: one of staircase2's lamps does .12 there, a box in redkitchen, most of whose
- * light is of that kind, .04. */
+/* Least reduction of the room's misfit, relative, by a brighter lamp; higher in open rooms (lamps_is_open). One of
+ * staircase2's lamps has .12 there; a box in redkitchen, most of whose light is from unobserved directions, .04. */
 #define EXPLAINS 0.01
 #define EXPLAINS_OPEN 0.08
-/* Nothing that a mesh has as a segment is so many times brighter than what saturates a photograph of its room. */
+/* Greatest credible ratio of a lamp's radiance to the level at which its photographs saturate. */
 #define TOO_BRIGHT 1000.0f
 /* The sky is asked for where this share of what is seen of it saturates: else what is unseen of it was not filled in
  * from a bound, and is unseen_light.h's. */
 #define SKY_SATURATED 0.5
 
-/* A segment that saturates, and how much it sheds. */
+/* A saturated segment, and its power. */
 struct saturated {
     uint32_t segment;
     double power;
@@ -37,7 +36,7 @@ static int by_power(const void *a, const void *b) {
     return (first->segment > second->segment) - (first->segment < second->segment);
 }
 
-/* The most powerful segments that saturate, as many as there is room for. */
+/* The saturated segments of the greatest power, at most LAMPS_MOST. */
 static void add_segments(struct lamps *l) {
     const struct reconstruction *r = l->r;
     struct saturated *found = mem_array(r->segments.count + 1, sizeof *found);
@@ -53,7 +52,7 @@ static void add_segments(struct lamps *l) {
     mem_free(found);
 }
 
-/* Puts the lamp that explains most into place `first`; false where it is not enough. */
+/* Moves the lamp that reduces misfit most to `first`; false if it is not enough. */
 static bool find_best(struct lamps *l, size_t first, double least_share) {
     double most = 0.0;
     size_t best = first;
@@ -72,7 +71,7 @@ static bool find_best(struct lamps *l, size_t first, double least_share) {
     return true;
 }
 
-/* Makes lamps brighter, as many as explain something. Returns their number: they are the first ones. */
+/* Brightens lamps for as long as one reduces misfit enough; returns their number, the first ones. */
 static size_t brighten(struct lamps *l) {
     size_t count = 0;
     double least_share = lamps_is_open(l) ? EXPLAINS_OPEN : EXPLAINS;

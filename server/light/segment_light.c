@@ -28,7 +28,7 @@ struct lighting {
     struct surface_point point[SEGMENT_LIGHT_POINTS];
 };
 
-/* What comes from a point, which stands for a disc, if nothing is between. */
+/* Irradiance from a point that represents a disc, with visibility. */
 static float disc_light(const struct surface_point *from, const struct surface_point *to, float area_m2) {
     vec3 way = vec3_sub(from->position, to->position);
     float square = vec3_dot(way, way), scale = 1.0f / sqrtf(fmaxf(square, 1e-20f));

@@ -13,16 +13,16 @@
 #define POINTS 1024        /* all over the room; those with this share of unseen directions tell of them */
 #define SHARE_LEAST 0.1f
 #define LEAST_POINTS 64
-#define WAYS 256           /* directions at a place */
+#define RAYS_PER_POINT 256           /* directions at a place */
 #define BRIGHTER_PLACES 0.75
 #define KEY_PLACES 31      /* keep these random numbers apart from others of the triangle */
-#define KEY_WAYS 37
+#define KEY_RAYS 37
 #define KEY_SUN 41
-/* What saturates in all photographs may be so much brighter than they tell: who takes too much light for granted splits
- * too little. */
+/* Assumed ratio of true to observed radiance where all photographs saturate. High, since overestimated light only makes
+ * fewer splits. */
 #define PERHAPS_BRIGHTER 16.0f
 /* The sun is looked for in so many directions; from the best ones on in steps that grow smaller. */
-#define SUN_WAYS 2048
+#define SUN_DIRECTIONS 2048
 #define SUN_BEST 8
 #define SUN_STEPS 96
 #define SUN_STEP 0.05f     /* radians, about half the spacing of the directions */
@@ -69,15 +69,15 @@ static size_t choose_places(const struct mesh *mesh, const uint32_t *triangle, s
 /* --- what arrives --------------------------------------------------------------------------------- */
 
 static void trace_ways(const struct shining *s, const struct shining_place *place, uint32_t key,
-                       struct accel_ray ray[WAYS], struct accel_hit hit[WAYS]) {
+                       struct accel_ray ray[RAYS_PER_POINT], struct accel_hit hit[RAYS_PER_POINT]) {
     vec3 frame[3] = {[2] = place->normal};
     vec3_frame(place->normal, &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < WAYS; i++) {
+    for (uint32_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
         ray[i] = (struct accel_ray){accel_offset(place->position, place->normal, direction), 0.0f, direction,
                                     INFINITY};
     }
-    accel_intersect_many(s->r->world.accel, WAYS, ray, hit);
+    accel_intersect_many(s->r->world.accel, RAYS_PER_POINT, ray, hit);
 }
 
 static float radiance_of(const struct shining *s, uint32_t triangle) {
@@ -107,15 +107,15 @@ static float distant_radiance(const struct shining *s, vec3 direction) {
 }
 
 static float white_at(const struct shining *s, const struct shining_place *place, uint32_t key) {
-    struct accel_ray ray[WAYS];
-    struct accel_hit hit[WAYS];
+    struct accel_ray ray[RAYS_PER_POINT];
+    struct accel_hit hit[RAYS_PER_POINT];
     double sum = 0.0;
     trace_ways(s, place, key, ray, hit);
-    for (size_t i = 0; i < WAYS; i++) {
+    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         bool far = hit[i].triangle == ACCEL_NONE;
         sum += (double)(far ? distant_radiance(s, ray[i].direction) : radiance_of(s, hit[i].triangle));
     }
-    return (float)(sum / WAYS);
+    return (float)(sum / RAYS_PER_POINT);
 }
 
 float shining_white(const struct shining *s, const uint32_t *triangle, size_t count) {
@@ -123,7 +123,7 @@ float shining_white(const struct shining *s, const uint32_t *triangle, size_t co
     float white[PLACES];
     size_t places = choose_places(&s->r->scene->mesh, triangle, count, PLACES, place);
     for (size_t i = 0; i < places; i++)
-        white[i] = white_at(s, &place[i], sampler_key(KEY_WAYS, triangle[0], (uint32_t)i));
+        white[i] = white_at(s, &place[i], sampler_key(KEY_RAYS, triangle[0], (uint32_t)i));
     return quantile(white, places, BRIGHTER_PLACES);
 }
 
@@ -134,29 +134,29 @@ struct survey {
     struct unseen_point point[POINTS];
 };
 
-/* What arrives at a place, known and not. */
+/* Lambert radiance at a place, by known and unknown light. */
 static void look_around(void *user, size_t index, int thread) {
     (void)thread;
     struct survey *survey = user;
     const struct shining *s = survey->shining;
     uint32_t triangle = s->room[index].triangle;
     struct unseen_point *p = &survey->point[index];
-    struct accel_ray ray[WAYS];
-    struct accel_hit hit[WAYS];
+    struct accel_ray ray[RAYS_PER_POINT];
+    struct accel_hit hit[RAYS_PER_POINT];
     *p = (struct unseen_point){.segment = s->r->segments.of_triangle[triangle], .shown = s->light->mean[triangle]};
-    trace_ways(s, &s->room[index], sampler_key(KEY_WAYS, triangle, 0), ray, hit);
-    for (size_t i = 0; i < WAYS; i++) {
+    trace_ways(s, &s->room[index], sampler_key(KEY_RAYS, triangle, 0), ray, hit);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 direction = ray[i].direction;
         if (hit[i].triangle != ACCEL_NONE || is_seen(s, direction)) {
             bool far = hit[i].triangle == ACCEL_NONE;
-            p->known += (far ? distant_radiance(s, direction) : radiance_of(s, hit[i].triangle)) / WAYS;
+            p->known += (far ? distant_radiance(s, direction) : radiance_of(s, hit[i].triangle)) / RAYS_PER_POINT;
             continue;
         }
-        p->filled += distant_radiance(s, direction) / WAYS;
-        p->unseen += 1.0f / WAYS;
+        p->filled += distant_radiance(s, direction) / RAYS_PER_POINT;
+        p->unseen += 1.0f / RAYS_PER_POINT;
         struct unseen_corners c = unseen_corners(direction);
         for (int k = 0; k < 4; k++)
-            p->share[c.cell[k]] += c.weight[k] / WAYS;
+            p->share[c.cell[k]] += c.weight[k] / RAYS_PER_POINT;
     }
 }
 
@@ -179,8 +179,7 @@ static void find_segment_means(struct shining *s) {
     mem_free(pixels);
 }
 
-/* As unseen_light.h has it, but that it is done in any case: who takes too much light for granted splits too
- * little. */
+/* The fit of unseen_light.h, made unconditionally: overestimated light only makes fewer splits. */
 static void find_unseen_light(struct shining *s) {
     const struct reconstruction *r = s->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -244,7 +243,7 @@ static float share_open(const struct sunlight *sun, const struct shining_place *
     return (float)open / (float)count;
 }
 
-/* How much more of the part than of what is beside it sees out in a direction. */
+/* Visibility of a direction from the part, less that from beside it. */
 static float contrast(const struct sunlight *sun, vec3 direction) {
     float lit = share_open(sun, sun->lit, sun->lit_count, direction);
     return lit > SUN_CONTRAST ? lit - share_open(sun, sun->beside, sun->beside_count, direction) : lit - 1.0f;
@@ -274,20 +273,20 @@ static size_t choose_beside(struct sunlight *sun, const struct mesh *mesh, const
     return near_count < LEAST_BESIDE ? 0 : chosen;
 }
 
-struct candidate {
+struct shining_candidate {
     vec3 direction;
     float contrast;
 };
 
 /* Climbs from a direction to better ones near it. */
-static void climb(const struct sunlight *sun, struct candidate *c, uint32_t key) {
+static void climb(const struct sunlight *sun, struct shining_candidate *c, uint32_t key) {
     float step = SUN_STEP;
     for (uint32_t i = 0; i < SUN_STEPS && step > SUN_SMALLEST && c->contrast < SUN_CONTRAST; i++) {
         vec3 s, t;
         vec3_frame(c->direction, &s, &t);
         vec2 u = sampler_pair(key, i, 0);
         vec3 moved = vec3_mad(c->direction, step * (2.0f * u.x - 1.0f), s);
-        struct candidate next = {.direction = vec3_normalize(vec3_mad(moved, step * (2.0f * u.y - 1.0f), t))};
+        struct shining_candidate next = {.direction = vec3_normalize(vec3_mad(moved, step * (2.0f * u.y - 1.0f), t))};
         next.contrast = contrast(sun, next.direction);
         if (next.contrast > c->contrast)
             *c = next;
@@ -296,7 +295,7 @@ static void climb(const struct sunlight *sun, struct candidate *c, uint32_t key)
     }
 }
 
-/* Whether what light from a direction would fall on, all over the room, is no brighter than the rest. */
+/* Whether the places that a direction reaches are no brighter than the rest of the room. */
 static bool is_contradicted(const struct sunlight *sun, vec3 direction) {
     const struct shining *s = sun->shining;
     float value[2][POINTS];
@@ -313,22 +312,22 @@ bool shining_is_sunlit(const struct shining *s, const uint32_t *lit, size_t lit_
                        size_t unlit_count) {
     const struct mesh *mesh = &s->r->scene->mesh;
     struct sunlight sun = {.shining = s, .accel = s->r->world.accel};
-    struct candidate best[SUN_BEST];
+    struct shining_candidate best[SUN_BEST];
     sun.lit_count = choose_places(mesh, lit, lit_count, PLACES, sun.lit);
     sun.beside_count = choose_beside(&sun, mesh, unlit, unlit_count);
     if (sun.beside_count == 0)
         return false;
     for (int k = 0; k < SUN_BEST; k++)
-        best[k] = (struct candidate){.direction = sun.lit[0].normal, .contrast = -2.0f};
+        best[k] = (struct shining_candidate){.direction = sun.lit[0].normal, .contrast = -2.0f};
     uint32_t key = sampler_key(KEY_SUN, lit[0], 0);
     vec3 frame[3] = {[2] = sun.lit[0].normal};
     vec3_frame(frame[2], &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < SUN_WAYS; i++) {
-        struct candidate c = {.direction = incident_cosine_direction(frame, sampler_pair(key, i, 0))};
+    for (uint32_t i = 0; i < SUN_DIRECTIONS; i++) {
+        struct shining_candidate c = {.direction = incident_cosine_direction(frame, sampler_pair(key, i, 0))};
         c.contrast = contrast(&sun, c.direction);
         for (int k = 0; k < SUN_BEST; k++) {
             if (c.contrast > best[k].contrast) {
-                struct candidate worse = best[k];
+                struct shining_candidate worse = best[k];
                 best[k] = c;
                 c = worse;
             }

@@ -1,10 +1,9 @@
-/* shining.h -- whether a part of the surface sends out light of its own, told from photographs alone, before
- * anything is known of materials.
+/* shining.h -- tests whether a part of the surface may emit, from photographs alone, before materials are known.
  *
- * Two questions. Is it brighter than a white surface could be there? What arrives is gathered by rays, which read
- * what photographs show of the triangles that they meet. And if so, may something far away shine on
- * this part only, through an opening: the sun? Then there is a direction in which one sees out from the part
- * and not from beside it, and what else it reaches through openings is brighter than the rest of the room. */
+ * Two tests. Is it brighter than a white surface could be there? Incident light is gathered by rays that read the
+ * observed radiance of the triangles they meet. If so, may it be sunlit through an opening? Then there is a direction
+ * that is unoccluded from the part and occluded beside it, and everything else that this direction reaches is brighter
+ * than the rest of the room. */
 #ifndef UNBAKE_LIGHT_SHINING_H
 #define UNBAKE_LIGHT_SHINING_H
 
@@ -32,8 +31,8 @@ struct shining {
 void shining_init(struct shining *s, const struct reconstruction *r, const struct triangle_light *light);
 void shining_release(struct shining *s);
 
-/* Radiance (mean of the channels) that a white surface would send out at the brighter places of count > 0
- * triangles. Thread-safe, as is the next. */
+/* Upper quartile over count > 0 triangles of Lambert radiance at albedo 1, mean of the channels. Thread-safe, as is the
+ * next. */
 float shining_white(const struct shining *s, const uint32_t *triangle, size_t count);
 
 /* Whether light from one direction may fall on the triangles `lit` and not on those of `unlit` that are near them. */

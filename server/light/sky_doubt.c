@@ -9,10 +9,10 @@
 #include "server/state/evidence.h"
 
 #define PLACES 64
-#define WAYS 64
+#define RAYS_PER_POINT 64
 #define KEY_DOUBT 0x5d0b7u
 
-/* What comes to a place from there, by the cosine. */
+/* Cosine-weighted mean radiance from unobserved sky at a place. */
 static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
     struct surface_point at;
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
@@ -21,13 +21,13 @@ static float unseen_light_at(const struct reconstruction *r, uint32_t texel) {
     vec3 frame[3] = {[2] = at.shading};
     vec3_frame(at.shading, &frame[0], &frame[1]);
     float sum = 0.0f;
-    for (uint32_t i = 0; i < WAYS; i++) {
+    for (uint32_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 d = incident_cosine_direction(frame, sampler_pair(key, i, 0));
         if (vec3_dot(d, at.normal) > 0.0f && !environment_is_seen(&r->environment, d) &&
             !accel_occluded(r->world.accel, accel_offset(at.position, at.normal, d), d, 0.0f, INFINITY))
             sum += rgb_mean(lights_environment(r->world.lights, d));
     }
-    return sum / WAYS;
+    return sum / RAYS_PER_POINT;
 }
 
 float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count) {

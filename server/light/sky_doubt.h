@@ -13,8 +13,8 @@
 
 #include "server/state/reconstruction.h"
 
-/* Radiance (mean of the channels) that a white surface at the brighter of texel[count], all of one segment, would send
- * of what the map of r->world's environment holds in directions that no photograph shows; 0 without a map. Thread-safe. */
+/* Lambert radiance at albedo 1 (mean of the channels), at the brighter of texel[count], all of one segment, by the
+ * unobserved directions of the map of r->world's environment; 0 without a map. Thread-safe. */
 float sky_doubt(const struct reconstruction *r, const uint32_t *texel, size_t count);
 
 #endif

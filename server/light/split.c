@@ -27,12 +27,12 @@
 #define LEAST_PIXELS 100.0f
 #define LEAST_SHARE 0.05f
 #define LEAST_CONTRAST 2.0f
-/* What shows less than this share of its part is mixed with what is beside it. */
+/* Triangles below this part of their part's radiance are mixed with their neighbours. */
 #define PURE 0.3f
-/* What is cut off from the rest of the segment by a part and smaller than this share of it belongs to it. */
+/* A piece that a part cuts off from its segment is added to the part if it is smaller than this part of it. */
 #define HOLE 0.02f
 
-struct job {
+struct split_job {
     const struct reconstruction *r;
     struct shining shining;
     struct triangle_light light;
@@ -49,8 +49,8 @@ struct job {
 };
 
 /* A segment at one level. */
-struct level {
-    const struct job *job;
+struct split_level {
+    const struct split_job *job;
     const uint32_t *triangle; /* [triangle_count] of the segment */
     size_t triangle_count;
     uint32_t segment;
@@ -68,17 +68,17 @@ static uint32_t root_of(uint32_t *parent, uint32_t t) {
     return t;
 }
 
-static bool is_lit(const struct level *l, uint32_t t) {
+static bool is_lit(const struct split_level *l, uint32_t t) {
     return !l->job->settled[t] && l->job->light.observed[t] >= l->bright;
 }
 
-static bool is_rest(const struct level *l, uint32_t t) {
+static bool is_rest(const struct split_level *l, uint32_t t) {
     return l->job->part[t] == 0;
 }
 
-/* Joins neighbours of the segment that both belong to what is asked for. */
-static void connect(const struct level *l, bool (*belongs)(const struct level *l, uint32_t t)) {
-    const struct job *job = l->job;
+/* Joins neighbouring triangles of the set. */
+static void connect(const struct split_level *l, bool (*belongs)(const struct split_level *l, uint32_t t)) {
+    const struct split_job *job = l->job;
     for (size_t i = 0; i < l->triangle_count; i++)
         job->parent[l->triangle[i]] = l->triangle[i];
     for (size_t i = 0; i < l->triangle_count; i++) {
@@ -95,16 +95,16 @@ static void connect(const struct level *l, bool (*belongs)(const struct level *l
 
 /* --- a part --------------------------------------------------------------------------------------- */
 
-static float area_of(const struct job *job, uint32_t t) {
+static float area_of(const struct split_job *job, uint32_t t) {
     return 0.5f * vec3_length(mesh_cross(&job->r->scene->mesh, t));
 }
 
-struct measure {
+struct split_measure {
     float pixels, shown; /* what they fill together; the median of what they show */
 };
 
-static struct measure measure(const struct level *l, const uint32_t *triangle, size_t count) {
-    struct measure m = {0.0f, 0.0f};
+static struct split_measure measure(const struct split_level *l, const uint32_t *triangle, size_t count) {
+    struct split_measure m = {0.0f, 0.0f};
     for (size_t i = 0; i < count; i++) {
         m.pixels += l->job->light.pixels[triangle[i]];
         l->value[i] = l->job->light.observed[triangle[i]];
@@ -113,7 +113,7 @@ static struct measure measure(const struct level *l, const uint32_t *triangle, s
     return m;
 }
 
-static size_t collect_unlit(const struct level *l) {
+static size_t collect_unlit(const struct split_level *l) {
     size_t count = 0;
     for (size_t i = 0; i < l->triangle_count; i++) {
         float shown = l->job->light.observed[l->triangle[i]];
@@ -123,9 +123,9 @@ static size_t collect_unlit(const struct level *l) {
     return count;
 }
 
-/* Makes the part's own what it cuts off from the rest and is small: dark writing on a bright screen. */
-static void fill_holes(const struct level *l, size_t lit_count, uint32_t part) {
-    const struct job *job = l->job;
+/* Adds small enclosed pieces to a part: dark writing on a bright screen. */
+static void fill_holes(const struct split_level *l, size_t lit_count, uint32_t part) {
+    const struct split_job *job = l->job;
     float area = 0.0f;
     connect(l, is_rest);
     for (size_t i = 0; i < l->triangle_count; i++)
@@ -154,7 +154,7 @@ static void fill_holes(const struct level *l, size_t lit_count, uint32_t part) {
 }
 
 /* Keeps those of the part's triangles that show it alone. All of them are settled. */
-static size_t settle(const struct level *l, size_t lit_count, float shown) {
+static size_t settle(const struct split_level *l, size_t lit_count, float shown) {
     size_t kept = 0;
     for (size_t i = 0; i < lit_count; i++) {
         uint32_t t = l->lit[i];
@@ -165,17 +165,18 @@ static size_t settle(const struct level *l, size_t lit_count, float shown) {
     return kept;
 }
 
-static void make_part(const struct level *l, size_t lit_count) {
+static void make_part(const struct split_level *l, size_t lit_count) {
     uint32_t part = ++l->job->count[l->segment];
     for (size_t i = 0; i < lit_count; i++)
         l->job->part[l->lit[i]] = part;
     fill_holes(l, lit_count, part);
 }
 
-/* Looks at one connected set of what shows at least the level. */
-static void try_part(const struct level *l, size_t lit_count, const struct measure *unlit, size_t unlit_count) {
-    const struct job *job = l->job;
-    struct measure lit = measure(l, l->lit, lit_count);
+/* Tests one connected set of triangles of at least the level's radiance. */
+static void try_part(const struct split_level *l, size_t lit_count, const struct split_measure *unlit,
+                     size_t unlit_count) {
+    const struct split_job *job = l->job;
+    struct split_measure lit = measure(l, l->lit, lit_count);
     if (lit.pixels < LEAST_PIXELS || l->bright < job->needed[l->lit[0]])
         return;
     float white = shining_white(&job->shining, l->lit, lit_count);
@@ -203,9 +204,9 @@ static int by_root(const void *a, const void *b) {
     return x->triangle < y->triangle ? -1 : x->triangle > y->triangle;
 }
 
-static void try_level(const struct level *l) {
+static void try_level(const struct split_level *l) {
     size_t unlit_count = collect_unlit(l), members = 0;
-    struct measure unlit = measure(l, l->unlit, unlit_count);
+    struct split_measure unlit = measure(l, l->unlit, unlit_count);
     connect(l, is_lit);
     for (size_t i = 0; i < l->triangle_count; i++) {
         if (is_lit(l, l->triangle[i]))
@@ -222,7 +223,7 @@ static void try_level(const struct level *l) {
 
 /* --- all segments --------------------------------------------------------------------------------- */
 
-static float brightest(const struct job *job, const uint32_t *triangle, size_t count) {
+static float brightest(const struct split_job *job, const uint32_t *triangle, size_t count) {
     float bright = 0.0f;
     for (size_t i = 0; i < count; i++)
         bright = fmaxf(bright, job->light.observed[triangle[i]]);
@@ -231,9 +232,9 @@ static float brightest(const struct job *job, const uint32_t *triangle, size_t c
 
 static void try_segment(void *user, size_t segment, int thread) {
     (void)thread;
-    struct job *job = user;
+    struct split_job *job = user;
     size_t count = job->first[segment + 1] - job->first[segment];
-    struct level l = {.job = job, .triangle = job->triangle + job->first[segment], .triangle_count = count,
+    struct split_level l = {.job = job, .triangle = job->triangle + job->first[segment], .triangle_count = count,
                       .segment = (uint32_t)segment, .bright = job->first_level};
     float most = brightest(job, l.triangle, count);
     if (!(most >= l.bright))
@@ -250,7 +251,7 @@ static void try_segment(void *user, size_t segment, int thread) {
     mem_free(l.lit);
 }
 
-static void sort_triangles(struct job *job) {
+static void sort_triangles(struct split_job *job) {
     const struct segments *segments = &job->r->segments;
     size_t triangles = job->r->scene->mesh.triangle_count;
     job->first = mem_calloc(segments->count + 2, sizeof *job->first);
@@ -265,7 +266,7 @@ static void sort_triangles(struct job *job) {
 }
 
 /* Numbers the parts after the segments, in the order of these. */
-static void number_parts(struct split *split, const struct job *job, struct segments *segments) {
+static void number_parts(struct split *split, const struct split_job *job, struct segments *segments) {
     split->old_count = segments->count;
     for (size_t s = 0; s < split->old_count; s++)
         split->part_count += job->count[s];
@@ -286,7 +287,7 @@ static void number_parts(struct split *split, const struct job *job, struct segm
 
 void split_segments(struct split *split, struct reconstruction *r, const struct views *views) {
     size_t triangles = r->scene->mesh.triangle_count;
-    struct job job = {.r = r, .first_level = FIRST_LEVEL * views->median_radiance};
+    struct split_job job = {.r = r, .first_level = FIRST_LEVEL * views->median_radiance};
     *split = (struct split){0};
     triangle_light_measure(&job.light, views, r->pool);
     shining_init(&job.shining, r, &job.light);

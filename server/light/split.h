@@ -1,17 +1,12 @@
-/* split.h -- parts of segments that shine become segments of their own.
+/* split.h -- splits bright parts off their segments.
  *
- * A segment emits as a whole or not at all, and a screen in its bezel, or a bulb in its fixture, often is one
- * segment with it, given or made from the shape. Here a connected part of a segment is split off that all
- * over shows more than a white surface could reflect of what arrives there, while what is left of the
- * segment is at most half as bright and of some size as well. It says nothing yet of what emits: that is
- * decided later, for all segments alike (emitters.h).
+ * A segment emits as a whole or not at all, but a screen and its bezel, or a bulb and its fixture, often are one
+ * segment. A connected part is split off if all of it is brighter than a white surface could be there, and the rest of
+ * the segment is at most half as bright and large enough. Whether the part emits is decided later, as for all segments
+ * (solve.c). White paint, highlights (bright from some directions only) and sun patches are not split off (shining.h).
  *
- * What is only painted white, a highlight (shining from some places only) and a patch of sun are left
- * where they are (shining.h).
- *
- * Limits. Triangles are not cut: a lit part of one is not found. Nor is a screen that shows less than white
- * paper in its place would. Light of a sun that no photograph shows, through an opening that the mesh does
- * not have, makes what it falls on look like something that shines. */
+ * Limits: triangles are not cut, so a lit part of one is not found; nor is a screen darker than white paper in its
+ * place. Sunlight of an unobserved sun, through an opening that the mesh lacks, looks like an emitter. */
 #ifndef UNBAKE_LIGHT_SPLIT_H
 #define UNBAKE_LIGHT_SPLIT_H
 

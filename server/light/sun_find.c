@@ -26,11 +26,11 @@ static const float radius_degrees[] = {0.27f, 0.6f, 1.2f, 2.0f, 3.0f, 4.5f, 6.0f
 #define EXPLAINS 0.7
 /* Where the best of the likeliest directions explains less than this part of that there is none. */
 #define HOPEFUL 0.25
-/* Nor does one make white paper brighter than this many times the room: 100,000 lux over 10. */
+/* Greatest credible ratio of sunlit white paper to the room's median: 100,000 lux over 10. */
 #define BRIGHTEST 1e4f
 #define STEPS 24 /* to better directions, or to smaller steps */
 
-struct search {
+struct sun_search {
     struct reconstruction *r;
     float median_radiance; /* of the room */
     struct light_places places;
@@ -39,8 +39,8 @@ struct search {
     int rays;              /* a point, to see how much of it is open */
 };
 
-/* A direction and how odd what it lights is. */
-struct candidate {
+/* A direction and the misfit of the places that it lights. */
+struct sun_candidate {
     vec3 direction;
     double score;
 };
@@ -48,24 +48,24 @@ struct candidate {
 /* --- directions ------------------------------------------------------------------------------------ */
 
 struct asked {
-    const struct search *s;
+    const struct sun_search *s;
     size_t count;
     uint32_t *place;           /* [count] */
     float *weight;             /* [count] places of the room that it stands for */
     double mean, deviation;    /* of how odd places are */
-    struct candidate *candidate;
+    struct sun_candidate *candidate;
 };
 
 static void ask_direction(void *user, size_t index, int thread) {
     (void)thread;
     const struct asked *a = user;
-    struct candidate *c = &a->candidate[index];
+    struct sun_candidate *c = &a->candidate[index];
     struct sun sun = {.direction = c->direction};
     double sum = 0.0, weights = 0.0;
     for (size_t i = 0; i < a->count; i++) {
         const struct light_place *p = &a->s->places.place[a->place[i]];
         double weight = (double)(a->weight[i] * sun_visibility(&sun, a->s->r->world.accel, &p->at, 1));
-        sum += weight * ((double)p->odd - a->mean);
+        sum += weight * ((double)p->residual - a->mean);
         weights += weight;
     }
     c->score = sum / (sqrt(weights + 1.0) * a->deviation);
@@ -75,10 +75,10 @@ static void ask_direction(void *user, size_t index, int thread) {
 static void choose_asked(struct asked *a, bool bright) {
     size_t all = 0, met = 0, first = a->count;
     for (size_t i = 0; i < a->s->places.count; i++)
-        all += (a->s->places.place[i].odd > PLACE_BRIGHT) == bright;
+        all += (a->s->places.place[i].residual > PLACE_BRIGHT) == bright;
     size_t wanted = all < ASKED_POINTS ? all : ASKED_POINTS;
     for (size_t i = 0; i < a->s->places.count && a->count - first < wanted; i++) {
-        if ((a->s->places.place[i].odd > PLACE_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
+        if ((a->s->places.place[i].residual > PLACE_BRIGHT) == bright && met++ == (a->count - first) * all / wanted) {
             a->weight[a->count] = (float)all / (float)wanted;
             a->place[a->count++] = (uint32_t)i;
         }
@@ -86,12 +86,12 @@ static void choose_asked(struct asked *a, bool bright) {
 }
 
 static int by_score(const void *a, const void *b) {
-    const struct candidate *first = a, *second = b;
+    const struct sun_candidate *first = a, *second = b;
     return (first->score < second->score) - (first->score > second->score);
 }
 
 /* Fills candidate[CANDIDATES] with the likeliest unseen directions; returns their number. */
-static size_t ask_directions(const struct search *s, struct candidate candidate[CANDIDATES]) {
+static size_t ask_directions(const struct sun_search *s, struct sun_candidate candidate[CANDIDATES]) {
     struct asked a = {.s = s};
     size_t rows = (size_t)(180.0 / ASKED_DEGREES), count = 0;
     a.place = mem_array(2 * ASKED_POINTS, sizeof *a.place);
@@ -108,8 +108,8 @@ static size_t ask_directions(const struct search *s, struct candidate candidate[
     }
     double squares = 0.0;
     for (size_t i = 0; i < s->places.count; i++) {
-        a.mean += (double)s->places.place[i].odd / (double)s->places.count;
-        squares += (double)(s->places.place[i].odd * s->places.place[i].odd) / (double)s->places.count;
+        a.mean += (double)s->places.place[i].residual / (double)s->places.count;
+        squares += (double)(s->places.place[i].residual * s->places.place[i].residual) / (double)s->places.count;
     }
     a.deviation = sqrt(fmax(squares - a.mean * a.mean, 1e-12));
     choose_asked(&a, true);
@@ -128,14 +128,14 @@ static size_t ask_directions(const struct search *s, struct candidate candidate[
 
 static void shine_on(void *user, size_t index, int thread) {
     (void)thread;
-    struct search *s = user;
+    struct sun_search *s = user;
     struct light_place *p = &s->places.place[index];
     p->open = sun_visibility(&s->sun, s->r->world.accel, &p->at, s->rays);
     p->lit = p->open > 0.0f ? p->open * vec3_dot(s->sun.direction, p->at.shading) : 0.0f;
 }
 
-/* How much a sun in a direction explains. */
-static double try_direction(struct search *s, vec3 direction) {
+/* Reduction of misfit by a sun in a direction. */
+static double try_direction(struct sun_search *s, vec3 direction) {
     double explained;
     s->sun.direction = direction;
     parallel_for(s->r->pool, s->places.count, shine_on, s);
@@ -144,7 +144,7 @@ static double try_direction(struct search *s, vec3 direction) {
 }
 
 /* Moves the best direction by ever smaller steps for as long as more is explained. */
-static void walk(struct search *s, struct candidate *best, double degrees, double least_degrees) {
+static void walk(struct sun_search *s, struct sun_candidate *best, double degrees, double least_degrees) {
     for (int i = 0; i < STEPS && degrees >= least_degrees; i++) {
         bool moved = false;
         vec3 middle = best->direction, across, up;
@@ -153,7 +153,7 @@ static void walk(struct search *s, struct candidate *best, double degrees, doubl
         for (int k = 0; k < 8; k++) {
             float angle = (float)k * 0.25f * BSDF_PI;
             vec3 d = vec3_mad(vec3_mad(middle, step * cosf(angle), across), step * sinf(angle), up);
-            struct candidate other = {vec3_normalize(d), 0.0};
+            struct sun_candidate other = {vec3_normalize(d), 0.0};
             other.score = try_direction(s, other.direction);
             if (other.score > best->score)
                 *best = other, moved = true;
@@ -163,16 +163,16 @@ static void walk(struct search *s, struct candidate *best, double degrees, doubl
     }
 }
 
-/* So many places that are odder than this the sun lights; one that sees half of it is half a place. */
-static double count_lit(const struct search *s, float odd) {
+/* Sunlit places of a greater residual, each weighted by the visible part of the disc. */
+static double count_lit(const struct sun_search *s, float residual) {
     double lit = 0.0;
     for (size_t i = 0; i < s->places.count; i++)
-        lit += s->places.place[i].odd > odd ? (double)s->places.place[i].open : 0.0;
+        lit += s->places.place[i].residual > residual ? (double)s->places.place[i].open : 0.0;
     return lit;
 }
 
-static struct candidate best_direction(struct search *s) {
-    struct candidate candidate[CANDIDATES], best = {.score = 0.0};
+static struct sun_candidate best_direction(struct sun_search *s) {
+    struct sun_candidate candidate[CANDIDATES], best = {.score = 0.0};
     size_t count = ask_directions(s, candidate);
     s->rays = 1;
     for (size_t i = 0; i < count; i++) {
@@ -189,8 +189,8 @@ static struct candidate best_direction(struct search *s) {
     return best;
 }
 
-/* False where the light is wider than a disc. */
-static bool find_radius(struct search *s, struct candidate *best) {
+/* False if the light is wider than a disc. */
+static bool find_radius(struct sun_search *s, struct sun_candidate *best) {
     size_t radius = 0;
     best->score = 0.0;
     s->rays = DISC_RAYS;
@@ -208,8 +208,8 @@ static bool find_radius(struct search *s, struct candidate *best) {
 /* --- the whole ------------------------------------------------------------------------------------- */
 
 /* Fills s->sun; the share of what it lights that it explains goes to *explains. */
-static void look_for_sun(struct search *s, double *explains) {
-    struct candidate best = best_direction(s);
+static void look_for_sun(struct sun_search *s, double *explains) {
+    struct sun_candidate best = best_direction(s);
     if (!(best.score > 0.0))
         return;
     bool is_disc = find_radius(s, &best);
@@ -221,7 +221,7 @@ static void look_for_sun(struct search *s, double *explains) {
     s->sun.irradiance = rgb_scale(white, BSDF_PI);
 }
 
-static void report(const struct search *s, double explains) {
+static void report(const struct sun_search *s, double explains) {
     const struct reconstruction *r = s->r;
     cJSON *figures = cJSON_AddObjectToObject(r->report, "sun");
     json_add_bool(figures, "found", r->sun.is_there);
@@ -241,7 +241,7 @@ void sun_report(const struct reconstruction *r) {
 }
 
 void sun_find(struct reconstruction *r, const struct views *views) {
-    struct search s = {.r = r, .median_radiance = views->median_radiance};
+    struct sun_search s = {.r = r, .median_radiance = views->median_radiance};
     double explains = 0.0;
     struct survey survey;
     survey_lights_on(r, views, NULL);
@@ -251,7 +251,7 @@ void sun_find(struct reconstruction *r, const struct views *views) {
     survey_lights_off(r);
     light_places_leave_out_lamps(&s.places);
     missing_light_init(&s.missing, &s.places, PLACE_WHITE, true);
-    if (light_places_odder(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
+    if (light_places_above(&s.places, PLACE_BRIGHT) >= LEAST_BRIGHT)
         look_for_sun(&s, &explains);
     r->sun = s.sun;
     report(&s, explains);

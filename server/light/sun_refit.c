@@ -9,7 +9,7 @@
 #include "server/render/bsdf.h"
 #include "server/scene/surface.h"
 
-/* By so much a channel changes at most: what asks for more is no polish. */
+/* Greatest factor by which a channel is changed; a greater one means another error. */
 #define CHANGE_MOST 2.0f
 
 static bool tells(const struct divide *d, uint32_t texel) {

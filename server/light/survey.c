@@ -62,7 +62,7 @@ static void leave_out(struct survey *s, const bool *without) {
 }
 
 /* A surface that photographs show, and do not only tell how bright it is at least, and that is no lamp. */
-static bool tells(const struct reconstruction *r, const bool *without, uint32_t texel) {
+static bool is_usable(const struct reconstruction *r, const bool *without, uint32_t texel) {
     uint32_t segment = reconstruction_segment(r, texel);
     return r->fused.count[texel] > 0.0f && !r->fused.is_bound[texel] && rgb_is_black(r->materials.emission[segment]) &&
            !(without && without[segment]);
@@ -72,12 +72,12 @@ static void choose_points(struct survey *s, const bool *without, size_t points) 
     const struct reconstruction *r = s->r;
     size_t seen = 0, met = 0;
     for (size_t i = 0; i < r->inverse.valid_count; i++)
-        seen += tells(r, without, r->inverse.valid[i]);
+        seen += is_usable(r, without, r->inverse.valid[i]);
     size_t wanted = seen < points ? seen : points;
     s->texel = mem_array(wanted + 1, sizeof *s->texel);
     for (size_t i = 0; i < r->inverse.valid_count && s->count < wanted; i++) {
         uint32_t texel = r->inverse.valid[i];
-        if (tells(r, without, texel) && met++ == s->count * seen / wanted)
+        if (is_usable(r, without, texel) && met++ == s->count * seen / wanted)
             s->texel[s->count++] = texel;
     }
 }

@@ -1,10 +1,9 @@
-/* unseen_fit.h -- how much light comes from the unseen directions (unseen_light.h), by what it does to
- * points of the surface.
+/* unseen_fit.h -- fits radiance of unobserved directions (unseen_light.h) to points of the surface.
  *
- * Unknown is the logarithm of a coarse latitude-longitude map (layout of world.h), linear between the
- * centres of its cells. What a point shows is base colour times the light that is known and that of the map.
- * Robust Gauss-Newton, with a pull of neighbouring cells to each other, makes base colours alike within a
- * segment and not whiter than white; a factor on the whole then leaves nine tenths of them below that. */
+ * The unknown is the logarithm of a coarse latitude-longitude map (layout of world.h), bilinear between the centres of
+ * its cells. A point's radiance is base colour times Lambert radiance, by known light and by the map. Robust
+ * Gauss-Newton with a smoothness prior makes base colours similar within a segment and plausible; a common factor then
+ * leaves nine tenths of them below that of white paint. */
 #ifndef UNBAKE_LIGHT_UNSEEN_FIT_H
 #define UNBAKE_LIGHT_UNSEEN_FIT_H
 
@@ -24,17 +23,15 @@ struct unseen_corners {
 };
 struct unseen_corners unseen_corners(vec3 direction);
 
-/* One point: the radiance that it shows; what a white surface there would send back of the light that is
- * known, and of what was filled in; and which shares of its rays, by cosine, go to each cell. Means of the
- * channels. */
+/* One point: its observed radiance; Lambert radiance at albedo 1 by known light, and by filled-in light; and the parts
+ * of its cosine-distributed rays that go to each cell. Means of the channels. */
 struct unseen_point {
     uint32_t segment;
     float shown, known, filled;
     float unseen, share[UNSEEN_CELLS]; /* unseen: the sum of the shares */
 };
 
-/* Base colour that part `below` of the points do not exceed under a map, or, if it is NULL, under what was
- * filled in. */
+/* Quantile `below` of the points' base colour under a map, or, if it is NULL, under the filled-in light. */
 double unseen_base_color(const struct unseen_point *point, size_t count, double below, const double *log_radiance);
 
 /* Fills the map. Segments of the points are below segment_count. */

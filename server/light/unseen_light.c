@@ -10,7 +10,7 @@
 #include "server/render/sampler.h"
 
 #define POINTS 2048
-#define WAYS 512 /* directions a point */
+#define RAYS_PER_POINT 512 /* directions a point */
 #define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
 /* A point speaks of the unseen directions where they have this share of its rays; so many must. */
 #define SHARE_LEAST 0.1f
@@ -51,13 +51,13 @@ static void look_around(void *user, size_t index, int thread) {
         return;
     vec3 frame[3] = {[2] = at.shading};
     vec3_frame(at.shading, &frame[0], &frame[1]);
-    for (uint32_t i = 0; i < WAYS; i++)
+    for (uint32_t i = 0; i < RAYS_PER_POINT; i++)
         in->direction[i] = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-    incident_trace(in, field, &at, key, 0, WAYS);
-    for (size_t i = 0; i < WAYS; i++) {
+    incident_trace(in, field, &at, key, 0, RAYS_PER_POINT);
+    for (size_t i = 0; i < RAYS_PER_POINT; i++) {
         if (!in->escapes[i])
             continue;
-        float share = 1.0f / WAYS; /* of the ray, that is unseen */
+        float share = 1.0f / RAYS_PER_POINT; /* of the ray, that is unseen */
         if (u->angle)
             share *= 1.0f - kept_of_filled(u, environment_cell(&r->environment, in->direction[i]));
         p->filled += share * rgb_mean(in->radiance[i]);
@@ -67,7 +67,7 @@ static void look_around(void *user, size_t index, int thread) {
             p->share[c.cell[k]] += share * c.weight[k];
     }
     struct irradiance light;
-    irradiance_gather(&light, in, field, &at, key, WAYS);
+    irradiance_gather(&light, in, field, &at, key, RAYS_PER_POINT);
     p->known = fmaxf(rgb_mean(irradiance_diffuse(&light, at.shading, 1.0f, at.shading)) - p->filled, 0.0f);
     p->shown = rgb_mean(fused_radiance(&r->fused, texel));
 }

@@ -32,14 +32,14 @@ const struct highlight_levels specular_levels = {
 };
 
 /* Places of a patch, and the irradiance at each. */
-struct patch {
+struct specular_patch {
     size_t count;
     struct surface_point at[PATCH * PATCH];
     struct irradiance light[PATCH * PATCH];
 };
 
 /* Places around a texel that are in its chart and have similar normals. */
-static void patch_around(const struct specular_observer *l, uint32_t texel, float side, struct patch *patch) {
+static void patch_around(const struct specular_observer *l, uint32_t texel, float side, struct specular_patch *patch) {
     const struct reconstruction *r = l->r;
     struct surface_point at;
     patch->count = 0;
@@ -64,7 +64,7 @@ static void patch_around(const struct specular_observer *l, uint32_t texel, floa
 
 /* Mean radiance of the patch in a photograph. False unless every place faces the camera, has a valid sample and is no
  * nearer to an edge than class `edge`. */
-static bool patch_observed(const struct views *views, const struct view *view, const struct patch *patch, int edge,
+static bool patch_observed(const struct views *views, const struct view *view, const struct specular_patch *patch, int edge,
                         rgb *observed) {
     const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
     *observed = rgb_gray(0.0f);
@@ -84,7 +84,7 @@ static bool patch_observed(const struct views *views, const struct view *view, c
 }
 
 /* Radiance that each candidate reflects towards a photograph, mean over the patch. */
-static void predict(const struct specular_observer *l, const struct patch *patch, uint32_t texel, uint32_t train,
+static void predict(const struct specular_observer *l, const struct specular_patch *patch, uint32_t texel, uint32_t train,
                     struct incident *scratch, struct specular_observation *observation) {
     float share = 1.0f / (float)patch->count;
     memset(observation->unit_diffuse, 0, sizeof observation->unit_diffuse);
@@ -108,7 +108,7 @@ static void predict(const struct specular_observer *l, const struct patch *patch
 
 static bool observe_texel(const struct specular_observer *l, uint32_t texel, struct specular_criteria criteria,
                           struct incident *scratch, struct specular_point *point) {
-    struct patch patch;
+    struct specular_patch patch;
     struct view view[VIEWS_TRIED];
     size_t observed_count = 0;
     point->count = 0;

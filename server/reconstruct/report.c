@@ -140,11 +140,11 @@ static void render_view(struct reconstruction *r, struct photograph *photo, stru
 }
 
 /* Mean over the views that have a value; a view without valid pixels has none. */
-struct mean {
+struct metric_mean {
     double sum, count;
 };
 
-static void mean_add(struct mean *mean, double value) {
+static void mean_add(struct metric_mean *mean, double value) {
     if (isnan(value))
         return;
     mean->sum += value;
@@ -163,7 +163,7 @@ enum status report_held_out(struct reconstruction *r, const struct views *views,
     double pixels_left = 0.0;
     for (size_t i = 0; i < scene->photograph_count; i++)
         pixels_left += scene->photograph[i].is_test ? pixels_of(&scene->photograph[i]) : 0.0;
-    struct mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
+    struct metric_mean msre = {0}, render_noise = {0}, photograph_noise = {0}, psnr = {0}, ssim = {0};
     r->held_out = mem_calloc(total + 1, sizeof *r->held_out);
     for (size_t i = 0; i < scene->photograph_count; i++) {
         if (!scene->photograph[i].is_test)
