@@ -76,9 +76,9 @@ void lamps_hand_over(const struct lamps *l, size_t count);
 /* Whether there are lamps that were handed over. */
 bool lamps_are_estimated(const struct reconstruction *r);
 
-/* Fits all of them again, with what texels send out, those too that no photograph shows, as `field` has it; `shown` is as
- * in lamps_survey. Where that is NULL the sky is fitted again as well, and the factor by which it changes noted in
- * r->sky_factor. The world is without emitters after it. */
+/* Fits all of them again with the outgoing radiance of `field`, which unobserved texels have too; `shown` is as in
+ * lamps_survey. With NULL the sky is fitted again as well, and the factor of its change is stored in r->sky_factor.
+ * Leaves the world without emitters. */
 void lamps_refit(struct reconstruction *r, const struct views *views, const struct light_field *field,
                  const struct fused *shown);
 
