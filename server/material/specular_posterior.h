@@ -40,7 +40,7 @@ struct specular_posterior {
     double diffuse, roughness, specular;
 };
 
-/* Posterior of `segment`, whose told[segment].any must be true; told[count]. */
+/* Posterior of `segment`, whose evidence[segment].is_observed must be true; evidence[count]. */
 struct specular_posterior specular_posterior(const struct specular_evidence *evidence, size_t count, size_t segment);
 
 #endif

@@ -23,7 +23,7 @@ static void log_light(const struct reconstruction *r, const struct light_found *
     snprintf(line, sizeof line,
              "calibration: %zu exposures solved%s%s%s; photographs of one place now differ by %.3f "
              "(rms of the logarithm), before by %.3f",
-             found->exposures_solved, found->drift ? ", told exposures drift" : "",
+             found->exposures_solved, found->drift ? ", given exposures drift" : "",
              found->white_balance ? ", white balance changes" : "", vignette, found->spread_after,
              found->spread_before);
     hooks->log(hooks->user, line);
