@@ -7,7 +7,7 @@
 
 #include "common/exr_reader.h"
 
-struct comparison {
+struct exr_comparison {
     const struct image *image;
     int channel[IMAGE_MAX_CHANNELS]; /* of the picture, for each of the file's */
     size_t wrong_count;
@@ -29,7 +29,7 @@ static bool is_float_of(uint32_t bits, float value) {
     return found == value || (isnan(found) && isnan(value));
 }
 
-static void note_wrong(struct comparison *c, const struct exr_row *row, uint32_t i, float found) {
+static void note_wrong(struct exr_comparison *c, const struct exr_row *row, uint32_t i, float found) {
     if (c->wrong_count++ > 0)
         return;
     c->first_channel = c->channel[row->channel];
@@ -39,7 +39,7 @@ static void note_wrong(struct comparison *c, const struct exr_row *row, uint32_t
 }
 
 static void compare_row(void *user, const struct exr_row *row) {
-    struct comparison *c = user;
+    struct exr_comparison *c = user;
     size_t stride = c->image->channel_count;
     const uint8_t *at = row->values;
     const float *value = c->image->pixel + ((size_t)row->y * c->image->width + row->x) * stride +
@@ -63,7 +63,7 @@ static void compare_row(void *user, const struct exr_row *row) {
 
 static enum status compare(const struct exr_reader *r, const struct image *image, const struct image *header,
                            struct error *err) {
-    struct comparison c = {.image = image};
+    struct exr_comparison c = {.image = image};
     const char *path = r->stream->source->name;
     if (header->width != image->width || header->height != image->height ||
         exr_data_width(r) != image->width || exr_data_height(r) != image->height)

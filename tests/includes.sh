@@ -84,6 +84,10 @@ if ! circle=$(units | tsort 2>&1 >/dev/null); then
     printf 'these include each other:\n%s\n' "$circle"
     bad=1
 fi
+# A reader who searches for a struct finds one.
+tags=$(grep -rhoE '^(typedef |static )?(const )?struct [a-z_0-9]+ \{' common client server --include='*.[ch]' |
+    sed -E 's/.*struct ([a-z_0-9]+) \{/\1/' | sort | uniq -d)
+[ -z "$tags" ] || { printf 'structs of the same name: %s\n' "$tags"; bad=1; }
 silent=$(grep -L 'check_result()' tests/{unit,gradient,render,api,chaos,soak}/test_*.c 2>/dev/null)
 [ -z "$silent" ] || { printf 'cannot fail, for want of check_result:\n%s\n' "$silent"; bad=1; }
 exit $bad

@@ -10,7 +10,7 @@
 #define OCCLUSION_MARGIN 0.01f   /* an occluder is nearer than the point by this share of its distance; by hand */
 
 /* A held-out photograph. */
-struct held_out {
+struct held_out_photograph {
     struct photograph *photo;
     struct pyramid pyramid;
     struct pose_frame frame;
@@ -20,7 +20,7 @@ struct held_out {
 
 struct held_out_set {
     const struct pose_solver *solver;
-    struct held_out *held_out;
+    struct held_out_photograph *held_out;
     double *consensus;     /* [track_count] consensus of each track at this level; NAN: unknown */
     int level;
 };
@@ -34,7 +34,7 @@ struct track_sample {
 
 /* --- visible tracks ------------------------------------------------------------------------------ */
 
-static bool sees(const struct held_out *h, const struct accel *accel, const struct track *track, float *depth_m) {
+static bool sees(const struct held_out_photograph *h, const struct accel *accel, const struct track *track, float *depth_m) {
     const struct camera *camera = &h->frame.before;
     vec3 origin = camera_origin(camera), to = vec3_sub(track->point, origin);
     vec3 normal = vec3_normalize(vec3_cross(track->right, track->down));
@@ -48,7 +48,7 @@ static void find_tracks(void *user, size_t index, int thread) {
     (void)thread;
     const struct held_out_set *all = user;
     const struct pose_solver *s = all->solver;
-    struct held_out *h = &all->held_out[index];
+    struct held_out_photograph *h = &all->held_out[index];
     double depth_sum_m = 0.0;
     h->track = mem_array(s->track_count + 1, sizeof *h->track);
     for (size_t i = 0; i < s->track_count; i++) {
@@ -64,7 +64,7 @@ static void find_tracks(void *user, size_t index, int thread) {
 /* --- alignment ----------------------------------------------------------------------------------- */
 
 /* Residuals and derivatives of the tracks that the frame shows; returns their number. */
-static size_t evaluate_tracks(const struct held_out_set *all, const struct held_out *h, struct track_sample *sample) {
+static size_t evaluate_tracks(const struct held_out_set *all, const struct held_out_photograph *h, struct track_sample *sample) {
     size_t count = 0;
     for (size_t k = 0; k < h->count; k++) {
         const struct track *track = all->solver->track[h->track[k]];
@@ -97,7 +97,7 @@ static double scale_of(const struct track_sample *sample, size_t count, double o
 }
 
 /* One step of the robust least squares, from which the offset is eliminated. */
-static void step(const struct held_out_set *all, struct held_out *h, const struct track_sample *sample, size_t count,
+static void step(const struct held_out_set *all, struct held_out_photograph *h, const struct track_sample *sample, size_t count,
                  double *scratch) {
     double a[POSE_UNKNOWNS][POSE_UNKNOWNS] = {{0.0}}, b[POSE_UNKNOWNS] = {0.0}, d[POSE_UNKNOWNS] = {0.0};
     double offset = offset_of(sample, count, scratch), weights = 0.0, residual_sum = 0.0;
@@ -132,7 +132,7 @@ static void step(const struct held_out_set *all, struct held_out *h, const struc
 static void align(void *user, size_t index, int thread) {
     (void)thread;
     const struct held_out_set *all = user;
-    struct held_out *h = &all->held_out[index];
+    struct held_out_photograph *h = &all->held_out[index];
     struct track_sample *sample = mem_array(h->count + 1, sizeof *sample);
     double *scratch = mem_array(h->count + 1, sizeof *scratch);
     for (int round = 0; round < POSE_ROUNDS; round++) {
@@ -149,7 +149,7 @@ static void align(void *user, size_t index, int thread) {
 
 /* Robust costs of the held-out tracks, by place in h->track; NAN elsewhere. Returns the number of tracks shown, held
  * out or not. */
-static size_t costs(const struct held_out_set *all, const struct held_out *h, const struct camera *camera, double scale,
+static size_t costs(const struct held_out_set *all, const struct held_out_photograph *h, const struct camera *camera, double scale,
                     double *cost) {
     double *residual = mem_array(2 * h->count + 1, sizeof *residual), *scratch = residual + h->count;
     size_t count = 0;
@@ -169,7 +169,7 @@ static size_t costs(const struct held_out_set *all, const struct held_out *h, co
 }
 
 /* Root mean squared distance between the tracks' image positions in both cameras, pixels. */
-static double shift_of(const struct held_out_set *all, const struct held_out *h) {
+static double shift_of(const struct held_out_set *all, const struct held_out_photograph *h) {
     double squares = 0.0, count = 0.0;
     for (size_t k = 0; k < h->count; k++) {
         double square = pose_squared_shift(&h->frame.before, &h->frame.now, all->solver->track[h->track[k]]->point);
@@ -184,7 +184,7 @@ static double shift_of(const struct held_out_set *all, const struct held_out *h)
 static void judge(void *user, size_t index, int thread) {
     (void)thread;
     const struct held_out_set *all = user;
-    struct held_out *h = &all->held_out[index];
+    struct held_out_photograph *h = &all->held_out[index];
     double *before = mem_array(2 * h->count + 1, sizeof *before), *now = before + h->count;
     struct validation v = {0};
     size_t seen = costs(all, h, &h->frame.before, h->frame.scale, before);
@@ -217,8 +217,8 @@ static size_t init_all(struct held_out_set *all, struct scene *scene) {
         struct photograph *photo = &scene->photograph[i];
         if (!photo->is_test)
             continue;
-        struct held_out *h = &all->held_out[count++];
-        *h = (struct held_out){.photo = photo};
+        struct held_out_photograph *h = &all->held_out[count++];
+        *h = (struct held_out_photograph){.photo = photo};
         pose_frame_init(&h->frame, &photo->camera);
         tracks_pyramid(tracks, photo, &h->pyramid);
     }
@@ -238,7 +238,7 @@ size_t held_out_poses_align(struct scene *scene, struct pose_solver *s, int coar
     }
     parallel_for(pool, count, judge, &all);
     for (size_t i = 0; i < count; i++) {
-        struct held_out *h = &all.held_out[i];
+        struct held_out_photograph *h = &all.held_out[i];
         if (!h->frame.is_fixed) {
             h->photo->camera = h->frame.now;
             squares += h->frame.shift_px * h->frame.shift_px;

@@ -136,7 +136,7 @@ static enum status file_has_faces(const char *root, const char *name, bool *has,
 }
 
 /* Mesh files at the top level. */
-struct candidates {
+struct bundle_candidates {
     char **name; /* [count] sorted */
     size_t count;
     size_t point_cloud_count;
@@ -145,7 +145,7 @@ struct candidates {
 };
 
 /* Among PLY files, or among files of the other formats. */
-static enum status find_candidates(struct candidates *c, const char *root, bool ply, struct error *err) {
+static enum status find_candidates(struct bundle_candidates *c, const char *root, bool ply, struct error *err) {
     static const char *const unknown[] = {"stl", "fbx", "off", "usd", "usdz", "dae", "3ds"};
     for (size_t i = 0; i < c->count; i++) {
         bool has_faces;
@@ -171,7 +171,7 @@ static enum status find_candidates(struct candidates *c, const char *root, bool 
 /* The only PLY with faces at the top level, else the only mesh of another format. NULL with a problem when there is
  * none or more than one. */
 static enum status search_mesh(const char *root, char **found, struct findings *f, struct error *err) {
-    struct candidates c = {0};
+    struct bundle_candidates c = {0};
     struct error two;
     enum status status = list_folder(root, &c.name, &c.count, err);
     if (status == STATUS_OK)

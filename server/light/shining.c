@@ -129,7 +129,7 @@ float shining_white(const struct shining *s, const uint32_t *triangle, size_t co
 
 /* --- light from directions that nobody sees ------------------------------------------------------- */
 
-struct survey {
+struct shining_survey {
     const struct shining *shining;
     struct unseen_point point[POINTS];
 };
@@ -137,7 +137,7 @@ struct survey {
 /* Lambert radiance at a place, by known and unknown light. */
 static void look_around(void *user, size_t index, int thread) {
     (void)thread;
-    struct survey *survey = user;
+    struct shining_survey *survey = user;
     const struct shining *s = survey->shining;
     uint32_t triangle = s->room[index].triangle;
     struct unseen_point *p = &survey->point[index];
@@ -183,7 +183,7 @@ static void find_segment_means(struct shining *s) {
 static void find_unseen_light(struct shining *s) {
     const struct reconstruction *r = s->r;
     const struct mesh *mesh = &r->scene->mesh;
-    struct survey *survey = mem_alloc(sizeof *survey);
+    struct shining_survey *survey = mem_alloc(sizeof *survey);
     uint32_t *shown = mem_array(mesh->triangle_count + 1, sizeof *shown);
     size_t count = 0, kept = 0;
     double unseen = 0.0;

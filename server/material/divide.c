@@ -88,7 +88,7 @@ static bool sharpen(const struct divide *d, const struct view *view, uint32_t tr
 }
 
 /* An observation whose highlight is not gathered yet. */
-struct candidate {
+struct divide_candidate {
     struct view view;
     rgb observed, unit_diffuse;
     float weight, mixing;
@@ -96,17 +96,17 @@ struct candidate {
 };
 
 /* The photographs of a texel with the greatest weights. */
-struct candidates {
+struct divide_candidates {
     struct best best;
     struct best_item item[MEASURED_OBSERVATIONS];
-    struct candidate candidate[MEASURED_OBSERVATIONS];
+    struct divide_candidate candidate[MEASURED_OBSERVATIONS];
 };
 
 /* Adds photograph `train` of the texel if it has a valid sample there and is among the best. */
 static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
-                       const struct irradiance *light, uint32_t train, struct candidates *of) {
+                       const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[train]];
-    struct candidate c;
+    struct divide_candidate c;
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
@@ -131,7 +131,7 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
 }
 
 static struct robust_sample observation_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
-                                    const struct candidate *c, struct incident *scratch) {
+                                    const struct divide_candidate *c, struct incident *scratch) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = reconstruction_segment(d->r, texel);
     float median = d->views->median_radiance, weight = c->weight;
@@ -166,7 +166,7 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
 static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch,
                         struct irradiance *light, struct measured_observations *observations) {
     struct surface_point at;
-    struct candidates candidates;
+    struct divide_candidates candidates;
     observations->count = 0;
     if (!light_at(d, texel, &at, light))
         return;

@@ -26,6 +26,12 @@ for library in $(objdump -p "$build/unbaked" "$build/unbake" 2>/dev/null | awk '
     grep -qw -- "${package%%:*}" <<<"$runtime" || fail "deploy/Dockerfile's second stage lacks ${package%%:*} ($library)"
 done
 
+# --- client and server share no global name: a library of both could be made ---
+names() { nm -g --defined-only "$1" 2>/dev/null | awk 'NF == 3 {print $3}' | sort -u; }
+[ "$(names "$build/libclient.a" | wc -l)" -gt 50 ] || fail "libclient.a has no names"
+shared=$(comm -12 <(names "$build/libclient.a") <(names "$build/libserver.a") | tr '\n' ' ')
+[ -z "$shared" ] || fail "client and server both define $shared"
+
 # --- installing ---
 make -s install B="$build" PREFIX=/usr ZSH_COMPLETIONS=/usr/share/zsh/vendor-completions DESTDIR="$work/root" \
     >"$work/out" 2>&1 || fail "make install: $(tail -n 5 "$work/out")"
