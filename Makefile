@@ -50,7 +50,7 @@ FUZZ_BIN = $(patsubst tests/%.c,$(B)/tests/%,$(FUZZ_SRC))
 BUILD = echo building... && $(MAKE) -s $(if $(filter -j%,$(MAKEFLAGS)),,-j$(shell nproc))
 
 .PHONY: all help deps man deb demo test tests check check-build benches bench fidelity rooms sensitivity paper chaos soak asan tsan asan-build tsan-build fuzz \
-        fuzzers fuzz-build portable coverage coverage-build install clean
+        fuzzers fuzz-build portable format coverage coverage-build install clean
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -204,6 +204,10 @@ coverage: deps ## run the tests and say what share of the code they reach; write
 	@deploy/install-deps.sh coverage
 	@+$(BUILD) coverage-build
 	@tests/coverage.sh build/coverage "$(T)"
+
+format: ## lay out all C files as .clang-format has it (clang-format 14)
+	@deploy/install-deps.sh format
+	@git ls-files -z '*.c' '*.h' | xargs -0 $$(command -v clang-format-14 || echo clang-format) -i
 
 portable: deps ## build and check on the next Debian (trixie), in a throw-away root under build/portable; needs root
 	@deploy/install-deps.sh portable

@@ -151,8 +151,7 @@ int version_run(struct client *c, const struct options *o) {
     else if (c->json)
         print_versions_json(c, reply.json);
     else {
-        printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(),
-               archive_version_details());
+        printf("unbake %s, libcurl %s, %s\n", UNBAKE_VERSION, request_library_version(), archive_version_details());
         if (status == STATUS_OK)
             print_server(c, reply.json);
         else

@@ -77,8 +77,7 @@ int client_fail(struct client *c, const struct reply *reply, const struct error 
         print_problem_json(reply, err, code);
         return code;
     }
-    fprintf(stderr, "%sunbake:%s ", terminal_colour(&c->err, COLOUR_RED),
-            terminal_colour(&c->err, COLOUR_NONE));
+    fprintf(stderr, "%sunbake:%s ", terminal_colour(&c->err, COLOUR_RED), terminal_colour(&c->err, COLOUR_NONE));
     put_clean(stderr, err->message);
     fputs("\n", stderr);
     if (reply && reply->json)
@@ -162,9 +161,7 @@ const cJSON *member_items(const cJSON *object, const char *key) {
     return cJSON_IsArray(value) ? value : NULL;
 }
 
-const char *member_name(const cJSON *member) {
-    return member->string ? member->string : "";
-}
+const char *member_name(const cJSON *member) { return member->string ? member->string : ""; }
 
 double time_parse(const char *text) {
     struct tm time = {0};
@@ -187,8 +184,7 @@ double time_since(const char *text) {
 
 /* --- jobs and lists ------------------------------------------------------------------------ */
 
-enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply,
-                          struct error *err) {
+enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply, struct error *err) {
     if (strcmp(word, "last") == 0) {
         enum status status = request_get(c->request, "/v1/jobs?limit=1", reply, err);
         if (status != STATUS_OK)
@@ -211,8 +207,8 @@ enum status client_job_get(struct client *c, int64_t id, struct reply *reply, st
     return request_get(c->request, path, reply, err);
 }
 
-enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items,
-                        struct reply *reply, struct error *err) {
+enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items, struct reply *reply,
+                        struct error *err) {
     char *cursor = NULL;
     enum status status;
     *items = cJSON_CreateArray();

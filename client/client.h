@@ -75,20 +75,19 @@ void field_print(struct client *c, const char *name, const char *value);
 void client_print_json(struct client *c, const cJSON *value);
 
 /* The job that a word names: its number, or `last` for the newest. */
-enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply,
-                          struct error *err);
+enum status client_job_id(struct client *c, const char *word, int64_t *id, struct reply *reply, struct error *err);
 /* GET /v1/jobs/ID. */
 enum status client_job_get(struct client *c, int64_t id, struct reply *reply, struct error *err);
 /* Collects `items` over all pages of a list ("/v1/jobs?state=failed"), at most `limit` (0: all). */
-enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items,
-                        struct reply *reply, struct error *err);
+enum status client_list(struct client *c, const char *path, size_t limit, cJSON **items, struct reply *reply,
+                        struct error *err);
 
 /* Members of a reply, with what stands for absent, null and another type: "", `fallback`. */
 const char *member_text(const cJSON *object, const char *key);
 double member_number(const cJSON *object, const char *key, double fallback);
 int64_t member_whole(const cJSON *object, const char *key, int64_t fallback); /* also beyond 2^53 */
-const cJSON *member_items(const cJSON *object, const char *key); /* an array or NULL */
-const char *member_name(const cJSON *member); /* "" where it is an item of an array */
+const cJSON *member_items(const cJSON *object, const char *key);              /* an array or NULL */
+const char *member_name(const cJSON *member);                                 /* "" where it is an item of an array */
 
 /* Unix time of an RFC 3339 time in UTC ("2024-05-06T07:08:09.123Z"); NaN for anything else. */
 double time_parse(const char *text);

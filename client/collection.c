@@ -26,15 +26,16 @@ static int list(struct client *c, const struct options *o, const struct collecti
     int code = CLIENT_OK;
     long limit = options_whole(o, "limit", 20);
     reply_init(&reply);
-    enum status status =
-        limit < 0 ? error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit)
-                  : client_list(c, what->path, (size_t)limit, &items, &reply, &err);
+    enum status status = limit < 0 ? error_set(&err, STATUS_INPUT, "--limit must be 0 or more, not %ld", limit)
+                                   : client_list(c, what->path, (size_t)limit, &items, &reply, &err);
     if (status != STATUS_OK)
         code = client_fail(c, &reply, &err);
     else if (c->json)
         client_print_json(c, items);
     else if (c->quiet)
-        cJSON_ArrayForEach(item, items) { client_say(c, "%s", member_text(item, "id")); }
+        cJSON_ArrayForEach(item, items) {
+            client_say(c, "%s", member_text(item, "id"));
+        }
     else if (cJSON_GetArraySize(items) == 0)
         client_note(c, "no %s", what->name);
     else
@@ -87,10 +88,12 @@ static int one(struct client *c, const struct collection *what, const char *id, 
         what->print_one(c, reply.json);
     else if (!c->quiet) {
         retention_sentence(kept, reply.json);
-        bool is_used = cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
-        client_say(c, "%s %.12s is %s", what->one, id, *kept      ? kept
-                                                       : is_used ? "in use, and kept at least as long"
-                                                                 : "kept until it is removed");
+        bool is_used =
+            cJSON_IsString(cJSON_GetObjectItemCaseSensitive(body, "expires_at")); /* its time does not count yet */
+        client_say(c, "%s %.12s is %s", what->one, id,
+                   *kept     ? kept
+                   : is_used ? "in use, and kept at least as long"
+                             : "kept until it is removed");
     }
     buf_release(&path);
     reply_release(&reply);
@@ -121,8 +124,8 @@ static enum status read_verb(const struct options *o, const struct collection *w
 }
 
 /* An option that the verb does not take was meant for another one. */
-static enum status check_options(const struct options *o, const struct collection *what, enum verb verb,
-                                 bool keeps, struct error *err) {
+static enum status check_options(const struct options *o, const struct collection *what, enum verb verb, bool keeps,
+                                 struct error *err) {
     if (verb == VERB_KEEP && !keeps)
         return error_set(err, STATUS_INPUT, "%s keep needs --pin, --unpin or --keep-days N", what->name);
     if (verb != VERB_KEEP && keeps)

@@ -5,9 +5,9 @@
 #include "client/client.h"
 
 struct collection {
-    const char *name; /* of the command, "scenes" */
-    const char *one;  /* "scene" */
-    const char *path; /* "/v1/scenes" */
+    const char *name;                                        /* of the command, "scenes" */
+    const char *one;                                         /* "scene" */
+    const char *path;                                        /* "/v1/scenes" */
     void (*print_all)(struct client *c, const cJSON *items); /* at least one */
     void (*print_one)(struct client *c, const cJSON *thing);
 };

@@ -13,8 +13,7 @@
 static const struct client_option no_options[] = {{0}};
 
 const struct client_option command_shared_options[] = {
-    {"server", 0, OPTION_TEXT, "URL",
-     "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
+    {"server", 0, OPTION_TEXT, "URL", "where unbaked listens; else $UNBAKE_SERVER, else " PROTOCOL_DEFAULT_SERVER},
     {"ca", 0, OPTION_TEXT, "FILE", "certificates (PEM) to trust for https; else $UNBAKE_CA, else the system's"},
     {"json", 0, OPTION_FLAG, NULL, "print JSON, also for errors (those go to stderr)"},
     {"quiet", 'q', OPTION_FLAG, NULL, "print only what was asked for: no progress, no remarks"},
@@ -33,8 +32,8 @@ static const struct command table[] = {
      "  unbake submit room.zip --name kitchen --set texture_size=4096 --set seed=7\n"
      "  unbake submit --scene 3f2a91c0 --set quality=fine --priority 5\n",
      0, 1, submit_options, submit_run},
-    {"list", "", "list jobs, newest first", "",
-     "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0, list_options, list_run},
+    {"list", "", "list jobs, newest first", "", "  unbake list\n  unbake list --state failed --limit 5\n", 0, 0,
+     list_options, list_run},
     {"show", "JOB", "show one job: state, settings, outputs", "",
      "  unbake show 17\n  unbake show last --json | jq .settings\n", 1, 1, no_options, show_run},
     {"watch", "JOB", "follow a job until it ends",
@@ -45,20 +44,19 @@ static const struct command table[] = {
      "its environment.\n",
      "  unbake watch last\n  unbake watch 17 --exec 'notify-send \"$UNBAKE_NAME: $UNBAKE_STATE\"'\n  unbake watch 17 --json --all | jq -c 'select(.event == \"metric\").data'\n",
      1, 1, watch_options, watch_run},
-    {"logs", "JOB", "print what the job's log says so far", "",
-     "  unbake logs 17\n  unbake logs last --follow\n", 1, 1, logs_options, logs_run},
+    {"logs", "JOB", "print what the job's log says so far", "", "  unbake logs 17\n  unbake logs last --follow\n", 1, 1,
+     logs_options, logs_run},
     {"get", "JOB [NAME...]", "fetch a job's outputs, also while it runs",
      "Fetches all outputs, or those named; a NAME may be a pattern such as 'preview/*'. Files that\n"
      "are there already with the right SHA-256 are left alone, and a fetch that was broken off goes\n"
      "on where it stopped (NAME.part). Each file gets its name only when its SHA-256 is right.\n",
-     "  unbake get 17 -o room-textures\n  unbake get last base_color.exr 'preview/*'\n", 1, ANY_NUMBER,
-     get_options, get_run},
-    {"cancel", "JOB...", "end jobs for good", "", "  unbake cancel 17\n", 1, ANY_NUMBER, no_options,
-     cancel_run},
-    {"pause", "JOB...", "stop jobs after a checkpoint, and let them wait", "", "  unbake pause 17\n", 1,
-     ANY_NUMBER, no_options, pause_run},
-    {"resume", "JOB...", "queue paused jobs again; they go on from their checkpoints", "",
-     "  unbake resume 17\n", 1, ANY_NUMBER, no_options, resume_run},
+     "  unbake get 17 -o room-textures\n  unbake get last base_color.exr 'preview/*'\n", 1, ANY_NUMBER, get_options,
+     get_run},
+    {"cancel", "JOB...", "end jobs for good", "", "  unbake cancel 17\n", 1, ANY_NUMBER, no_options, cancel_run},
+    {"pause", "JOB...", "stop jobs after a checkpoint, and let them wait", "", "  unbake pause 17\n", 1, ANY_NUMBER,
+     no_options, pause_run},
+    {"resume", "JOB...", "queue paused jobs again; they go on from their checkpoints", "", "  unbake resume 17\n", 1,
+     ANY_NUMBER, no_options, resume_run},
     {"retry", "JOB...", "queue failed or cancelled jobs again, attempts counted anew",
      "They go on from their checkpoints. With --from, also those that succeeded: that stage and all\n"
      "after it are done anew. Stages are load, prepare, fuse, solve, refine, report and export.\n",
@@ -68,36 +66,35 @@ static const struct command table[] = {
      "  unbake redeliver 17\n", 1, ANY_NUMBER, no_options, redeliver_run},
     {"extend", "JOB", "let a job that has ended go on for longer",
      "It goes on from its checkpoint, which the server keeps for a while.\n",
-     "  unbake extend 17 --looks 1000\n  unbake extend last --time 3600\n", 1, 1, extend_options,
-     extend_run},
+     "  unbake extend 17 --looks 1000\n  unbake extend last --time 3600\n", 1, 1, extend_options, extend_run},
     {"edit", "JOB...", "change the name, priority, labels, place in the queue or time of removal", "",
-     "  unbake edit 17 --priority 10\n  unbake edit 17 --before 12\n  unbake edit last --name kitchen\n",
-     1, ANY_NUMBER, edit_options, edit_run},
+     "  unbake edit 17 --priority 10\n  unbake edit 17 --before 12\n  unbake edit last --name kitchen\n", 1, ANY_NUMBER,
+     edit_options, edit_run},
     {"rm", "JOB...", "remove jobs that do not run, with their outputs", "",
      "  unbake rm 12 13\n  unbake rm 12 --dry-run\n", 1, ANY_NUMBER, rm_options, rm_run},
     {"scenes", "[show|keep|rm SCENE...]", "list uploaded rooms, show, keep or remove them",
      "A SCENE is an id or its beginning, 8 digits or more. What the server removes by itself, and when,\n"
      "is in the column `expires`.\n",
      "  unbake scenes\n  unbake scenes show 3f2a91c0\n  unbake scenes keep 3f2a91c0 --pin\n"
-     "  unbake scenes rm 3f2a91c0 --dry-run\n", 0, ANY_NUMBER, collection_options, scenes_run},
+     "  unbake scenes rm 3f2a91c0 --dry-run\n",
+     0, ANY_NUMBER, collection_options, scenes_run},
     {"uploads", "[show|keep|rm UPLOAD...]", "list uploads, show, keep or give them up",
      "`unbake submit` of the same room goes on where an upload stopped. One that is whole has become\n"
      "a scene.\n",
      "  unbake uploads\n  unbake uploads keep 5f0c77d2a5e14b0e8f6f0c9f4b6f8d11 --keep-days 7\n", 0, ANY_NUMBER,
      collection_options, uploads_run},
     {"collect", "", "remove what has expired, now (admins)",
-     "The server does so by itself once a minute or as it is configured.\n",
-     "  unbake collect --dry-run\n", 0, 0, collect_options, collect_run},
+     "The server does so by itself once a minute or as it is configured.\n", "  unbake collect --dry-run\n", 0, 0,
+     collect_options, collect_run},
     {"login", "", "keep a server's token for the commands that follow",
      "Reads the token from stdin, asks the server whose it is, and keeps it in a file that nobody else\n"
      "can read, ~/.config/unbake/tokens. $UNBAKE_TOKEN goes before it.\n",
-     "  unbake login --server https://lab.example.org\n  unbake login <token.txt\n", 0, 0, no_options,
-     login_run},
+     "  unbake login --server https://lab.example.org\n  unbake login <token.txt\n", 0, 0, no_options, login_run},
     {"logout", "", "forget it", "", "  unbake logout\n", 0, 0, no_options, logout_run},
     {"settings", "[NAME...]", "list what --set can set, with ranges and defaults", "",
      "  unbake settings\n  unbake settings texture_size\n", 0, ANY_NUMBER, no_options, settings_run},
-    {"version", "", "print the versions of the client and of the server", "",
-     "  unbake version --json\n", 0, 0, no_options, version_run},
+    {"version", "", "print the versions of the client and of the server", "", "  unbake version --json\n", 0, 0,
+     no_options, version_run},
     {"manual", "PAGE", "write unbake.1, or the completion for bash or zsh", "",
      "  unbake manual unbake.1 | man -l -\n  source <(unbake manual bash)\n", 1, 1, no_options, manual_run},
 };
@@ -140,8 +137,13 @@ const struct command_exit command_exit_statuses[] = {
     {0, NULL},
 };
 
-const char *const command_job_states[] = {JOB_STATE_QUEUED, JOB_STATE_RUNNING, JOB_STATE_PAUSED,
-    JOB_STATE_SUCCEEDED, JOB_STATE_FAILED, JOB_STATE_CANCELLED, NULL};
+const char *const command_job_states[] = {JOB_STATE_QUEUED,
+                                          JOB_STATE_RUNNING,
+                                          JOB_STATE_PAUSED,
+                                          JOB_STATE_SUCCEEDED,
+                                          JOB_STATE_FAILED,
+                                          JOB_STATE_CANCELLED,
+                                          NULL};
 
 static void print_exit_statuses(FILE *out) {
     fputs("exit status:\n", out);
@@ -151,8 +153,8 @@ static void print_exit_statuses(FILE *out) {
 
 void command_help(const struct command *command, FILE *out) {
     if (command) {
-        fprintf(out, "usage: unbake %s%s%s [options]\n\n%s.\n", command->name,
-                *command->arguments ? " " : "", command->arguments, command->summary);
+        fprintf(out, "usage: unbake %s%s%s [options]\n\n%s.\n", command->name, *command->arguments ? " " : "",
+                command->arguments, command->summary);
         if (*command->details)
             fprintf(out, "\n%s", command->details);
         fprintf(out, "\nexamples:\n%s\noptions:\n", command->examples);

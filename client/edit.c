@@ -26,8 +26,7 @@ const struct client_option extend_options[] = {
 };
 
 /* Sends the body to /v1/jobs/ID`suffix` and tells what the job is then. */
-static int send_change(struct client *c, int64_t id, const char *method, const char *suffix,
-                       const cJSON *body) {
+static int send_change(struct client *c, int64_t id, const char *method, const char *suffix, const cJSON *body) {
     struct reply reply;
     struct error err;
     int code = CLIENT_OK;
@@ -51,8 +50,8 @@ static int send_change(struct client *c, int64_t id, const char *method, const c
     return code;
 }
 
-static enum status describe_order(struct client *c, const struct options *o, cJSON *body,
-                                  struct reply *reply, struct error *err) {
+static enum status describe_order(struct client *c, const struct options *o, cJSON *body, struct reply *reply,
+                                  struct error *err) {
     const char *before = options_text(o, "before", NULL);
     bool first = options_flag(o, "first"), last = options_flag(o, "last");
     int64_t id;
@@ -69,8 +68,8 @@ static enum status describe_order(struct client *c, const struct options *o, cJS
     return STATUS_OK;
 }
 
-static enum status describe_edit(struct client *c, const struct options *o, cJSON *body,
-                                 struct reply *reply, struct error *err) {
+static enum status describe_edit(struct client *c, const struct options *o, cJSON *body, struct reply *reply,
+                                 struct error *err) {
     enum status status = STATUS_OK;
     cJSON *labels = NULL;
     if (options_text(o, "name", NULL))

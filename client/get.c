@@ -45,7 +45,7 @@ struct fetch {
     char sha256[SHA256_HEX_SIZE];
     uint64_t bytes;
     int fd;
-    uint64_t have;            /* bytes of NAME.part, all of them in `hash` */
+    uint64_t have; /* bytes of NAME.part, all of them in `hash` */
     struct sha256 hash;
     bool resumed;
     double moved_at;          /* when bytes last came */
@@ -95,8 +95,7 @@ static const cJSON *find_output(const struct fetch *f, const char *name) {
 static enum status look_up(struct fetch *f) {
     const cJSON *item = find_output(f, f->name);
     if (!item)
-        return error_set(f->err, STATUS_NOT_FOUND, "job %lld has no output %s any more",
-                         (long long)f->job, f->name);
+        return error_set(f->err, STATUS_NOT_FOUND, "job %lld has no output %s any more", (long long)f->job, f->name);
     int64_t bytes = member_whole(item, "bytes", 0);
     f->bytes = bytes > 0 ? (uint64_t)bytes : 0;
     snprintf(f->sha256, sizeof f->sha256, "%s", member_text(item, "sha256"));
@@ -269,9 +268,8 @@ static enum status fetch_verified(struct fetch *f) {
             return status;
         if (strcmp(listed, f->sha256) == 0 && !resumed) {
             f->reply.code = 0;
-            return error_set(f->err, STATUS_CORRUPT,
-                             "%s arrived with SHA-256 %.12s..., listed is %.12s...", f->name, found,
-                             listed);
+            return error_set(f->err, STATUS_CORRUPT, "%s arrived with SHA-256 %.12s..., listed is %.12s...", f->name,
+                             found, listed);
         }
     }
     f->reply.code = 0;
@@ -322,8 +320,7 @@ static enum status fetch_one(struct fetch *f, cJSON *results) {
     if (status == STATUS_OK)
         status = open_part(f);
     if (status == STATUS_OK) {
-        meter_begin(&f->meter, c->quiet || c->json ? NULL : &c->err, f->name, (double)f->have,
-                    (double)f->bytes);
+        meter_begin(&f->meter, c->quiet || c->json ? NULL : &c->err, f->name, (double)f->have, (double)f->bytes);
         status = fetch_verified(f);
         meter_end(&f->meter);
     }
@@ -356,8 +353,7 @@ static enum status fetch_all(struct fetch *f, const struct options *o, cJSON *re
             continue;
         if (!get_name_is_safe(name)) {
             f->reply.code = 0;
-            status = error_set(f->err, STATUS_CORRUPT,
-                               "the server lists an output with an unsafe name: %.200s", name);
+            status = error_set(f->err, STATUS_CORRUPT, "the server lists an output with an unsafe name: %.200s", name);
             break;
         }
         f->name = mem_strdup(name);

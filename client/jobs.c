@@ -45,8 +45,8 @@ static double percent_done(const cJSON *job) {
 }
 
 static void print_jobs(struct client *c, const cJSON *items) {
-    static const char *const headings[] = {">job", "state", ">done", "stage", ">left", ">age", ">expires",
-                                           "?owner", "name"};
+    static const char *const headings[] = {">job", "state",    ">done",  "stage", ">left",
+                                           ">age", ">expires", "?owner", "name"};
     struct table t;
     const cJSON *job;
     table_init(&t, 9, headings);
@@ -102,7 +102,8 @@ int list_run(struct client *c, const struct options *o) {
         client_note(c, "no jobs%s%s", state ? " are " : "", state ? state : "");
     else if (c->quiet) {
         const cJSON *job;
-        cJSON_ArrayForEach(job, items) printf("%.0f\n", member_number(job, "id", 0.0));
+        cJSON_ArrayForEach(job, items)
+            printf("%.0f\n", member_number(job, "id", 0.0));
     } else
         print_jobs(c, items);
     cJSON_Delete(items);
@@ -175,8 +176,7 @@ static void print_job(struct client *c, const cJSON *job, const cJSON *outputs) 
     field_print(c, "hint", member_text(job, "hint"));
     if (strcmp(member_text(job, "state"), JOB_STATE_RUNNING) == 0) {
         format_duration(left, member_number(job, "eta_sec", -1.0));
-        snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job),
-                 left);
+        snprintf(text, sizeof text, "%s, %.0f%%, %s left", member_text(job, "stage"), percent_done(job), left);
         field_print(c, "stage", text);
     }
     field_print(c, "owner", member_text(job, "owner"));
@@ -294,8 +294,7 @@ static int act_on(struct client *c, const char *word, const char *action) {
 static int act_on_all(struct client *c, const struct options *o, const char *action) {
     int first = CLIENT_OK;
     for (size_t i = 0; i < o->word_count; i++) {
-        int code = action ? act_on(c, o->word[i], action)
-                          : remove_job(c, o->word[i], options_flag(o, "dry-run"));
+        int code = action ? act_on(c, o->word[i], action) : remove_job(c, o->word[i], options_flag(o, "dry-run"));
         if (first == CLIENT_OK)
             first = code;
         if (code == CLIENT_UNREACHABLE || code == CLIENT_INTERRUPTED)
@@ -304,21 +303,13 @@ static int act_on_all(struct client *c, const struct options *o, const char *act
     return first;
 }
 
-int cancel_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, "cancel");
-}
+int cancel_run(struct client *c, const struct options *o) { return act_on_all(c, o, "cancel"); }
 
-int pause_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, "pause");
-}
+int pause_run(struct client *c, const struct options *o) { return act_on_all(c, o, "pause"); }
 
-int redeliver_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, "webhook/redeliver");
-}
+int redeliver_run(struct client *c, const struct options *o) { return act_on_all(c, o, "webhook/redeliver"); }
 
-int resume_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, "resume");
-}
+int resume_run(struct client *c, const struct options *o) { return act_on_all(c, o, "resume"); }
 
 int retry_run(struct client *c, const struct options *o) {
     const char *from = options_text(o, "from", NULL);
@@ -334,6 +325,4 @@ int retry_run(struct client *c, const struct options *o) {
     return code;
 }
 
-int rm_run(struct client *c, const struct options *o) {
-    return act_on_all(c, o, NULL);
-}
+int rm_run(struct client *c, const struct options *o) { return act_on_all(c, o, NULL); }

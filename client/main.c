@@ -85,14 +85,14 @@ static int present_token(struct client *c, const struct options *o) {
     char *kept = NULL;
     for (const char *at = given; at && *at; at++)
         if (*at <= ' ' || *at > '~') {
-            error_set(&err, STATUS_INPUT, "UNBAKE_TOKEN is not a token: it contains blanks or other characters that no token has");
+            error_set(&err, STATUS_INPUT,
+                      "UNBAKE_TOKEN is not a token: it contains blanks or other characters that no token has");
             return client_fail(c, NULL, &err);
         }
     ca = options_text(o, "ca", ca && *ca ? ca : NULL);
     if (ca)
         request_set_ca(c->request, ca);
-    if ((!given || !*given) &&
-        credentials_find(request_server(c->request), &kept, &err) != STATUS_OK)
+    if ((!given || !*given) && credentials_find(request_server(c->request), &kept, &err) != STATUS_OK)
         return client_fail(c, NULL, &err);
     request_set_token(c->request, kept ? kept : given && *given ? given : NULL);
     mem_free(kept);
@@ -142,8 +142,7 @@ static int dispatch(struct client *c, int argc, char **argv) {
         return CLIENT_OK;
     }
     int code = CLIENT_OK;
-    enum status status = options_parse(&o, argc - 2, argv + 2, command->options,
-                                       command_shared_options, &err);
+    enum status status = options_parse(&o, argc - 2, argv + 2, command->options, command_shared_options, &err);
     if (status == STATUS_OK)
         c->json = options_flag(&o, "json");
     c->quiet = options_flag(&o, "quiet");

@@ -43,7 +43,7 @@ static void page_1(void) {
         manual_synopsis(stdout, "unbake", table[i].name, table[i].arguments, true);
     manual_section(stdout, "DESCRIPTION");
     manual_text(stdout, "unbake sends rooms to unbaked(8), follows its jobs and fetches what comes out. A JOB is a "
-                "number, or `last` for the newest. Results go to stdout, progress and messages to stderr.\n");
+                        "number, or `last` for the newest. Results go to stdout, progress and messages to stderr.\n");
     manual_section(stdout, "OPTIONS OF EVERY COMMAND");
     option_list(command_shared_options);
     manual_section(stdout, "COMMANDS");

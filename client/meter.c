@@ -10,11 +10,15 @@
 #define REDRAW_SEC 0.1
 #define BAR_COLUMNS 24
 
-void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done,
-                 double total) {
+void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done, double total) {
     double now = clock_sec();
-    *m = (struct meter){.terminal = terminal, .label = label, .total = total, .done = done,
-                        .rate = -1.0, .measured_at = now, .measured_done = done};
+    *m = (struct meter){.terminal = terminal,
+                        .label = label,
+                        .total = total,
+                        .done = done,
+                        .rate = -1.0,
+                        .measured_at = now,
+                        .measured_done = done};
     m->drawn_at = terminal && terminal->live ? now - REDRAW_SEC : now;
 }
 
@@ -40,8 +44,7 @@ void meter_text(const struct meter *m, struct buf *out, size_t columns, bool uni
     struct buf tail;
     buf_init(&tail, 256);
     if (m->total > 0.0)
-        buf_printf(&tail, " %3.0f%%  %s of %s", floor(100.0 * fmin(m->done / m->total, 1.0)),
-                   done, total);
+        buf_printf(&tail, " %3.0f%%  %s of %s", floor(100.0 * fmin(m->done / m->total, 1.0)), done, total);
     else
         buf_printf(&tail, "  %s", done);
     if (m->rate > 0.0) {

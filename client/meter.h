@@ -13,14 +13,13 @@ struct meter {
     const char *label;         /* borrowed */
     double total;              /* bytes; 0: unknown */
     double done;
-    double rate;               /* bytes a second, smoothed; negative before the first figure */
+    double rate;                       /* bytes a second, smoothed; negative before the first figure */
     double measured_at, measured_done; /* where the rate was last brought up to date */
     double drawn_at;
 };
 
 /* `done` bytes are there already (a download that goes on) and do not count for the rate. */
-void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done,
-                 double total);
+void meter_begin(struct meter *m, struct terminal *terminal, const char *label, double done, double total);
 void meter_update(struct meter *m, double done);
 void meter_end(struct meter *m); /* takes the line away */
 

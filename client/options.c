@@ -28,8 +28,8 @@ static void offer(struct nearest *nearest, const struct client_option *table) {
         nearest_offer(nearest, table->name);
 }
 
-static enum status unknown(const char *argument, const struct client_option *own,
-                           const struct client_option *shared, struct error *err) {
+static enum status unknown(const char *argument, const struct client_option *own, const struct client_option *shared,
+                           struct error *err) {
     if (argument[1] != '-')
         return error_set(err, STATUS_INPUT, "unknown option -%c", argument[1]);
     char *name = mem_strndup(argument + 2, strcspn(argument + 2, "="));
@@ -49,21 +49,19 @@ static enum status check_value(const struct client_option *option, const char *t
     if (option->kind == OPTION_WHOLE) {
         long value = strtol(text, &end, 10);
         if (end == text || *end || strlen(text) > 10 || value > 999999999 || value < -999999999)
-            return error_set(err, STATUS_INPUT, "--%s must be a whole number, not \"%s\"",
-                             option->name, text);
+            return error_set(err, STATUS_INPUT, "--%s must be a whole number, not \"%s\"", option->name, text);
     }
     if (option->kind == OPTION_SECONDS) {
         double value = strtod(text, &end);
         if (end == text || *end || !isfinite(value) || value < 0.0 || value > 1e9)
-            return error_set(err, STATUS_INPUT, "--%s must be a number, 0 or more, not \"%s\"",
-                             option->name, text);
+            return error_set(err, STATUS_INPUT, "--%s must be a number, 0 or more, not \"%s\"", option->name, text);
     }
     return STATUS_OK;
 }
 
 /* The option that begins with `argument`; *text is the value in the same word, if there is one. */
-static const struct client_option *read_option(const char *argument, const struct client_option *own, const struct client_option *shared,
-                                        const char **text) {
+static const struct client_option *read_option(const char *argument, const struct client_option *own,
+                                               const struct client_option *shared, const char **text) {
     const struct client_option *option;
     *text = NULL;
     if (argument[1] == '-') {
@@ -85,9 +83,8 @@ int options_length(const char *word, const struct client_option *table) {
     return !option ? 0 : option->kind == OPTION_FLAG || text ? 1 : 2;
 }
 
-enum status options_parse(struct options *o, int count, char *const *argv,
-                          const struct client_option *own, const struct client_option *shared,
-                          struct error *err) {
+enum status options_parse(struct options *o, int count, char *const *argv, const struct client_option *own,
+                          const struct client_option *shared, struct error *err) {
     size_t room = count > 0 ? (size_t)count : 1;
     *o = (struct options){
         .given = mem_calloc(room, sizeof *o->given),
@@ -112,8 +109,8 @@ enum status options_parse(struct options *o, int count, char *const *argv,
             return error_set(err, STATUS_INPUT, "--%s takes no value", option->name);
         if (option->kind != OPTION_FLAG && !text) {
             if (i + 1 >= count)
-                return error_set(err, STATUS_INPUT, "--%s needs a value: --%s %s", option->name,
-                                 option->name, option->value);
+                return error_set(err, STATUS_INPUT, "--%s needs a value: --%s %s", option->name, option->name,
+                                 option->value);
             text = argv[++i];
         }
         enum status status = check_value(option, text, err);
@@ -137,9 +134,7 @@ static const struct options_given *last(const struct options *o, const char *nam
     return NULL;
 }
 
-bool options_flag(const struct options *o, const char *name) {
-    return last(o, name) != NULL;
-}
+bool options_flag(const struct options *o, const char *name) { return last(o, name) != NULL; }
 
 const char *options_text(const struct options *o, const char *name, const char *fallback) {
     const struct options_given *given = last(o, name);

@@ -19,8 +19,8 @@ enum option_kind {
 };
 
 struct client_option {
-    const char *name;  /* without the dashes; NULL ends a table */
-    char letter;       /* 0: no short form */
+    const char *name; /* without the dashes; NULL ends a table */
+    char letter;      /* 0: no short form */
     enum option_kind kind;
     const char *value; /* what the help calls the value: "DIR"; NULL for a flag */
     const char *help;
@@ -40,9 +40,8 @@ struct options {
 
 /* Parses argv[count] by two tables (a command's own, then the ones that all commands share).
  * STATUS_INPUT, with the nearest valid name as the hint, when it does not fit them. */
-enum status options_parse(struct options *o, int count, char *const *argv,
-                          const struct client_option *own, const struct client_option *shared,
-                          struct error *err);
+enum status options_parse(struct options *o, int count, char *const *argv, const struct client_option *own,
+                          const struct client_option *shared, struct error *err);
 void options_release(struct options *o);
 /* How many words the option that begins with `word` takes of a command line, by that table; 0 where it is
  * none of them. */

@@ -37,9 +37,9 @@ struct pack {
     struct archive *archive; /* NULL where path is no folder, and once the end is written */
     struct buf ready;        /* written by libarchive, not yet read */
     size_t ready_taken;
-    size_t next;     /* entry that comes next */
-    int fd;          /* of entry[next - 1], -1 between entries */
-    uint64_t left;   /* of that file */
+    size_t next;   /* entry that comes next */
+    int fd;        /* of entry[next - 1], -1 between entries */
+    uint64_t left; /* of that file */
     char chunk[CHUNK];
 };
 
@@ -57,11 +57,9 @@ static int by_name(const void *a, const void *b) {
 }
 
 /* Adds the files under `folder`, whose names in the archive begin with `prefix`. */
-static enum status list_folder(struct pack *p, const char *folder, const char *prefix, int depth,
-                               struct error *err) {
+static enum status list_folder(struct pack *p, const char *folder, const char *prefix, int depth, struct error *err) {
     if (depth > DEEPEST)
-        return error_set(err, STATUS_INPUT, "%s: folders are more than %d deep: do links lead back?",
-                         folder, DEEPEST);
+        return error_set(err, STATUS_INPUT, "%s: folders are more than %d deep: do links lead back?", folder, DEEPEST);
     char **names;
     size_t count;
     enum status status = file_list(folder, &names, &count, err);
@@ -145,17 +143,11 @@ void pack_close(struct pack *p) {
     mem_free(p);
 }
 
-bool pack_is_folder(const struct pack *p) {
-    return p->is_folder;
-}
+bool pack_is_folder(const struct pack *p) { return p->is_folder; }
 
-size_t pack_file_count(const struct pack *p) {
-    return p->count;
-}
+size_t pack_file_count(const struct pack *p) { return p->count; }
 
-uint64_t pack_content_bytes(const struct pack *p) {
-    return p->content_bytes;
-}
+uint64_t pack_content_bytes(const struct pack *p) { return p->content_bytes; }
 
 static la_ssize_t take_written(struct archive *archive, void *user, const void *bytes, size_t length) {
     (void)archive;
@@ -267,8 +259,8 @@ enum status pack_read(struct pack *p, void *bytes, size_t room, size_t *got, str
     return STATUS_OK;
 }
 
-enum status pack_measure(struct pack *p, bool (*tick)(void *user, uint64_t done), void *user,
-                         uint64_t *length, char sha256[SHA256_HEX_SIZE], struct error *err) {
+enum status pack_measure(struct pack *p, bool (*tick)(void *user, uint64_t done), void *user, uint64_t *length,
+                         char sha256[SHA256_HEX_SIZE], struct error *err) {
     char *bytes = mem_alloc(CHUNK);
     struct sha256 hash;
     sha256_init(&hash);

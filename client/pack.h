@@ -33,7 +33,7 @@ enum status pack_read(struct pack *pack, void *bytes, size_t room, size_t *got, 
 
 /* Reads the whole stream once for its length and SHA-256. `tick` (may be NULL) hears how far it
  * is; false from it ends the reading with STATUS_CANCELLED. */
-enum status pack_measure(struct pack *pack, bool (*tick)(void *user, uint64_t done), void *user,
-                         uint64_t *length, char sha256[SHA256_HEX_SIZE], struct error *err);
+enum status pack_measure(struct pack *pack, bool (*tick)(void *user, uint64_t done), void *user, uint64_t *length,
+                         char sha256[SHA256_HEX_SIZE], struct error *err);
 
 #endif

@@ -23,7 +23,7 @@
 #define PAUSE_MAX_SEC 5.0
 
 struct http_request {
-    char *server; /* owned */
+    char *server;        /* owned */
     char *authorization; /* the header; owned; NULL: none */
     char *ca_file;       /* owned; NULL: the system's */
     double retry_sec;
@@ -80,13 +80,9 @@ void request_free(struct http_request *r) {
     mem_free(r);
 }
 
-const char *request_server(const struct http_request *r) {
-    return r->server;
-}
+const char *request_server(const struct http_request *r) { return r->server; }
 
-const char *request_library_version(void) {
-    return curl_version_info(CURLVERSION_NOW)->version;
-}
+const char *request_library_version(void) { return curl_version_info(CURLVERSION_NOW)->version; }
 
 /* --- interruption and pauses --------------------------------------------------------------- */
 
@@ -99,9 +95,7 @@ static bool wait_for_signal(struct http_request *r, int milliseconds) {
     return r->interrupted;
 }
 
-bool request_interrupted(struct http_request *r) {
-    return wait_for_signal(r, 0);
-}
+bool request_interrupted(struct http_request *r) { return wait_for_signal(r, 0); }
 
 static double pause_length(int tries, double asked_sec) {
     double pause = fmin(PAUSE_FIRST_SEC * pow(2.0, tries), PAUSE_MAX_SEC);
@@ -112,9 +106,7 @@ bool request_pause(struct http_request *r, int tries, double asked_sec) {
     return !wait_for_signal(r, (int)lround(1000.0 * pause_length(tries, asked_sec)));
 }
 
-static enum status cancelled(struct error *err) {
-    return error_set(err, STATUS_CANCELLED, "interrupted");
-}
+static enum status cancelled(struct error *err) { return error_set(err, STATUS_CANCELLED, "interrupted"); }
 
 /* --- the reply ----------------------------------------------------------------------------- */
 
@@ -190,13 +182,10 @@ static size_t on_read(char *bytes, size_t size, size_t count, void *user) {
 static bool is_loopback(const char *server) {
     const char *host = strstr(server, "://");
     host = host ? host + 3 : server;
-    return strncmp(host, "127.", 4) == 0 || strncasecmp(host, "localhost", 9) == 0 ||
-           strncmp(host, "[::1]", 5) == 0;
+    return strncmp(host, "127.", 4) == 0 || strncasecmp(host, "localhost", 9) == 0 || strncmp(host, "[::1]", 5) == 0;
 }
 
-bool request_is_loopback(const struct http_request *r) {
-    return is_loopback(r->server);
-}
+bool request_is_loopback(const struct http_request *r) { return is_loopback(r->server); }
 
 /* Sets up the handle; the returned list of headers and the texts must live until the end. */
 static struct curl_slist *set_up(struct request_try *a, const char *url, const char *body) {
@@ -208,8 +197,7 @@ static struct curl_slist *set_up(struct request_try *a, const char *url, const c
     curl_easy_setopt(easy, CURLOPT_USERAGENT, "unbake/" UNBAKE_VERSION);
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT, CONNECT_SEC);
     curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
-    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME,
-                     lround(call->silence_sec > 0.0 ? call->silence_sec : SILENCE_SEC));
+    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, lround(call->silence_sec > 0.0 ? call->silence_sec : SILENCE_SEC));
     curl_easy_setopt(easy, CURLOPT_HEADERFUNCTION, on_header);
     curl_easy_setopt(easy, CURLOPT_HEADERDATA, a);
     curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, on_body);
@@ -277,8 +265,8 @@ static enum status transport_failed(struct request_try *a, CURLcode code, const 
     struct error *err = a->err;
     const char *why = *detail ? detail : curl_easy_strerror(code);
     long number = 0; /* of the operating system: "Connection refused" says more than curl does */
-    if (code == CURLE_COULDNT_CONNECT &&
-        curl_easy_getinfo(a->request->easy, CURLINFO_OS_ERRNO, &number) == CURLE_OK && number > 0)
+    if (code == CURLE_COULDNT_CONNECT && curl_easy_getinfo(a->request->easy, CURLINFO_OS_ERRNO, &number) == CURLE_OK &&
+        number > 0)
         why = strerror((int)number);
     if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) {
         error_set(err, STATUS_INPUT, "%s is not the URL of a server: %s", a->request->server, why);
@@ -351,8 +339,7 @@ static enum status status_of(long code) {
 static enum status judge(struct request_try *a) {
     struct reply *reply = a->reply;
     if (strstr(reply->content_type, "json") && reply->body.length > 0) {
-        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the reply",
-                                        &reply->json, NULL);
+        enum status status = json_parse(buf_text(&reply->body), reply->body.length, "the reply", &reply->json, NULL);
         if (status != STATUS_OK) {
             error_set(a->err, STATUS_UNAVAILABLE, "%s does not answer in JSON", a->request->server);
             return error_hint(a->err, "is that server unbaked?");
@@ -386,8 +373,7 @@ enum status request_run(struct http_request *r, const struct request_call *call,
         status = try_once(&a, url, body, &unsent);
         if (status == STATUS_OK)
             status = judge(&a);
-        bool again = status == STATUS_UNAVAILABLE && !call->once &&
-                     (same_twice || unsent || reply->code == 503);
+        bool again = status == STATUS_UNAVAILABLE && !call->once && (same_twice || unsent || reply->code == 503);
         if (!again || clock_sec() + pause_length(tries, reply->retry_after_sec) > give_up_at)
             break;
         if (!request_pause(r, tries, reply->retry_after_sec)) {

@@ -28,7 +28,7 @@ void request_set_ca(struct http_request *r, const char *path);
 bool request_is_loopback(const struct http_request *r); /* the server's address */
 void request_free(struct http_request *r);
 const char *request_server(const struct http_request *r); /* the URL, without a slash at its end */
-const char *request_library_version(void);           /* libcurl's */
+const char *request_library_version(void);                /* libcurl's */
 
 /* True once SIGINT or SIGTERM has come. */
 bool request_interrupted(struct http_request *r);
@@ -38,9 +38,9 @@ bool request_pause(struct http_request *r, int tries, double asked_sec);
 
 /* What came back. */
 struct reply {
-    long code;              /* HTTP status; 0: no reply at all */
-    struct buf body;        /* but for what went to a sink */
-    cJSON *json;            /* the body where it is JSON, also a problem; else NULL */
+    long code;       /* HTTP status; 0: no reply at all */
+    struct buf body; /* but for what went to a sink */
+    cJSON *json;     /* the body where it is JSON, also a problem; else NULL */
     char content_type[128];
     double retry_after_sec; /* negative: not said */
     int64_t range_first;    /* of Content-Range; -1: not said */
@@ -51,11 +51,11 @@ void reply_init(struct reply *reply);
 void reply_release(struct reply *reply);
 
 struct request_call {
-    const char *method; /* NULL: GET */
-    const char *path;   /* "/v1/jobs?limit=1", percent-encoded */
+    const char *method;    /* NULL: GET */
+    const char *path;      /* "/v1/jobs?limit=1", percent-encoded */
     const char *header[4]; /* more headers, "Name: value"; unused ones NULL */
 
-    const cJSON *body;  /* sent as JSON; NULL: none */
+    const cJSON *body; /* sent as JSON; NULL: none */
     /* Or a body that is pulled: `read` as pack_read, `rewind` before every try. */
     enum status (*read)(void *user, void *bytes, size_t room, size_t *got, struct error *err);
     enum status (*rewind)(void *user, struct error *err);

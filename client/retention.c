@@ -25,9 +25,7 @@ enum status retention_describe(const struct options *o, cJSON *body, struct erro
     return STATUS_OK;
 }
 
-static bool is_pinned(const cJSON *thing) {
-    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned"));
-}
+static bool is_pinned(const cJSON *thing) { return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(thing, "pinned")); }
 
 const char *retention_time(const cJSON *thing) {
     return is_pinned(thing) ? "never: pinned" : member_text(thing, "expires_at");
@@ -52,6 +50,9 @@ void retention_disk(char out[16], const cJSON *thing) {
 void retention_sentence(char out[40], const cJSON *thing) {
     char left[16];
     retention_text(left, thing);
-    snprintf(out, 40, "%s%s", !*left ? "" : is_pinned(thing) ? "kept for good" : "removed in ",
+    snprintf(out, 40, "%s%s",
+             !*left             ? ""
+             : is_pinned(thing) ? "kept for good"
+                                : "removed in ",
              is_pinned(thing) ? "" : left);
 }

@@ -5,10 +5,10 @@
 #include "client/client.h"
 
 /* For tables of options. */
-#define KEEPING_OPTIONS                                                                        \
-    {"pin", 0, OPTION_FLAG, NULL, "keep it for good"},                                         \
-    {"unpin", 0, OPTION_FLAG, NULL, "no longer"},                                              \
-    {"keep-days", 0, OPTION_SECONDS, "N", "remove it N days from now; 0: as the server's rules say"}
+#define KEEPING_OPTIONS                                                                                                \
+    {"pin", 0, OPTION_FLAG, NULL, "keep it for good"}, {"unpin", 0, OPTION_FLAG, NULL, "no longer"}, {                 \
+        "keep-days", 0, OPTION_SECONDS, "N", "remove it N days from now; 0: as the server's rules say"                 \
+    }
 
 /* Adds what those options ask for to the body of a PATCH. */
 enum status retention_describe(const struct options *o, cJSON *body, struct error *err);

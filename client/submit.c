@@ -27,7 +27,8 @@ const struct client_option submit_options[] = {
     {"label", 'l', OPTION_LIST, "KEY=VALUE", "a label of your own"},
     {"scene", 0, OPTION_TEXT, "SCENE", "a room that is there already, instead of ROOM"},
     {"share", 0, OPTION_FLAG, NULL, "let every user of the server look at the job and its room"},
-    {"webhook", 0, OPTION_TEXT, "URL", "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET (whsec_ and base64)"},
+    {"webhook", 0, OPTION_TEXT, "URL",
+     "is told of the job's states, signed with $UNBAKE_WEBHOOK_SECRET (whsec_ and base64)"},
     {"watch", 'w', OPTION_FLAG, NULL, "follow the job to its end, as `unbake watch` does"},
     {"dry-run", 0, OPTION_FLAG, NULL, "check the settings and the room; send and queue nothing"},
     {0},
@@ -117,9 +118,7 @@ static bool on_measured(void *user, uint64_t done) {
     return !request_interrupted(s->client->request);
 }
 
-static struct terminal *meter_terminal(struct client *c) {
-    return c->quiet || c->json ? NULL : &c->err;
-}
+static struct terminal *meter_terminal(struct client *c) { return c->quiet || c->json ? NULL : &c->err; }
 
 static enum status measure(struct submission *s, const char *room, struct error *err) {
     char sha256[SHA256_HEX_SIZE];
@@ -131,8 +130,7 @@ static enum status measure(struct submission *s, const char *room, struct error 
     if (status != STATUS_OK)
         return status;
     s->name = room_name(room);
-    meter_begin(&s->meter, meter_terminal(s->client), "reading", 0.0,
-                (double)pack_content_bytes(s->pack));
+    meter_begin(&s->meter, meter_terminal(s->client), "reading", 0.0, (double)pack_content_bytes(s->pack));
     status = pack_measure(s->pack, on_measured, s, &s->length, sha256, err);
     meter_end(&s->meter);
     if (status == STATUS_OK)
@@ -152,8 +150,8 @@ static enum status ask_for_scene(struct submission *s, struct reply *reply, stru
 }
 
 static enum status upload(struct submission *s, struct reply *reply, struct error *err) {
-    struct client_upload u = {.client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene,
-                       .length = s->length};
+    struct client_upload u = {
+        .client = s->client, .pack = s->pack, .name = s->name, .sha256 = s->scene, .length = s->length};
     char size[16];
     enum status status = upload_send(&u, reply, err);
     format_bytes(size, (double)s->length);
@@ -176,8 +174,7 @@ static bool only_scene_is_missing(struct reply *reply) {
 }
 
 static enum status check(struct submission *s, struct reply *reply, struct error *err) {
-    struct request_call call = {
-        .method = "POST", .path = "/v1/jobs?dry_run=1", .body = s->job, .same_twice = true};
+    struct request_call call = {.method = "POST", .path = "/v1/jobs?dry_run=1", .body = s->job, .same_twice = true};
     enum status status = request_run(s->client->request, &call, reply, err);
     bool to_be_sent = s->pack && !s->present;
     if (status != STATUS_OK && reply->code == 422 && to_be_sent && only_scene_is_missing(reply))
@@ -192,8 +189,8 @@ static enum status queue(struct submission *s, struct reply *reply, struct error
         return error_set_errno(err, errno, "cannot get random numbers");
     for (size_t i = 0; i < sizeof random; i++)
         snprintf(header + 17 + 2 * i, 3, "%02x", random[i]);
-    struct request_call call = {.method = "POST", .path = "/v1/jobs", .header = {header},
-                                .body = s->job, .same_twice = true};
+    struct request_call call = {
+        .method = "POST", .path = "/v1/jobs", .header = {header}, .body = s->job, .same_twice = true};
     return request_run(s->client->request, &call, reply, err);
 }
 
@@ -206,8 +203,7 @@ static void print_dry_run(struct submission *s, const struct reply *reply) {
             json_add_bool(object, "dry_run", true);
             json_add_string(object, "scene", s->scene);
             json_add_string(object, "scene_state", NULL);
-            json_add(object, "settings",
-                     cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(s->job, "settings"), true));
+            json_add(object, "settings", cJSON_Duplicate(cJSON_GetObjectItemCaseSensitive(s->job, "settings"), true));
         }
         json_add_int(object, "upload_bytes", s->pack && !s->present ? (int64_t)s->length : 0);
         client_print_json(c, object);
@@ -235,19 +231,17 @@ static void print_job(struct submission *s, const cJSON *job) {
         struct buf name;
         buf_init(&name, 4096);
         terminal_clean(&name, member_text(job, "name"));
-        printf("job %.0f is queued: %s (scene %.12s)\n", member_number(job, "id", 0.0),
-               buf_text(&name), member_text(job, "scene"));
+        printf("job %.0f is queued: %s (scene %.12s)\n", member_number(job, "id", 0.0), buf_text(&name),
+               member_text(job, "scene"));
         buf_release(&name);
     }
     fflush(stdout);
 }
 
-static enum status submit(struct submission *s, const struct options *o, struct reply *reply,
-                          struct error *err) {
+static enum status submit(struct submission *s, const struct options *o, struct reply *reply, struct error *err) {
     const char *scene = options_text(o, "scene", NULL);
     if ((scene != NULL) == (o->word_count == 1)) {
-        error_set(err, STATUS_INPUT,
-                  scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
+        error_set(err, STATUS_INPUT, scene ? "ROOM and --scene exclude each other" : "missing argument ROOM");
         return error_hint(err, "an example: unbake submit living-room/ --watch");
     }
     s->scene = scene ? mem_strdup(scene) : NULL;

@@ -54,12 +54,9 @@ void table_set(struct table *t, size_t column, enum colour colour, const char *f
     t->colour[at] = colour;
 }
 
-static void put_spaces(FILE *out, size_t count) {
-    fprintf(out, "%*s", (int)count, "");
-}
+static void put_spaces(FILE *out, size_t count) { fprintf(out, "%*s", (int)count, ""); }
 
-static void print_row(const struct table *t, size_t row, const size_t *width,
-                      struct terminal *terminal) {
+static void print_row(const struct table *t, size_t row, const size_t *width, struct terminal *terminal) {
     size_t used = 0, edge = terminal->live ? terminal_width(terminal) : 0;
     for (size_t i = 0; i < t->columns; i++) {
         if (width[i] == 0)

@@ -12,8 +12,8 @@ struct table {
     size_t columns;
     bool right[TABLE_COLUMNS];    /* align to the right */
     bool optional[TABLE_COLUMNS]; /* left out where no row has anything in it */
-    char **cell;               /* [rows][columns]; owned */
-    enum colour *colour;       /* [rows][columns] */
+    char **cell;                  /* [rows][columns]; owned */
+    enum colour *colour;          /* [rows][columns] */
     size_t rows, capacity;
 };
 

@@ -160,9 +160,15 @@ void format_duration(char out[16], double seconds) {
 
 void format_bar(struct buf *out, size_t columns, double fraction, bool unicode) {
     /* Eighths of a block, U+258F (one) to U+2588 (eight). */
-    static const char *const part[] = {
-        " ",            "\xE2\x96\x8F", "\xE2\x96\x8E", "\xE2\x96\x8D", "\xE2\x96\x8C",
-        "\xE2\x96\x8B", "\xE2\x96\x8A", "\xE2\x96\x89", "\xE2\x96\x88"};
+    static const char *const part[] = {" ",
+                                       "\xE2\x96\x8F",
+                                       "\xE2\x96\x8E",
+                                       "\xE2\x96\x8D",
+                                       "\xE2\x96\x8C",
+                                       "\xE2\x96\x8B",
+                                       "\xE2\x96\x8A",
+                                       "\xE2\x96\x89",
+                                       "\xE2\x96\x88"};
     if (columns < 3)
         return;
     size_t cells = columns - 2, steps = unicode ? 8 : 1;

@@ -34,8 +34,8 @@ static void put_base64(struct buf *out, const char *text) {
     for (size_t left = strlen(text); left > 0;) {
         const unsigned char *at = (const unsigned char *)text;
         size_t count = left < 3 ? left : 3;
-        unsigned bits = (unsigned)at[0] << 16 | (count > 1 ? (unsigned)at[1] << 8 : 0u) |
-                        (count > 2 ? (unsigned)at[2] : 0u);
+        unsigned bits =
+            (unsigned)at[0] << 16 | (count > 1 ? (unsigned)at[1] << 8 : 0u) | (count > 2 ? (unsigned)at[2] : 0u);
         buf_printf(out, "%c%c%c%c", digits[bits >> 18], digits[bits >> 12 & 63],
                    count > 1 ? digits[bits >> 6 & 63] : '=', count > 2 ? digits[bits & 63] : '=');
         text += count;
@@ -52,8 +52,7 @@ static enum status find(struct upload_sending *s, struct reply *reply, struct er
     cJSON_ArrayForEach(item, items) {
         const char *self = member_text(cJSON_GetObjectItemCaseSensitive(item, "links"), "self");
         bool unfinished = !*member_text(item, "scene");
-        if (!s->path && unfinished && *self == '/' &&
-            member_number(item, "length", 0.0) == (double)s->u->length)
+        if (!s->path && unfinished && *self == '/' && member_number(item, "length", 0.0) == (double)s->u->length)
             s->path = mem_strdup(self);
     }
     mem_free(path);
@@ -69,8 +68,8 @@ static enum status create(struct upload_sending *s, struct reply *reply, struct 
     buf_puts(&metadata, ",sha256 ");
     put_base64(&metadata, s->u->sha256);
     snprintf(length, sizeof length, "Upload-Length: %llu", (unsigned long long)s->u->length);
-    struct request_call call = {.method = "POST", .path = "/v1/uploads", .once = true,
-                                .header = {VERSION_FIELD, length, buf_text(&metadata)}};
+    struct request_call call = {
+        .method = "POST", .path = "/v1/uploads", .once = true, .header = {VERSION_FIELD, length, buf_text(&metadata)}};
     enum status status = request_run(s->u->client->request, &call, reply, err);
     if (status == STATUS_OK && reply->location[0] == '/')
         s->path = mem_strdup(reply->location);
@@ -91,8 +90,8 @@ static enum status take_offset(struct upload_sending *s, const struct reply *rep
 }
 
 static enum status ask(struct upload_sending *s, struct reply *reply, struct error *err) {
-    struct request_call call = {.method = "HEAD", .path = s->path, .header = {VERSION_FIELD}, .once = true,
-                                .silence_sec = SILENCE_SEC};
+    struct request_call call = {
+        .method = "HEAD", .path = s->path, .header = {VERSION_FIELD}, .once = true, .silence_sec = SILENCE_SEC};
     enum status status = request_run(s->u->client->request, &call, reply, err);
     return status == STATUS_OK ? take_offset(s, reply, err) : status;
 }
@@ -153,8 +152,7 @@ static enum status send_rest(struct upload_sending *s, struct reply *reply, stru
         .silence_sec = SILENCE_SEC,
         .once = true,
     };
-    meter_begin(&s->meter, c->quiet || c->json ? NULL : &c->err, "sending", (double)s->offset,
-                (double)s->u->length);
+    meter_begin(&s->meter, c->quiet || c->json ? NULL : &c->err, "sending", (double)s->offset, (double)s->u->length);
     enum status status = request_run(c->request, &call, reply, err);
     meter_end(&s->meter);
     return status == STATUS_OK ? take_offset(s, reply, err) : status;

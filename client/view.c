@@ -7,9 +7,7 @@
 #include "client/client.h"
 #include "common/protocol.h"
 
-void view_init(struct client_view *v, int64_t job) {
-    *v = (struct client_view){.job = job, .eta_sec = -1.0};
-}
+void view_init(struct client_view *v, int64_t job) { *v = (struct client_view){.job = job, .eta_sec = -1.0}; }
 
 static void copy(char *to, size_t size, const cJSON *data, const char *key) {
     if (cJSON_GetObjectItemCaseSensitive(data, key))
@@ -105,8 +103,8 @@ static void put_numbers(const struct client_view *v, double age_sec, struct buf 
     }
 }
 
-void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar,
-               double age_sec, struct buf *out) {
+void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar, double age_sec,
+               struct buf *out) {
     bool running = strcmp(v->state, JOB_STATE_RUNNING) == 0;
     buf_printf(out, "job %lld  ", (long long)v->job);
     enum colour colour = state_colour(v->state);

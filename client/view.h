@@ -19,12 +19,12 @@ struct view_metric {
 struct client_view {
     int64_t job;
     char state[16];
-    char wanted[16];     /* "pause" or "cancel" while that is asked for and not done; else "" */
+    char wanted[16]; /* "pause" or "cancel" while that is asked for and not done; else "" */
     char stage[48];
-    double done, total;  /* of the stage; total 0: unknown */
-    double eta_sec;      /* when it was reported; negative: unknown */
+    double done, total; /* of the stage; total 0: unknown */
+    double eta_sec;     /* when it was reported; negative: unknown */
     int attempt;
-    char reason[512];    /* "" if none */
+    char reason[512]; /* "" if none */
     struct view_metric metric[VIEW_METRICS];
     size_t metric_count;
     uint64_t reports;
@@ -39,8 +39,8 @@ bool view_is_over(const struct client_view *v);
 double view_fraction(const struct client_view *v);
 /* The line: state or stage, bar if `columns` leave room for one, numbers, time left.
  * `age_sec` is how long ago the last progress came. */
-void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar,
-               double age_sec, struct buf *out);
+void view_line(const struct client_view *v, const struct terminal *t, size_t columns, bool with_bar, double age_sec,
+               struct buf *out);
 
 enum colour state_colour(const char *state);
 

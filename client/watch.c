@@ -100,9 +100,7 @@ static void print_log(struct watch *w, const cJSON *data) {
         terminal_clean(&line, member_text(data, "at"));
         buf_puts(&line, " ");
     }
-    enum colour colour = !important                      ? COLOUR_NONE
-                         : strcmp(level, "error") == 0 ? COLOUR_RED
-                                                       : COLOUR_YELLOW;
+    enum colour colour = !important ? COLOUR_NONE : strcmp(level, "error") == 0 ? COLOUR_RED : COLOUR_YELLOW;
     buf_puts(&line, terminal_colour(&c->out, colour));
     terminal_clean(&line, level);
     buf_puts(&line, terminal_colour(&c->out, COLOUR_NONE));
@@ -158,8 +156,7 @@ static void on_tick(void *user, double sent) {
 
 static enum status follow_once(struct watch *w, struct reply *reply, struct error *err) {
     char path[64], last[SSE_ID_MAX + 20] = "";
-    snprintf(path, sizeof path, "/v1/jobs/%lld/events%s", (long long)w->view.job,
-             w->only_past ? "?follow=0" : "");
+    snprintf(path, sizeof path, "/v1/jobs/%lld/events%s", (long long)w->view.job, w->only_past ? "?follow=0" : "");
     if (w->sse.last_id[0])
         snprintf(last, sizeof last, "Last-Event-ID: %s", w->sse.last_id);
     struct request_call call = {
@@ -192,9 +189,7 @@ static enum status follow(struct watch *w, struct reply *reply, struct error *er
             told = false;
             tries = 0;
         }
-        double patience = c->retry_sec >= 0.0 ? c->retry_sec
-                          : ever              ? PATIENCE_SEC
-                                              : CLIENT_RETRY_SEC;
+        double patience = c->retry_sec >= 0.0 ? c->retry_sec : ever ? PATIENCE_SEC : CLIENT_RETRY_SEC;
         if (status == STATUS_OK)
             error_set(err, STATUS_UNAVAILABLE, "%s ended the stream of events before the job ended",
                       request_server(c->request));
@@ -291,9 +286,7 @@ static int watch_events(struct watch *w, struct client *c, int64_t job, bool all
     return code;
 }
 
-int watch_job(struct client *c, int64_t job, bool all) {
-    return watch_events(&(struct watch){0}, c, job, all);
-}
+int watch_job(struct client *c, int64_t job, bool all) { return watch_events(&(struct watch){0}, c, job, all); }
 
 /* What is to be done when the job has ended; `code` is how it did, and stays so unless the command
  * cannot be run. */
@@ -351,8 +344,7 @@ int watch_run(struct client *c, const struct options *o) {
 
 /* What the job's processes wrote to their standard error: mostly nothing, and the last words of
  * those that crashed. */
-static enum status print_stderr(struct client *c, int64_t job, struct reply *reply,
-                                struct error *err) {
+static enum status print_stderr(struct client *c, int64_t job, struct reply *reply, struct error *err) {
     char path[80];
     snprintf(path, sizeof path, "/v1/jobs/%lld/log?bytes=1048576", (long long)job);
     enum status status = request_run(c->request, &(struct request_call){.path = path}, reply, err);
@@ -366,8 +358,8 @@ static enum status print_stderr(struct client *c, int64_t job, struct reply *rep
         cJSON_Delete(data);
         return STATUS_OK;
     }
-    fprintf(c->out.out, "%s--- standard error of its processes:%s\n",
-            terminal_colour(&c->out, COLOUR_DIM), terminal_colour(&c->out, COLOUR_NONE));
+    fprintf(c->out.out, "%s--- standard error of its processes:%s\n", terminal_colour(&c->out, COLOUR_DIM),
+            terminal_colour(&c->out, COLOUR_NONE));
     for (const char *at = text; *at;) {
         struct buf line;
         size_t length = strcspn(at, "\n");

@@ -7,9 +7,7 @@
 
 #include "common/mem.h"
 
-void buf_init(struct buf *b, size_t limit) {
-    *b = (struct buf){.limit = limit};
-}
+void buf_init(struct buf *b, size_t limit) { *b = (struct buf){.limit = limit}; }
 
 void buf_release(struct buf *b) {
     mem_free(b->data);
@@ -47,9 +45,7 @@ bool buf_append(struct buf *b, const void *data, size_t length) {
     return true;
 }
 
-bool buf_puts(struct buf *b, const char *text) {
-    return buf_append(b, text, strlen(text));
-}
+bool buf_puts(struct buf *b, const char *text) { return buf_append(b, text, strlen(text)); }
 
 bool buf_printf(struct buf *b, const char *format, ...) {
     va_list args;
@@ -74,9 +70,7 @@ void buf_consume(struct buf *b, size_t length) {
     b->length -= length;
 }
 
-const char *buf_text(const struct buf *b) {
-    return b->data ? b->data : "";
-}
+const char *buf_text(const struct buf *b) { return b->data ? b->data : ""; }
 
 char *buf_detach(struct buf *b) {
     char *text = b->data ? b->data : mem_strdup("");

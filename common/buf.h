@@ -6,8 +6,8 @@
 #include <stddef.h>
 
 struct buf {
-    char *data;      /* NUL-terminated after the first append; NULL before; owned */
-    size_t length;   /* bytes, the NUL not counted */
+    char *data;    /* NUL-terminated after the first append; NULL before; owned */
+    size_t length; /* bytes, the NUL not counted */
     size_t capacity;
     size_t limit;    /* bytes; an append that would pass it is refused */
     bool overflowed; /* an append was refused: the content is not whole */

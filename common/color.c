@@ -24,9 +24,7 @@ const struct color_primaries color_rec601_625 = {{0.64, 0.33}, {0.29, 0.60}, {0.
 
 #define PQ_WHITE 203.0 /* cd/m2 */
 
-void color_init(struct color *color) {
-    *color = (struct color){.is_srgb = true};
-}
+void color_init(struct color *color) { *color = (struct color){.is_srgb = true}; }
 
 void color_release(struct color *color) {
     if (color->profile)

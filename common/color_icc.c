@@ -58,7 +58,9 @@ static void note_complaint(cmsContext context, cmsUInt32Number code, const char 
 static struct color_icc *start(void) {
     cmsPluginMemHandler memory = {
         .base = {.Magic = cmsPluginMagicNumber, .ExpectedVersion = 2060, .Type = cmsPluginMemHandlerSig},
-        .MallocPtr = allocate, .FreePtr = release, .ReallocPtr = reallocate,
+        .MallocPtr = allocate,
+        .FreePtr = release,
+        .ReallocPtr = reallocate,
     };
     struct color_icc *icc = mem_calloc(1, sizeof *icc);
     icc->context = cmsCreateContext(&memory, icc);
@@ -162,9 +164,9 @@ static bool make_transform(struct color_icc *icc) {
     icc->is_grey = cmsGetColorSpace(icc->profile) == cmsSigGrayData;
     icc->rec709 = make_rec709(icc->context);
     if (icc->rec709)
-        icc->transform = cmsCreateTransformTHR(icc->context, icc->profile, icc->is_grey ? TYPE_GRAY_FLT : TYPE_RGB_FLT,
-                                               icc->rec709, TYPE_RGB_FLT, INTENT_RELATIVE_COLORIMETRIC,
-                                               cmsFLAGS_NOOPTIMIZE | cmsFLAGS_NOCACHE);
+        icc->transform =
+            cmsCreateTransformTHR(icc->context, icc->profile, icc->is_grey ? TYPE_GRAY_FLT : TYPE_RGB_FLT, icc->rec709,
+                                  TYPE_RGB_FLT, INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE | cmsFLAGS_NOCACHE);
     float probe[3][3] = {{0.0f, 0.0f, 0.0f}, {0.5f, 0.5f, 0.5f}, {1.0f, 1.0f, 1.0f}}, sum = 0.0f;
     if (!icc->transform)
         return false;
@@ -208,8 +210,8 @@ void color_set_profile(struct color *color, const void *profile, size_t size, bo
     const char *why = use(icc, color, profile, size, is_grey);
     if (color->profile != icc) {
         if (why)
-            snprintf(color->warning, sizeof color->warning, "its ICC profile %s%s%s", why, icc->complaint[0] ? ": " : "",
-                     icc->complaint);
+            snprintf(color->warning, sizeof color->warning, "its ICC profile %s%s%s", why,
+                     icc->complaint[0] ? ": " : "", icc->complaint);
         release_profile(icc);
     }
     if (why || color->is_srgb)

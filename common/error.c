@@ -33,8 +33,7 @@ enum status error_set_errno(struct error *err, int number, const char *format, .
         size_t used = strlen(err->message);
         char text[128];
         /* The GNU strerror_r: may or may not use the buffer. */
-        snprintf(err->message + used, sizeof err->message - used, ": %s",
-                 strerror_r(number, text, sizeof text));
+        snprintf(err->message + used, sizeof err->message - used, ": %s", strerror_r(number, text, sizeof text));
     }
     return status;
 }

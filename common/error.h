@@ -39,12 +39,10 @@ enum status error_set_errno(struct error *err, int number, const char *format, .
     __attribute__((format(printf, 3, 4)));
 
 /* Puts "prefix: " before the message already in *err; returns its status. */
-enum status error_prefix(struct error *err, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+enum status error_prefix(struct error *err, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Sets the hint of an error that was just set; returns its status. */
-enum status error_hint(struct error *err, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+enum status error_hint(struct error *err, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* A stable lower-case word for a status: "input", "no-space", ... Never NULL. */
 const char *status_name(enum status status);

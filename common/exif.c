@@ -14,8 +14,8 @@ enum {
     TAG_INTEROPERABILITY_INDEX = 0x0001,
     TAG_EXPOSURE_TIME = 0x829a,
     TAG_F_NUMBER = 0x829d,
-    TAG_SENSITIVITY = 0x8827,       /* PhotographicSensitivity; 65535 when it does not fit */
-    TAG_ISO_SPEED = 0x8833,         /* ISOSpeed, a LONG */
+    TAG_SENSITIVITY = 0x8827, /* PhotographicSensitivity; 65535 when it does not fit */
+    TAG_ISO_SPEED = 0x8833,   /* ISOSpeed, a LONG */
     TAG_STANDARD_SENSITIVITY = 0x8831,
     TAG_RECOMMENDED_INDEX = 0x8832
 };
@@ -80,7 +80,7 @@ struct next {
 
 /* Reads one directory. */
 static struct next read_directory(const struct block *b, size_t offset, struct image_info *info,
-                             struct sensitivity *iso) {
+                                  struct sensitivity *iso) {
     struct next next = {0, 0};
     size_t count = integer_at(b, offset, 2);
     for (size_t i = 0; i < count; i++) {

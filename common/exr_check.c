@@ -11,7 +11,7 @@ struct exr_comparison {
     const struct image *image;
     int channel[IMAGE_MAX_CHANNELS]; /* of the picture, for each of the file's */
     size_t wrong_count;
-    int first_channel;               /* of the picture, and the pixel of the first wrong value */
+    int first_channel; /* of the picture, and the pixel of the first wrong value */
     uint32_t first_x, first_y;
     float found;
 };
@@ -42,8 +42,8 @@ static void compare_row(void *user, const struct exr_row *row) {
     struct exr_comparison *c = user;
     size_t stride = c->image->channel_count;
     const uint8_t *at = row->values;
-    const float *value = c->image->pixel + ((size_t)row->y * c->image->width + row->x) * stride +
-                         (size_t)c->channel[row->channel];
+    const float *value =
+        c->image->pixel + ((size_t)row->y * c->image->width + row->x) * stride + (size_t)c->channel[row->channel];
     for (uint32_t i = 0; i < row->width; i++, value += stride) {
         if (row->type == EXR_PIXEL_HALF) {
             uint16_t half = (uint16_t)(at[0] | at[1] << 8);
@@ -65,8 +65,8 @@ static enum status compare(const struct exr_reader *r, const struct image *image
                            struct error *err) {
     struct exr_comparison c = {.image = image};
     const char *path = r->stream->source->name;
-    if (header->width != image->width || header->height != image->height ||
-        exr_data_width(r) != image->width || exr_data_height(r) != image->height)
+    if (header->width != image->width || header->height != image->height || exr_data_width(r) != image->width ||
+        exr_data_height(r) != image->height)
         return error_set(err, STATUS_CORRUPT, "%s: read back, it has %u x %u pixels, not %u x %u", path, header->width,
                          header->height, image->width, image->height);
     for (int i = 0; i < r->list->num_channels; i++)

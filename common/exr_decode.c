@@ -47,8 +47,7 @@ static exr_result_t unpack(exr_decode_pipeline_t *pipeline) {
 /* Decodes the chunk with its corner at (x, y). The first call sets the pipeline up, the others reuse its buffers. */
 static exr_result_t decode_chunk(const struct exr_reader *r, exr_decode_pipeline_t *pipeline,
                                  const exr_chunk_info_t *chunk, struct receiver *to, uint32_t x, uint32_t y) {
-    if (chunk->width < 0 || chunk->height < 0 ||
-        (uint64_t)x + (uint64_t)chunk->width > exr_data_width(r) ||
+    if (chunk->width < 0 || chunk->height < 0 || (uint64_t)x + (uint64_t)chunk->width > exr_data_width(r) ||
         (uint64_t)y + (uint64_t)chunk->height > exr_data_height(r))
         return EXR_ERR_BAD_CHUNK_LEADER;
     exr_result_t code;
@@ -105,8 +104,8 @@ enum status exr_decode(const struct exr_reader *r, void (*take)(void *user, cons
                           .user = user,
                           .is_zip = r->compression == EXR_COMPRESSION_ZIP || r->compression == EXR_COMPRESSION_ZIPS};
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
-    exr_result_t code = r->storage == EXR_STORAGE_TILED ? decode_tiles(r, &pipeline, &to)
-                                                        : decode_scanlines(r, &pipeline, &to);
+    exr_result_t code =
+        r->storage == EXR_STORAGE_TILED ? decode_tiles(r, &pipeline, &to) : decode_scanlines(r, &pipeline, &to);
     exr_decoding_destroy(r->context, &pipeline);
     return code == EXR_ERR_SUCCESS ? STATUS_OK : exr_stream_refuse(r->stream, code, err);
 }

@@ -30,8 +30,7 @@ static enum status choose_part(struct exr_reader *r, struct error *err) {
         code = exr_get_channels(r->context, i, &list);
         if (code != EXR_ERR_SUCCESS)
             break;
-        bool colour = find_channel(list, "R") >= 0 && find_channel(list, "G") >= 0 &&
-                      find_channel(list, "B") >= 0;
+        bool colour = find_channel(list, "R") >= 0 && find_channel(list, "G") >= 0 && find_channel(list, "B") >= 0;
         if (r->part < 0 || colour) {
             r->part = i;
             r->storage = storage;
@@ -43,8 +42,7 @@ static enum status choose_part(struct exr_reader *r, struct error *err) {
     if (code != EXR_ERR_SUCCESS)
         return exr_stream_refuse(r->stream, code, err);
     if (r->part < 0)
-        return error_set(err, STATUS_INPUT,
-                         "%s: the EXR holds only deep data; a flat picture was expected",
+        return error_set(err, STATUS_INPUT, "%s: the EXR holds only deep data; a flat picture was expected",
                          r->stream->source->name);
     return STATUS_OK;
 }
@@ -54,38 +52,34 @@ static enum status check_channels(const struct exr_reader *r, struct error *err)
     const exr_attr_chlist_t *list = r->list;
     const char *file = r->stream->source->name;
     if (list->num_channels > IMAGE_MAX_CHANNELS - 2) /* grey becomes three */
-        return error_set(err, STATUS_LIMIT, "%s: %d channels are more than the limit of %d", file,
-                         list->num_channels, IMAGE_MAX_CHANNELS - 2);
+        return error_set(err, STATUS_LIMIT, "%s: %d channels are more than the limit of %d", file, list->num_channels,
+                         IMAGE_MAX_CHANNELS - 2);
     bool half = true;
     for (int i = 0; i < list->num_channels; i++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[i];
-        char name[sizeof ((struct image *)NULL)->channel[0]];
+        char name[sizeof((struct image *)NULL)->channel[0]];
         exr_stream_printable(entry->name.str, name, sizeof name);
         if (entry->x_sampling != 1 || entry->y_sampling != 1)
             return error_set(err, STATUS_INPUT,
                              "%s: channel %s is subsampled %d x %d (luminance/chroma EXR); only "
-                             "full-resolution channels can be read", file, name,
-                             entry->x_sampling, entry->y_sampling);
+                             "full-resolution channels can be read",
+                             file, name, entry->x_sampling, entry->y_sampling);
         if (strlen(entry->name.str) >= sizeof name)
-            return error_set(err, STATUS_INPUT, "%s: the channel name %s... is too long", file,
-                             name);
+            return error_set(err, STATUS_INPUT, "%s: the channel name %s... is too long", file, name);
         half = half && entry->pixel_type == EXR_PIXEL_HALF;
     }
-    if (r->compression <= EXR_COMPRESSION_PXR24 ||
-        (half && r->compression <= EXR_COMPRESSION_B44A))
+    if (r->compression <= EXR_COMPRESSION_PXR24 || (half && r->compression <= EXR_COMPRESSION_B44A))
         return STATUS_OK;
     /* OpenEXRCore 3.1.5 has no DWA and mixes up the rows of B44's other channels. */
     error_set(err, STATUS_INPUT, "%s: this reader knows no EXR compression %s", file,
-              r->compression <= EXR_COMPRESSION_B44A ? "B44 of channels other than half"
-                                                     : "DWAA or DWAB");
+              r->compression <= EXR_COMPRESSION_B44A ? "B44 of channels other than half" : "DWAA or DWAB");
     return error_hint(err, "save the file with ZIP or PIZ compression");
 }
 
 /* Orders the channels: R, G, B, A first, then the others alphabetically. Fills name[] and returns their count. */
 static uint32_t order_channels(struct exr_reader *r, const char **name) {
     const exr_attr_chlist_t *list = r->list;
-    bool colour = find_channel(list, "R") >= 0 || find_channel(list, "G") >= 0 ||
-                  find_channel(list, "B") >= 0;
+    bool colour = find_channel(list, "R") >= 0 || find_channel(list, "G") >= 0 || find_channel(list, "B") >= 0;
     uint32_t count = 0;
     r->grey = colour ? -1 : find_channel(list, "Y");
     for (int i = 0; i < list->num_channels; i++)
@@ -111,9 +105,7 @@ static uint32_t order_channels(struct exr_reader *r, const char **name) {
     return count;
 }
 
-static int64_t side(int32_t min, int32_t max) {
-    return (int64_t)max - min + 1;
-}
+static int64_t side(int32_t min, int32_t max) { return (int64_t)max - min + 1; }
 
 /* Checks the sizes against the file's length. */
 static enum status check_plausible(const struct exr_reader *r, struct error *err) {
@@ -125,14 +117,14 @@ static enum status check_plausible(const struct exr_reader *r, struct error *err
     uint64_t pixel_bytes = 0;
     for (int i = 0; i < r->list->num_channels; i++)
         pixel_bytes += r->list->entries[i].pixel_type == EXR_PIXEL_HALF ? 2 : 4;
-    uint64_t bytes = pixel_bytes * (uint64_t)side(r->data.min.x, r->data.max.x) *
-                     (uint64_t)side(r->data.min.y, r->data.max.y);
+    uint64_t bytes =
+        pixel_bytes * (uint64_t)side(r->data.min.x, r->data.max.x) * (uint64_t)side(r->data.min.y, r->data.max.y);
     uint64_t ratio = r->compression == EXR_COMPRESSION_NONE ? 1 : MAX_RATIO;
-    if (chunk_count < 1 || (uint64_t)chunk_count * 8 > source->size ||
-        bytes / ratio > source->size)
+    if (chunk_count < 1 || (uint64_t)chunk_count * 8 > source->size || bytes / ratio > source->size)
         return error_set(err, STATUS_INPUT,
                          "%s: damaged EXR: the file's %llu bytes cannot hold the picture that its "
-                         "header promises", source->name, (unsigned long long)source->size);
+                         "header promises",
+                         source->name, (unsigned long long)source->size);
     return STATUS_OK;
 }
 
@@ -162,10 +154,9 @@ enum status exr_read_header(struct exr_reader *r, struct image *image, struct im
         if (status != STATUS_OK)
             return status;
     }
-    if (r->data.min.x > r->display.max.x || r->data.max.x < r->display.min.x ||
-        r->data.min.y > r->display.max.y || r->data.max.y < r->display.min.y)
-        return error_set(err, STATUS_INPUT,
-                         "%s: the EXR's data window lies outside its display window",
+    if (r->data.min.x > r->display.max.x || r->data.max.x < r->display.min.x || r->data.min.y > r->display.max.y ||
+        r->data.max.y < r->display.min.y)
+        return error_set(err, STATUS_INPUT, "%s: the EXR's data window lies outside its display window",
                          r->stream->source->name);
     info->encoding = IMAGE_LINEAR;
     info->bits = 16;

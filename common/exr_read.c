@@ -11,8 +11,8 @@ static void unpack_row(const uint8_t *from, uint16_t type, size_t width, size_t 
             to[x * stride] = image_float_from_half((uint16_t)(from[2 * x] | from[2 * x + 1] << 8));
     else
         for (size_t x = 0; x < width; x++) {
-            uint32_t bits = (uint32_t)from[4 * x] | (uint32_t)from[4 * x + 1] << 8 |
-                            (uint32_t)from[4 * x + 2] << 16 | (uint32_t)from[4 * x + 3] << 24;
+            uint32_t bits = (uint32_t)from[4 * x] | (uint32_t)from[4 * x + 1] << 8 | (uint32_t)from[4 * x + 2] << 16 |
+                            (uint32_t)from[4 * x + 3] << 24;
             float value = (float)bits;
             if (type == EXR_PIXEL_FLOAT)
                 memcpy(&value, &bits, sizeof value);
@@ -88,9 +88,10 @@ static void convert(const struct exr_reader *r, struct image *image, struct imag
     if (r->grey >= 0 || image_channel(image, "B") != 2 ||
         exr_attr_get_chromaticities(r->context, r->part, "chromaticities", &c) != EXR_ERR_SUCCESS)
         return;
-    const struct color_primaries primaries = {
-        {(double)c.red_x, (double)c.red_y}, {(double)c.green_x, (double)c.green_y},
-        {(double)c.blue_x, (double)c.blue_y}, {(double)c.white_x, (double)c.white_y}};
+    const struct color_primaries primaries = {{(double)c.red_x, (double)c.red_y},
+                                              {(double)c.green_x, (double)c.green_y},
+                                              {(double)c.blue_x, (double)c.blue_y},
+                                              {(double)c.white_x, (double)c.white_y}};
     if (!color_matrix(&primaries, matrix, &is_same)) {
         snprintf(info->color_warning, sizeof info->color_warning, "its chromaticities cannot be");
         return;
@@ -102,8 +103,8 @@ static void convert(const struct exr_reader *r, struct image *image, struct imag
                    &info->outside_count);
 }
 
-enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err) {
+enum status image_read_exr(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err) {
     struct exr_stream stream = {.source = source, .fd = -1};
     struct exr_reader r = {.stream = &stream};
     exr_context_initializer_t init = exr_stream_reader(&stream);

@@ -8,9 +8,7 @@
 
 /* Largest single allocation; a chunk of the largest picture is smaller. */
 #define MAX_ALLOCATION ((size_t)2 << 30)
-static void *limited_alloc(size_t bytes) {
-    return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL;
-}
+static void *limited_alloc(size_t bytes) { return bytes <= MAX_ALLOCATION ? mem_alloc(bytes) : NULL; }
 
 const char *exr_stream_printable(const char *text, char *out, size_t size) {
     size_t i = 0;
@@ -36,8 +34,8 @@ static void drop_error(exr_const_context_t context, exr_result_t code, const cha
     (void)message;
 }
 
-static int64_t stream_read(exr_const_context_t context, void *user, void *buffer, uint64_t size,
-                           uint64_t offset, exr_stream_error_func_ptr_t report) {
+static int64_t stream_read(exr_const_context_t context, void *user, void *buffer, uint64_t size, uint64_t offset,
+                           exr_stream_error_func_ptr_t report) {
     (void)context;
     (void)report;
     struct exr_stream *stream = user;
@@ -50,15 +48,14 @@ static int64_t stream_size(exr_const_context_t context, void *user) {
     return (int64_t)stream->source->size;
 }
 
-static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer,
-                            uint64_t size, uint64_t offset, exr_stream_error_func_ptr_t report) {
+static int64_t stream_write(exr_const_context_t context, void *user, const void *buffer, uint64_t size, uint64_t offset,
+                            exr_stream_error_func_ptr_t report) {
     (void)context;
     (void)report;
     struct exr_stream *stream = user;
     uint64_t done = 0;
     while (done < size) {
-        ssize_t wrote = pwrite(stream->fd, (const char *)buffer + done, (size_t)(size - done),
-                               (off_t)(offset + done));
+        ssize_t wrote = pwrite(stream->fd, (const char *)buffer + done, (size_t)(size - done), (off_t)(offset + done));
         if (wrote < 0 && errno == EINTR)
             continue;
         if (wrote <= 0) {
@@ -70,8 +67,7 @@ static int64_t stream_write(exr_const_context_t context, void *user, const void 
     return (int64_t)done;
 }
 
-static exr_context_initializer_t initializer(struct exr_stream *stream,
-                                             exr_error_handler_cb_t on_error) {
+static exr_context_initializer_t initializer(struct exr_stream *stream, exr_error_handler_cb_t on_error) {
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = on_error;
     init.alloc_fn = limited_alloc;
@@ -88,13 +84,9 @@ static exr_context_initializer_t initializer(struct exr_stream *stream,
     return init;
 }
 
-exr_context_initializer_t exr_stream_reader(struct exr_stream *stream) {
-    return initializer(stream, note_error);
-}
+exr_context_initializer_t exr_stream_reader(struct exr_stream *stream) { return initializer(stream, note_error); }
 
-exr_context_initializer_t exr_stream_writer(struct exr_stream *stream) {
-    return initializer(stream, drop_error);
-}
+exr_context_initializer_t exr_stream_writer(struct exr_stream *stream) { return initializer(stream, drop_error); }
 
 enum status exr_stream_refuse(const struct exr_stream *stream, exr_result_t code, struct error *err) {
     return error_set(err, STATUS_INPUT, "%s: damaged EXR: %s", stream->source->name,

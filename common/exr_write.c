@@ -14,25 +14,22 @@ struct encoder {
     exr_result_t (*compress)(exr_encode_pipeline_t *); /* the library's */
 };
 
-static exr_result_t write_header(exr_context_t context, const struct image *image,
-                                 enum image_exr_type type, bool tiled) {
+static exr_result_t write_header(exr_context_t context, const struct image *image, enum image_exr_type type,
+                                 bool tiled) {
     /* ITU-R BT.709: red, green, blue, white. */
     static const exr_attr_chromaticities_t rec709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
     int part = 0;
-    exr_result_t code = exr_add_part(context, NULL,
-                                     tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
+    exr_result_t code = exr_add_part(context, NULL, tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
     if (code == EXR_ERR_SUCCESS)
-        code = exr_initialize_required_attr_simple(context, part, (int32_t)image->width,
-                                                   (int32_t)image->height, EXR_COMPRESSION_ZIP);
+        code = exr_initialize_required_attr_simple(context, part, (int32_t)image->width, (int32_t)image->height,
+                                                   EXR_COMPRESSION_ZIP);
     if (code == EXR_ERR_SUCCESS && tiled)
-        code = exr_set_tile_descriptor(context, part, TILE_SIDE, TILE_SIDE, EXR_TILE_ONE_LEVEL,
-                                       EXR_TILE_ROUND_DOWN);
+        code = exr_set_tile_descriptor(context, part, TILE_SIDE, TILE_SIDE, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN);
     if (code == EXR_ERR_SUCCESS && image_channel(image, "R") >= 0 && image_channel(image, "G") >= 0 &&
         image_channel(image, "B") >= 0)
         code = exr_attr_set_chromaticities(context, part, "chromaticities", &rec709);
     for (uint32_t c = 0; code == EXR_ERR_SUCCESS && c < image->channel_count; c++)
-        code = exr_add_channel(context, part, image->channel[c],
-                               type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
+        code = exr_add_channel(context, part, image->channel[c], type == IMAGE_HALF ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                                EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
     return code == EXR_ERR_SUCCESS ? exr_write_header(context) : code;
 }
@@ -51,11 +48,10 @@ static exr_result_t compress_or_store(exr_encode_pipeline_t *pipeline) {
 }
 
 static exr_result_t encode_chunk(exr_context_t context, struct encoder *encoder, exr_encode_pipeline_t *pipeline,
-                                 const exr_chunk_info_t *chunk, uint32_t x, uint32_t y,
-                                 const struct image *image) {
+                                 const exr_chunk_info_t *chunk, uint32_t x, uint32_t y, const struct image *image) {
     bool first = pipeline->channels == NULL;
-    exr_result_t code = first ? exr_encoding_initialize(context, 0, chunk, pipeline)
-                              : exr_encoding_update(context, 0, chunk, pipeline);
+    exr_result_t code =
+        first ? exr_encoding_initialize(context, 0, chunk, pipeline) : exr_encoding_update(context, 0, chunk, pipeline);
     if (code != EXR_ERR_SUCCESS)
         return code;
     size_t stride = image->channel_count * sizeof(float);
@@ -90,8 +86,7 @@ static exr_result_t write_chunks(exr_context_t context, const struct image *imag
         for (uint32_t x = 0; code == EXR_ERR_SUCCESS && x < image->width; x += step_x) {
             exr_chunk_info_t chunk;
             if (tiled)
-                code = exr_write_tile_chunk_info(context, 0, (int)(x / TILE_SIDE),
-                                                 (int)(y / TILE_SIDE), 0, 0, &chunk);
+                code = exr_write_tile_chunk_info(context, 0, (int)(x / TILE_SIDE), (int)(y / TILE_SIDE), 0, 0, &chunk);
             else
                 code = exr_write_scanline_chunk_info(context, 0, (int)y, &chunk);
             if (code == EXR_ERR_SUCCESS)
@@ -101,8 +96,8 @@ static exr_result_t write_chunks(exr_context_t context, const struct image *imag
     return code;
 }
 
-enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
-                            bool tiled, struct error *err) {
+enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
+                            struct error *err) {
     struct exr_stream stream = {.fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)};
     if (stream.fd < 0)
         return error_set_errno(err, errno, "cannot create %s", path);
@@ -121,8 +116,7 @@ enum status image_write_exr(const char *path, const struct image *image, enum im
     if (stream.io_error)
         status = error_set_errno(err, stream.io_error, "cannot write %s", path);
     else if (code != EXR_ERR_SUCCESS)
-        status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path,
-                           exr_get_default_error_message(code));
+        status = error_set(err, STATUS_INTERNAL, "cannot write %s: %s", path, exr_get_default_error_message(code));
     struct stat facts;
     bool is_file = fstat(stream.fd, &facts) == 0 && S_ISREG(facts.st_mode);
     if (close(stream.fd) != 0 && status == STATUS_OK)

@@ -48,8 +48,7 @@ enum status file_rename_new(const char *from, const char *to, struct error *err)
     return failed ? error_set_errno(err, failed, "cannot rename to %s", to) : STATUS_OK;
 }
 
-enum status file_write_all(int fd, const void *data, size_t length, const char *path,
-                           struct error *err) {
+enum status file_write_all(int fd, const void *data, size_t length, const char *path, struct error *err) {
     const char *at = data;
     while (length > 0) {
         ssize_t wrote = write(fd, at, length);
@@ -165,9 +164,7 @@ void file_free_names(char **names, size_t count) {
     mem_free(names);
 }
 
-static int by_name(const void *a, const void *b) {
-    return strcmp(*(char *const *)a, *(char *const *)b);
-}
+static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
 /* As file_list, of an open folder. */
 static enum status list(DIR *dir, const char *path, char ***names, size_t *count, struct error *err) {
@@ -197,8 +194,8 @@ static enum status list(DIR *dir, const char *path, char ***names, size_t *count
 }
 
 /* Opens the folder `name` of the folder `dir_fd` and lists it. */
-static enum status open_folder(int dir_fd, const char *name, const char *path, DIR **dir, char ***names,
-                               size_t *count, struct error *err) {
+static enum status open_folder(int dir_fd, const char *name, const char *path, DIR **dir, char ***names, size_t *count,
+                               struct error *err) {
     int fd = openat(dir_fd, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     *dir = fd >= 0 ? fdopendir(fd) : NULL;
     if (!*dir) {
@@ -248,9 +245,7 @@ static enum status remove_at(int dir_fd, const char *name, const char *path, str
     return status;
 }
 
-enum status file_remove_tree(const char *path, struct error *err) {
-    return remove_at(AT_FDCWD, path, path, err);
-}
+enum status file_remove_tree(const char *path, struct error *err) { return remove_at(AT_FDCWD, path, path, err); }
 
 /* Adds what `name` is inside the folder `dir_fd`. `path` is for messages. */
 static enum status add_size(int dir_fd, const char *name, const char *path, uint64_t *files, uint64_t *bytes,

@@ -23,8 +23,7 @@ enum status file_put_in_place(const char *temporary, const char *path, struct er
 enum status file_rename_new(const char *from, const char *to, struct error *err);
 
 /* Writes all of `data` to fd, through short writes and EINTR. `path` is for the message. */
-enum status file_write_all(int fd, const void *data, size_t length, const char *path,
-                           struct error *err);
+enum status file_write_all(int fd, const void *data, size_t length, const char *path, struct error *err);
 
 /* fsync of the folder that holds `path`, so that a rename in it is durable. */
 enum status file_sync_parent(const char *path, struct error *err);

@@ -9,9 +9,7 @@
 #define PRIME_4 0x85EBCA77C2B2AE63u
 #define PRIME_5 0x27D4EB2F165667C5u
 
-static uint64_t rotate(uint64_t x, int by) {
-    return x << by | x >> (64 - by);
-}
+static uint64_t rotate(uint64_t x, int by) { return x << by | x >> (64 - by); }
 
 /* Both machines that we build for are little-endian, as the specification wants. */
 static uint64_t read_64(const uint8_t *at) {
@@ -26,13 +24,9 @@ static uint32_t read_32(const uint8_t *at) {
     return x;
 }
 
-static uint64_t mix_in(uint64_t lane, uint64_t input) {
-    return rotate(lane + input * PRIME_2, 31) * PRIME_1;
-}
+static uint64_t mix_in(uint64_t lane, uint64_t input) { return rotate(lane + input * PRIME_2, 31) * PRIME_1; }
 
-static uint64_t merge(uint64_t hash, uint64_t lane) {
-    return (hash ^ mix_in(0, lane)) * PRIME_1 + PRIME_4;
-}
+static uint64_t merge(uint64_t hash, uint64_t lane) { return (hash ^ mix_in(0, lane)) * PRIME_1 + PRIME_4; }
 
 uint64_t hash64(const void *data, size_t bytes, uint64_t seed) {
     const uint8_t *at = data, *end = at + bytes;

@@ -93,7 +93,8 @@ static enum status read_header(struct hdr_stream *s, struct image *image, struct
         if (strncmp(line, "FORMAT=", 7) == 0 && strncmp(line + 7, "32-bit_rle_rgbe", 15) != 0)
             return error_set(err, STATUS_INPUT,
                              "%s: Radiance format %.40s is not supported; expected "
-                             "32-bit_rle_rgbe", name, line + 7);
+                             "32-bit_rle_rgbe",
+                             name, line + 7);
         if (strncmp(line, "EXPOSURE=", 9) == 0)
             exposure *= strtod(line + 9, NULL);
         if (strncmp(line, "PRIMARIES=", 10) == 0)
@@ -103,20 +104,23 @@ static enum status read_header(struct hdr_stream *s, struct image *image, struct
     if (!ok)
         return error_set(err, STATUS_INPUT, "%s: the Radiance header has no end", name);
     if (!(exposure > 1e-30 && exposure < 1e30))
-        return error_set(err, STATUS_INPUT, "%s: the Radiance header's EXPOSURE is not a positive "
-                         "number", name);
+        return error_set(err, STATUS_INPUT,
+                         "%s: the Radiance header's EXPOSURE is not a positive "
+                         "number",
+                         name);
     h->scale = (float)(1 / exposure);
     unsigned long width = 0, height = 0;
     char rest = '\0';
     int found = sscanf(line, "-Y %9lu +X %9lu%c", &height, &width, &rest);
     if (found < 2 || (found == 3 && rest != '\r'))
-        return error_set(err, STATUS_INPUT,
-                         "%s: expected the resolution as '-Y height +X width', found '%.60s'", name,
+        return error_set(err, STATUS_INPUT, "%s: expected the resolution as '-Y height +X width', found '%.60s'", name,
                          line);
     enum status status = image_header(image, name, width, height, 3, image_rgba, err);
     if (status == STATUS_OK && width * height / MAX_PIXELS_PER_BYTE > s->source->size)
-        status = error_set(err, STATUS_INPUT, "%s: the file's %llu bytes cannot hold %lu x %lu "
-                           "pixels", name, (unsigned long long)s->source->size, width, height);
+        status = error_set(err, STATUS_INPUT,
+                           "%s: the file's %llu bytes cannot hold %lu x %lu "
+                           "pixels",
+                           name, (unsigned long long)s->source->size, width, height);
     return status;
 }
 
@@ -172,8 +176,8 @@ static bool read_row(struct hdr_stream *s, uint8_t *row, size_t width) {
     return ((size_t)pixel[2] << 8 | pixel[3]) == width && read_new_rle(s, row, width);
 }
 
-enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err) {
+enum status image_read_hdr(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err) {
     struct hdr_stream s = {.source = source};
     struct header header = {.scale = 1};
     enum status status = read_header(&s, image, &header, info, err);
@@ -193,8 +197,10 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
     float *pixel = image->pixel;
     for (uint32_t y = 0; y < image->height && status == STATUS_OK; y++) {
         if (!read_row(&s, row, width))
-            status = error_set(err, STATUS_INPUT, "%s: row %u of the Radiance picture is damaged or "
-                               "cut short", source->name, y);
+            status = error_set(err, STATUS_INPUT,
+                               "%s: row %u of the Radiance picture is damaged or "
+                               "cut short",
+                               source->name, y);
         else
             for (size_t x = 0; x < width; x++, pixel += 3)
                 for (size_t c = 0; c < 3; c++)

@@ -6,8 +6,8 @@
 
 #include "common/mem.h"
 
-static void set_header(struct image *image, uint32_t width, uint32_t height,
-                       uint32_t channel_count, const char *const *channel) {
+static void set_header(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
+                       const char *const *channel) {
     *image = (struct image){.width = width, .height = height, .channel_count = channel_count};
     image->channel = mem_calloc(channel_count, sizeof *image->channel);
     for (uint32_t c = 0; c < channel_count; c++)
@@ -51,18 +51,18 @@ int image_channel(const struct image *image, const char *name) {
     return -1;
 }
 
-enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
-                         uint32_t channel_count, const char *const *channel, struct error *err) {
+enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height, uint32_t channel_count,
+                         const char *const *channel, struct error *err) {
     if (width == 0 || height == 0 || channel_count == 0)
         return error_set(err, STATUS_INPUT, "%s: the picture has no pixels", name);
     if (width > IMAGE_MAX_SIDE || height > IMAGE_MAX_SIDE || width * height > IMAGE_MAX_PIXELS)
         return error_set(err, STATUS_LIMIT,
                          "%s: %llu x %llu pixels are more than the limits of %d a side and %zu "
-                         "altogether", name, (unsigned long long)width,
-                         (unsigned long long)height, IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS);
+                         "altogether",
+                         name, (unsigned long long)width, (unsigned long long)height, IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS);
     if (channel_count > IMAGE_MAX_CHANNELS)
-        return error_set(err, STATUS_LIMIT, "%s: %u channels are more than the limit of %d", name,
-                         channel_count, IMAGE_MAX_CHANNELS);
+        return error_set(err, STATUS_LIMIT, "%s: %u channels are more than the limit of %d", name, channel_count,
+                         IMAGE_MAX_CHANNELS);
     set_header(image, (uint32_t)width, (uint32_t)height, channel_count, channel);
     return STATUS_OK;
 }

@@ -42,12 +42,12 @@ enum image_encoding {
 
 struct image_info {
     enum image_encoding encoding;
-    int bits;              /* per channel as stored: 8, 16, 32 */
+    int bits; /* per channel as stored: 8, 16, 32 */
     /* From EXIF where present, else 0. */
     double exposure_time_sec, iso, f_number;
-    int orientation;       /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
-    bool is_adobe_rgb;     /* EXIF says so; cameras without profile do that */
-    bool is_uncalibrated;  /* EXIF says that the colour space is not sRGB, without naming it */
+    int orientation;      /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
+    bool is_adobe_rgb;    /* EXIF says so; cameras without profile do that */
+    bool is_uncalibrated; /* EXIF says that the colour space is not sRGB, without naming it */
     /* Set by reading, not by probing: */
     char color_space[64];    /* converted from, for people: "Display P3"; "" if not converted */
     char color_warning[160]; /* why the file's colour information is not used and sRGB is assumed; or "" */
@@ -56,7 +56,7 @@ struct image_info {
 };
 
 void image_init(struct image *image, uint32_t width, uint32_t height, uint32_t channel_count,
-                const char *const *channel); /* zero pixels; names are copied */
+                const char *const *channel);                               /* zero pixels; names are copied */
 void image_init_rgb(struct image *image, uint32_t width, uint32_t height); /* channels R G B */
 /* The first three channels of `from`, which must be R G B, as a new picture. */
 void image_take_rgb(const struct image *from, struct image *image);
@@ -64,8 +64,8 @@ void image_release(struct image *image);
 
 /* First half of image_init, for sizes from a file: sets size and channel names, without pixels; STATUS_LIMIT when a
  * limit is exceeded, STATUS_INPUT when a size is 0. `name` is for messages. */
-enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height,
-                         uint32_t channel_count, const char *const *channel, struct error *err);
+enum status image_header(struct image *image, const char *name, uint64_t width, uint64_t height, uint32_t channel_count,
+                         const char *const *channel, struct error *err);
 
 /* Second half: zero pixels. */
 void image_allocate(struct image *image);
@@ -81,19 +81,17 @@ int image_channel(const struct image *image, const char *name);
  * Colours are linear or sRGB of Rec. 709's primaries and white D65. Files that specify others (ICC profile; PNG's
  * cICP, cHRM and gAMA; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these; colour
  * information that cannot be used gives a warning in info. */
-enum status image_read(const char *path, struct image *image, struct image_info *info,
-                       struct error *err);
+enum status image_read(const char *path, struct image *image, struct image_info *info, struct error *err);
 
 /* The same with stored values of PNG and JPEG, without colour conversion: for masks. */
 enum status image_read_stored(const char *path, struct image *image, struct error *err);
 
 /* The same from memory; `name` stands for the path in messages. */
-enum status image_read_memory(const char *name, const void *data, size_t size,
-                              struct image *image, struct image_info *info, struct error *err);
+enum status image_read_memory(const char *name, const void *data, size_t size, struct image *image,
+                              struct image_info *info, struct error *err);
 
 /* The same without reading pixels: only width, height, channels and info; pixel is NULL. */
-enum status image_probe(const char *path, struct image *image, struct image_info *info,
-                        struct error *err);
+enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err);
 
 enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
 
@@ -102,13 +100,12 @@ enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
  *
  * Writes an EXR (ZIP, 16-line scanline blocks, or 64 x 64 tiles when `tiled`) with these channels; the same pixels
  * give the same bytes. Overwrites `path` in place: callers that need atomicity write a temporary name. */
-enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type,
-                            bool tiled, struct error *err);
+enum status image_write_exr(const char *path, const struct image *image, enum image_exr_type type, bool tiled,
+                            struct error *err);
 
 /* Writes an 8-bit sRGB PNG of the first three channels (or the one there is, as grey), values
  * times `scale`, clamped to [0, 1], converted from linear. Non-finite values become magenta. */
-enum status image_write_png(const char *path, const struct image *image, float scale,
-                            struct error *err);
+enum status image_write_png(const char *path, const struct image *image, float scale, struct error *err);
 
 /* The sRGB transfer function (IEC 61966-2-1), value by value. */
 float image_srgb_to_linear(float value);

@@ -31,9 +31,7 @@ enum status image_source_open(struct image_source *source, const char *path, str
     return status;
 }
 
-void image_source_close(struct image_source *source) {
-    close(source->fd);
-}
+void image_source_close(struct image_source *source) { close(source->fd); }
 
 /* Maps clipped channels of the file to the Rec. 709 channels they contribute most to (for wider spaces each to its
  * own). Their smaller contributions to other channels (at most 0.23 for Display P3) are not marked, though they are
@@ -72,8 +70,7 @@ void image_convert(struct image *image, struct image_info *info, struct color *c
     color_release(color);
 }
 
-size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
-                         size_t length) {
+size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer, size_t length) {
     if (offset >= source->size)
         return 0;
     if (length > source->size - offset)
@@ -84,8 +81,7 @@ size_t image_source_read(struct image_source *source, uint64_t offset, void *buf
     }
     size_t done = 0;
     while (done < length) {
-        ssize_t got = pread(source->fd, (char *)buffer + done, length - done,
-                            (off_t)(offset + done));
+        ssize_t got = pread(source->fd, (char *)buffer + done, length - done, (off_t)(offset + done));
         if (got < 0 && errno == EINTR)
             continue;
         if (got < 0 && source->io_error == 0)

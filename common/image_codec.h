@@ -14,9 +14,9 @@ struct image_source {
     const char *name;      /* for messages */
     const uint8_t *memory; /* NULL for a file */
     int fd;
-    uint64_t size;         /* bytes */
-    int io_error;          /* errno of the first read that the system refused, else 0 */
-    bool as_stored;        /* values of PNG and JPEG are not converted */
+    uint64_t size;  /* bytes */
+    int io_error;   /* errno of the first read that the system refused, else 0 */
+    bool as_stored; /* values of PNG and JPEG are not converted */
 };
 
 /* Opens a file (a FIFO under a picture's name does not block) that must be a regular one; `path` is borrowed. */
@@ -24,8 +24,7 @@ enum status image_source_open(struct image_source *source, const char *path, str
 void image_source_close(struct image_source *source);
 
 /* Reads up to `length` bytes at `offset`; fewer only at the end or after an I/O error. */
-size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer,
-                         size_t length);
+size_t image_source_read(struct image_source *source, uint64_t offset, void *buffer, size_t length);
 
 /* Converts a picture with values in [0, 1] by *color and records it in *info; releases *color. */
 void image_convert(struct image *image, struct image_info *info, struct color *color);
@@ -38,14 +37,14 @@ extern const char *const image_rgba[4];
 
 /* One reader per format. With `probe` they stop after the header. The source's first bytes
  * were recognised. On error the caller releases *image. */
-enum status image_read_exr(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err);
-enum status image_read_hdr(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err);
-enum status image_read_png(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err);
-enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
-                            struct image_info *info, struct error *err);
+enum status image_read_exr(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err);
+enum status image_read_hdr(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err);
+enum status image_read_png(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err);
+enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                            struct error *err);
 
 /* Whether written files hold these pictures; called by image_write_exr and image_write_png. STATUS_CORRUPT says what
  * a reader finds instead. */

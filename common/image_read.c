@@ -3,13 +3,12 @@
 
 #include "common/image_codec.h"
 
-static enum status read_source(struct image_source *source, bool probe, struct image *image,
-                               struct image_info *info, struct error *err) {
+static enum status read_source(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                               struct error *err) {
     static const struct {
         const char *magic;
         size_t length;
-        enum status (*read)(struct image_source *, bool, struct image *, struct image_info *,
-                            struct error *);
+        enum status (*read)(struct image_source *, bool, struct image *, struct image_info *, struct error *);
     } codecs[] = {
         {"\x76\x2f\x31\x01", 4, image_read_exr},
         {"\x89PNG", 4, image_read_png}, /* libpng explains what is wrong with the other four */
@@ -25,16 +24,14 @@ static enum status read_source(struct image_source *source, bool probe, struct i
     size_t length = image_source_read(source, 0, start, sizeof start);
     enum status status = STATUS_INPUT;
     size_t i = 0, codec_count = sizeof codecs / sizeof codecs[0];
-    while (i < codec_count && (length < codecs[i].length ||
-                               memcmp(start, codecs[i].magic, codecs[i].length) != 0))
+    while (i < codec_count && (length < codecs[i].length || memcmp(start, codecs[i].magic, codecs[i].length) != 0))
         i++;
     if (i < codec_count)
         status = codecs[i].read(source, probe, image, info, err);
     else if (source->size == 0)
         error_set(err, status, "%s: the file is empty", source->name);
     else
-        error_set(err, status, "%s: not a picture in EXR, PNG, JPEG or Radiance HDR format",
-                  source->name);
+        error_set(err, status, "%s: not a picture in EXR, PNG, JPEG or Radiance HDR format", source->name);
     /* a truncated file may be a failing disk */
     if (source->io_error)
         status = error_set_errno(err, source->io_error, "cannot read %s", source->name);
@@ -43,8 +40,8 @@ static enum status read_source(struct image_source *source, bool probe, struct i
     return status;
 }
 
-static enum status read_path(const char *path, bool probe, bool as_stored, struct image *image,
-                             struct image_info *info, struct error *err) {
+static enum status read_path(const char *path, bool probe, bool as_stored, struct image *image, struct image_info *info,
+                             struct error *err) {
     *image = (struct image){0};
     struct image_source source;
     enum status status = image_source_open(&source, path, err);
@@ -56,8 +53,7 @@ static enum status read_path(const char *path, bool probe, bool as_stored, struc
     return status;
 }
 
-enum status image_read(const char *path, struct image *image, struct image_info *info,
-                       struct error *err) {
+enum status image_read(const char *path, struct image *image, struct image_info *info, struct error *err) {
     return read_path(path, false, false, image, info, err);
 }
 
@@ -65,13 +61,12 @@ enum status image_read_stored(const char *path, struct image *image, struct erro
     return read_path(path, false, true, image, NULL, err);
 }
 
-enum status image_probe(const char *path, struct image *image, struct image_info *info,
-                        struct error *err) {
+enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err) {
     return read_path(path, true, false, image, info, err);
 }
 
-enum status image_read_memory(const char *name, const void *data, size_t size,
-                              struct image *image, struct image_info *info, struct error *err) {
+enum status image_read_memory(const char *name, const void *data, size_t size, struct image *image,
+                              struct image_info *info, struct error *err) {
     struct image_source source = {.name = name, .memory = data, .fd = -1, .size = size};
     return read_source(&source, false, image, info, err);
 }

@@ -60,28 +60,21 @@ static void on_message(j_common_ptr common, int level) {
     if (level >= 0)
         return; /* a trace */
     switch (common->err->msg_code) {
-    case JWRN_BOGUS_ICC: /* parts of a profile that do not make one */
-        r->is_profile_damaged = true;
-        return;
+    case JWRN_BOGUS_ICC: /* parts of a profile that do not make one */ r->is_profile_damaged = true; return;
     case JWRN_ADOBE_XFORM:     /* an unknown colour transform: the default is right */
     case JWRN_EXTRANEOUS_DATA: /* padding between segments, as some cameras write it */
-    case JWRN_JFIF_MAJOR:
-        return;
-    default:
-        damaged(common);
+    case JWRN_JFIF_MAJOR: return;
+    default: damaged(common);
     }
 }
 
-static void init_source(j_decompress_ptr jpeg) {
-    (void)jpeg;
-}
+static void init_source(j_decompress_ptr jpeg) { (void)jpeg; }
 
 static boolean fill_buffer(j_decompress_ptr jpeg) {
     struct jpeg_reader *r = jpeg->client_data;
     size_t got = image_source_read(r->source, r->offset, r->buffer, sizeof r->buffer);
     if (got == 0)
-        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: the file is cut short",
-                          r->source->name));
+        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: the file is cut short", r->source->name));
     r->offset += got;
     r->input.next_input_byte = r->buffer;
     r->input.bytes_in_buffer = got;
@@ -102,15 +95,12 @@ static void skip_bytes(j_decompress_ptr jpeg, long count) {
     }
 }
 
-static void end_source(j_decompress_ptr jpeg) {
-    (void)jpeg;
-}
+static void end_source(j_decompress_ptr jpeg) { (void)jpeg; }
 
 static void on_progress(j_common_ptr common) {
     struct jpeg_reader *r = common->client_data;
     if (r->jpeg.input_scan_number > MAX_SCANS)
-        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: more than %d scans",
-                          r->source->name, MAX_SCANS));
+        stop(r, error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: more than %d scans", r->source->name, MAX_SCANS));
 }
 
 static void start(struct jpeg_reader *r) {
@@ -130,10 +120,8 @@ static void start(struct jpeg_reader *r) {
 static void read_exif(struct jpeg_reader *r) {
     static const char start_of_exif[6] = "Exif\0";
     for (jpeg_saved_marker_ptr m = r->jpeg.marker_list; m; m = m->next)
-        if (m->data_length > sizeof start_of_exif &&
-            memcmp(m->data, start_of_exif, sizeof start_of_exif) == 0) {
-            image_parse_exif(m->data + sizeof start_of_exif,
-                             m->data_length - sizeof start_of_exif, r->info);
+        if (m->data_length > sizeof start_of_exif && memcmp(m->data, start_of_exif, sizeof start_of_exif) == 0) {
+            image_parse_exif(m->data + sizeof start_of_exif, m->data_length - sizeof start_of_exif, r->info);
             return;
         }
 }
@@ -144,14 +132,15 @@ static void read_header(struct jpeg_reader *r) {
     if (r->jpeg.num_components != 1 && r->jpeg.num_components != 3)
         stop(r, error_set(r->err, STATUS_INPUT,
                           "%s: a JPEG of %d components (CMYK?) is not a photograph; expected grey, "
-                          "YCbCr or RGB", name, r->jpeg.num_components));
+                          "YCbCr or RGB",
+                          name, r->jpeg.num_components));
     uint64_t width = r->jpeg.image_width, height = r->jpeg.image_height;
     enum status status = image_header(r->image, name, width, height, 3, image_rgba, r->err);
     if (status != STATUS_OK)
         stop(r, status);
     if (width * height / MAX_PIXELS_PER_BYTE > r->source->size)
-        stop(r, error_set(r->err, STATUS_INPUT,
-                          "%s: damaged JPEG: the file is too short for its picture's size", name));
+        stop(r,
+             error_set(r->err, STATUS_INPUT, "%s: damaged JPEG: the file is too short for its picture's size", name));
     r->info->encoding = IMAGE_SRGB;
     r->info->bits = 8;
     read_exif(r);
@@ -186,8 +175,8 @@ static void read_pixels(struct jpeg_reader *r) {
     jpeg_finish_decompress(&r->jpeg);
 }
 
-enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image,
-                            struct image_info *info, struct error *err) {
+enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                            struct error *err) {
     struct jpeg_reader *r = mem_calloc(1, sizeof *r);
     r->source = source;
     r->image = image;

@@ -65,9 +65,7 @@ static const char *own_fault(const char *text, size_t length, const char **where
     return NULL;
 }
 
-static int by_text(const void *a, const void *b) {
-    return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
+static int by_text(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
 
 /* A duplicate key of this object; NULL when there is none. Sorts, since a megabyte of keys must not take quadratic
  * time. */
@@ -96,8 +94,7 @@ static const char *duplicate_key(const cJSON *value) {
     return twice;
 }
 
-enum status json_parse(const char *text, size_t length, const char *what, cJSON **value,
-                       struct error *err) {
+enum status json_parse(const char *text, size_t length, const char *what, cJSON **value, struct error *err) {
     *value = NULL;
     size_t line, column, bad = 0;
     const char *where = text;
@@ -109,8 +106,7 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
         return error_set(err, STATUS_INPUT, "%s is not JSON: it contains a NUL byte", what);
     if (!utf8_valid(text, length, &bad)) {
         locate(text, text + bad, &line, &column);
-        return error_set(err, STATUS_INPUT, "%s is not UTF-8: bad byte at line %zu, column %zu",
-                         what, line, column);
+        return error_set(err, STATUS_INPUT, "%s is not UTF-8: bad byte at line %zu, column %zu", what, line, column);
     }
     const char *fault = own_fault(text, length, &where);
     if (fault) {
@@ -121,16 +117,14 @@ enum status json_parse(const char *text, size_t length, const char *what, cJSON 
     cJSON *parsed = cJSON_ParseWithLengthOpts(text, length, &end, false);
     if (!parsed) {
         locate(text, end ? end : text, &line, &column);
-        return error_set(err, STATUS_INPUT, "%s is not JSON: syntax error at line %zu, column %zu",
-                         what, line, column);
+        return error_set(err, STATUS_INPUT, "%s is not JSON: syntax error at line %zu, column %zu", what, line, column);
     }
     while (end < text + length && strchr(" \t\r\n", *end))
         end++;
     if (end < text + length) {
         locate(text, end, &line, &column);
         cJSON_Delete(parsed);
-        return error_set(err, STATUS_INPUT, "%s has text after the JSON at line %zu, column %zu",
-                         what, line, column);
+        return error_set(err, STATUS_INPUT, "%s has text after the JSON at line %zu, column %zu", what, line, column);
     }
     const char *twice = duplicate_key(parsed);
     if (twice) {
@@ -211,13 +205,9 @@ static char *print(const cJSON *value, bool with_line_breaks) {
     return text;
 }
 
-char *json_text(const cJSON *value) {
-    return print(value, false);
-}
+char *json_text(const cJSON *value) { return print(value, false); }
 
-char *json_page(const cJSON *value) {
-    return print(value, true);
-}
+char *json_page(const cJSON *value) { return print(value, true); }
 
 static const char *type_name(const cJSON *value) {
     return cJSON_IsNumber(value)   ? "a number"
@@ -234,50 +224,45 @@ static const cJSON *member(const cJSON *object, const char *key) {
     return cJSON_IsNull(value) ? NULL : value;
 }
 
-enum status json_number(const cJSON *object, const char *key, const char *what, double fallback,
-                        double *value, struct error *err) {
+enum status json_number(const cJSON *object, const char *key, const char *what, double fallback, double *value,
+                        struct error *err) {
     const cJSON *found = member(object, key);
     *value = fallback;
     if (!found)
         return STATUS_OK;
     if (!cJSON_IsNumber(found))
-        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a number, found %s", what, key,
-                         type_name(found));
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a number, found %s", what, key, type_name(found));
     if (!isfinite(found->valuedouble))
         return error_set(err, STATUS_INPUT, "%s: \"%s\" is not a finite number", what, key);
     *value = found->valuedouble;
     return STATUS_OK;
 }
 
-enum status json_string(const cJSON *object, const char *key, const char *what,
-                        const char *fallback, const char **value, struct error *err) {
+enum status json_string(const cJSON *object, const char *key, const char *what, const char *fallback,
+                        const char **value, struct error *err) {
     const cJSON *found = member(object, key);
     *value = fallback;
     if (!found)
         return STATUS_OK;
     if (!cJSON_IsString(found))
-        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a string, found %s", what, key,
-                         type_name(found));
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be a string, found %s", what, key, type_name(found));
     *value = found->valuestring;
     return STATUS_OK;
 }
 
-enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback,
-                      bool *value, struct error *err) {
+enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback, bool *value,
+                      struct error *err) {
     const cJSON *found = member(object, key);
     *value = fallback;
     if (!found)
         return STATUS_OK;
     if (!cJSON_IsBool(found))
-        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be true or false, found %s", what, key,
-                         type_name(found));
+        return error_set(err, STATUS_INPUT, "%s: \"%s\" must be true or false, found %s", what, key, type_name(found));
     *value = cJSON_IsTrue(found);
     return STATUS_OK;
 }
 
-void json_add(cJSON *object, const char *key, cJSON *value) {
-    cJSON_AddItemToObject(object, key, value);
-}
+void json_add(cJSON *object, const char *key, cJSON *value) { cJSON_AddItemToObject(object, key, value); }
 
 cJSON *json_new_string(const char *text) {
     cJSON *value = cJSON_CreateString(text);
@@ -303,6 +288,4 @@ void json_add_int(cJSON *object, const char *key, int64_t value) {
     json_add(object, key, cJSON_CreateNumber((double)value));
 }
 
-void json_add_bool(cJSON *object, const char *key, bool value) {
-    json_add(object, key, cJSON_CreateBool(value));
-}
+void json_add_bool(cJSON *object, const char *key, bool value) { json_add(object, key, cJSON_CreateBool(value)); }

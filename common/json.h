@@ -15,8 +15,7 @@
 
 /* Parses `length` bytes of UTF-8. `what` names the source in messages ("transforms.json",
  * "the request body"). *value is the caller's (cJSON_Delete), NULL on error. */
-enum status json_parse(const char *text, size_t length, const char *what, cJSON **value,
-                       struct error *err);
+enum status json_parse(const char *text, size_t length, const char *what, cJSON **value, struct error *err);
 
 /* Reads and parses a file of at most `limit` bytes. */
 enum status json_read(const char *path, size_t limit, cJSON **value, struct error *err);
@@ -29,12 +28,12 @@ char *json_page(const cJSON *value);
 
 /* The member as a finite number / string / boolean, or `fallback` when the member is absent
  * or null. A member of another type is STATUS_INPUT and names `what` and the key. */
-enum status json_number(const cJSON *object, const char *key, const char *what, double fallback,
-                        double *value, struct error *err);
-enum status json_string(const cJSON *object, const char *key, const char *what,
-                        const char *fallback, const char **value, struct error *err);
-enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback,
-                      bool *value, struct error *err);
+enum status json_number(const cJSON *object, const char *key, const char *what, double fallback, double *value,
+                        struct error *err);
+enum status json_string(const cJSON *object, const char *key, const char *what, const char *fallback,
+                        const char **value, struct error *err);
+enum status json_bool(const cJSON *object, const char *key, const char *what, bool fallback, bool *value,
+                      struct error *err);
 
 /* A string. Invalid UTF-8 (file names, truncated sentences) is replaced by '?', so that our output can always be
  * read. */
@@ -42,7 +41,7 @@ cJSON *json_new_string(const char *text);
 
 /* Add a member to an object under construction. */
 void json_add_string(cJSON *object, const char *key, const char *value); /* NULL: JSON null */
-void json_add_number(cJSON *object, const char *key, double value); /* non-finite: JSON null */
+void json_add_number(cJSON *object, const char *key, double value);      /* non-finite: JSON null */
 void json_add_int(cJSON *object, const char *key, int64_t value);
 void json_add_bool(cJSON *object, const char *key, bool value);
 void json_add(cJSON *object, const char *key, cJSON *value); /* takes value */

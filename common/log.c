@@ -22,13 +22,9 @@ static atomic_int current_level = LOG_INFO, current_format = LOG_TEXT;
 static const char *const level_names[] = {"error", "warning", "info", "debug"};
 static const char *const format_names[] = {"text", "logfmt", "json"};
 
-void log_set_level(enum log_level level) {
-    atomic_store(&current_level, (int)level);
-}
+void log_set_level(enum log_level level) { atomic_store(&current_level, (int)level); }
 
-void log_set_format(enum log_format format) {
-    atomic_store(&current_format, (int)format);
-}
+void log_set_format(enum log_format format) { atomic_store(&current_format, (int)format); }
 
 bool log_level_parse(const char *name, enum log_level *level) {
     for (int i = LOG_ERROR; i <= LOG_DEBUG; i++) {
@@ -61,9 +57,7 @@ static void put(struct line *line, const char *text, size_t length) {
     line->length += length;
 }
 
-static void put_text(struct line *line, const char *text) {
-    put(line, text, strlen(text));
-}
+static void put_text(struct line *line, const char *text) { put(line, text, strlen(text)); }
 
 /* The text as utf8_show has it; `quoted`: with \ before " and \ */
 static void put_clean(struct line *line, const char *text, bool quoted) {
@@ -103,8 +97,8 @@ static void put_member(struct line *line, const char *key, const char *value, bo
         put_quoted(line, value);
 }
 
-static void write_line(enum log_level level, const struct log_field *fields, size_t count,
-                       const char *format, va_list args) {
+static void write_line(enum log_level level, const struct log_field *fields, size_t count, const char *format,
+                       va_list args) {
     if ((int)level > atomic_load(&current_level))
         return;
     enum log_format style = (enum log_format)atomic_load(&current_format);
@@ -149,20 +143,19 @@ static void write_line(enum log_level level, const struct log_field *fields, siz
         return;
 }
 
-void log_fields(enum log_level level, const struct log_field *fields, size_t count,
-                const char *format, ...) {
+void log_fields(enum log_level level, const struct log_field *fields, size_t count, const char *format, ...) {
     va_list args;
     va_start(args, format);
     write_line(level, fields, count, format, args);
     va_end(args);
 }
 
-#define DEFINE_LOG(name, level)                \
-    void name(const char *format, ...) {       \
-        va_list args;                          \
-        va_start(args, format);                \
-        write_line(level, NULL, 0, format, args); \
-        va_end(args);                          \
+#define DEFINE_LOG(name, level)                                                                                        \
+    void name(const char *format, ...) {                                                                               \
+        va_list args;                                                                                                  \
+        va_start(args, format);                                                                                        \
+        write_line(level, NULL, 0, format, args);                                                                      \
+        va_end(args);                                                                                                  \
     }
 
 DEFINE_LOG(log_error, LOG_ERROR)

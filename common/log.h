@@ -35,7 +35,7 @@ struct log_field {
     const char *value; /* UTF-8; NULL: none */
     bool is_number;    /* written without quotes in JSON */
 };
-void log_fields(enum log_level level, const struct log_field *fields, size_t count,
-                const char *format, ...) __attribute__((format(printf, 4, 5)));
+void log_fields(enum log_level level, const struct log_field *fields, size_t count, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
 
 #endif

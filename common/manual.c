@@ -23,9 +23,7 @@ static void put(FILE *out, const char *text, size_t length) {
     }
 }
 
-static void put_all(FILE *out, const char *text) {
-    put(out, text, strlen(text));
-}
+static void put_all(FILE *out, const char *text) { put(out, text, strlen(text)); }
 
 void manual_head(FILE *out, const char *title, int section, const char *name, const char *summary) {
     fprintf(out, ".TH %s %d \"\" \"unbake\" \"unbake\"\n.SH NAME\n", title, section);
@@ -35,9 +33,7 @@ void manual_head(FILE *out, const char *title, int section, const char *name, co
     fputs("\n", out);
 }
 
-void manual_section(FILE *out, const char *title) {
-    fprintf(out, ".SH %s\n", title);
-}
+void manual_section(FILE *out, const char *title) { fprintf(out, ".SH %s\n", title); }
 
 void manual_subsection(FILE *out, const char *name, const char *arguments) {
     fputs(".SS \"", out);
@@ -101,32 +97,28 @@ void manual_example(FILE *out, const char *lines) {
 void completion_begin(FILE *out, const char *program, bool zsh) {
     if (zsh)
         fprintf(out, "#compdef %s\nautoload -U +X bashcompinit && bashcompinit\n", program);
-    fprintf(out, "_%s() {\n"
+    fprintf(out,
+            "_%s() {\n"
             "    local at=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command= words=\n"
             "    [ \"$COMP_CWORD\" -gt 1 ] && command=${COMP_WORDS[1]}\n"
-            "    case $command in\n", program);
+            "    case $command in\n",
+            program);
 }
 
-void completion_words(FILE *out, const char *pattern) {
-    fprintf(out, "    %s) words=\"", pattern);
-}
+void completion_words(FILE *out, const char *pattern) { fprintf(out, "    %s) words=\"", pattern); }
 
-void completion_word(FILE *out, const char *word, const char *after) {
-    fprintf(out, "%s%s ", word, after);
-}
+void completion_word(FILE *out, const char *word, const char *after) { fprintf(out, "%s%s ", word, after); }
 
-void completion_words_end(FILE *out) {
-    fputs("\" ;;\n", out);
-}
+void completion_words_end(FILE *out) { fputs("\" ;;\n", out); }
 
-void completion_values(FILE *out) {
-    fputs("    esac\n    case $before in\n", out);
-}
+void completion_values(FILE *out) { fputs("    esac\n    case $before in\n", out); }
 
 void completion_end(FILE *out, const char *program) {
-    fprintf(out, "    esac\n"
+    fprintf(out,
+            "    esac\n"
             "    COMPREPLY=($(compgen -W \"$words\" -- \"$at\"))\n"
             "    [ ${#COMPREPLY[@]} -gt 0 ] || COMPREPLY=($(compgen -f -- \"$at\"))\n"
             "    case ${COMPREPLY[0]-} in *=) compopt -o nospace 2>/dev/null ;; esac\n"
-            "}\ncomplete -F _%s %s\n", program, program);
+            "}\ncomplete -F _%s %s\n",
+            program, program);
 }

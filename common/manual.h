@@ -14,7 +14,7 @@ void manual_synopsis(FILE *out, const char *program, const char *name, const cha
 void manual_text(FILE *out, const char *text);     /* a paragraph; "": none */
 void manual_sentence(FILE *out, const char *text); /* a paragraph made a sentence: capital letter and full stop */
 void manual_item(FILE *out, const char *word, const char *value, const char *text); /* value may be NULL */
-void manual_example(FILE *out, const char *lines); /* "": none */
+void manual_example(FILE *out, const char *lines);                                  /* "": none */
 
 /* A completion is: begin; words, word..., words_end per command, the last for "*", the program itself; values; the
  * same for words that are completed by the previous word; end. */

@@ -23,9 +23,7 @@ void mem_exhausted(const char *who) {
     _Exit(MEM_EXIT_STATUS);
 }
 
-bool mem_overflows(size_t count, size_t size) {
-    return size != 0 && count > SIZE_MAX / size;
-}
+bool mem_overflows(size_t count, size_t size) { return size != 0 && count > SIZE_MAX / size; }
 
 static size_t product(size_t count, size_t size) {
     if (mem_overflows(count, size)) {
@@ -35,17 +33,11 @@ static size_t product(size_t count, size_t size) {
     return count * size;
 }
 
-void *mem_alloc(size_t bytes) {
-    return check(malloc(bytes), bytes);
-}
+void *mem_alloc(size_t bytes) { return check(malloc(bytes), bytes); }
 
-void *mem_calloc(size_t count, size_t size) {
-    return check(calloc(count, size), product(count, size));
-}
+void *mem_calloc(size_t count, size_t size) { return check(calloc(count, size), product(count, size)); }
 
-void *mem_array(size_t count, size_t size) {
-    return mem_alloc(product(count, size));
-}
+void *mem_array(size_t count, size_t size) { return mem_alloc(product(count, size)); }
 
 void *mem_realloc_array(void *old, size_t count, size_t size) {
     size_t bytes = product(count, size);
@@ -77,9 +69,7 @@ char *mem_strndup(const char *text, size_t length) {
     return copy;
 }
 
-char *mem_strdup(const char *text) {
-    return mem_strndup(text, strlen(text));
-}
+char *mem_strdup(const char *text) { return mem_strndup(text, strlen(text)); }
 
 char *mem_printf(const char *format, ...) {
     va_list args;
@@ -94,6 +84,4 @@ char *mem_printf(const char *format, ...) {
     return text;
 }
 
-void mem_free(void *pointer) {
-    free(pointer);
-}
+void mem_free(void *pointer) { free(pointer); }

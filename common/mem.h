@@ -11,15 +11,15 @@
 /* Exit status of a process that ran out of memory (the daemon tells it from a crash). */
 #define MEM_EXIT_STATUS 71
 
-void *mem_alloc(size_t bytes);                       /* contents undefined */
-void *mem_calloc(size_t count, size_t size);         /* zeroed */
-void *mem_array(size_t count, size_t size);          /* contents undefined, overflow checked */
+void *mem_alloc(size_t bytes);               /* contents undefined */
+void *mem_calloc(size_t count, size_t size); /* zeroed */
+void *mem_array(size_t count, size_t size);  /* contents undefined, overflow checked */
 void *mem_realloc_array(void *old, size_t count, size_t size);
 /* As mem_calloc, aligned to 64 bytes and backed by transparent huge pages where the kernel
  * offers them: for arrays of many megabytes that are read at random. */
 void *mem_calloc_large(size_t count, size_t size);
 char *mem_strdup(const char *text);
-char *mem_strndup(const char *text, size_t length);  /* at most `length` bytes of text */
+char *mem_strndup(const char *text, size_t length); /* at most `length` bytes of text */
 /* A formatted string of its own; never NULL. */
 char *mem_printf(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void mem_free(void *pointer);

@@ -28,9 +28,7 @@ static size_t distance(const char *a, const char *b) {
     return row[length];
 }
 
-void nearest_init(struct nearest *n, const char *typed) {
-    *n = (struct nearest){.typed = typed};
-}
+void nearest_init(struct nearest *n, const char *typed) { *n = (struct nearest){.typed = typed}; }
 
 void nearest_offer(struct nearest *n, const char *candidate) {
     size_t typed_length = strlen(n->typed), length = strlen(candidate);
@@ -38,8 +36,7 @@ void nearest_offer(struct nearest *n, const char *candidate) {
     size_t edits_max = longer / 3 + 1;
     if (longer > LENGTH_MAX)
         return;
-    bool begins = typed_length >= 2 && typed_length < length &&
-                  memcmp(n->typed, candidate, typed_length) == 0;
+    bool begins = typed_length >= 2 && typed_length < length && memcmp(n->typed, candidate, typed_length) == 0;
     if (!begins && longer - shorter > edits_max) /* the distance is no less */
         return;
     size_t edits = begins ? 1 : distance(n->typed, candidate);

@@ -104,12 +104,9 @@ void parallel_free(struct parallel *p) {
     mem_free(p);
 }
 
-int parallel_thread_count(const struct parallel *p) {
-    return p->thread_count;
-}
+int parallel_thread_count(const struct parallel *p) { return p->thread_count; }
 
-void parallel_for(struct parallel *p, size_t count,
-                  void (*body)(void *user, size_t index, int thread), void *user) {
+void parallel_for(struct parallel *p, size_t count, void (*body)(void *user, size_t index, int thread), void *user) {
     p->count = count;
     p->body = body;
     p->user = user;

@@ -19,7 +19,6 @@ int parallel_thread_count(const struct parallel *pool);
 /* Calls body(user, index, thread) for every index in [0, count), each once; returns when all
  * have returned. thread is in [0, thread_count) and names a slot for scratch memory: no two
  * bodies with the same slot run at once. Not reentrant: a body must not call it. */
-void parallel_for(struct parallel *pool, size_t count, void (*body)(void *user, size_t index, int thread),
-                  void *user);
+void parallel_for(struct parallel *pool, size_t count, void (*body)(void *user, size_t index, int thread), void *user);
 
 #endif

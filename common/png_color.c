@@ -96,12 +96,16 @@ static bool use_cicp(const uint8_t *data, int bits, struct color *color) {
     default: primaries = NULL;
     }
     if (!primaries || data[2] != 0 || data[3] != 1) {
-        snprintf(color->warning, sizeof color->warning, "its chunk cICP has the numbers %d, %d, %d, %d, which are not known here",
-                 data[0], data[1], data[2], data[3]);
+        snprintf(color->warning, sizeof color->warning,
+                 "its chunk cICP has the numbers %d, %d, %d, %d, which are not known here", data[0], data[1], data[2],
+                 data[3]);
         return false;
     }
-    static const char *const curve[] = {[COLOR_SRGB] = "", [COLOR_POWER] = ", a power", [COLOR_REC709] = ", its curve",
-                                        [COLOR_PQ] = ", PQ", [COLOR_HLG] = ", HLG"};
+    static const char *const curve[] = {[COLOR_SRGB] = "",
+                                        [COLOR_POWER] = ", a power",
+                                        [COLOR_REC709] = ", its curve",
+                                        [COLOR_PQ] = ", PQ",
+                                        [COLOR_HLG] = ", HLG"};
     char full[COLOR_NAME_SIZE];
     snprintf(full, sizeof full, "%s%s", name, transfer == COLOR_POWER && gamma == 1.0 ? ", linear" : curve[transfer]);
     color_set(color, full, primaries, transfer, gamma, bits);
@@ -129,9 +133,7 @@ static bool use_iccp(const struct chunk *chunk, bool is_grey, int bits, struct c
     return color->warning[0] == '\0';
 }
 
-static double hundred_thousandths(const uint8_t *at) {
-    return (double)big_endian(at) / 100000.0;
-}
+static double hundred_thousandths(const uint8_t *at) { return (double)big_endian(at) / 100000.0; }
 
 /* sRGB files may carry gAMA 1/2.2 for programs that know only gAMA (11.3.2.5); together with sRGB's primaries or none
  * this means sRGB. Files without gAMA have sRGB's curve. */

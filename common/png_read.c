@@ -27,7 +27,7 @@ struct png_reader {
     enum status status; /* what the jump reports */
     png_structp png;
     png_infop png_info;
-    uint8_t *row;      /* [row_bytes] one row as stored */
+    uint8_t *row; /* [row_bytes] one row as stored */
     bool is_grey;
     struct color color;
     char warning[128]; /* the last one, which often explains the error that follows */
@@ -93,10 +93,8 @@ static void read_header(struct png_reader *r) {
     png_uint_32 width, height;
     int depth, color;
     png_get_IHDR(r->png, r->png_info, &width, &height, &depth, &color, NULL, NULL, NULL);
-    bool alpha = (color & PNG_COLOR_MASK_ALPHA) ||
-                 png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
-    enum status status = image_header(r->image, r->source->name, width, height, alpha ? 4 : 3,
-                                      image_rgba, r->err);
+    bool alpha = (color & PNG_COLOR_MASK_ALPHA) || png_get_valid(r->png, r->png_info, PNG_INFO_tRNS) != 0;
+    enum status status = image_header(r->image, r->source->name, width, height, alpha ? 4 : 3, image_rgba, r->err);
     if (status != STATUS_OK)
         stop(r, status);
     uint64_t bytes = (uint64_t)png_get_rowbytes(r->png, r->png_info) * height;
@@ -154,12 +152,12 @@ static void convert(struct png_reader *r) {
     image_convert(r->image, r->info, &r->color);
 }
 
-enum status image_read_png(struct image_source *source, bool probe, struct image *image,
-                           struct image_info *info, struct error *err) {
+enum status image_read_png(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                           struct error *err) {
     struct png_reader r = {.source = source, .image = image, .info = info, .probe = probe, .err = err};
     struct png_reader *volatile kept = &r;
-    r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL,
-                                     png_memory_new, png_memory_free);
+    r.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &r, read_failed, note_warning, NULL, png_memory_new,
+                                     png_memory_free);
     r.png_info = r.png ? png_create_info_struct(r.png) : NULL;
     if (!r.png_info) {
         png_destroy_read_struct(&r.png, NULL, NULL);

@@ -40,9 +40,7 @@ static void write_bytes(png_structp png, png_bytep data, size_t length) {
     longjmp(png_jmpbuf(png), 1);
 }
 
-static void flush_bytes(png_structp png) {
-    (void)png; /* fclose does */
-}
+static void flush_bytes(png_structp png) { (void)png; /* fclose does */ }
 
 static uint8_t to_byte(float linear) {
     float value = linear > 0 ? fminf(linear, 1) : 0; /* not a number: 0 */
@@ -50,8 +48,7 @@ static uint8_t to_byte(float linear) {
 }
 
 /* One row of `out_count` channels: 3, or 1 for a grey picture. */
-static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, float scale,
-                     uint8_t *row) {
+static void fill_row(const struct image *image, uint32_t y, uint32_t out_count, float scale, uint8_t *row) {
     const float *pixel = image->pixel + (size_t)y * image->width * image->channel_count;
     uint32_t step = image->channel_count < 3 ? 0 : 1; /* grey: all from the first channel */
     for (uint32_t x = 0; x < image->width; x++, pixel += image->channel_count, row += out_count) {
@@ -77,9 +74,8 @@ static bool has_non_finite(const struct image *image) {
 static void write_picture(struct writer *w, const struct image *image, float scale) {
     /* A grey picture with a non-finite value is written in colour, for the magenta to show. */
     bool colour = image->channel_count >= 3 || has_non_finite(image);
-    png_set_IHDR(w->png, w->png_info, image->width, image->height, 8,
-                 colour ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_IHDR(w->png, w->png_info, image->width, image->height, 8, colour ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     png_set_sRGB(w->png, w->png_info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_set_compression_level(w->png, 4);
     png_write_info(w->png, w->png_info);
@@ -96,15 +92,14 @@ static bool is_regular(FILE *file) {
     return fstat(fileno(file), &facts) == 0 && S_ISREG(facts.st_mode);
 }
 
-enum status image_write_png(const char *path, const struct image *image, float scale,
-                            struct error *err) {
+enum status image_write_png(const char *path, const struct image *image, float scale, struct error *err) {
     struct writer w = {.path = path, .err = err};
     struct writer *volatile kept = &w;
     w.file = fopen(path, "wbe");
     if (!w.file)
         return error_set_errno(err, errno, "cannot create %s", path);
-    w.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning, NULL,
-                                      png_memory_new, png_memory_free);
+    w.png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, &w, write_failed, ignore_warning, NULL, png_memory_new,
+                                      png_memory_free);
     w.png_info = w.png ? png_create_info_struct(w.png) : NULL;
     if (!w.png_info)
         w.status = error_set(err, STATUS_INTERNAL, "libpng does not start");
@@ -173,8 +168,8 @@ enum status image_check_png(const char *path, const struct image *image, float s
     enum status status = image_source_open(&c.source, path, err);
     if (status != STATUS_OK)
         return status;
-    c.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &c, check_failed, ignore_warning, NULL,
-                                     png_memory_new, png_memory_free);
+    c.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &c, check_failed, ignore_warning, NULL, png_memory_new,
+                                     png_memory_free);
     c.png_info = c.png ? png_create_info_struct(c.png) : NULL;
     if (!c.png_info)
         c.status = error_set(err, STATUS_INTERNAL, "libpng does not start");

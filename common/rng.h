@@ -29,13 +29,9 @@ static inline uint64_t rng_key(uint64_t a, uint64_t b, uint64_t c) {
 }
 
 /* The upper 24 bits of x as a float in [0, 1). */
-static inline float rng_to_float(uint32_t x) {
-    return (float)(x >> 8) * 0x1p-24f;
-}
+static inline float rng_to_float(uint32_t x) { return (float)(x >> 8) * 0x1p-24f; }
 
 /* Maps 32 random bits to [0, count) by a multiplication (bias below count / 2^32). */
-static inline uint32_t rng_below(uint32_t bits, uint32_t count) {
-    return (uint32_t)(((uint64_t)bits * count) >> 32);
-}
+static inline uint32_t rng_below(uint32_t bits, uint32_t count) { return (uint32_t)(((uint64_t)bits * count) >> 32); }
 
 #endif

@@ -26,8 +26,7 @@ static const struct setting table[] = {
      "what an optimiser step looks at: texels evenly over the surface, or pixels evenly over the photographs"},
     {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "5", "listing1",
      "listing1: base colour moves in blocks of 2^n texels a side at first, then smaller ones, at last single texels"},
-    {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true", "solve",
-     "solve: take the photographs' noise out of base colour"},
+    {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true", "solve", "solve: take the photographs' noise out of base colour"},
     {"denoise_mesh", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
      "put the vertices of a rough mesh back to where its surfaces are; one that has normals stays as it is"},
     {"detail_steps", SETTING_INT, "steps", 0, 1000, NULL, "16", "solve",
@@ -64,8 +63,7 @@ static const struct setting table[] = {
      "goes on to the end of that"},
     {"report_samples", SETTING_INT, "samples", 1, 65536, NULL, "64", NULL,
      "samples per pixel of the held-out re-renders"},
-    {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1",
-     "listing1: first step size of roughness"},
+    {"roughness_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1", "listing1: first step size of roughness"},
     {"roulette_depth", SETTING_INT, "segments", 2, 32, NULL, "4", NULL,
      "segment from which Russian roulette may end a path"},
     {"samples_per_camera", SETTING_INT, "paths", 2, 4096, NULL, "16", NULL,
@@ -74,14 +72,12 @@ static const struct setting table[] = {
      "names the random numbers: the same seed gives the same bytes"},
     {"segmentation", SETTING_CHOICE, "", 0, 0, "auto|given|automatic", "auto", NULL,
      "objects from the mesh's object_id, from its shape, or (auto) from whichever is there"},
-    {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1",
-     "listing1: first step size of specular"},
+    {"specular_rate", SETTING_REAL, "", 1e-5, 1, NULL, "0.01", "listing1", "listing1: first step size of specular"},
     {"texels_per_iteration", SETTING_INT, "texels", 64, 16777216, NULL, "4096", NULL,
      "texels chosen in one optimiser step"},
     {"texels_per_metre", SETTING_REAL, "texels/m", 0, 100000, NULL, "0", NULL,
      "density of the textures; 0: the greatest that texture_size holds"},
-    {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048", NULL,
-     "side of the square textures"},
+    {"texture_size", SETTING_INT, "texels", 64, 16384, NULL, "2048", NULL, "side of the square textures"},
     {"time_limit_sec", SETTING_REAL, "s", 0, 2592000, NULL, "0", NULL,
      "most working time of the whole job, not counting what other processes take; work is left out to keep it, "
      "first of refine, then samples of the report, detail, three texels of four, gather_samples; 0: no limit"},
@@ -99,6 +95,7 @@ static const struct {
     const char *name;
     double amount[QUALITIES];
 } by_quality[] = {
+    /* clang-format off */
     {"detail_steps", {0, 16, 16}}, /* 16 bring it to rest */
     {"gather_samples", {128, 512, 2048}},
     {"gloss_passes", {1, 2, 2}},
@@ -106,6 +103,7 @@ static const struct {
     {"measure_stride", {2, 1, 1}},
     {"refine_looks", {100, 1000, 4000}},
     {"report_samples", {16, 64, 256}},
+    /* clang-format on */
 };
 #define BY_QUALITY_COUNT (sizeof by_quality / sizeof by_quality[0])
 
@@ -216,9 +214,7 @@ double settings_number(const struct settings *s, const char *name) {
     return s->number[i];
 }
 
-bool settings_bool(const struct settings *s, const char *name) {
-    return settings_number(s, name) != 0.0;
-}
+bool settings_bool(const struct settings *s, const char *name) { return settings_number(s, name) != 0.0; }
 
 static const char *choice_at(const char *choices, int index, char *word, size_t size) {
     while (index-- > 0)
@@ -247,19 +243,18 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
     switch (t->type) {
     case SETTING_INT:
     case SETTING_REAL:
-        if (!cJSON_IsNumber(value) || !isfinite(number) ||
-            (t->type == SETTING_INT && number != floor(number))) {
+        if (!cJSON_IsNumber(value) || !isfinite(number) || (t->type == SETTING_INT && number != floor(number))) {
             snprintf(reason, size, "must be %s number", t->type == SETTING_INT ? "a whole" : "a");
             return false;
         }
         if (number < t->minimum || number > t->maximum) {
             const char *gap = *t->unit ? " " : "";
             if (t->type == SETTING_INT)
-                snprintf(reason, size, "must be between %.0f and %.0f%s%s, found %.15g", t->minimum,
-                         t->maximum, gap, t->unit, number);
+                snprintf(reason, size, "must be between %.0f and %.0f%s%s, found %.15g", t->minimum, t->maximum, gap,
+                         t->unit, number);
             else
-                snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g",
-                         t->minimum, t->maximum, gap, t->unit, number);
+                snprintf(reason, size, "must be between %.15g and %.15g%s%s, found %.15g", t->minimum, t->maximum, gap,
+                         t->unit, number);
             return false;
         }
         s->number[i] = number;
@@ -280,8 +275,7 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
         s->number[i] = choice;
         return true;
     case SETTING_TEXT:
-        if (!cJSON_IsString(value) || !*value->valuestring ||
-            strlen(value->valuestring) > TEXT_MAX_LENGTH) {
+        if (!cJSON_IsString(value) || !*value->valuestring || strlen(value->valuestring) > TEXT_MAX_LENGTH) {
             snprintf(reason, size, "must be a text of 1 to %d bytes", TEXT_MAX_LENGTH);
             return false;
         }
@@ -342,8 +336,7 @@ static void check_method(struct settings *s, const cJSON *object, struct faults 
     }
 }
 
-enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
-                           struct error *err) {
+enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems, struct error *err) {
     struct faults faults = {.problems = problems};
     bool method_is_good = true;
     if (!cJSON_IsObject(object)) {
@@ -399,8 +392,7 @@ static void add_value(cJSON *object, const char *key, size_t i, const struct set
     if (t->type == SETTING_BOOL)
         json_add_bool(object, key, s->number[i] != 0.0);
     else if (t->type == SETTING_CHOICE)
-        json_add_string(object, key,
-                        choice_at(t->choices, (int)s->number[i], word, sizeof word));
+        json_add_string(object, key, choice_at(t->choices, (int)s->number[i], word, sizeof word));
     else if (t->type == SETTING_TEXT)
         json_add_string(object, key, s->text[i]);
     else
@@ -449,8 +441,7 @@ cJSON *settings_describe(void) {
             cJSON *choices = cJSON_AddArrayToObject(entry, "choices");
             char word[NAME_MAX_LENGTH];
             for (const char *at = t->choices; *at; at += strcspn(at, "|"), at += *at == '|')
-                cJSON_AddItemToArray(choices, cJSON_CreateString(
-                                                  choice_at(at, 0, word, sizeof word)));
+                cJSON_AddItemToArray(choices, cJSON_CreateString(choice_at(at, 0, word, sizeof word)));
         }
         add_value(entry, "default", i, &defaults);
         add_help(entry, t);

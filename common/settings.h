@@ -17,12 +17,12 @@ enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SET
 struct setting {
     const char *name;
     enum setting_type type;
-    const char *unit;           /* "texels", "s", ...; "" where there is none */
-    double minimum, maximum;    /* inclusive, for numbers */
-    const char *choices;        /* "a|b|c" for SETTING_CHOICE */
+    const char *unit;        /* "texels", "s", ...; "" where there is none */
+    double minimum, maximum; /* inclusive, for numbers */
+    const char *choices;     /* "a|b|c" for SETTING_CHOICE */
     const char *default_text;
-    const char *method;         /* the only one that uses it; NULL: every method does */
-    const char *help;           /* one sentence */
+    const char *method; /* the only one that uses it; NULL: every method does */
+    const char *help;   /* one sentence */
 };
 
 /* The table in alphabetical order; *count entries; static storage. */
@@ -53,8 +53,7 @@ const char *settings_text(const struct settings *s, const char *name); /* borrow
 /* Checks a JSON object and applies it over *s. Collects all problems: each appends an object {"name", "reason",
  * "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. A setting that the method does not use is a
  * problem unless its value is the default, so the output of settings_to_json is accepted. */
-enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems,
-                           struct error *err);
+enum status settings_apply(struct settings *s, const cJSON *object, cJSON *problems, struct error *err);
 
 /* Parses "key=value" from a command line into `object` with the JSON type that the table
  * gives the key (a string where the key is unknown, so that the daemon can say so). */

@@ -34,14 +34,10 @@ __attribute__((target("+crypto"))) static void blocks(uint32_t state[8], const u
     vst1q_u32(&state[4], efgh);
 }
 
-sha256_blocks *sha256_blocks_native(void) {
-    return getauxval(AT_HWCAP) & HWCAP_SHA2 ? blocks : NULL;
-}
+sha256_blocks *sha256_blocks_native(void) { return getauxval(AT_HWCAP) & HWCAP_SHA2 ? blocks : NULL; }
 
 #elif !defined __x86_64__
 
-sha256_blocks *sha256_blocks_native(void) {
-    return NULL;
-}
+sha256_blocks *sha256_blocks_native(void) { return NULL; }
 
 #endif

@@ -9,13 +9,9 @@
 
 #if __has_include(<sys/platform/x86.h>)
 #include <sys/platform/x86.h> /* glibc 2.33: what it found by cpuid when the program started */
-static bool has_sha(void) {
-    return CPU_FEATURE_PRESENT(SHA) && CPU_FEATURE_PRESENT(SSE4_1);
-}
+static bool has_sha(void) { return CPU_FEATURE_PRESENT(SHA) && CPU_FEATURE_PRESENT(SSE4_1); }
 #else
-static bool has_sha(void) {
-    return false;
-}
+static bool has_sha(void) { return false; }
 #endif
 
 #define TARGET __attribute__((target("sha,sse4.1")))
@@ -61,8 +57,6 @@ TARGET static void blocks(uint32_t state[8], const uint8_t *data, size_t count) 
     _mm_storeu_si128((__m128i *)&state[4], _mm_alignr_epi8(dchg, feba, 8));
 }
 
-sha256_blocks *sha256_blocks_native(void) {
-    return has_sha() ? blocks : NULL;
-}
+sha256_blocks *sha256_blocks_native(void) { return has_sha() ? blocks : NULL; }
 
 #endif

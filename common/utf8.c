@@ -9,8 +9,11 @@ bool utf8_valid(const char *text, size_t length, size_t *bad) {
     size_t i = 0;
     while (i < length) {
         unsigned char c = s[i];
-        size_t extra = c < 0x80 ? 0 : c >= 0xc2 && c < 0xe0 ? 1 : c >= 0xe0 && c < 0xf0 ? 2
-                                  : c >= 0xf0 && c < 0xf5 ? 3 : 4;
+        size_t extra = c < 0x80                ? 0
+                       : c >= 0xc2 && c < 0xe0 ? 1
+                       : c >= 0xe0 && c < 0xf0 ? 2
+                       : c >= 0xf0 && c < 0xf5 ? 3
+                                               : 4;
         if (bad)
             *bad = i;
         if (extra == 4 || i + extra >= length)
@@ -19,8 +22,8 @@ bool utf8_valid(const char *text, size_t length, size_t *bad) {
             if ((s[i + k] & 0xc0) != 0x80)
                 return false;
         }
-        if ((c == 0xe0 && s[i + 1] < 0xa0) || (c == 0xed && s[i + 1] > 0x9f) ||
-            (c == 0xf0 && s[i + 1] < 0x90) || (c == 0xf4 && s[i + 1] > 0x8f))
+        if ((c == 0xe0 && s[i + 1] < 0xa0) || (c == 0xed && s[i + 1] > 0x9f) || (c == 0xf0 && s[i + 1] < 0x90) ||
+            (c == 0xf4 && s[i + 1] > 0x8f))
             return false;
         i += extra + 1;
     }
@@ -50,12 +53,11 @@ static bool is_in(const struct span *spans, size_t count, uint32_t c) {
 }
 
 enum utf8_kind utf8_kind(uint32_t c) {
-    static const struct span control[] = {
-        {0x00, 0x1f}, {0x7f, 0x9f}, {0x2028, 0x202e}, {0x2066, 0x2069}};
+    static const struct span control[] = {{0x00, 0x1f}, {0x7f, 0x9f}, {0x2028, 0x202e}, {0x2066, 0x2069}};
     static const struct span hidden[] = {
-        {0xad, 0xad},     {0x600, 0x605},     {0x61c, 0x61c},     {0x6dd, 0x6dd},     {0x70f, 0x70f},
-        {0x890, 0x891},   {0x8e2, 0x8e2},     {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2060, 0x2065},
-        {0x206a, 0x206f}, {0xfeff, 0xfeff},   {0xfff0, 0xfffb},   {0xfffe, 0xffff},   {0x110bd, 0x110bd},
+        {0xad, 0xad},       {0x600, 0x605},     {0x61c, 0x61c},     {0x6dd, 0x6dd},     {0x70f, 0x70f},
+        {0x890, 0x891},     {0x8e2, 0x8e2},     {0x180e, 0x180e},   {0x200b, 0x200f},   {0x2060, 0x2065},
+        {0x206a, 0x206f},   {0xfeff, 0xfeff},   {0xfff0, 0xfffb},   {0xfffe, 0xffff},   {0x110bd, 0x110bd},
         {0x110cd, 0x110cd}, {0x13430, 0x1343f}, {0x1bca0, 0x1bca3}, {0x1d173, 0x1d17a}, {0xe0000, 0xe0fff}};
     if (c >= 0x20 && c < 0x7f)
         return UTF8_VISIBLE;

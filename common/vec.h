@@ -7,10 +7,16 @@
 
 #define PI 3.14159265358979323846
 
-typedef struct vec2 { float x, y; } vec2;
-typedef struct vec3 { float x, y, z; } vec3;
+typedef struct vec2 {
+    float x, y;
+} vec2;
+typedef struct vec3 {
+    float x, y, z;
+} vec3;
 /* Linear Rec. 709 colour: radiance, reflectance or throughput. */
-typedef struct rgb { float r, g, b; } rgb;
+typedef struct rgb {
+    float r, g, b;
+} rgb;
 
 static inline vec2 vec2_make(float x, float y) { return (vec2){x, y}; }
 static inline vec2 vec2_add(vec2 a, vec2 b) { return (vec2){a.x + b.x, a.y + b.y}; }
@@ -23,9 +29,7 @@ static inline vec3 vec3_sub(vec3 a, vec3 b) { return (vec3){a.x - b.x, a.y - b.y
 static inline vec3 vec3_scale(vec3 a, float s) { return (vec3){a.x * s, a.y * s, a.z * s}; }
 static inline vec3 vec3_neg(vec3 a) { return (vec3){-a.x, -a.y, -a.z}; }
 /* a + s * b */
-static inline vec3 vec3_mad(vec3 a, float s, vec3 b) {
-    return (vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
-}
+static inline vec3 vec3_mad(vec3 a, float s, vec3 b) { return (vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z}; }
 static inline float vec3_dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static inline vec3 vec3_cross(vec3 a, vec3 b) {
     return (vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -36,9 +40,7 @@ static inline vec3 vec3_normalize(vec3 a) {
     float length = vec3_length(a);
     return length > 0.0f ? vec3_scale(a, 1.0f / length) : a;
 }
-static inline bool vec3_is_finite(vec3 a) {
-    return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
-}
+static inline bool vec3_is_finite(vec3 a) { return isfinite(a.x) && isfinite(a.y) && isfinite(a.z); }
 
 static inline float clampf(float v, float lo, float hi) { return v < lo ? lo : v > hi ? hi : v; }
 
@@ -49,9 +51,7 @@ static inline rgb rgb_sub(rgb a, rgb b) { return (rgb){a.r - b.r, a.g - b.g, a.b
 static inline rgb rgb_mul(rgb a, rgb b) { return (rgb){a.r * b.r, a.g * b.g, a.b * b.b}; }
 static inline rgb rgb_scale(rgb a, float s) { return (rgb){a.r * s, a.g * s, a.b * s}; }
 /* a + s * b */
-static inline rgb rgb_mad(rgb a, float s, rgb b) {
-    return (rgb){a.r + s * b.r, a.g + s * b.g, a.b + s * b.b};
-}
+static inline rgb rgb_mad(rgb a, float s, rgb b) { return (rgb){a.r + s * b.r, a.g + s * b.g, a.b + s * b.b}; }
 static inline rgb rgb_clamp(rgb a, float low, float high) {
     return (rgb){clampf(a.r, low, high), clampf(a.g, low, high), clampf(a.b, low, high)};
 }
@@ -59,12 +59,8 @@ static inline float rgb_dot(rgb a, rgb b) { return a.r * b.r + a.g * b.g + a.b *
 static inline float rgb_max(rgb a) { return fmaxf(a.r, fmaxf(a.g, a.b)); }
 static inline float rgb_mean(rgb a) { return (a.r + a.g + a.b) * (1.0f / 3.0f); }
 /* Relative luminance (Rec. 709). */
-static inline float rgb_luminance(rgb a) {
-    return 0.2126f * a.r + 0.7152f * a.g + 0.0722f * a.b;
-}
-static inline bool rgb_is_finite(rgb a) {
-    return isfinite(a.r) && isfinite(a.g) && isfinite(a.b);
-}
+static inline float rgb_luminance(rgb a) { return 0.2126f * a.r + 0.7152f * a.g + 0.0722f * a.b; }
+static inline bool rgb_is_finite(rgb a) { return isfinite(a.r) && isfinite(a.g) && isfinite(a.b); }
 static inline bool rgb_is_black(rgb a) { return a.r == 0.0f && a.g == 0.0f && a.b == 0.0f; }
 
 /* An orthonormal frame around unit n (Duff et al. 2017). */

@@ -12,6 +12,7 @@ zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
 fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 coverage_packages="gcovr"
 portable_packages="mmdebstrap"
+format_packages="clang-format-14|clang-format"
 room_packages="libllvm19 python3-venv sweethome3d-furniture"
 bench_packages="libllvm19 python3-venv libmeshoptimizer-dev"
 
@@ -72,6 +73,7 @@ case ${1:-} in
 fuzz) install $fuzz_packages ;;
 coverage) install $coverage_packages ;;
 portable) install $portable_packages ;;
+format) install $format_packages ;;
 rooms) install $room_packages ;;
 esac
 if [ "${1:-}" = bench ]; then

@@ -46,10 +46,11 @@ bool arguments_read(struct arguments *a, int argc, char **argv, const struct fla
         const char *value = argv[i][length] == '=' ? argv[i] + length + 1 : NULL;
         if (flag->value && !value && i + 1 < argc)
             value = argv[++i];
-        if ((flag->value != NULL) != (value != NULL) ||
-            a->given_count == sizeof a->given / sizeof *a->given) {
+        if ((flag->value != NULL) != (value != NULL) || a->given_count == sizeof a->given / sizeof *a->given) {
             fprintf(stderr, "unbaked: %s %s\n", flag->name,
-                    !flag->value ? "takes no value" : value ? "is given too often" : "needs a value");
+                    !flag->value ? "takes no value"
+                    : value      ? "is given too often"
+                                 : "needs a value");
             return false;
         }
         a->given[a->given_count].flag = flag;

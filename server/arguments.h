@@ -20,7 +20,8 @@ struct flag {
     const char *help;
 };
 
-#define COMMAND_HELP_FLAG {"--help", NULL, "print this help"}
+#define COMMAND_HELP_FLAG                                                                                              \
+    { "--help", NULL, "print this help" }
 
 #define WORDS_MAX 8
 

@@ -94,8 +94,7 @@ static void print_commands_and_options(FILE *out) {
 void commands_help(const struct server_command *command, FILE *out) {
     bool is_daemon = command == table;
     fprintf(out, "usage: unbaked%s%s%s%s%s\n\n%s.\n", is_daemon ? "" : " ", command->name,
-            *command->arguments ? " " : "", command->arguments, command->flags ? " [OPTION]..." : "",
-            command->summary);
+            *command->arguments ? " " : "", command->arguments, command->flags ? " [OPTION]..." : "", command->summary);
     if (*command->details)
         fprintf(out, "\n%s", command->details);
     if (command->flags)

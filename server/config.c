@@ -15,24 +15,24 @@
 #define FILE_MAX_BYTES ((size_t)1 << 20)
 #define DEFAULT "default" /* where an option is from that was not set */
 
-#define TEXT(name, value, help) {#name, OPTION_TEXT, "", 0, 0, value, help, offsetof(struct config, name)}
-#define INT(name, unit, low, high, value, help) \
-    {#name, OPTION_INT, unit, low, high, value, help, offsetof(struct config, name)}
-#define REAL(name, unit, low, high, value, help) \
-    {#name, OPTION_REAL, unit, low, high, value, help, offsetof(struct config, name)}
-#define BOOL(name, value, help) {#name, OPTION_BOOL, "", 0, 1, value, help, offsetof(struct config, name)}
+#define TEXT(name, value, help)                                                                                        \
+    { #name, OPTION_TEXT, "", 0, 0, value, help, offsetof(struct config, name) }
+#define INT(name, unit, low, high, value, help)                                                                        \
+    { #name, OPTION_INT, unit, low, high, value, help, offsetof(struct config, name) }
+#define REAL(name, unit, low, high, value, help)                                                                       \
+    { #name, OPTION_REAL, unit, low, high, value, help, offsetof(struct config, name) }
+#define BOOL(name, value, help)                                                                                        \
+    { #name, OPTION_BOOL, "", 0, 1, value, help, offsetof(struct config, name) }
 
 static const struct config_option table[] = {
     TEXT(data_dir, "/var/lib/unbaked",
          "Folder of everything that the daemon keeps. One daemon a folder; a local disk."),
-    TEXT(listen, "127.0.0.1:7117",
-         "Address and port for HTTP. Port 0 takes a free one."),
+    TEXT(listen, "127.0.0.1:7117", "Address and port for HTTP. Port 0 takes a free one."),
     TEXT(access, "auto",
          "Who may use the daemon: auto (anybody on loopback until there is a token), tokens, or open (loopback only)."),
     TEXT(tls_certificate, "", "PEM file of the certificate chain for HTTPS. Empty: plain HTTP."),
     TEXT(tls_key, "", "PEM file of the certificate's key. SIGHUP reads both files again."),
-    TEXT(server_names, "",
-         "Host names besides localhost that the daemon answers for, as a proxy passes them on."),
+    TEXT(server_names, "", "Host names besides localhost that the daemon answers for, as a proxy passes them on."),
     TEXT(trusted_proxies, "",
          "Addresses or networks of proxies in front, 10.0.0.0/8: their word on where a request comes from counts."),
     TEXT(proxy_field, "X-Forwarded-For", "The field in which they say so: X-Forwarded-For or Forwarded."),
@@ -61,13 +61,12 @@ static const struct config_option table[] = {
     INT(events_per_job, "events", 100, 10000000, "20000", "Newest events of a job that are kept."),
     REAL(event_keep_hours, "h", 1, 1000000, "720",
          "Time after a job's end for which its events are kept; the last one stays."),
-    REAL(stop_grace_sec, "s", 1, 3600, "30",
-         "Time that a job has to write its checkpoint when it is stopped."),
+    REAL(stop_grace_sec, "s", 1, 3600, "30", "Time that a job has to write its checkpoint when it is stopped."),
     BOOL(webhook_private, "no", "Let webhooks call private and loopback addresses."),
     BOOL(sandbox, "yes", "Keep jobs from the network and from files that are not theirs."),
     INT(max_upload_mib, "MiB", 1, 16777216, "65536", "Largest upload; a larger one is refused with 413."),
     INT(min_free_mib, "MiB", 0, 16777216, "1024",
-         "Space of the disk that uploads leave free; below it they are refused with 507."),
+        "Space of the disk that uploads leave free; below it they are refused with 507."),
     INT(low_disk_mib, "MiB", 0, 16777216, "512",
         "Free space of the disk below which jobs stop at a checkpoint and wait for more. 0: never."),
     INT(admin_free_mib, "MiB", 0, 16777216, "1024",
@@ -78,22 +77,26 @@ static const struct config_option table[] = {
         "Unfinished uploads of one user; more are refused with 429. 0: no limit."),
     INT(user_max_checks, "scenes", 0, 10000, "50",
         "Scenes of one user that wait to be checked; more uploads are refused with 429. 0: no limit."),
-    REAL(upload_start_minutes, "min", 0.001, 1440, "10",
-         "Time for which an upload holds space for what is still to come while nothing of it arrives; one without a byte is removed then."),
+    REAL(
+        upload_start_minutes, "min", 0.001, 1440, "10",
+        "Time for which an upload holds space for what is still to come while nothing of it arrives; one without a byte is removed then."),
     REAL(upload_keep_hours, "h", 0.0001, 87600, "24",
          "Time after its last byte for which an unfinished upload can be resumed."),
     REAL(job_keep_days, "days", 0, 36500, "0",
          "Time after its end for which a job and its outputs are kept. 0: for ever."),
-    REAL(scene_keep_days, "days", 0, 36500, "0",
-         "Time after its last use for which a scene is kept. 0: for ever."),
+    REAL(scene_keep_days, "days", 0, 36500, "0", "Time after its last use for which a scene is kept. 0: for ever."),
     REAL(collect_interval_sec, "s", 0.1, 86400, "60", "Time between two looks for what has expired."),
-    INT(max_connections, "connections", 8, 100000, "1000", "Open HTTP connections; a twentieth is kept for loopback, others are refused with 503."),
+    INT(max_connections, "connections", 8, 100000, "1000",
+        "Open HTTP connections; a twentieth is kept for loopback, others are refused with 503."),
     INT(address_max_connections, "connections", 0, 100000, "200",
         "Open connections of one address, loopback and trusted proxies aside; more are refused with 429. 0: no limit."),
-    INT(max_streams, "streams", 1, 100000, "500", "Open event streams, one in ten kept for admins; more are refused with 503."),
-    INT(user_max_streams, "streams", 0, 100000, "50", "Open event streams of one user; more are refused with 429. 0: no limit."),
+    INT(max_streams, "streams", 1, 100000, "500",
+        "Open event streams, one in ten kept for admins; more are refused with 503."),
+    INT(user_max_streams, "streams", 0, 100000, "50",
+        "Open event streams of one user; more are refused with 429. 0: no limit."),
     REAL(head_timeout_sec, "s", 1, 600, "10", "Time for the whole head of a request to arrive."),
-    REAL(idle_timeout_sec, "s", 1, 3600, "30", "Silence after which a connection is closed; time for a whole body that is no upload."),
+    REAL(idle_timeout_sec, "s", 1, 3600, "30",
+         "Silence after which a connection is closed; time for a whole body that is no upload."),
     INT(body_min_bytes_per_sec, "bytes/s", 0, 1073741824, "1024",
         "A body or a reply that moves more slowly over idle_timeout_sec is cut off. 0: any speed will do."),
     REAL(keepalive_sec, "s", 1, 300, "15", "Longest silence in an event stream."),
@@ -105,9 +108,7 @@ const struct config_option *config_table(size_t *count) {
     return table;
 }
 
-static void *member(struct config *c, const struct config_option *option) {
-    return (char *)c + option->offset;
-}
+static void *member(struct config *c, const struct config_option *option) { return (char *)c + option->offset; }
 
 static const struct config_option *find(const char *name) {
     for (size_t i = 0; i < TABLE_COUNT; i++)
@@ -123,14 +124,14 @@ static double read_number(const char *text) {
     return *text && *end == '\0' && isfinite(value) ? value : NAN;
 }
 
-static void set_number(struct config *c, const struct config_option *option, const char *value,
-                       const char *where, struct buf *problems) {
+static void set_number(struct config *c, const struct config_option *option, const char *value, const char *where,
+                       struct buf *problems) {
     double number = read_number(value);
     bool is_whole = option->type == OPTION_INT;
     if (!(number >= option->minimum && number <= option->maximum) || (is_whole && number != floor(number)))
-        buf_printf(problems, "%s: %s must be a %snumber from %.15g to %.15g%s%s, not \"%s\"\n", where,
-                   option->name, is_whole ? "whole " : "", option->minimum, option->maximum,
-                   *option->unit ? " " : "", option->unit, value);
+        buf_printf(problems, "%s: %s must be a %snumber from %.15g to %.15g%s%s, not \"%s\"\n", where, option->name,
+                   is_whole ? "whole " : "", option->minimum, option->maximum, *option->unit ? " " : "", option->unit,
+                   value);
     else if (is_whole)
         *(int64_t *)member(c, option) = (int64_t)number;
     else
@@ -145,17 +146,15 @@ static void set_bool(struct config *c, const struct config_option *option, const
         buf_printf(problems, "%s: %s must be yes or no, not \"%s\"\n", where, option->name, value);
 }
 
-void config_set(struct config *c, const char *name, const char *value, const char *where,
-                struct buf *problems) {
+void config_set(struct config *c, const char *name, const char *value, const char *where, struct buf *problems) {
     const struct config_option *option = find(name);
     if (!option) {
         struct nearest nearest;
         nearest_init(&nearest, name);
         for (size_t i = 0; i < TABLE_COUNT; i++)
             nearest_offer(&nearest, table[i].name);
-        buf_printf(problems, "%s: unknown option \"%s\"%s%s%s\n", where, name,
-                   nearest.best ? "; did you mean " : "", nearest.best ? nearest.best : "",
-                   nearest.best ? "?" : "");
+        buf_printf(problems, "%s: unknown option \"%s\"%s%s%s\n", where, name, nearest.best ? "; did you mean " : "",
+                   nearest.best ? nearest.best : "", nearest.best ? "?" : "");
         return;
     }
     char **origin = &c->where[option - table];
@@ -245,8 +244,8 @@ enum status config_read(struct config *c, const char *path, struct buf *problems
     return status;
 }
 
-enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
-                           bool *is_loopback, struct error *err) {
+enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port, bool *is_loopback,
+                           struct error *err) {
     const char *colon = strrchr(listen, ':');
     size_t length = colon ? (size_t)(colon - listen) : 0;
     const char *host = listen;
@@ -256,29 +255,24 @@ enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE]
         length -= 2;
     }
     double number = colon ? read_number(colon + 1) : NAN;
-    bool is_good = length > 0 && length < CONFIG_ADDRESS_SIZE && number >= 0 && number <= 65535 &&
-                   number == floor(number);
+    bool is_good =
+        length > 0 && length < CONFIG_ADDRESS_SIZE && number >= 0 && number <= 65535 && number == floor(number);
     struct in_addr v4;
     struct in6_addr v6;
     snprintf(address, CONFIG_ADDRESS_SIZE, "%.*s", is_good ? (int)length : 0, host);
     if (!is_v6 && strcmp(address, "localhost") == 0)
         snprintf(address, CONFIG_ADDRESS_SIZE, "127.0.0.1");
     if (!is_good || inet_pton(is_v6 ? AF_INET6 : AF_INET, address, is_v6 ? (void *)&v6 : &v4) != 1)
-        return error_set(err, STATUS_INPUT,
-                         "listen must be like 127.0.0.1:7117 or [::1]:7117, not \"%s\"", listen);
+        return error_set(err, STATUS_INPUT, "listen must be like 127.0.0.1:7117 or [::1]:7117, not \"%s\"", listen);
     *port = (uint16_t)number;
     *is_loopback = is_v6 ? IN6_IS_ADDR_LOOPBACK(&v6) : ntohl(v4.s_addr) >> 24 == 127;
     return STATUS_OK;
 }
 
 /* Where an option was set. */
-static const char *origin(const struct config *c, const char *name) {
-    return c->where[find(name) - table];
-}
+static const char *origin(const struct config *c, const char *name) { return c->where[find(name) - table]; }
 
-static bool is_set(const struct config *c, const char *name) {
-    return strcmp(origin(c, name), DEFAULT) != 0;
-}
+static bool is_set(const struct config *c, const char *name) { return strcmp(origin(c, name), DEFAULT) != 0; }
 
 static void check_word(const struct config *c, const char *name, const char *value, const char *const *words,
                        struct buf *problems) {
@@ -319,6 +313,6 @@ void config_check(const struct config *c, struct buf *problems) {
                    origin(c, *c->tls_key ? "tls_key" : "tls_certificate"));
     if (c->max_streams >= c->max_connections)
         buf_printf(problems, "%s: max_streams (%lld) must be less than max_connections (%lld)\n",
-                   origin(c, is_set(c, "max_streams") ? "max_streams" : "max_connections"),
-                   (long long)c->max_streams, (long long)c->max_connections);
+                   origin(c, is_set(c, "max_streams") ? "max_streams" : "max_connections"), (long long)c->max_streams,
+                   (long long)c->max_connections);
 }

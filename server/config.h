@@ -17,11 +17,11 @@ enum option_type { OPTION_TEXT, OPTION_INT, OPTION_REAL, OPTION_BOOL };
 struct config_option {
     const char *name;
     enum option_type type;
-    const char *unit;         /* "s", "MiB", ...; "" where there is none */
-    double minimum, maximum;  /* inclusive, for numbers */
+    const char *unit;        /* "s", "MiB", ...; "" where there is none */
+    double minimum, maximum; /* inclusive, for numbers */
     const char *default_text;
-    const char *help;         /* one sentence or two */
-    size_t offset;            /* of the member in struct config */
+    const char *help; /* one sentence or two */
+    size_t offset;    /* of the member in struct config */
 };
 
 #define CONFIG_OPTIONS_MAX 128
@@ -52,8 +52,7 @@ void config_release(struct config *c);
 
 /* Sets one option from text. `where` begins a message about it ("unbaked.conf:12"). A fault
  * appends one line to *problems and leaves the option as it was. */
-void config_set(struct config *c, const char *name, const char *value, const char *where,
-                struct buf *problems);
+void config_set(struct config *c, const char *name, const char *value, const char *where, struct buf *problems);
 /* Reads a file; faults append a line each. The status is about the file itself. */
 enum status config_read(struct config *c, const char *path, struct buf *problems, struct error *err);
 /* What concerns several options, or needs more than a range. Appends a line a fault, which begins with where
@@ -63,7 +62,7 @@ void config_check(const struct config *c, struct buf *problems);
 #define CONFIG_ADDRESS_SIZE 64
 /* Takes `listen` apart: "127.0.0.1:7117", "[::1]:0", "localhost:7117", "0.0.0.0:443". STATUS_INPUT
  * when it is no such thing. */
-enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port,
-                           bool *is_loopback, struct error *err);
+enum status config_address(const char *listen, char address[CONFIG_ADDRESS_SIZE], uint16_t *port, bool *is_loopback,
+                           struct error *err);
 
 #endif

@@ -42,8 +42,7 @@ static void read_config(struct invocation *in, const char *default_file, struct 
     config_check(&in->config, problems);
 }
 
-int invocation_read(struct invocation *in, int argc, char **argv, const struct flag *flags,
-                    const char *config_file) {
+int invocation_read(struct invocation *in, int argc, char **argv, const struct flag *flags, const char *config_file) {
     memset(in, 0, sizeof *in);
     config_init(&in->config);
     if (!arguments_read(&in->arguments, argc, argv, flags))
@@ -60,6 +59,4 @@ int invocation_read(struct invocation *in, int argc, char **argv, const struct f
     return is_good ? -1 : EXIT_USAGE;
 }
 
-void invocation_release(struct invocation *in) {
-    config_release(&in->config);
-}
+void invocation_release(struct invocation *in) { config_release(&in->config); }

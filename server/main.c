@@ -63,7 +63,7 @@ struct daemon {
     struct admin *admin;
     struct collector *collector;
     char address[CONFIG_ADDRESS_SIZE]; /* that it listens on */
-    unsigned long watched_rounds; /* of the scheduler, when the watchdog was last fed */
+    unsigned long watched_rounds;      /* of the scheduler, when the watchdog was last fed */
     struct api_library libraries[LIBRARY_COUNT];
     struct proxies proxies;
 };
@@ -74,13 +74,17 @@ static enum status check_access(const struct daemon *d, bool is_loopback, struct
     if (is_loopback)
         return STATUS_OK;
     if (strcmp(c->access, "open") == 0) {
-        error_set(err, STATUS_INPUT, "access = open is for loopback addresses, and listen is \"%s\": anybody who "
-                  "reaches the daemon could use it", c->listen);
+        error_set(err, STATUS_INPUT,
+                  "access = open is for loopback addresses, and listen is \"%s\": anybody who "
+                  "reaches the daemon could use it",
+                  c->listen);
         return error_hint(err, "access = auto, with a token for each user (`unbaked token add NAME`)");
     }
     if (strcmp(c->access, "auto") == 0 && !store_has_users(d->store)) {
-        error_set(err, STATUS_INPUT, "listen is \"%s\", which is not a loopback address, and there are no "
-                  "tokens: anybody who reaches the daemon could use it", c->listen);
+        error_set(err, STATUS_INPUT,
+                  "listen is \"%s\", which is not a loopback address, and there are no "
+                  "tokens: anybody who reaches the daemon could use it",
+                  c->listen);
         return error_hint(err, "`unbaked token add NAME --role admin` makes one");
     }
     if (!*c->tls_certificate)
@@ -160,16 +164,15 @@ static struct api_config api_options(const struct config *c, const struct proxie
 }
 
 /* *address is where `listen` says, in the caller's memory; *is_loopback: nobody else can reach it. */
-static void listener_options(const struct config *c, struct listener_config *network,
-                             char address[CONFIG_ADDRESS_SIZE], bool *is_loopback) {
+static void listener_options(const struct config *c, struct listener_config *network, char address[CONFIG_ADDRESS_SIZE],
+                             bool *is_loopback) {
     *network = (struct listener_config){
         .address = address,
         .connection_max = (unsigned)c->max_connections,
         .address_connection_max = (unsigned)c->address_max_connections,
         .certificate_file = *c->tls_certificate ? c->tls_certificate : NULL,
         .key_file = c->tls_key,
-        .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec,
-                   (double)c->body_min_bytes_per_sec},
+        .limits = {c->head_timeout_sec, c->idle_timeout_sec, c->idle_timeout_sec, (double)c->body_min_bytes_per_sec},
     };
     config_address(c->listen, address, &network->port, is_loopback, NULL); /* was checked with the rest */
 }
@@ -218,8 +221,7 @@ static void feed_watchdog(struct daemon *d) {
 /* The next of the signals in `asked`, while the watchdog is fed. */
 static int next_signal(struct daemon *d, const sigset_t *asked) {
     double pause_sec = notify_watchdog_sec() / 3;
-    struct timespec pause = {.tv_sec = (time_t)pause_sec,
-                             .tv_nsec = (long)(1e9 * (pause_sec - floor(pause_sec)))};
+    struct timespec pause = {.tv_sec = (time_t)pause_sec, .tv_nsec = (long)(1e9 * (pause_sec - floor(pause_sec)))};
     for (;;) {
         int number = pause_sec > 0 ? sigtimedwait(asked, NULL, &pause) : sigwaitinfo(asked, NULL);
         if (number > 0)
@@ -287,7 +289,8 @@ static enum status announce(const struct daemon *d, const char *port_file, struc
     char text[16];
     uint16_t port = listener_port(d->listener);
     bool is_v6 = strchr(d->address, ':') != NULL;
-    printf("http%s://%s%s%s:%u\n", *d->config->tls_certificate ? "s" : "", is_v6 ? "[" : "", d->address, is_v6 ? "]" : "", port);
+    printf("http%s://%s%s%s:%u\n", *d->config->tls_certificate ? "s" : "", is_v6 ? "[" : "", d->address,
+           is_v6 ? "]" : "", port);
     fflush(stdout);
     log_info("listening on %s port %u", d->address, port);
     int length = snprintf(text, sizeof text, "%u\n", port);
@@ -351,7 +354,8 @@ int daemon_command(int argc, char **argv) {
         if (commands_find(in.arguments.words[0]))
             fprintf(stderr, "unbaked: the command comes before its options: unbaked %s ...\n", in.arguments.words[0]);
         else
-            fprintf(stderr, "unbaked: unknown command \"%s\"; unbaked --help lists the commands\n", in.arguments.words[0]);
+            fprintf(stderr, "unbaked: unknown command \"%s\"; unbaked --help lists the commands\n",
+                    in.arguments.words[0]);
         code = EXIT_USAGE;
     } else if (code < 0 && invocation_has(&in, "--help")) {
         code = COMMAND_HELP;

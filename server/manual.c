@@ -21,8 +21,8 @@ static void page_8(void) {
         manual_synopsis(stdout, "unbaked", table[i].name, table[i].arguments, table[i].flags != NULL);
     manual_section(stdout, "DESCRIPTION");
     manual_text(stdout, "unbaked takes scenes over HTTP (a triangle mesh, photographs, their cameras), and "
-                "reconstructs what their surfaces are made of and what lights them. Jobs survive crashes and "
-                "restarts. unbake(1) is its client.\n");
+                        "reconstructs what their surfaces are made of and what lights them. Jobs survive crashes and "
+                        "restarts. unbake(1) is its client.\n");
     manual_text(stdout, table[0].details);
     manual_section(stdout, "OPTIONS");
     flag_list(table[0].flags);
@@ -37,7 +37,8 @@ static void page_8(void) {
     manual_section(stdout, "EXIT STATUS");
     manual_text(stdout, "0 done, or stopped when asked to; 1 failed; 2 bad usage or configuration.\n");
     manual_section(stdout, "FILES");
-    manual_item(stdout, CONFIG_FILE_DEFAULT, NULL, "what the commands read where neither --config nor --data "
+    manual_item(stdout, CONFIG_FILE_DEFAULT, NULL,
+                "what the commands read where neither --config nor --data "
                 "is given; the daemon reads what its --config names");
     manual_item(stdout, "/var/lib/unbaked", NULL, "the data folder: state.db, scenes, jobs, admin.sock");
     manual_section(stdout, "SEE ALSO");
@@ -49,7 +50,8 @@ static void page_5(void) {
     const struct config_option *table = config_table(&count);
     manual_head(stdout, "UNBAKED.CONF", 5, "unbaked.conf", "configuration of unbaked");
     manual_section(stdout, "DESCRIPTION");
-    manual_text(stdout, "Lines read \"name = value\"; # begins a comment. The same options are taken by --set on "
+    manual_text(stdout,
+                "Lines read \"name = value\"; # begins a comment. The same options are taken by --set on "
                 "the command line, which wins. `unbaked check-config` says everything that is wrong with a file.\n");
     manual_section(stdout, "OPTIONS");
     for (size_t i = 0; i < count; i++) {

@@ -70,7 +70,7 @@ count() { grep -c "^$1\$" "$outcomes"; }
 
 outcomes=$(mktemp)
 trap 'rm -f "$outcomes"' EXIT
-[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; start_one includes tests/includes.sh; }
+[ -n "$only" ] || { logs=$1/logs; mkdir -p "$logs"; start_one includes tests/includes.sh; start_one format tests/format.sh; }
 several=$(($# > 1))
 for build in "$@"; do
     export UNBAKE_BUILD=$build

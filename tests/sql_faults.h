@@ -19,27 +19,22 @@ static const struct sql_fault {
     int code, number; /* errno */
     enum status status;
 } sql_faults[] = {
-    {SQLITE_IOERR_WRITE, EIO, STATUS_IO},
-    {SQLITE_FULL, 0, STATUS_NO_SPACE},
-    {SQLITE_IOERR_FSYNC, ENOSPC, STATUS_NO_SPACE},
-    {SQLITE_BUSY, 0, STATUS_UNAVAILABLE},
-    {SQLITE_CORRUPT, 0, STATUS_CORRUPT},
-    {SQLITE_CANTOPEN, EACCES, STATUS_IO},
-    {SQLITE_CANTOPEN, EDQUOT, STATUS_NO_SPACE},
-    {SQLITE_IOERR_READ, 0, STATUS_IO},
-    {SQLITE_LOCKED, 0, STATUS_UNAVAILABLE},
-    {SQLITE_NOTADB, 0, STATUS_CORRUPT},
+    {SQLITE_IOERR_WRITE, EIO, STATUS_IO},          {SQLITE_FULL, 0, STATUS_NO_SPACE},
+    {SQLITE_IOERR_FSYNC, ENOSPC, STATUS_NO_SPACE}, {SQLITE_BUSY, 0, STATUS_UNAVAILABLE},
+    {SQLITE_CORRUPT, 0, STATUS_CORRUPT},           {SQLITE_CANTOPEN, EACCES, STATUS_IO},
+    {SQLITE_CANTOPEN, EDQUOT, STATUS_NO_SPACE},    {SQLITE_IOERR_READ, 0, STATUS_IO},
+    {SQLITE_LOCKED, 0, STATUS_UNAVAILABLE},        {SQLITE_NOTADB, 0, STATUS_CORRUPT},
     {SQLITE_MISUSE, 0, STATUS_INTERNAL},
 };
 #define SQL_FAULTS (sizeof sql_faults / sizeof *sql_faults)
 
 static const struct sql_fault *_Atomic sql_fault; /* the one that is to come */
-static atomic_long sql_faults_left;          /* calls until then; 0: none fails */
-static const char *_Atomic sql_faults_only;  /* what a statement has in it, or else does not count; NULL: all do */
-static atomic_bool sql_faults_stay;          /* all later ones fail, too */
-static _Thread_local bool faults_are_off;    /* in this thread, as while SQLite calls itself */
+static atomic_long sql_faults_left;               /* calls until then; 0: none fails */
+static const char *_Atomic sql_faults_only;       /* what a statement has in it, or else does not count; NULL: all do */
+static atomic_bool sql_faults_stay;               /* all later ones fail, too */
+static _Thread_local bool faults_are_off;         /* in this thread, as while SQLite calls itself */
 
-static atomic_bool faults_behind;            /* also in the threads that hash and remove behind everybody's back */
+static atomic_bool faults_behind; /* also in the threads that hash and remove behind everybody's back */
 static void (*_Atomic faults_watch)(const char *call); /* told of each call before it is made; NULL: nobody */
 
 /* Whether the calls of this thread are no part of what the test does. */
@@ -61,9 +56,7 @@ static inline void sql_faults_arm_only(const char *only, long n, bool stays) {
     atomic_store(&sql_faults_left, n);
 }
 
-static inline void sql_faults_arm(long n) {
-    sql_faults_arm_only(NULL, n, false);
-}
+static inline void sql_faults_arm(long n) { sql_faults_arm_only(NULL, n, false); }
 
 /* Until it is mended all calls fail as a disk does that neither reads nor writes. */
 static inline void sql_break(void) {
@@ -71,9 +64,7 @@ static inline void sql_break(void) {
     atomic_store(&sql_faults_left, 1);
 }
 
-static inline void sql_mend(void) {
-    atomic_store(&sql_faults_left, 0);
-}
+static inline void sql_mend(void) { atomic_store(&sql_faults_left, 0); }
 
 /* One more call; whether it is the one that fails, or comes after it (`left` stays below 0 then). */
 static inline bool faults_strike(atomic_long *left, bool stays) {
@@ -88,9 +79,7 @@ static inline bool faults_strike(atomic_long *left, bool stays) {
 }
 
 /* From now on none does; whether one has. */
-static inline bool sql_faults_lift(void) {
-    return atomic_exchange(&sql_faults_left, 0) <= 0;
-}
+static inline bool sql_faults_lift(void) { return atomic_exchange(&sql_faults_left, 0) <= 0; }
 
 static inline bool sql_fails(const char *text) {
     const char *only = sql_faults_only;
@@ -104,13 +93,13 @@ static inline bool sql_fails(const char *text) {
 }
 
 /* The library's own; what it calls meanwhile does not fail. */
-#define SQL_PASS(name, type, ...)                                                                                   \
-    __typeof__(name) *call;                                                                                         \
-    bool outer = faults_are_off;                                                                                      \
-    *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                      \
-    faults_are_off = true;                                                                                            \
-    type result = call(__VA_ARGS__);                                                                                \
-    faults_are_off = outer;                                                                                           \
+#define SQL_PASS(name, type, ...)                                                                                      \
+    __typeof__(name) *call;                                                                                            \
+    bool outer = faults_are_off;                                                                                       \
+    *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                         \
+    faults_are_off = true;                                                                                             \
+    type result = call(__VA_ARGS__);                                                                                   \
+    faults_are_off = outer;                                                                                            \
     return result
 
 /* A rollback, or what the reserve asks after each commit, which does without an answer. */
@@ -124,7 +113,8 @@ int sqlite3_step(sqlite3_stmt *stmt) {
     SQL_PASS(sqlite3_step, int, stmt);
 }
 
-int sqlite3_prepare_v3(sqlite3 *db, const char *text, int size, unsigned flags, sqlite3_stmt **stmt, const char **tail) {
+int sqlite3_prepare_v3(sqlite3 *db, const char *text, int size, unsigned flags, sqlite3_stmt **stmt,
+                       const char **tail) {
     *stmt = NULL;
     if (!sql_is_spared(text) && sql_fails(text))
         return sql_fault->code;

@@ -36,14 +36,10 @@ static inline void system_faults_arm_only(const char *only, long n, bool stays) 
     atomic_store(&system_faults_left, n);
 }
 
-static inline void system_faults_arm(long n) {
-    system_faults_arm_only(NULL, n, false);
-}
+static inline void system_faults_arm(long n) { system_faults_arm_only(NULL, n, false); }
 
 /* From now on none does; whether one has. */
-static inline bool system_faults_lift(void) {
-    return atomic_exchange(&system_faults_left, 0) <= 0;
-}
+static inline bool system_faults_lift(void) { return atomic_exchange(&system_faults_left, 0) <= 0; }
 
 /* Until they are mended all these calls fail. */
 static inline void system_break(const char *calls, int fault) {
@@ -52,9 +48,7 @@ static inline void system_break(const char *calls, int fault) {
     atomic_store(&system_faults_left, 1);
 }
 
-static inline void system_mend(void) {
-    atomic_store(&system_faults_left, 0);
-}
+static inline void system_mend(void) { atomic_store(&system_faults_left, 0); }
 
 static inline bool is_among(const char *name, const char *names) {
     size_t length = strlen(name);
@@ -71,8 +65,7 @@ static inline bool system_fails(const char *name) {
     const char *only = system_faults_only;
     if (faults_watch)
         faults_watch(name);
-    if (faults_pass_by() || (only && !is_among(name, only)) ||
-        !faults_strike(&system_faults_left, system_faults_stay))
+    if (faults_pass_by() || (only && !is_among(name, only)) || !faults_strike(&system_faults_left, system_faults_stay))
         return false;
     system_failed = name;
     errno = system_fault;
@@ -84,13 +77,13 @@ static inline bool is_file(int fd) {
     return fd > STDERR_FILENO && syscall(SYS_fstat, fd, &info) == 0 && (S_ISREG(info.st_mode) || S_ISDIR(info.st_mode));
 }
 
-#define SYSTEM_CALL(type, name, failed, counts, parameters, ...)                                                    \
-    type name parameters {                                                                                          \
-        __typeof__(name) *call;                                                                                     \
-        if ((counts) && system_fails(#name))                                                                        \
-            return failed;                                                                                          \
-        *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                  \
-        return call(__VA_ARGS__);                                                                                   \
+#define SYSTEM_CALL(type, name, failed, counts, parameters, ...)                                                       \
+    type name parameters {                                                                                             \
+        __typeof__(name) *call;                                                                                        \
+        if ((counts) && system_fails(#name))                                                                           \
+            return failed;                                                                                             \
+        *(void **)&call = dlsym(RTLD_NEXT, #name);                                                                     \
+        return call(__VA_ARGS__);                                                                                      \
     }
 
 SYSTEM_CALL(int, chmod, -1, true, (const char *path, mode_t mode), path, mode)
@@ -101,7 +94,8 @@ SYSTEM_CALL(int, fdatasync, -1, true, (int fd), fd)
 SYSTEM_CALL(int, flock, -1, true, (int fd, int operation), fd, operation)
 SYSTEM_CALL(pid_t, fork, -1, true, (void))
 SYSTEM_CALL(int, fstat, -1, is_file(fd), (int fd, struct stat *info), fd, info)
-SYSTEM_CALL(int, fstatat, -1, true, (int folder, const char *path, struct stat *info, int flags), folder, path, info, flags)
+SYSTEM_CALL(int, fstatat, -1, true, (int folder, const char *path, struct stat *info, int flags), folder, path, info,
+            flags)
 SYSTEM_CALL(int, fsync, -1, true, (int fd), fd)
 SYSTEM_CALL(int, ftruncate, -1, true, (int fd, off_t length), fd, length)
 SYSTEM_CALL(ssize_t, getrandom, -1, true, (void *data, size_t length, unsigned flags), data, length, flags)
@@ -114,11 +108,10 @@ SYSTEM_CALL(DIR *, opendir, NULL, true, (const char *path), path)
 SYSTEM_CALL(int, pipe2, -1, true, (int ends[2], int flags), ends, flags)
 SYSTEM_CALL(ssize_t, pread, -1, is_file(fd), (int fd, void *data, size_t length, off_t at), fd, data, length, at)
 SYSTEM_CALL(int, pthread_create, errno, true,
-            (pthread_t *thread, const pthread_attr_t *attributes, void *(*run)(void *), void *user), thread, attributes, run,
-            user)
-SYSTEM_CALL(ssize_t, pwrite, -1, is_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length,
-            at)
-SYSTEM_CALL(struct dirent *, readdir, NULL, true, (DIR *dir), dir)
+            (pthread_t * thread, const pthread_attr_t *attributes, void *(*run)(void *), void *user), thread,
+            attributes, run, user)
+SYSTEM_CALL(ssize_t, pwrite, -1, is_file(fd), (int fd, const void *data, size_t length, off_t at), fd, data, length, at)
+SYSTEM_CALL(struct dirent *, readdir, NULL, true, (DIR * dir), dir)
 SYSTEM_CALL(int, rename, -1, true, (const char *from, const char *to), from, to)
 SYSTEM_CALL(int, setegid, -1, true, (gid_t gid), gid)
 SYSTEM_CALL(int, seteuid, -1, true, (uid_t uid), uid)
@@ -128,13 +121,13 @@ SYSTEM_CALL(int, unlink, -1, true, (const char *path), path)
 SYSTEM_CALL(int, unlinkat, -1, true, (int folder, const char *path, int flags), folder, path, flags)
 SYSTEM_CALL(ssize_t, write, -1, is_file(fd), (int fd, const void *data, size_t length), fd, data, length)
 
-#define SYSTEM_OPEN_MODE                                                                                            \
-    mode_t mode = 0;                                                                                                \
-    if (flags & O_CREAT) {                                                                                          \
-        va_list args;                                                                                               \
-        va_start(args, flags);                                                                                      \
-        mode = va_arg(args, mode_t);                                                                                \
-        va_end(args);                                                                                               \
+#define SYSTEM_OPEN_MODE                                                                                               \
+    mode_t mode = 0;                                                                                                   \
+    if (flags & O_CREAT) {                                                                                             \
+        va_list args;                                                                                                  \
+        va_start(args, flags);                                                                                         \
+        mode = va_arg(args, mode_t);                                                                                   \
+        va_end(args);                                                                                                  \
     }
 
 int open(const char *path, int flags, ...) {

@@ -73,8 +73,7 @@ static enum status token_list(struct store *store, cJSON *reply, struct error *e
     return status;
 }
 
-static enum status token_revoke(struct store *store, const cJSON *request, cJSON *reply,
-                                struct error *err) {
+static enum status token_revoke(struct store *store, const cJSON *request, cJSON *reply, struct error *err) {
     const char *which;
     size_t count;
     enum status status = json_string(request, "which", "the request", "", &which, err);
@@ -110,8 +109,8 @@ static enum status backup(const char *data_dir, struct store *store, int *fd, st
     return status;
 }
 
-enum status admin_do(const char *data_dir, struct store *store, const cJSON *request, cJSON *reply,
-                     int *fd, struct error *err) {
+enum status admin_do(const char *data_dir, struct store *store, const cJSON *request, cJSON *reply, int *fd,
+                     struct error *err) {
     const char *command;
     enum status status = json_string(request, "command", "the request", "", &command, err);
     if (status != STATUS_OK)
@@ -131,8 +130,7 @@ enum status admin_do(const char *data_dir, struct store *store, const cJSON *req
 
 /* Binds (or connects) fd to DIR/admin.sock: through the folder's descriptor, since a socket's
  * address holds 108 bytes and a folder's name may be longer. */
-static int with_address(const char *dir, int fd,
-                        int (*call)(int, const struct sockaddr *, socklen_t)) {
+static int with_address(const char *dir, int fd, int (*call)(int, const struct sockaddr *, socklen_t)) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     int dir_fd = open(dir, O_PATH | O_DIRECTORY | O_CLOEXEC);
     if (dir_fd < 0)
@@ -189,8 +187,8 @@ static bool receive_line(int from, struct buf *line, int *fd) {
             char bytes[CMSG_SPACE(sizeof(int))];
         } control;
         struct iovec part = {.iov_base = chunk, .iov_len = sizeof chunk};
-        struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1, .msg_control = control.bytes,
-                                 .msg_controllen = sizeof control.bytes};
+        struct msghdr message = {
+            .msg_iov = &part, .msg_iovlen = 1, .msg_control = control.bytes, .msg_controllen = sizeof control.bytes};
         ssize_t got = recvmsg(from, &message, MSG_CMSG_CLOEXEC);
         if (got < 0 && errno == EINTR)
             continue;
@@ -236,8 +234,7 @@ static void answer(struct admin *a, int client) {
 static bool may_ask(int client) {
     struct ucred peer;
     socklen_t size = sizeof peer;
-    return getsockopt(client, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
-           (peer.uid == 0 || peer.uid == geteuid());
+    return getsockopt(client, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 && (peer.uid == 0 || peer.uid == geteuid());
 }
 
 static void *serve(void *user) {
@@ -262,11 +259,11 @@ static void *serve(void *user) {
     }
 }
 
-enum status admin_start(struct admin **out, const char *data_dir, struct store *store,
-                        void (*revoked)(void *user), void *user, struct error *err) {
+enum status admin_start(struct admin **out, const char *data_dir, struct store *store, void (*revoked)(void *user),
+                        void *user, struct error *err) {
     struct admin *a = mem_calloc(1, sizeof *a);
-    *a = (struct admin){.data_dir = data_dir, .store = store, .revoked = revoked, .user = user,
-                        .stop_fd = eventfd(0, EFD_CLOEXEC)};
+    *a = (struct admin){
+        .data_dir = data_dir, .store = store, .revoked = revoked, .user = user, .stop_fd = eventfd(0, EFD_CLOEXEC)};
     if (a->stop_fd < 0) {
         enum status failed = error_set_errno(err, errno, "cannot make an eventfd");
         mem_free(a);
@@ -277,8 +274,8 @@ enum status admin_start(struct admin **out, const char *data_dir, struct store *
     unlink(path); /* of an earlier life: this process holds the folder's lock */
     a->listen_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     /* The mode of a socket that is not yet bound becomes that of the file. */
-    a->is_bound = a->listen_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 &&
-                  with_address(data_dir, a->listen_fd, bind) == 0;
+    a->is_bound =
+        a->listen_fd >= 0 && fchmod(a->listen_fd, 0600) == 0 && with_address(data_dir, a->listen_fd, bind) == 0;
     if (!a->is_bound || listen(a->listen_fd, 16) != 0)
         status = error_set_errno(err, errno, "cannot listen on %s", path);
     else {
@@ -315,8 +312,7 @@ void admin_stop(struct admin *a) {
 
 /* --- the command's side -------------------------------------------------------------------- */
 
-static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply, int *fd,
-                              struct error *err) {
+static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply, int *fd, struct error *err) {
     struct buf line;
     const char *message = NULL, *hint = "";
     double number = STATUS_INTERNAL;
@@ -355,16 +351,14 @@ static enum status become_owner(const char *dir, struct error *err) {
     return error_set_errno(err, errno, "cannot act as the owner of %s", dir);
 }
 
-static enum status do_alone(const char *data_dir, const cJSON *request, cJSON **reply, int *fd,
-                            struct error *err) {
+static enum status do_alone(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err) {
     struct store *store = NULL;
     int lock_fd = -1;
     enum status status = become_owner(data_dir, err);
     if (status == STATUS_OK)
         status = folder_lock(data_dir, &lock_fd, err);
     if (status == STATUS_CONFLICT)
-        error_hint(err, "it does not listen on %s/admin.sock: it starts or stops just now; try again",
-                   data_dir);
+        error_hint(err, "it does not listen on %s/admin.sock: it starts or stops just now; try again", data_dir);
     if (status == STATUS_OK)
         status = store_open(&store, data_dir, err);
     if (status == STATUS_OK) {
@@ -379,8 +373,7 @@ static enum status do_alone(const char *data_dir, const cJSON *request, cJSON **
     return status;
 }
 
-enum status admin_call(const char *data_dir, const cJSON *request, cJSON **reply, int *fd,
-                       struct error *err) {
+enum status admin_call(const char *data_dir, const cJSON *request, cJSON **reply, int *fd, struct error *err) {
     *reply = NULL;
     *fd = -1;
     int socket_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);

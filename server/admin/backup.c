@@ -109,7 +109,7 @@ static enum status backup_database(const char *data_dir, const char *path, struc
 
 struct making {
     const char *data_dir;
-    char *folder;   /* the backup, under a temporary name; owned */
+    char *folder; /* the backup, under a temporary name; owned */
     struct copy copy;
     struct contents contents;
     size_t damaged; /* in the last round: outputs and archives that are missing or not as announced */
@@ -237,7 +237,8 @@ static enum status leave_out(const struct making *m, struct error *err) {
     for (size_t i = 0; status == STATUS_OK && i < m->contents.job_count; i++) {
         char *folder = layout_job(m->folder, m->contents.jobs[i].id);
         char *path = layout_checkpoint(folder), *journal = layout_checkpoint_journal(folder);
-        if (m->contents.jobs[i].is_running && ((unlink(path) != 0 && errno != ENOENT) || (unlink(journal) != 0 && errno != ENOENT)))
+        if (m->contents.jobs[i].is_running &&
+            ((unlink(path) != 0 && errno != ENOENT) || (unlink(journal) != 0 && errno != ENOENT)))
             status = error_set_errno(err, errno, "cannot remove %s", path);
         mem_free(journal);
         mem_free(path);
@@ -298,7 +299,8 @@ static enum status open_folders(struct making *m, struct error *err) {
 }
 
 static enum status backup_all(const char *data_dir, const char *path, bool *is_damaged, struct error *err) {
-    struct making m = {.data_dir = data_dir, .folder = mem_printf("%s.part-XXXXXX", path),
+    struct making m = {.data_dir = data_dir,
+                       .folder = mem_printf("%s.part-XXXXXX", path),
                        .copy = {.from = -1, .to = -1, .may_link = true, .owner = (uid_t)-1}};
     enum status status = open_folders(&m, err);
     for (int round = 1; status == STATUS_OK && round <= ROUNDS_MAX; round++) {

@@ -85,7 +85,9 @@ int token_command(int argc, char **argv) {
         code = EXIT_USAGE;
     } else if (code < 0 && in.arguments.word_count != (is_add || is_revoke ? 2 : 1)) {
         fprintf(stderr, "unbaked: token %s takes %s\n", action,
-                is_add ? "the user's NAME" : is_revoke ? "a token's number or a user's name" : "no more words");
+                is_add      ? "the user's NAME"
+                : is_revoke ? "a token's number or a user's name"
+                            : "no more words");
         code = EXIT_USAGE;
     }
     if (code < 0) {

@@ -29,9 +29,7 @@ bool copy_path_is_plain(const char *path) {
     }
 }
 
-static bool give(const struct copy *c, int fd) {
-    return c->owner == (uid_t)-1 || fchown(fd, c->owner, c->group) == 0;
-}
+static bool give(const struct copy *c, int fd) { return c->owner == (uid_t)-1 || fchown(fd, c->owner, c->group) == 0; }
 
 /* The folder of `path` below the folder `root`, made where `makes`; *base is the last part. -1 with errno. */
 static int open_parent(const struct copy *c, int root, const char *path, bool makes, const char **base) {
@@ -153,8 +151,9 @@ enum status copy_tree(struct copy *c, const char *path, struct error *err) {
     int fd = open_parent(c, c->from, inside, false, &base);
     mem_free(inside);
     if (fd < 0)
-        return errno == ENOENT || errno == ELOOP || errno == ENOTDIR ? STATUS_OK
-                                                                     : error_set_errno(err, errno, "cannot open %s", path);
+        return errno == ENOENT || errno == ELOOP || errno == ENOTDIR
+                   ? STATUS_OK
+                   : error_set_errno(err, errno, "cannot open %s", path);
     char self[40];
     snprintf(self, sizeof self, "/proc/self/fd/%d", fd);
     enum status status = file_list(self, &names, &count, err);

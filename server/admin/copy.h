@@ -12,9 +12,9 @@
 #include "common/error.h"
 
 struct copy {
-    int from, to;        /* open folders */
-    bool may_link;       /* the files are never changed in place: a hard link will do */
-    uid_t owner;         /* of what is made; (uid_t)-1: whoever makes it */
+    int from, to;  /* open folders */
+    bool may_link; /* the files are never changed in place: a hard link will do */
+    uid_t owner;   /* of what is made; (uid_t)-1: whoever makes it */
     gid_t group;
     uint64_t file_count, byte_count, shared_count; /* shared: by reflink or hard link */
 };

@@ -38,8 +38,8 @@ struct doctor {
     int bad_count;
 };
 
-__attribute__((format(printf, 4, 5)))
-static void tell(struct doctor *d, enum verdict verdict, const char *what, const char *format, ...) {
+__attribute__((format(printf, 4, 5))) static void tell(struct doctor *d, enum verdict verdict, const char *what,
+                                                       const char *format, ...) {
     static const char *const words[] = {"ok", "warn", "FAIL"};
     char text[1200];
     va_list args;
@@ -82,8 +82,9 @@ static void check_processors(struct doctor *d) {
     enum verdict verdict = wanted > memory || c->threads > count ? WARN : GOOD;
     tell(d, verdict, "machine", "%ld processors, %llu MiB of memory; jobs use %lld threads (0: all) and %s", count,
          (unsigned long long)memory, (long long)c->threads,
-         wanted == 0 ? "as much memory as they ask for" : wanted > memory ? "may use more memory than there is"
-                                                                           : "have room");
+         wanted == 0       ? "as much memory as they ask for"
+         : wanted > memory ? "may use more memory than there is"
+                           : "have room");
 }
 
 /* Tries the sandbox in a child, where it does no harm. */
@@ -110,12 +111,12 @@ static void check_sandbox(struct doctor *d) {
     if (child < 0 || read(channel[0], &result, sizeof result) != (ssize_t)sizeof result) {
         tell(d, BAD, "sandbox", "a process in the sandbox does not even start");
     } else {
-        tell(d, result.files ? GOOD : WARN, "sandbox", "Landlock %s", result.files
-             ? "keeps jobs from files that are not theirs"
-             : "is missing (Linux 5.13, lsm=landlock): jobs may read files that are not theirs");
-        tell(d, result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s", result.system_calls
-             ? "keeps jobs from the network, from new programs and from other processes"
-             : "is missing: jobs may use the network");
+        tell(d, result.files ? GOOD : WARN, "sandbox", "Landlock %s",
+             result.files ? "keeps jobs from files that are not theirs"
+                          : "is missing (Linux 5.13, lsm=landlock): jobs may read files that are not theirs");
+        tell(d, result.system_calls ? GOOD : WARN, "sandbox", "seccomp %s",
+             result.system_calls ? "keeps jobs from the network, from new programs and from other processes"
+                                 : "is missing: jobs may use the network");
     }
     if (child > 0) {
         close(channel[0]);
@@ -166,7 +167,8 @@ static void check_disk(struct doctor *d) {
     }
     if (check_writable(d, dir))
         tell(d, info.st_mode & 077 ? WARN : GOOD, "data", "%s can be written%s", dir,
-             info.st_mode & 077 ? ", and others can look into it: chmod go= it, as the daemon does when it starts" : "");
+             info.st_mode & 077 ? ", and others can look into it: chmod go= it, as the daemon does when it starts"
+                                : "");
     if (is_remote(dir))
         tell(d, BAD, "data", "%s lies on a network file system, where SQLite's locks cannot be relied on", dir);
     if (file_free_bytes(dir, &room, &err) != STATUS_OK)
@@ -207,13 +209,15 @@ static void check_tokens(struct doctor *d, bool runs) {
     mem_free(path);
     if (strcmp(c->access, "open") == 0)
         tell(d, is_loopback ? GOOD : BAD, "tokens", "access = open%s",
-             is_loopback ? ": whoever has an account on this machine may do everything" : " is for loopback addresses only");
+             is_loopback ? ": whoever has an account on this machine may do everything"
+                         : " is for loopback addresses only");
     else if (count > 0)
         tell(d, GOOD, "tokens", "%d", count);
     else if (is_loopback)
         tell(d, GOOD, "tokens", "none: whoever has an account on this machine may do everything");
     else
-        tell(d, BAD, "tokens", "none, and %s is not a loopback address: `unbaked token add NAME --role admin`", c->listen);
+        tell(d, BAD, "tokens", "none, and %s is not a loopback address: `unbaked token add NAME --role admin`",
+             c->listen);
 }
 
 static void check_tls(struct doctor *d) {
@@ -224,8 +228,8 @@ static void check_tls(struct doctor *d) {
     struct stat info;
     double days = 0;
     if (!*c->tls_certificate) {
-        tell(d, is_loopback ? GOOD : WARN, "tls", is_loopback ? "none, on loopback"
-             : "none: tokens and scenes cross the network unencrypted");
+        tell(d, is_loopback ? GOOD : WARN, "tls",
+             is_loopback ? "none, on loopback" : "none: tokens and scenes cross the network unencrypted");
         return;
     }
     enum status status = tls_new(&tls, c->tls_certificate, c->tls_key, &err);
@@ -237,8 +241,11 @@ static void check_tls(struct doctor *d) {
         tell(d, BAD, "tls", "%s%s%s", err.message, *err.hint ? "; " : "", err.hint);
         return;
     }
-    tell(d, days < 0 ? BAD : days < 14 ? WARN : GOOD, "tls", "the certificate %s %.0f days",
-         days < 0 ? "has expired, for" : "is good for", days < 0 ? -days : days);
+    tell(d,
+         days < 0    ? BAD
+         : days < 14 ? WARN
+                     : GOOD,
+         "tls", "the certificate %s %.0f days", days < 0 ? "has expired, for" : "is good for", days < 0 ? -days : days);
     if (stat(c->tls_key, &info) == 0 && info.st_mode & 07)
         tell(d, WARN, "tls", "everybody here can read the key: chmod o= %s", c->tls_key);
 }

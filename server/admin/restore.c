@@ -127,7 +127,8 @@ static enum status restore_files(struct restoring *r, char *sums, char database[
     return status;
 }
 
-static enum status restore_database(struct restoring *r, const char *digest, struct contents *contents, struct error *err) {
+static enum status restore_database(struct restoring *r, const char *digest, struct contents *contents,
+                                    struct error *err) {
     size_t before = r->damaged;
     char *path = layout_state(r->data);
     enum status status = STATUS_OK;
@@ -172,7 +173,8 @@ static enum status restore(struct restoring *r, struct contents *contents, struc
     if (status == STATUS_OK)
         status = restore_files(r, sums.length > 0 ? sums.data : NULL, database, err);
     if (status == STATUS_OK && r->damaged > 0 && !r->skips) {
-        error_set(err, STATUS_CORRUPT, "%zu files of %s are missing or damaged: nothing is restored", r->damaged, r->backup);
+        error_set(err, STATUS_CORRUPT, "%zu files of %s are missing or damaged: nothing is restored", r->damaged,
+                  r->backup);
         status = error_hint(err, "--skip-damaged restores the others");
     }
     if (status == STATUS_OK)
@@ -191,13 +193,16 @@ int restore_command(int argc, char **argv) {
     struct error err;
     int code = command_begin(NULL, &in, argc, argv, restore_flags, 2, 2);
     if (code < 0) {
-        struct restoring r = {.backup = in.arguments.words[0], .data = in.arguments.words[1], .skips = invocation_has(&in, "--skip-damaged"),
+        struct restoring r = {.backup = in.arguments.words[0],
+                              .data = in.arguments.words[1],
+                              .skips = invocation_has(&in, "--skip-damaged"),
                               .copy = {.from = -1, .to = -1}};
         enum status status = restore(&r, &contents, &err);
         if (status == STATUS_OK)
-            printf("%s: %zu scenes, %zu jobs, %zu outputs; %llu files with %llu bytes, %s\n", r.data, contents.scene_count,
-                   contents.job_count, contents.output_count, (unsigned long long)r.copy.file_count,
-                   (unsigned long long)r.copy.byte_count, r.damaged ? "without those named above" : "all digests match");
+            printf("%s: %zu scenes, %zu jobs, %zu outputs; %llu files with %llu bytes, %s\n", r.data,
+                   contents.scene_count, contents.job_count, contents.output_count,
+                   (unsigned long long)r.copy.file_count, (unsigned long long)r.copy.byte_count,
+                   r.damaged ? "without those named above" : "all digests match");
         code = status != STATUS_OK ? command_failed(&err) : r.damaged ? EXIT_FAILURE : EXIT_SUCCESS;
         if (r.copy.to >= 0)
             close(r.copy.to);

@@ -6,7 +6,7 @@
 
 #include "common/mem.h"
 
-#define MIN_PHOTOGRAPHS 4 /* that show a track, to compare one with the median of the others; by hand */
+#define MIN_PHOTOGRAPHS 4   /* that show a track, to compare one with the median of the others; by hand */
 #define MIN_OBSERVATIONS 60 /* of tracks, for a photograph to be judged; by hand */
 /* Standard deviation of a sharp photograph's blur at level 0, pixels of that level: pixel area, lens and the pyramid's
  * binomial. */
@@ -90,8 +90,8 @@ void calibrate_blur(struct scene *scene, const struct tracks *tracks, struct blu
     float *blur = mem_array(frames + 1, sizeof *blur);
     for (size_t f = 0; f < frames; f++) {
         for (size_t i = 0; i < tracks->count[f]; i++)
-            compare_others(tracks, &tracks->track[f * tracks->capacity + i],
-                           0.5f / tracks->pyramid[f].scale, sharpness);
+            compare_others(tracks, &tracks->track[f * tracks->capacity + i], 0.5f / tracks->pyramid[f].scale,
+                           sharpness);
     }
     *found = (struct blur_found){0};
     for (size_t f = 0; f < frames; f++) {

@@ -147,8 +147,8 @@ static void apply(const struct light_fit *f, int model, const double *x, struct 
         double level = f->exposure_known[t] ? 0.0 : (g[0] + g[1] + g[2]) / 3.0;
         photo->exposure *= (float)exp(level);
         if (model & (LIGHT_DRIFT | LIGHT_COLOR))
-            photo->gain = rgb_mul(photo->gain, rgb_make((float)exp(g[0] - level), (float)exp(g[1] - level),
-                                                        (float)exp(g[2] - level)));
+            photo->gain = rgb_mul(
+                photo->gain, rgb_make((float)exp(g[0] - level), (float)exp(g[1] - level), (float)exp(g[2] - level)));
     }
     for (size_t i = 0; i < scene->photograph_count && (model & LIGHT_VIGNETTE); i++) {
         for (size_t k = 0; k < 3; k++)
@@ -157,8 +157,7 @@ static void apply(const struct light_fit *f, int model, const double *x, struct 
 }
 
 void calibrate_light(struct scene *scene, const struct views *views, const struct atlas *atlas,
-                     const struct inverse_uv *inverse, bool faults, struct parallel *pool,
-                     struct light_found *found) {
+                     const struct inverse_uv *inverse, bool faults, struct parallel *pool, struct light_found *found) {
     struct overlaps overlaps;
     struct light_fit fit;
     size_t points = POINTS_PER_FRAME * views->train_count;

@@ -20,7 +20,7 @@
 #include "server/scene/inverse_uv.h"
 
 struct light_found {
-    size_t exposures_solved;  /* that the bundle does not give */
+    size_t exposures_solved;             /* that the bundle does not give */
     bool drift, white_balance, vignette; /* whether the fault was accepted */
     double spread_before, spread_after;  /* rms deviation of log radiance from the mean of its point, all channels */
 };
@@ -29,7 +29,6 @@ struct light_found {
  * values. With `faults` false only unknown exposures are solved. Gauge: where nothing determines the mean of G, it is
  * 0. The same for any number of threads. */
 void calibrate_light(struct scene *scene, const struct views *views, const struct atlas *atlas,
-                     const struct inverse_uv *inverse, bool faults, struct parallel *pool,
-                     struct light_found *found);
+                     const struct inverse_uv *inverse, bool faults, struct parallel *pool, struct light_found *found);
 
 #endif

@@ -8,13 +8,12 @@
 #include "server/capture/held_out_poses.h"
 #include "server/capture/pose_solver.h"
 
-#define LAST_ROUNDS 4 /* after the first judgement, at the finest level; by hand */
-#define COARSEST_PX 75 /* pixels: least width of a pyramid level that is used; coarser ones mislead; by hand */
+#define LAST_ROUNDS 4     /* after the first judgement, at the finest level; by hand */
+#define COARSEST_PX 75    /* pixels: least width of a pyramid level that is used; coarser ones mislead; by hand */
 #define COMMON_SCALE 0.05 /* of log residuals, to compare the agreement of all photographs; by hand */
 
 /* Root mean squared distance, in pixels, between the image positions of a frame's own tracks in two cameras. */
-static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a,
-                       const struct camera *b) {
+static double shift_of(const struct pose_solver *s, size_t f, const struct camera *a, const struct camera *b) {
     double squares = 0.0;
     size_t count = 0;
     for (size_t i = 0; i < s->tracks->count[f]; i++) {
@@ -57,7 +56,7 @@ static void validate_frames(const struct pose_solver *s, struct validation *vali
                 continue;
             double cost = pose_robust_cost((double)old - s->x[observation[k].offset] - consensus, frame->scale);
             validation_add(&validation[observation[k].frame], cost,
-                              pose_robust_cost((double)value - s->x[observation[k].offset] - consensus, frame->scale));
+                           pose_robust_cost((double)value - s->x[observation[k].offset] - consensus, frame->scale));
         }
     }
 }

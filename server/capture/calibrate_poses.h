@@ -13,10 +13,10 @@
 
 struct poses_found {
     size_t moved_count;
-    double shift_px;  /* rms over the moved photographs, pixels */
+    double shift_px;             /* rms over the moved photographs, pixels */
     size_t held_out_moved_count; /* held-out photographs, and their rms, pixels */
     double held_out_shift_px;
-    float *shift;     /* [train_count] rms over a photograph's tracks, pixels; 0 where it was not moved; owned */
+    float *shift; /* [train_count] rms over a photograph's tracks, pixels; 0 where it was not moved; owned */
 };
 
 /* Moves the cameras of training photographs and, where any is moved, those of held-out ones (held_out_poses.h). The

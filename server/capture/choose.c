@@ -38,8 +38,7 @@ size_t choose_even_step(size_t count) {
 void chooser_init(struct chooser *c, size_t item_count, size_t per_iteration, uint64_t seed) {
     c->item_count = item_count;
     c->stratum_count = per_iteration < item_count ? per_iteration : item_count;
-    c->epoch_length =
-        c->stratum_count ? (item_count + c->stratum_count - 1) / c->stratum_count : 0;
+    c->epoch_length = c->stratum_count ? (item_count + c->stratum_count - 1) / c->stratum_count : 0;
     c->seed = seed;
 }
 

@@ -6,9 +6,9 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define WINDOW_RADIUS 2 /* pixels to either side; by hand */
-#define WINDOW_MIN_PIXELS 9 /* pixels that must show the same surface; by hand */
-#define SATURATED_SHARE 0.3f /* measured: with a tenth, bathroom loses .13 dB (8 bits) */
+#define WINDOW_RADIUS 2       /* pixels to either side; by hand */
+#define WINDOW_MIN_PIXELS 9   /* pixels that must show the same surface; by hand */
+#define SATURATED_SHARE 0.3f  /* measured: with a tenth, bathroom loses .13 dB (8 bits) */
 #define NOISE_DEVIATIONS 3.0f /* standard deviations that noise reaches below the clip; by hand */
 
 struct clip_job {

@@ -18,8 +18,7 @@ void conjugate_residual(const struct conjugate_system *s, const double *x, doubl
     mem_free(product);
 }
 
-void conjugate_solve(const struct conjugate_system *s, int steps, double goal, double *residual,
-                     double *x) {
+void conjugate_solve(const struct conjugate_system *s, int steps, double goal, double *residual, double *x) {
     size_t n = s->count;
     double *memory = mem_calloc(3 * n, sizeof *memory), rz = 0.0;
     double *z = memory, *direction = z + n, *product = direction + n;

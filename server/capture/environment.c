@@ -33,14 +33,14 @@ struct window {
     size_t pixel_count; /* open pixels */
     vec3 axis;          /* a cone around their directions */
     float cosine;
-    int grid;           /* sample points along each side of a pixel of the map */
+    int grid; /* sample points along each side of a pixel of the map */
 };
 
 struct environment_gather {
     const struct views *views;
     struct environment *e;
     size_t window_count;
-    struct window *window; /* [window_count] */
+    struct window *window;    /* [window_count] */
     struct censored *scratch; /* [threads][3][window_count] observations of one direction */
 };
 
@@ -155,7 +155,7 @@ static struct cell cell_at(const struct image *map, size_t column, size_t row) {
 
 /* A photograph's observation of a pixel, for each channel; false: none. */
 static bool sample_window(const struct environment_gather *g, const struct window *w, const struct cell *cell,
-                     struct censored value[3]) {
+                          struct censored value[3]) {
     const struct views *v = g->views;
     const struct photograph *photo = &v->scene->photograph[v->train[w->train]];
     vec3 origin = camera_origin(&photo->camera);
@@ -168,8 +168,8 @@ static bool sample_window(const struct environment_gather *g, const struct windo
         vec3 far = vec3_mad(origin, FAR_M, direction);
         float x, y, depth_m;
         struct photograph_sample sample;
-        if (!camera_project(&photo->camera, far, &x, &y, &depth_m) ||
-            !views_open(v, w->train, x, y, 0) || !photograph_sample(photo, x, y, &sample))
+        if (!camera_project(&photo->camera, far, &x, &y, &depth_m) || !views_open(v, w->train, x, y, 0) ||
+            !photograph_sample(photo, x, y, &sample))
             continue;
         float tap_weight = views_open(v, w->train, x, y, 1) ? 1.0f : RIM_WEIGHT;
         const float radiance[3] = {sample.radiance.r, sample.radiance.g, sample.radiance.b};
@@ -261,9 +261,7 @@ static void join_pole(struct environment *e, size_t row) {
 
 /* --- lower bounds ------------------------------------------------------------------------------- */
 
-static bool is_seen(const struct environment *e, size_t cell) {
-    return e->confidence.pixel[2 * cell] > 0.0f;
-}
+static bool is_seen(const struct environment *e, size_t cell) { return e->confidence.pixel[2 * cell] > 0.0f; }
 
 /* Median of the channels' mean over measured directions; 0 where there is none. */
 static float median_measured(const struct environment *e) {

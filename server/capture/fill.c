@@ -269,7 +269,7 @@ static float angle_at(const struct nearest_known *n, uint32_t pixel) {
 static void nearest_init(struct nearest_known *n, const struct image *known) {
     size_t pixels = (size_t)known->width * known->height;
     *n = (struct nearest_known){known->width, known->height, mem_array(pixels, sizeof *n->of),
-                          mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
+                                mem_array(known->height, sizeof *n->row), mem_array(known->width, sizeof *n->column)};
     for (uint32_t y = 0; y < n->height; y++) {
         double theta = latlong_polar(n->height, y);
         n->row[y] = (vec2){(float)sin(theta), (float)cos(theta)};

@@ -6,7 +6,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 
-#define MIN_RATIO 2.0f /* to the brightest of the eight neighbours; by hand */
+#define MIN_RATIO 2.0f        /* to the brightest of the eight neighbours; by hand */
 #define NOISE_DEVIATIONS 4.0f /* standard deviations above that neighbour; by hand */
 
 struct fireflies_job {

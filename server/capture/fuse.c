@@ -35,8 +35,8 @@ struct fuse_observations {
     struct best_item item[MAX_OBSERVATIONS];
     struct robust_sample observation[MAX_OBSERVATIONS];
     struct view view[MAX_OBSERVATIONS];
-    float mixing[MAX_OBSERVATIONS];          /* see views_mixing */
-    size_t seen, clean;               /* over all photographs, as the next */
+    float mixing[MAX_OBSERVATIONS]; /* see views_mixing */
+    size_t seen, clean;             /* over all photographs, as the next */
     double gray_sum, gray_square_sum;
 };
 
@@ -58,8 +58,8 @@ static void add_observation(const struct fuse_job *job, struct fuse_observations
         return;
     /* Noise at the same radiance for all photographs: by their own values bright noise would be preferred. */
     float weight = view->weight * views_trust(v, view, triangle);
-    size_t slot = best_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f),
-                           view->train);
+    size_t slot =
+        best_put(&l->best, weight * noise_weight(job->noise, v, view, rgb_gray(v->median_radiance), 0.0f), view->train);
     if (slot == BEST_NONE)
         return;
     l->observation[slot] = (struct robust_sample){.value = s->radiance, .gray = gray, .weight = weight};
@@ -74,8 +74,8 @@ static void weigh_by_noise(const struct fuse_job *job, struct fuse_observations 
     rgb sum = {0.0f, 0.0f, 0.0f};
     float weights = 0.0f;
     for (size_t i = 0; i < count; i++) {
-        float weight = l->observation[i].weight *
-                       job->views->scene->photograph[job->views->train[l->view[i].train]].exposure;
+        float weight =
+            l->observation[i].weight * job->views->scene->photograph[job->views->train[l->view[i].train]].exposure;
         sum = rgb_mad(sum, weight, l->observation[i].value);
         weights += weight;
     }

@@ -29,9 +29,7 @@ void fuse(struct fused *f, const struct views *views, const struct noise *noise,
           const struct inverse_uv *inverse, struct parallel *pool);
 void fused_release(struct fused *f);
 
-static inline rgb fused_radiance(const struct fused *f, uint32_t texel) {
-    return rgb_from_half(f->radiance[texel]);
-}
+static inline rgb fused_radiance(const struct fused *f, uint32_t texel) { return rgb_from_half(f->radiance[texel]); }
 
 /* Mean of the measured texels of the same chart at most `around` texels away in each axis, weighted by their count; 0
  * where there are none. A single texel may have a third of noise. */

@@ -28,9 +28,7 @@ static void finish(struct half_mean *m) {
     m->variance /= m->weight * m->weight;
 }
 
-int halves_of(uint32_t source, int split) {
-    return (int)(rng_mix64(source) >> split & 1);
-}
+int halves_of(uint32_t source, int split) { return (int)(rng_mix64(source) >> split & 1); }
 
 /* The share of the weight that the lighter half has. */
 static float lesser_share(const struct robust_sample *sample, size_t count, float min_sharp, int split) {

@@ -7,7 +7,7 @@
 #include "common/quantile.h"
 
 #define DEVIATIONS_PER_MAD 1.5 /* standard deviations of normal residuals in their median absolute deviation, about */
-#define OCCLUSION_MARGIN 0.01f   /* an occluder is nearer than the point by this share of its distance; by hand */
+#define OCCLUSION_MARGIN 0.01f /* an occluder is nearer than the point by this share of its distance; by hand */
 
 /* A held-out photograph. */
 struct held_out_photograph {
@@ -15,26 +15,27 @@ struct held_out_photograph {
     struct pyramid pyramid;
     struct pose_frame frame;
     size_t count;
-    uint32_t *track;  /* [count] tracks that it sees, by index; owned */
+    uint32_t *track; /* [count] tracks that it sees, by index; owned */
 };
 
 struct held_out_set {
     const struct pose_solver *solver;
     struct held_out_photograph *held_out;
-    double *consensus;     /* [track_count] consensus of each track at this level; NAN: unknown */
+    double *consensus; /* [track_count] consensus of each track at this level; NAN: unknown */
     int level;
 };
 
 /* One observation of a track. */
 struct track_sample {
     float d[POSE_UNKNOWNS];
-    double residual;       /* observed minus consensus */
+    double residual; /* observed minus consensus */
     bool is_held_out;
 };
 
 /* --- visible tracks ------------------------------------------------------------------------------ */
 
-static bool sees(const struct held_out_photograph *h, const struct accel *accel, const struct track *track, float *depth_m) {
+static bool sees(const struct held_out_photograph *h, const struct accel *accel, const struct track *track,
+                 float *depth_m) {
     const struct camera *camera = &h->frame.before;
     vec3 origin = camera_origin(camera), to = vec3_sub(track->point, origin);
     vec3 normal = vec3_normalize(vec3_cross(track->right, track->down));
@@ -64,7 +65,8 @@ static void find_tracks(void *user, size_t index, int thread) {
 /* --- alignment ----------------------------------------------------------------------------------- */
 
 /* Residuals and derivatives of the tracks that the frame shows; returns their number. */
-static size_t evaluate_tracks(const struct held_out_set *all, const struct held_out_photograph *h, struct track_sample *sample) {
+static size_t evaluate_tracks(const struct held_out_set *all, const struct held_out_photograph *h,
+                              struct track_sample *sample) {
     size_t count = 0;
     for (size_t k = 0; k < h->count; k++) {
         const struct track *track = all->solver->track[h->track[k]];
@@ -97,8 +99,8 @@ static double scale_of(const struct track_sample *sample, size_t count, double o
 }
 
 /* One step of the robust least squares, from which the offset is eliminated. */
-static void step(const struct held_out_set *all, struct held_out_photograph *h, const struct track_sample *sample, size_t count,
-                 double *scratch) {
+static void step(const struct held_out_set *all, struct held_out_photograph *h, const struct track_sample *sample,
+                 size_t count, double *scratch) {
     double a[POSE_UNKNOWNS][POSE_UNKNOWNS] = {{0.0}}, b[POSE_UNKNOWNS] = {0.0}, d[POSE_UNKNOWNS] = {0.0};
     double offset = offset_of(sample, count, scratch), weights = 0.0, residual_sum = 0.0;
     const double prior = pose_prior(&h->frame);
@@ -149,8 +151,8 @@ static void align(void *user, size_t index, int thread) {
 
 /* Robust costs of the held-out tracks, by place in h->track; NAN elsewhere. Returns the number of tracks shown, held
  * out or not. */
-static size_t costs(const struct held_out_set *all, const struct held_out_photograph *h, const struct camera *camera, double scale,
-                    double *cost) {
+static size_t costs(const struct held_out_set *all, const struct held_out_photograph *h, const struct camera *camera,
+                    double scale, double *cost) {
     double *residual = mem_array(2 * h->count + 1, sizeof *residual), *scratch = residual + h->count;
     size_t count = 0;
     for (size_t k = 0; k < h->count; k++) {
@@ -227,8 +229,9 @@ static size_t init_all(struct held_out_set *all, struct scene *scene) {
 
 size_t held_out_poses_align(struct scene *scene, struct pose_solver *s, int coarsest, struct parallel *pool,
                             double *shift_px) {
-    struct held_out_set all = {.solver = s, .held_out = mem_calloc(scene->photograph_count + 1, sizeof *all.held_out),
-                         .consensus = mem_array(s->track_count + 1, sizeof *all.consensus)};
+    struct held_out_set all = {.solver = s,
+                               .held_out = mem_calloc(scene->photograph_count + 1, sizeof *all.held_out),
+                               .consensus = mem_array(s->track_count + 1, sizeof *all.consensus)};
     size_t count = init_all(&all, scene), moved = 0;
     double squares = 0.0;
     parallel_for(pool, count, find_tracks, &all);

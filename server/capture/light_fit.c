@@ -27,11 +27,11 @@
 #define COLOR_SIGMA 0.2
 #define VIGNETTE_SIGMA 0.5
 
-#define ROUNDS 12 /* of reweighting; by hand */
-#define CONVEX_ROUNDS 4 /* the first of them, with convex weights; by hand */
+#define ROUNDS 12               /* of reweighting; by hand */
+#define CONVEX_ROUNDS 4         /* the first of them, with convex weights; by hand */
 #define DEVIATIONS_PER_MAD 1.48 /* standard deviations of normal residuals in their median absolute deviation */
-#define CG_STEPS 60 /* of conjugate gradients a round, at most */
-#define CG_TOLERANCE 1e-7 /* of the residual's norm, over that of the right-hand side */
+#define CG_STEPS 60             /* of conjugate gradients a round, at most */
+#define CG_TOLERANCE 1e-7       /* of the residual's norm, over that of the right-hand side */
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o) {
     size_t observations = o->start[o->point_count];
@@ -181,7 +181,7 @@ static void solve_linear(const struct light_fit *f, int model, double *x) {
 /* --- robustness --------------------------------------------------------------------------------- */
 
 void light_fit_residuals(const struct light_fit *f, const double *x, size_t point, const double *weight,
-                            double *square) {
+                         double *square) {
     size_t first = f->o->start[point], count = f->o->start[point + 1] - first;
     memset(square, 0, count * sizeof *square);
     for (int c = 0; c < 3; c++) {

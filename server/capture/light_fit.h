@@ -20,24 +20,22 @@
 enum { LIGHT_DRIFT = 1, LIGHT_COLOR = 2, LIGHT_VIGNETTE = 4, LIGHT_FAULTS = 8 };
 
 struct light_fit {
-    const struct overlaps *o;     /* borrowed, both */
+    const struct overlaps *o; /* borrowed, both */
     const struct views *views;
-    size_t frames;                /* parameters are 3 a frame and 3 of the vignette */
-    size_t unknown_exposure_count;          /* whose exposure is unknown */
-    bool *exposure_known;                   /* [frames]; owned, as all below */
-    double (*radius)[3];          /* [observations] s, s^2, s^3 */
-    double *trust;                /* [observations] inverse variance by contrast and angle */
-    double *weight;               /* [observations] trust times the robust weight; 0: held out */
-    double scale;                 /* of residuals, over what `trust` expects */
-    bool all_points;              /* no point is held out */
+    size_t frames;                 /* parameters are 3 a frame and 3 of the vignette */
+    size_t unknown_exposure_count; /* whose exposure is unknown */
+    bool *exposure_known;          /* [frames]; owned, as all below */
+    double (*radius)[3];           /* [observations] s, s^2, s^3 */
+    double *trust;                 /* [observations] inverse variance by contrast and angle */
+    double *weight;                /* [observations] trust times the robust weight; 0: held out */
+    double scale;                  /* of residuals, over what `trust` expects */
+    bool all_points;               /* no point is held out */
 };
 
 void light_fit_init(struct light_fit *f, const struct views *views, const struct overlaps *o);
 void light_fit_release(struct light_fit *f);
 
-static inline size_t light_fit_parameter_count(const struct light_fit *f) {
-    return 3 * f->frames + 3;
-}
+static inline size_t light_fit_parameter_count(const struct light_fit *f) { return 3 * f->frames + 3; }
 
 static inline bool light_fit_is_held_out(const struct light_fit *f, size_t point) {
     return !f->all_points && point % LIGHT_HELD_OUT_EVERY == 0;

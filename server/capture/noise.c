@@ -8,10 +8,10 @@
 #include "common/quantile.h"
 #include "common/rng.h"
 
-#define MIN_EXPONENT (-24) /* first octave: from 2^-24, the smallest half */
-#define SAMPLES 8192 /* differences kept for each octave; by hand */
-#define MIN_SAMPLES 512 /* an octave with fewer takes the share of the one below; by hand */
-#define QUANTILE 0.25 /* of the differences: below the median, which texture raises; by hand */
+#define MIN_EXPONENT (-24)          /* first octave: from 2^-24, the smallest half */
+#define SAMPLES 8192                /* differences kept for each octave; by hand */
+#define MIN_SAMPLES 512             /* an octave with fewer takes the share of the one below; by hand */
+#define QUANTILE 0.25               /* of the differences: below the median, which texture raises; by hand */
 #define QUANTILE_DEVIATIONS 0.3186f /* that quantile of |x| for standard normal x */
 /* Var(b - (a + c) / 2) over that of one pixel. */
 #define DIFFERENCE_VARIANCE 1.5f
@@ -42,9 +42,7 @@ static int octave_of(float value) {
     return octave < 0 ? 0 : octave >= NOISE_OCTAVES ? NOISE_OCTAVES - 1 : octave;
 }
 
-static float middle_of(int octave) {
-    return ldexpf(0.75f, octave + MIN_EXPONENT);
-}
+static float middle_of(int octave) { return ldexpf(0.75f, octave + MIN_EXPONENT); }
 
 static void offer(struct octave *octave, float difference) {
     uint64_t at = octave->offered++;
@@ -131,13 +129,11 @@ static void measure_shares(struct noise *noise, const struct views *v) {
 
 /* --- from place to place ------------------------------------------------------------------------ */
 
-static uint32_t blocks(uint32_t pixels) {
-    return (pixels + NOISE_BLOCK - 1) / NOISE_BLOCK;
-}
+static uint32_t blocks(uint32_t pixels) { return (pixels + NOISE_BLOCK - 1) / NOISE_BLOCK; }
 
 /* Squared median of the differences at a lag, over that expected from the octaves; 0 where there are too few. */
-static float block_variance(const struct noise *noise, const struct photograph *photo, const uint8_t *edge,
-                            uint32_t x0, uint32_t y0, uint32_t lag) {
+static float block_variance(const struct noise *noise, const struct photograph *photo, const uint8_t *edge, uint32_t x0,
+                            uint32_t y0, uint32_t lag) {
     float ratio[3 * NOISE_BLOCK * NOISE_BLOCK];
     size_t count = 0;
     for (uint32_t y = y0; y < y0 + NOISE_BLOCK && y < photo->camera.height; y++) {
@@ -221,9 +217,7 @@ float noise_deviation_of_value(const struct noise *noise, uint32_t train, const 
     return value * noise->share[octave_of(value)] * scale_at(noise, train, camera, x, y);
 }
 
-float noise_deviation_of_black(const struct noise *noise) {
-    return noise->black / BLACK_DEVIATIONS;
-}
+float noise_deviation_of_black(const struct noise *noise) { return noise->black / BLACK_DEVIATIONS; }
 
 /* The inverse of the relative variance of a look-up with such a deviation where the true radiance is `radiance`. */
 static float weight_of(rgb deviation, rgb radiance, float mixing) {

@@ -18,7 +18,7 @@ struct overlap_gathering {
     const struct inverse_uv *inverse;
     size_t points, step;
     struct overlap_observation *observation; /* [points][OVERLAP_OBSERVATIONS_MAX] */
-    uint8_t *count;       /* [points] */
+    uint8_t *count;                          /* [points] */
 };
 
 /* The mean of a cross of five pixels; false when one of them cannot be used. */
@@ -69,8 +69,8 @@ static void observe_point(struct overlap_gathering *g, size_t index) {
     for (size_t k = 0; k < seen; k++) {
         const struct photograph *photo = &scene->photograph[g->views->train[view[k].train]];
         vec3 out = vec3_normalize(vec3_sub(camera_origin(&photo->camera), point));
-        observation[count] = (struct overlap_observation){.train = view[k].train, .x = view[k].x, .y = view[k].y,
-                                       .cosine = vec3_dot(out, normal)};
+        observation[count] = (struct overlap_observation){
+            .train = view[k].train, .x = view[k].x, .y = view[k].y, .cosine = vec3_dot(out, normal)};
         if (views_clean(g->views, &view[k]) && observe_cross(photo, &observation[count]))
             count++;
     }

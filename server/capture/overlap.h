@@ -19,18 +19,18 @@
 
 /* One photograph's observation of one point. */
 struct overlap_observation {
-    uint32_t train;     /* index into views.train */
-    float x, y;         /* image position, pixels */
-    float cosine;       /* between the normal and the direction to the camera */
-    float value[3];     /* log radiance, by the present exposure, gain and falloff */
+    uint32_t train;                   /* index into views.train */
+    float x, y;                       /* image position, pixels */
+    float cosine;                     /* between the normal and the direction to the camera */
+    float value[3];                   /* log radiance, by the present exposure, gain and falloff */
     float min_value[3], max_value[3]; /* range in which `value` is usable: between dark and clipped, with margin */
-    float contrast;     /* standard deviation of the cross over its mean */
+    float contrast;                   /* standard deviation of the cross over its mean */
 };
 
 struct overlaps {
     size_t point_count;
-    size_t *start;         /* [point_count + 1] into `observation`; at least two a point; owned */
-    struct overlap_observation *observation;  /* owned */
+    size_t *start;                           /* [point_count + 1] into `observation`; at least two a point; owned */
+    struct overlap_observation *observation; /* owned */
 };
 
 /* Observes up to `points` points. The same for any number of threads. */

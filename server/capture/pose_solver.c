@@ -10,7 +10,7 @@
 #define RESIDUAL_CLAMP 2.0
 #define CONSENSUS_ROUNDS 4 /* of reweighting; by hand */
 #define MIN_CONSENSUS 3    /* observations: of two that differ neither is known to be wrong */
-#define FIRST_SCALE 0.1 /* of log residuals, until they are known; by hand */
+#define FIRST_SCALE 0.1    /* of log residuals, until they are known; by hand */
 
 /* A correction is accepted when it lowers the robust cost at held-out tracks by this share, and by so many standard
  * errors. By hand. */
@@ -70,8 +70,8 @@ static double size_of(const double twist[POSE_UNKNOWNS]) {
 }
 
 void pose_frame_init(struct pose_frame *frame, const struct camera *camera) {
-    *frame = (struct pose_frame){.before = *camera, .now = *camera, .scale = FIRST_SCALE,
-                                 .pose = pose_of(&camera->camera_from_world)};
+    *frame = (struct pose_frame){
+        .before = *camera, .now = *camera, .scale = FIRST_SCALE, .pose = pose_of(&camera->camera_from_world)};
 }
 
 double pose_squared_shift(const struct camera *a, const struct camera *b, vec3 point) {
@@ -118,12 +118,12 @@ static float value_at(const struct pose_solver *s, uint32_t frame, vec3 point, f
 
 /* An observation's surroundings. */
 struct pose_patch {
-    float value, along[2];   /* change of the value per `right` and `down` */
-    float place[2][2];       /* change of the image position per `right` and `down` */
+    float value, along[2]; /* change of the value per `right` and `down` */
+    float place[2][2];     /* change of the image position per `right` and `down` */
 };
 
 static bool sample_patch(const struct pose_solver *s, const struct track *track, float step, uint32_t frame,
-                        struct pose_patch *patch) {
+                         struct pose_patch *patch) {
     const vec3 direction[2] = {track->right, track->down};
     float x, y, x2[2], y2[2];
     patch->value = value_at(s, frame, track->point, &x, &y);
@@ -338,4 +338,3 @@ void pose_solver_release(struct pose_solver *s) {
     mem_free(s->observation);
     mem_free(s->along);
 }
-

@@ -27,13 +27,13 @@
 #define POSE_CELL_ROWS 6
 #define POSE_CELLS (POSE_CELL_COLUMNS * POSE_CELL_ROWS)
 #define POSE_OBSERVATIONS_MAX (TRACK_OTHERS + 1)
-#define POSE_HELD_OUT_EVERY 3 /* one track in so many is held out; by hand */
+#define POSE_HELD_OUT_EVERY 3    /* one track in so many is held out; by hand */
 #define POSE_MIN_OBSERVATIONS 60 /* finite ones, for a photograph to be moved: ten an unknown */
-#define POSE_ROUNDS 12 /* Gauss-Newton steps at each level; by hand */
-#define POSE_STEP_PX 1.5 /* pixels of a level: largest step; by hand */
-#define POSE_MIN_SHIFT_PX 0.15 /* pixels, rms: smaller corrections are not applied; by hand */
-#define POSE_DAMPING 0.01 /* share of the diagonal that is added to it (Levenberg-Marquardt); by hand */
-#define POSE_MIN_SCALE 0.01 /* of log residuals: bounds weights where photographs agree perfectly; by hand */
+#define POSE_ROUNDS 12           /* Gauss-Newton steps at each level; by hand */
+#define POSE_STEP_PX 1.5         /* pixels of a level: largest step; by hand */
+#define POSE_MIN_SHIFT_PX 0.15   /* pixels, rms: smaller corrections are not applied; by hand */
+#define POSE_DAMPING 0.01        /* share of the diagonal that is added to it (Levenberg-Marquardt); by hand */
+#define POSE_MIN_SCALE 0.01      /* of log residuals: bounds weights where photographs agree perfectly; by hand */
 
 struct pose { /* camera_from_world */
     double r[3][3], t[3];
@@ -43,9 +43,9 @@ struct pose_frame {
     struct camera before, now;
     struct pose pose;
     double total[POSE_UNKNOWNS]; /* sum of the twists applied, pixels */
-    double depth_m;         /* mean over its observations */
-    double scale;           /* of its residuals */
-    double shift_px;        /* between `before` and `now`, as judged last */
+    double depth_m;              /* mean over its observations */
+    double scale;                /* of its residuals */
+    double shift_px;             /* between `before` and `now`, as judged last */
     size_t observation_count;
     bool is_fixed;
 };
@@ -53,21 +53,21 @@ struct pose_frame {
 /* One photograph's observation of one track. */
 struct pose_observation {
     uint32_t frame;
-    uint32_t offset;     /* index into x: of its cell */
-    float value;         /* log radiance; NAN: none */
-    float weight;        /* robust inverse variance; 0 where held out */
-    float d[POSE_UNKNOWNS];   /* derivative of `value` by the frame's twist, per pixel */
+    uint32_t offset;        /* index into x: of its cell */
+    float value;            /* log radiance; NAN: none */
+    float weight;           /* robust inverse variance; 0 where held out */
+    float d[POSE_UNKNOWNS]; /* derivative of `value` by the frame's twist, per pixel */
 };
 
 struct pose_solver {
     const struct tracks *tracks;
     size_t frames, track_count, unknowns;
-    const struct track **track; /* [track_count] */
-    uint32_t *owner;            /* [track_count] the photograph it comes from */
-    struct pose_observation *observation;        /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
-    float (*along)[2];          /* [track_count] mean change of the value per `right` and `down`, at this level */
-    struct pose_frame *frame;        /* [frames] */
-    double *x;                  /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
+    const struct track **track;           /* [track_count] */
+    uint32_t *owner;                      /* [track_count] the photograph it comes from */
+    struct pose_observation *observation; /* [track_count][POSE_OBSERVATIONS_MAX], the owner's first */
+    float (*along)[2];        /* [track_count] mean change of the value per `right` and `down`, at this level */
+    struct pose_frame *frame; /* [frames] */
+    double *x;                /* [unknowns]: twist of each frame, then POSE_CELLS offsets of each */
     int level;
 };
 
@@ -120,14 +120,10 @@ void pose_twist(struct pose_frame *frame, const double twist[POSE_UNKNOWNS], dou
 void pose_move(struct pose_solver *s, size_t f, double most);
 void pose_reset(struct pose_solver *s, size_t f);
 
-static inline size_t pose_observation_count(const struct track *track) {
-    return (size_t)track->other_count + 1;
-}
+static inline size_t pose_observation_count(const struct track *track) { return (size_t)track->other_count + 1; }
 
 /* Held-out tracks take part in no solve: they judge it. */
-static inline bool pose_is_held_out(size_t track) {
-    return track % POSE_HELD_OUT_EVERY == 0;
-}
+static inline bool pose_is_held_out(size_t track) { return track % POSE_HELD_OUT_EVERY == 0; }
 
 static inline double pose_robust_cost(double residual, double scale) {
     double e = residual / scale;

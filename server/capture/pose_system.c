@@ -15,8 +15,8 @@
 /* pixels: scale of the prior, which is weak: redkitchen's drift is shared by neighbouring frames */
 #define PRIOR_PX 1.0
 #define PRIOR_LEAST_PX 0.2 /* pixels: the prior is quadratic below this; by hand */
-#define CG_STEPS 40 /* of conjugate gradients, at most */
-#define CG_TOLERANCE 1e-3 /* of the residual's norm, over that of the right-hand side */
+#define CG_STEPS 40        /* of conjugate gradients, at most */
+#define CG_TOLERANCE 1e-3  /* of the residual's norm, over that of the right-hand side */
 
 double pose_prior(const struct pose_frame *frame) {
     double squares = conjugate_dot(frame->total, frame->total, POSE_UNKNOWNS);

@@ -75,8 +75,7 @@ static void mask_edges(float *value, uint32_t width, uint32_t height, const uint
     }
 }
 
-void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
-                  float floor) {
+void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels, float floor) {
     uint32_t w = photo->camera.width, h = photo->camera.height;
     *p = (struct pyramid){.scale = 1.0f};
     float *raw = mem_array((size_t)w * h, sizeof *raw);
@@ -119,9 +118,7 @@ static float bilinear(const struct pyramid *p, int level, float x, float y) {
     return (1.0f - t) * ((1.0f - s) * a[0] + s * a[1]) + t * ((1.0f - s) * b[0] + s * b[1]);
 }
 
-static float scale_of(const struct pyramid *p, int level) {
-    return p->scale / (float)(1 << level);
-}
+static float scale_of(const struct pyramid *p, int level) { return p->scale / (float)(1 << level); }
 
 float pyramid_value(const struct pyramid *p, int level, float x, float y) {
     float scale = scale_of(p, level);

@@ -17,15 +17,14 @@
 #define PYRAMID_LEVELS 5
 
 struct pyramid {
-    float scale;  /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */
+    float scale; /* pixels of level 0 per pixel of the photograph: 1, 1/2, 1/4, ... */
     uint32_t width[PYRAMID_LEVELS], height[PYRAMID_LEVELS];
     float *value[PYRAMID_LEVELS]; /* [height][width] of each; owned */
 };
 
 /* `shows` [height][width] is the photograph's views.shows; NULL: unknown, and no edges are masked. Level 0 has at most
  * `pixels` pixels. `floor` is the radiance added before the logarithm. */
-void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels,
-                  float floor);
+void pyramid_make(struct pyramid *p, const struct photograph *photo, const uint8_t *shows, size_t pixels, float floor);
 void pyramid_release(struct pyramid *p);
 
 /* Bilinear value at the photograph's position (x, y), NaN where unknown. */

@@ -64,7 +64,7 @@ static void preview_row(void *user, size_t row, int thread) {
 }
 
 uint16_t (*radiance_preview(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
-                  struct parallel *pool))[3] {
+                            struct parallel *pool))[3] {
     struct preview_job job = {.views = views, .atlas = atlas, .inverse = inverse};
     job.radiance = mem_calloc_large((size_t)inverse->width * inverse->height, sizeof *job.radiance);
     parallel_for(pool, (inverse->height + BLOCK - 1) / BLOCK, preview_row, &job);

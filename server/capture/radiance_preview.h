@@ -14,6 +14,6 @@
 /* radiance[height][width], half precision, of valid texels; 0 where no photograph sees the block's texel. The caller's
  * (mem_free). */
 uint16_t (*radiance_preview(const struct views *views, const struct atlas *atlas, const struct inverse_uv *inverse,
-                  struct parallel *pool))[3];
+                            struct parallel *pool))[3];
 
 #endif

@@ -12,9 +12,9 @@
 #define TRACKS_MIN 150
 #define TRACKS_MAX 600
 #define PYRAMID_TOTAL ((size_t)64 << 20) /* pixels of all level 0, also of held-out photographs: 256 MiB */
-#define PYRAMID_MAX ((size_t)640 * 480) /* pixels of level 0, at most; by hand */
-#define PLACES_PER_CELL 8 /* random positions of which the strongest gradient is taken; by hand */
-#define DISTANCE_RATIO 1.7f /* of two cameras' distances, at most: texture of similar scale; by hand */
+#define PYRAMID_MAX ((size_t)640 * 480)  /* pixels of level 0, at most; by hand */
+#define PLACES_PER_CELL 8                /* random positions of which the strongest gradient is taken; by hand */
+#define DISTANCE_RATIO 1.7f              /* of two cameras' distances, at most: texture of similar scale; by hand */
 /* Least gradient of a track, log luminance per pixel; by hand. */
 #define MIN_SLOPE 0.01f
 /* Radiance added before logarithms, as a share of the median; by hand. */
@@ -29,8 +29,8 @@ static void make_pyramid(void *user, size_t t, int thread) {
 }
 
 /* Position of the strongest gradient among random ones of a cell; false when none suffices. */
-static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, size_t columns, size_t rows,
-                         float *x, float *y) {
+static bool choose_place(const struct tracks *tracks, size_t t, size_t cell, size_t columns, size_t rows, float *x,
+                         float *y) {
     const struct views *views = tracks->views;
     const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
     float best = MIN_SLOPE;
@@ -63,8 +63,7 @@ static vec3 to_pixel(const struct camera *camera, float x, float y, vec3 point, 
     return vec3_sub(vec3_mad(origin, distance, direction), point);
 }
 
-static bool make_track(const struct views *views, size_t t, float x, float y, uint32_t key,
-                       struct track *track) {
+static bool make_track(const struct views *views, size_t t, float x, float y, uint32_t key, struct track *track) {
     const struct camera *camera = &views->scene->photograph[views->train[t]].camera;
     vec3 direction, origin = camera_origin(camera);
     struct accel_hit hit;
@@ -81,12 +80,10 @@ static bool make_track(const struct views *views, size_t t, float x, float y, ui
     for (uint32_t i = 0; i < frames && track->other_count < TRACK_OTHERS; i++) {
         uint32_t other = choose_permute(i, frames, key);
         struct view view;
-        vec3 to = vec3_sub(camera_origin(&views->scene->photograph[views->train[other]].camera),
-                           track->point);
+        vec3 to = vec3_sub(camera_origin(&views->scene->photograph[views->train[other]].camera), track->point);
         float distance = vec3_length(to);
-        if (other != t && distance < DISTANCE_RATIO * hit.distance_m &&
-            hit.distance_m < DISTANCE_RATIO * distance && vec3_dot(to, normal) > TRACK_MIN_COSINE * distance &&
-            views_sees(views, other, track->point, normal, &view))
+        if (other != t && distance < DISTANCE_RATIO * hit.distance_m && hit.distance_m < DISTANCE_RATIO * distance &&
+            vec3_dot(to, normal) > TRACK_MIN_COSINE * distance && views_sees(views, other, track->point, normal, &view))
             track->other[track->other_count++] = other;
     }
     return track->other_count >= 2;

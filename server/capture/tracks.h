@@ -9,11 +9,11 @@
 #include "server/capture/pyramid.h"
 #include "server/capture/views.h"
 
-#define TRACK_OTHERS 10 /* photographs a track besides its own, at most; by hand */
+#define TRACK_OTHERS 10       /* photographs a track besides its own, at most; by hand */
 #define TRACK_MIN_COSINE 0.2f /* between normal and view, for a photograph to be used; by hand */
 
 struct track {
-    float x, y;                   /* position in its own photograph, pixels */
+    float x, y; /* position in its own photograph, pixels */
     vec3 point;
     vec3 right, down;             /* offsets along the surface to the next pixels, metres */
     uint32_t other[TRACK_OTHERS]; /* index into views.train */

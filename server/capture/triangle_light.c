@@ -8,10 +8,10 @@
 #include "server/render/sampler.h"
 
 #define OBSERVATIONS_PER_POINT 6 /* photographs a point, at most; by hand */
-#define MAX_POINTS 8 /* a triangle; by hand */
-#define PIXELS_PER_POINT 16.0f /* pixels of a triangle for each point: larger ones have several; by hand */
-#define BRIGHTER_SHARE 0.7f /* share of observations that reach the value; by hand */
-#define KEY_POINTS 29 /* separates these random numbers from others of the triangle */
+#define MAX_POINTS 8             /* a triangle; by hand */
+#define PIXELS_PER_POINT 16.0f   /* pixels of a triangle for each point: larger ones have several; by hand */
+#define BRIGHTER_SHARE 0.7f      /* share of observations that reach the value; by hand */
+#define KEY_POINTS 29            /* separates these random numbers from others of the triangle */
 
 struct measure_job {
     const struct views *views;

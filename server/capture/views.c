@@ -49,8 +49,7 @@ static bool centre_meets(const struct edge_job *job, const struct camera *camera
            accel_occluded(job->views->accel, camera_origin(camera), direction, 0.0f, INFINITY);
 }
 
-static struct corner trace_corner(const struct edge_job *job, const struct camera *camera,
-                                  uint32_t x, uint32_t y) {
+static struct corner trace_corner(const struct edge_job *job, const struct camera *camera, uint32_t x, uint32_t y) {
     struct corner corner = {.segment = NO_SURFACE};
     vec3 direction;
     struct accel_hit hit;
@@ -85,9 +84,7 @@ static bool are_adjacent(const struct corner *a, const struct corner *b, float f
 }
 
 /* 8-bit hash of a segment. */
-static uint8_t owner_mark(uint32_t segment) {
-    return (uint8_t)(rng_mix32(segment) >> 24);
-}
+static uint8_t owner_mark(uint32_t segment) { return (uint8_t)(rng_mix32(segment) >> 24); }
 
 /* One row of pixels. Corners are traced twice, by the rows above and below: simpler than sharing them between threads.
  */
@@ -176,8 +173,8 @@ void views_update_segments(struct views *v, const struct accel *accel, struct pa
         views_update_edges(v, t, pool);
 }
 
-void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
-                const struct accel *accel, struct parallel *pool) {
+void views_init(struct views *v, const struct scene *scene, const struct segments *segments, const struct accel *accel,
+                struct parallel *pool) {
     *v = (struct views){.scene = scene, .segments = segments, .accel = accel};
     v->train = mem_array(scene->photograph_count, sizeof *v->train);
     v->shows = mem_array(scene->photograph_count, sizeof *v->shows);
@@ -223,8 +220,7 @@ bool views_faces(const struct views *v, uint32_t train, vec3 point, vec3 normal,
     float distance = sqrtf(squared);
     float cosine = vec3_dot(to_camera, normal);
     float depth_m;
-    if (!(cosine > MIN_COSINE * distance) ||
-        !camera_project(camera, point, &view->x, &view->y, &depth_m))
+    if (!(cosine > MIN_COSINE * distance) || !camera_project(camera, point, &view->x, &view->y, &depth_m))
         return false;
     view->train = train;
     view->weight = cosine / (squared * distance) * photograph_weight(photo);
@@ -300,8 +296,7 @@ bool views_open(const struct views *v, uint32_t train, float x, float y, int mar
     return all_show(v, train, x, y, margin, VIEWS_OPEN);
 }
 
-size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, size_t max,
-                  struct view *view) {
+size_t views_pick(const struct views *v, vec3 point, vec3 normal, uint32_t key, size_t max, struct view *view) {
     struct view unclean[VIEWS_PICK_MAX];
     size_t count = 0, unclean_count = 0;
     uint32_t cameras = (uint32_t)v->train_count;

@@ -26,27 +26,27 @@ enum { VIEWS_SURFACE, VIEWS_MIXED, VIEWS_OPEN, VIEWS_SEAM };
 #define VIEWS_EDGE 3
 
 struct views {
-    const struct scene *scene;  /* borrowed */
+    const struct scene *scene;       /* borrowed */
     const struct segments *segments; /* borrowed */
-    const struct accel *accel;  /* borrowed */
+    const struct accel *accel;       /* borrowed */
     size_t train_count;
-    uint32_t *train;            /* training photographs: [train_count] indices into scene->photograph; owned */
-    uint8_t **shows;            /* [train_count][height * width] class of the pixel, VIEWS_SURFACE ...; owned */
-    uint8_t **edge;             /* [train_count][height * width] VIEWS_EDGE where the pixel mixes surfaces, less by one
+    uint32_t *train;       /* training photographs: [train_count] indices into scene->photograph; owned */
+    uint8_t **shows;       /* [train_count][height * width] class of the pixel, VIEWS_SURFACE ...; owned */
+    uint8_t **edge;        /* [train_count][height * width] VIEWS_EDGE where the pixel mixes surfaces, less by one
                                  * for every pixel of distance, down to 0; owned */
-    uint8_t **owner;            /* [train_count][height * width] hash of the segment seen; owned */
-    float median_radiance;      /* of the training pixels (mean of the channels) */
+    uint8_t **owner;       /* [train_count][height * width] hash of the segment seen; owned */
+    float median_radiance; /* of the training pixels (mean of the channels) */
 };
 
 /* A photograph's view of a point. */
 struct view {
-    uint32_t train;  /* index into views.train */
-    float x, y;      /* image position, pixels */
-    float weight;    /* solid angle per area of surface (cosine over squared distance) x photograph_weight */
+    uint32_t train; /* index into views.train */
+    float x, y;     /* image position, pixels */
+    float weight;   /* solid angle per area of surface (cosine over squared distance) x photograph_weight */
 };
 
-void views_init(struct views *v, const struct scene *scene, const struct segments *segments,
-                const struct accel *accel, struct parallel *pool);
+void views_init(struct views *v, const struct scene *scene, const struct segments *segments, const struct accel *accel,
+                struct parallel *pool);
 void views_release(struct views *v);
 /* Recomputes the pixel classes of training photograph `train`, after its camera moved. */
 void views_update_edges(struct views *v, uint32_t train, struct parallel *pool);
@@ -57,8 +57,7 @@ void views_update_median(struct views *v);
 
 /* Whether training photograph `train` sees the front of the point: frustum, facing, and a
  * visibility ray. */
-bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal,
-                struct view *view);
+bool views_sees(const struct views *v, uint32_t train, vec3 point, vec3 geometric_normal, struct view *view);
 
 /* Its two parts: whether the point is in the frustum and faces the camera (fills `view`), and whether nothing occludes
  * it. */

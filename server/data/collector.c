@@ -23,12 +23,9 @@ struct collector {
     bool stopping; /* under the mutex */
 };
 
-static const char *const kind_names[] = {[EXPIRED_UPLOAD] = "upload", [EXPIRED_JOB] = "job",
-                                         [EXPIRED_SCENE] = "scene"};
+static const char *const kind_names[] = {[EXPIRED_UPLOAD] = "upload", [EXPIRED_JOB] = "job", [EXPIRED_SCENE] = "scene"};
 
-const char *collector_kind_name(const struct expired *e) {
-    return kind_names[e->kind];
-}
+const char *collector_kind_name(const struct expired *e) { return kind_names[e->kind]; }
 
 static char *path_of(const char *data_dir, const struct expired *e) {
     return e->kind == EXPIRED_UPLOAD  ? layout_upload(data_dir, e->id)
@@ -62,15 +59,14 @@ static bool collect(const struct collector_config *c, const struct expired *e, i
     if (status != STATUS_OK && status != STATUS_CONFLICT)
         log_warning("%s %s has expired and cannot be removed: %s", kind_names[e->kind], e->id, err.message);
     else if (status == STATUS_OK && !dry_run)
-        log_info("%s %s has expired: removed, %llu bytes", kind_names[e->kind], e->id,
-                 (unsigned long long)*bytes);
+        log_info("%s %s has expired: removed, %llu bytes", kind_names[e->kind], e->id, (unsigned long long)*bytes);
     mem_free(path);
     return status == STATUS_OK;
 }
 
 enum status collector_run(const struct collector_config *config, bool dry_run,
-                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes), void *user,
-                          struct error *err) {
+                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes),
+                          void *user, struct error *err) {
     enum status status;
     size_t count, removed;
     int64_t now = clock_unix_ms();
@@ -114,7 +110,8 @@ static enum status sweep(struct store *store, struct folder *folder, const char 
 }
 
 enum status collector_sweep(struct store *store, struct folder *folder, struct error *err) {
-    char *folders[] = {[STORE_FILES_SCENE] = layout_scenes(NULL), [STORE_FILES_JOB] = layout_jobs(NULL),
+    char *folders[] = {[STORE_FILES_SCENE] = layout_scenes(NULL),
+                       [STORE_FILES_JOB] = layout_jobs(NULL),
                        [STORE_FILES_UPLOAD] = layout_uploads(NULL)};
     enum status status = STATUS_OK;
     for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {

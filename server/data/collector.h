@@ -25,8 +25,8 @@ enum status collector_sweep(struct store *store, struct folder *folder, struct e
 /* Removes what has expired by now, or (dry_run) only finds it. `found`, unless it is NULL, is called for each with what it
  * takes of the disk. What cannot be removed is logged and left for the next time. */
 enum status collector_run(const struct collector_config *config, bool dry_run,
-                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes), void *user,
-                          struct error *err);
+                          void (*found)(void *user, const struct expired *e, uint64_t files, uint64_t bytes),
+                          void *user, struct error *err);
 const char *collector_kind_name(const struct expired *e); /* "upload", "job" or "scene" */
 
 struct collector; /* its thread; opaque */

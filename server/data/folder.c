@@ -79,8 +79,8 @@ enum status folder_lock(const char *dir, int *fd, struct error *err) {
         ssize_t got = errno == EWOULDBLOCK ? pread(*fd, holder, sizeof holder - 1, 0) : -1;
         holder[got > 0 ? strcspn(holder, "\n") : 0] = '\0';
         if (got >= 0)
-            status = error_set(err, STATUS_CONFLICT, "the data folder %s already has a daemon (process %s)",
-                               dir, *holder ? holder : "unknown");
+            status = error_set(err, STATUS_CONFLICT, "the data folder %s already has a daemon (process %s)", dir,
+                               *holder ? holder : "unknown");
         else
             status = error_set_errno(err, errno, "cannot lock %s", path);
     } else {
@@ -118,5 +118,6 @@ void folder_close_to_others(const char *dir) {
     }
     file_free_names(names, name_count);
     if (count > 0)
-        log_info("data folder %s: %zu of its files and folders were open to other users and are closed now", dir, count);
+        log_info("data folder %s: %zu of its files and folders were open to other users and are closed now", dir,
+                 count);
 }

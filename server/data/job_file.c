@@ -23,8 +23,7 @@ static enum status open_in_jobs(const char *data_dir, const char *path, int *out
         int next = -1;
         if (length < sizeof part) {
             snprintf(part, sizeof part, "%.*s", (int)length, at);
-            next = openat(fd, part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC |
-                          (is_last ? 0 : O_DIRECTORY));
+            next = openat(fd, part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | (is_last ? 0 : O_DIRECTORY));
         } else {
             errno = ENAMETOOLONG;
         }

@@ -27,41 +27,46 @@ struct generator {
     struct parallel *pool;
     struct room room;
     uint32_t frame_count;
-    struct camera *camera;  /* [frame_count] training first */
-    struct image *picture;  /* [frame_count] R G B radiance */
-    float base_exposure;    /* of 8-bit photographs */
+    struct camera *camera; /* [frame_count] training first */
+    struct image *picture; /* [frame_count] R G B radiance */
+    float base_exposure;   /* of 8-bit photographs */
 };
 
 struct demo_settings demo_default_settings(void) {
     return (struct demo_settings){
-        .width = 160, .height = 120, .train_count = 40, .test_count = 8, .spp = 48,
-        .test_spp = 128, .max_depth = 12, .wall_radiance = 15.0f, .ceiling_radiance = 15.0f,
-        .sdr = false, .seed = 1, .texture_size = 1024,
+        .width = 160,
+        .height = 120,
+        .train_count = 40,
+        .test_count = 8,
+        .spp = 48,
+        .test_spp = 128,
+        .max_depth = 12,
+        .wall_radiance = 15.0f,
+        .ceiling_radiance = 15.0f,
+        .sdr = false,
+        .seed = 1,
+        .texture_size = 1024,
     };
 }
 
-static bool is_test(const struct generator *g, uint32_t frame) {
-    return frame >= g->settings->train_count;
-}
+static bool is_test(const struct generator *g, uint32_t frame) { return frame >= g->settings->train_count; }
 
 static float frame_exposure(const struct generator *g, uint32_t frame) {
     return g->base_exposure * exposure_factor[frame % 3];
 }
 
-static char *frame_path(const struct generator *g, const char *folder, uint32_t frame,
-                        const char *extension) {
+static char *frame_path(const struct generator *g, const char *folder, uint32_t frame, const char *extension) {
     return mem_printf("%s/%s/%03u.%s", g->dir, folder, frame, extension);
 }
 
 /* --- pictures ----------------------------------------------------------------------------- */
 
 static void render_frame(struct generator *g, uint32_t frame) {
-    struct path_settings path = {.max_depth = (int)g->settings->max_depth, .roulette_depth = 4,
-                                 .seed = g->settings->seed};
+    struct path_settings path = {
+        .max_depth = (int)g->settings->max_depth, .roulette_depth = 4, .seed = g->settings->seed};
     struct image film; /* has standard errors too */
-    film_render(&g->room.world, &g->camera[frame],
-                is_test(g, frame) ? g->settings->test_spp : g->settings->spp, &path, frame,
-                g->pool, &film);
+    film_render(&g->room.world, &g->camera[frame], is_test(g, frame) ? g->settings->test_spp : g->settings->spp, &path,
+                frame, g->pool, &film);
     image_take_rgb(&film, &g->picture[frame]);
     image_release(&film);
 }
@@ -93,8 +98,7 @@ static enum status write_frame(const struct generator *g, uint32_t frame, struct
 
 static enum status write_truth_view(struct generator *g, uint32_t frame, struct error *err) {
     struct image image;
-    film_render_first_hits(&g->room.world, &g->camera[frame], TRUTH_SAMPLES, g->settings->seed,
-                           g->pool, &image);
+    film_render_first_hits(&g->room.world, &g->camera[frame], TRUTH_SAMPLES, g->settings->seed, g->pool, &image);
     /* segment numbers equal object_id */
     snprintf(image.channel[image_channel(&image, "segment")], sizeof *image.channel, "object_id");
     char *path = frame_path(g, "truth", frame, "exr");
@@ -117,8 +121,8 @@ static enum status write_objects(const struct generator *g, struct error *err) {
         int64_t object = room->mesh.object_id[room->inverse.triangle[texel]];
         const float *c = room->materials.base_color.texel[texel];
         texels[object]++;
-        mean[object] = rgb_mad(mean[object], 1.0f / (float)texels[object],
-                               rgb_sub(rgb_make(c[0], c[1], c[2]), mean[object]));
+        mean[object] =
+            rgb_mad(mean[object], 1.0f / (float)texels[object], rgb_sub(rgb_make(c[0], c[1], c[2]), mean[object]));
     }
     for (size_t t = 0; t < room->mesh.triangle_count; t++)
         triangles[room->mesh.object_id[t]]++;
@@ -202,22 +206,20 @@ static enum status write_bundle(struct generator *g, struct error *err) {
     return status;
 }
 
-enum status demo_generate(const char *dir, const struct demo_settings *settings,
-                          struct parallel *pool,
-                          void (*progress)(void *user, uint32_t done, uint32_t total), void *user,
-                          struct error *err) {
-    struct generator g = {.dir = dir, .settings = settings, .pool = pool,
-                          .frame_count = settings->train_count + settings->test_count};
+enum status demo_generate(const char *dir, const struct demo_settings *settings, struct parallel *pool,
+                          void (*progress)(void *user, uint32_t done, uint32_t total), void *user, struct error *err) {
+    struct generator g = {
+        .dir = dir, .settings = settings, .pool = pool, .frame_count = settings->train_count + settings->test_count};
     enum status status = make_folders(dir, err);
     if (status == STATUS_OK)
-        status = room_init(&g.room, settings->texture_size, settings->wall_radiance,
-                           settings->ceiling_radiance, pool, err);
+        status =
+            room_init(&g.room, settings->texture_size, settings->wall_radiance, settings->ceiling_radiance, pool, err);
     if (status != STATUS_OK)
         return status;
     g.camera = mem_calloc(g.frame_count, sizeof *g.camera);
     g.picture = mem_calloc(g.frame_count, sizeof *g.picture);
-    viewpoints_choose(&g.room, settings->width, settings->height, settings->train_count,
-                      settings->test_count, settings->seed, g.camera);
+    viewpoints_choose(&g.room, settings->width, settings->height, settings->train_count, settings->test_count,
+                      settings->seed, g.camera);
     for (uint32_t f = 0; f < g.frame_count; f++) {
         render_frame(&g, f);
         if (progress)

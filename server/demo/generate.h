@@ -17,22 +17,20 @@
 #include "common/parallel.h"
 
 struct demo_settings {
-    uint32_t width, height;         /* pixels of a photograph */
+    uint32_t width, height; /* pixels of a photograph */
     uint32_t train_count, test_count;
-    uint32_t spp, test_spp;         /* paths per pixel */
-    uint32_t max_depth;             /* segments of a path */
+    uint32_t spp, test_spp; /* paths per pixel */
+    uint32_t max_depth;     /* segments of a path */
     float wall_radiance, ceiling_radiance;
     bool sdr;
     uint64_t seed;
-    uint32_t texture_size;          /* texels, of the room's own textures */
+    uint32_t texture_size; /* texels, of the room's own textures */
 };
 
 struct demo_settings demo_default_settings(void);
 
 /* Creates the folder if needed. `progress` (may be NULL) is called after each view. */
-enum status demo_generate(const char *dir, const struct demo_settings *settings,
-                          struct parallel *pool,
-                          void (*progress)(void *user, uint32_t done, uint32_t total), void *user,
-                          struct error *err);
+enum status demo_generate(const char *dir, const struct demo_settings *settings, struct parallel *pool,
+                          void (*progress)(void *user, uint32_t done, uint32_t total), void *user, struct error *err);
 
 #endif

@@ -14,9 +14,7 @@ static rgb hex(uint32_t code) {
                     image_srgb_to_linear((float)(code & 255) / 255.0f));
 }
 
-static rgb mix(rgb a, rgb b, float t) {
-    return rgb_mad(rgb_scale(a, 1.0f - t), t, b);
-}
+static rgb mix(rgb a, rgb b, float t) { return rgb_mad(rgb_scale(a, 1.0f - t), t, b); }
 
 static float smooth(float from, float to, float x) {
     float t = clampf((x - from) / (to - from), 0.0f, 1.0f);
@@ -44,9 +42,7 @@ static float clouds(float x, float y, int key) {
 }
 
 /* 0 to 1 to 0 over one period. */
-static float wave(float x) {
-    return 2.0f * fabsf(x - floorf(x) - 0.5f);
-}
+static float wave(float x) { return 2.0f * fabsf(x - floorf(x) - 0.5f); }
 
 /* --- surfaces; (u, v) are metres in the surface's plane ------------------------------------- */
 
@@ -116,8 +112,7 @@ static rgb landscape(float u, float v) { /* u in [0, 1.6], v in [0, 1] */
     c = mix(hex(0xf0e2b0), c, smooth(0.1f, 0.125f, sqrtf(x * x + y * y)));
     static const uint32_t hill[3] = {0x6b7fa0, 0x4b6b4f, 0x27402f};
     for (int i = 0; i < 3; i++) {
-        float top = 0.52f - 0.16f * (float)i +
-                    0.16f * (noise(u * (2.0f + (float)i), 0.5f, 31 + i) - 0.5f);
+        float top = 0.52f - 0.16f * (float)i + 0.16f * (noise(u * (2.0f + (float)i), 0.5f, 31 + i) - 0.5f);
         c = mix(hex(hill[i]), c, smooth(top - 0.006f, top + 0.006f, v));
     }
     return c;
@@ -212,9 +207,7 @@ rgb paint_base_color(enum room_object object, vec3 p, vec3 normal) {
     case ROOM_SHELVES: return wood(q.x, q.y, 0xa8845a, 0xd2b58a, 63);
     case ROOM_BOOKS: return books(p);
     case ROOM_GLOBE: return globe(p);
-    case ROOM_CHEST:
-        return ((int)floorf(q.x / 0.08f) + (int)floorf(q.y / 0.08f)) & 1 ? hex(0xe8dcc0)
-                                                                         : hex(0xa83a2c);
+    case ROOM_CHEST: return ((int)floorf(q.x / 0.08f) + (int)floorf(q.y / 0.08f)) & 1 ? hex(0xe8dcc0) : hex(0xa83a2c);
     case ROOM_VASE: return vase(p);
     case ROOM_PAINTING_LARGE: return landscape(p.x - 0.8f, p.y - 1.05f);
     case ROOM_PAINTING_SMALL: return composition(p.z - 0.6f, p.y - 1.25f);

@@ -38,15 +38,13 @@ static const struct {
 };
 
 static const vec3 obstacle[][2] = {
-    {{1.65f, 0.0f, 1.45f}, {3.15f, 1.2f, 2.35f}},  /* table and vase */
-    {{3.15f, 0.0f, 0.0f}, {4.85f, 2.0f, 0.35f}},   /* shelves */
-    {{4.1f, 0.0f, 1.5f}, {5.0f, 0.9f, 3.4f}},      /* sofa */
-    {{2.0f, 2.65f, 1.5f}, {3.0f, 2.8f, 2.5f}},     /* ceiling lamp */
+    {{1.65f, 0.0f, 1.45f}, {3.15f, 1.2f, 2.35f}}, /* table and vase */
+    {{3.15f, 0.0f, 0.0f}, {4.85f, 2.0f, 0.35f}},  /* shelves */
+    {{4.1f, 0.0f, 1.5f}, {5.0f, 0.9f, 3.4f}},     /* sofa */
+    {{2.0f, 2.65f, 1.5f}, {3.0f, 2.8f, 2.5f}},    /* ceiling lamp */
 };
 
-const char *room_object_name(enum room_object o) {
-    return object[o].name;
-}
+const char *room_object_name(enum room_object o) { return object[o].name; }
 
 const vec3 (*room_obstacles(size_t *count))[2] {
     *count = sizeof obstacle / sizeof *obstacle;
@@ -55,19 +53,21 @@ const vec3 (*room_obstacles(size_t *count))[2] {
 
 /* --- where things stand ------------------------------------------------------------------- */
 
-static void box(struct shapes *s, enum room_object o, float x0, float y0, float z0, float x1,
-                float y1, float z1, int without) {
+static void box(struct shapes *s, enum room_object o, float x0, float y0, float z0, float x1, float y1, float z1,
+                int without) {
     shapes_box(s, o, vec3_make(x0, y0, z0), vec3_make(x1, y1, z1), without);
 }
 
 static void add_shell(struct shapes *s) {
-    static const struct { enum room_object o; int face; } side[6] = {
+    static const struct {
+        enum room_object o;
+        int face;
+    } side[6] = {
         {ROOM_WALL_WEST, SHAPE_LEFT}, {ROOM_WALL_EAST, SHAPE_RIGHT}, {ROOM_FLOOR, SHAPE_BOTTOM},
-        {ROOM_CEILING, SHAPE_TOP}, {ROOM_WALL_NORTH, SHAPE_BACK}, {ROOM_WALL_SOUTH, SHAPE_FRONT},
+        {ROOM_CEILING, SHAPE_TOP},    {ROOM_WALL_NORTH, SHAPE_BACK}, {ROOM_WALL_SOUTH, SHAPE_FRONT},
     };
     for (int i = 0; i < 6; i++)
-        box(s, side[i].o, 0.0f, 0.0f, 0.0f, ROOM_WIDTH, ROOM_HEIGHT, ROOM_DEPTH,
-            (63 & ~side[i].face) | SHAPE_INWARD);
+        box(s, side[i].o, 0.0f, 0.0f, 0.0f, ROOM_WIDTH, ROOM_HEIGHT, ROOM_DEPTH, (63 & ~side[i].face) | SHAPE_INWARD);
 }
 
 static void add_table(struct shapes *s) {
@@ -76,16 +76,13 @@ static void add_table(struct shapes *s) {
     box(s, ROOM_TABLE_TOP, 1.7f, 0.71f, 1.5f, 3.1f, 0.75f, 2.3f, 0);
     for (int i = 0; i < 4; i++) {
         float left = x[i & 1], back = z[i >> 1];
-        box(s, ROOM_TABLE_LEGS, left, 0.012f, back, left + wide, 0.71f, back + wide,
-            SHAPE_BOTTOM | SHAPE_TOP);
+        box(s, ROOM_TABLE_LEGS, left, 0.012f, back, left + wide, 0.71f, back + wide, SHAPE_BOTTOM | SHAPE_TOP);
     }
     static const vec2 vase[] = {
-        {0.0f, 0.0f}, {0.060f, 0.0f}, {0.070f, 0.01f}, {0.090f, 0.05f}, {0.112f, 0.11f},
-        {0.118f, 0.17f}, {0.106f, 0.23f}, {0.078f, 0.28f}, {0.052f, 0.32f}, {0.046f, 0.35f},
-        {0.056f, 0.38f}, {0.070f, 0.40f},
+        {0.0f, 0.0f},    {0.060f, 0.0f},  {0.070f, 0.01f}, {0.090f, 0.05f}, {0.112f, 0.11f}, {0.118f, 0.17f},
+        {0.106f, 0.23f}, {0.078f, 0.28f}, {0.052f, 0.32f}, {0.046f, 0.35f}, {0.056f, 0.38f}, {0.070f, 0.40f},
     };
-    shapes_lathe(s, ROOM_VASE, vec3_make(2.12f, 0.75f, 1.84f), vase, sizeof vase / sizeof *vase,
-                 40);
+    shapes_lathe(s, ROOM_VASE, vec3_make(2.12f, 0.75f, 1.84f), vase, sizeof vase / sizeof *vase, 40);
 }
 
 static void add_door(struct shapes *s) {
@@ -93,26 +90,21 @@ static void add_door(struct shapes *s) {
     box(s, ROOM_DOOR, left, 0.0f, back - 0.04f, right, top, back, SHAPE_FRONT | SHAPE_BOTTOM);
     for (int i = 0; i < 2; i++) {
         float low = i ? 1.12f : 0.2f, high = i ? 1.88f : 0.92f;
-        box(s, ROOM_DOOR, left + 0.14f, low, back - 0.06f, right - 0.14f, high, back - 0.04f,
-            SHAPE_FRONT);
+        box(s, ROOM_DOOR, left + 0.14f, low, back - 0.06f, right - 0.14f, high, back - 0.04f, SHAPE_FRONT);
     }
-    box(s, ROOM_DOOR_FRAME, left - wide, 0.0f, back - 0.07f, left, top + wide, back,
-        SHAPE_FRONT | SHAPE_BOTTOM);
-    box(s, ROOM_DOOR_FRAME, right, 0.0f, back - 0.07f, right + wide, top + wide, back,
-        SHAPE_FRONT | SHAPE_BOTTOM);
-    box(s, ROOM_DOOR_FRAME, left, top, back - 0.07f, right, top + wide, back,
-        SHAPE_FRONT | SHAPE_LEFT | SHAPE_RIGHT);
+    box(s, ROOM_DOOR_FRAME, left - wide, 0.0f, back - 0.07f, left, top + wide, back, SHAPE_FRONT | SHAPE_BOTTOM);
+    box(s, ROOM_DOOR_FRAME, right, 0.0f, back - 0.07f, right + wide, top + wide, back, SHAPE_FRONT | SHAPE_BOTTOM);
+    box(s, ROOM_DOOR_FRAME, left, top, back - 0.07f, right, top + wide, back, SHAPE_FRONT | SHAPE_LEFT | SHAPE_RIGHT);
 }
 
 static void add_shelves(struct shapes *s) {
     const float left = 3.2f, right = 4.8f, deep = 0.3f, thick = 0.03f;
     static const float board[] = {0.35f, 0.85f, 1.35f, 1.9f};
     box(s, ROOM_SHELVES, left, 0.0f, 0.0f, left + thick, 1.93f, deep, SHAPE_BACK | SHAPE_BOTTOM);
-    box(s, ROOM_SHELVES, right - thick, 0.0f, 0.0f, right, 1.93f, deep,
-        SHAPE_BACK | SHAPE_BOTTOM);
+    box(s, ROOM_SHELVES, right - thick, 0.0f, 0.0f, right, 1.93f, deep, SHAPE_BACK | SHAPE_BOTTOM);
     for (int i = 0; i < 4; i++)
-        box(s, ROOM_SHELVES, left + thick, board[i], 0.0f, right - thick, board[i] + thick,
-            deep - 0.01f, SHAPE_BACK | SHAPE_LEFT | SHAPE_RIGHT);
+        box(s, ROOM_SHELVES, left + thick, board[i], 0.0f, right - thick, board[i] + thick, deep - 0.01f,
+            SHAPE_BACK | SHAPE_LEFT | SHAPE_RIGHT);
     float x = 3.3f;
     for (int i = 0; i < 9; i++) {
         float wide = 0.045f + 0.012f * (float)(i * 7 % 4), high = 0.24f + 0.03f * (float)(i * 5 % 4);
@@ -120,24 +112,25 @@ static void add_shelves(struct shapes *s) {
         x += wide + 0.002f;
     }
     static const vec2 globe[] = {
-        {0.0f, 0.0f}, {0.050f, 0.0f}, {0.052f, 0.02f}, {0.018f, 0.03f}, {0.016f, 0.06f},
+        {0.0f, 0.0f},     {0.050f, 0.0f},   {0.052f, 0.02f},  {0.018f, 0.03f}, {0.016f, 0.06f},
         {0.062f, 0.076f}, {0.106f, 0.114f}, {0.127f, 0.162f}, {0.130f, 0.19f}, {0.127f, 0.218f},
         {0.106f, 0.266f}, {0.062f, 0.304f}, {0.0f, 0.32f},
     };
-    shapes_lathe(s, ROOM_GLOBE, vec3_make(4.3f, 1.38f, 0.15f), globe,
-                 sizeof globe / sizeof *globe, 32);
+    shapes_lathe(s, ROOM_GLOBE, vec3_make(4.3f, 1.38f, 0.15f), globe, sizeof globe / sizeof *globe, 32);
     box(s, ROOM_CHEST, 3.5f, 1.38f, 0.04f, 3.9f, 1.62f, 0.26f, SHAPE_BOTTOM);
     box(s, ROOM_CHEST, 4.0f, 0.38f, 0.04f, 4.5f, 0.68f, 0.27f, SHAPE_BOTTOM);
 }
 
 /* A rectangular frame of width `wide` around the panel from `lower` to `upper` in the plane of axes u and v;
  * `without` omits the side on the wall. */
-static void add_frame(struct shapes *s, enum room_object o, vec3 lower, vec3 upper, vec3 u, vec3 v,
-                      float wide, int without) {
+static void add_frame(struct shapes *s, enum room_object o, vec3 lower, vec3 upper, vec3 u, vec3 v, float wide,
+                      int without) {
     vec3 span = vec3_sub(upper, lower);
     float across = vec3_dot(span, u), along = vec3_dot(span, v);
     vec3 deep = vec3_sub(vec3_sub(span, vec3_scale(u, across)), vec3_scale(v, along));
-    const struct { float u, v, width, height; } bar[4] = {
+    const struct {
+        float u, v, width, height;
+    } bar[4] = {
         {-wide, -wide, across + 2.0f * wide, wide},
         {-wide, along, across + 2.0f * wide, wide},
         {-wide, 0.0f, wide, along},
@@ -153,17 +146,15 @@ static void add_frame(struct shapes *s, enum room_object o, vec3 lower, vec3 upp
 static void add_pictures(struct shapes *s) {
     const vec3 x = {1.0f, 0.0f, 0.0f}, y = {0.0f, 1.0f, 0.0f}, z = {0.0f, 0.0f, 1.0f};
     box(s, ROOM_PAINTING_LARGE, 0.8f, 1.05f, 0.0f, 2.4f, 2.05f, 0.02f, 63 & ~SHAPE_FRONT);
-    add_frame(s, ROOM_PICTURE_FRAMES, vec3_make(0.8f, 1.05f, 0.0f), vec3_make(2.4f, 2.05f, 0.04f),
-              x, y, 0.06f, SHAPE_BACK);
-    box(s, ROOM_PAINTING_SMALL, ROOM_WIDTH - 0.02f, 1.25f, 0.6f, ROOM_WIDTH, 2.05f, 1.3f,
-        63 & ~SHAPE_LEFT);
-    add_frame(s, ROOM_PICTURE_FRAMES, vec3_make(ROOM_WIDTH - 0.04f, 1.25f, 0.6f),
-              vec3_make(ROOM_WIDTH, 2.05f, 1.3f), z, y, 0.05f, SHAPE_RIGHT);
+    add_frame(s, ROOM_PICTURE_FRAMES, vec3_make(0.8f, 1.05f, 0.0f), vec3_make(2.4f, 2.05f, 0.04f), x, y, 0.06f,
+              SHAPE_BACK);
+    box(s, ROOM_PAINTING_SMALL, ROOM_WIDTH - 0.02f, 1.25f, 0.6f, ROOM_WIDTH, 2.05f, 1.3f, 63 & ~SHAPE_LEFT);
+    add_frame(s, ROOM_PICTURE_FRAMES, vec3_make(ROOM_WIDTH - 0.04f, 1.25f, 0.6f), vec3_make(ROOM_WIDTH, 2.05f, 1.3f), z,
+              y, 0.05f, SHAPE_RIGHT);
 }
 
 static void add_sofa(struct shapes *s) {
-    box(s, ROOM_SOFA, 4.15f, 0.0f, 1.7f, 4.95f, 0.42f, 3.2f,
-        SHAPE_BOTTOM | SHAPE_BACK | SHAPE_FRONT);
+    box(s, ROOM_SOFA, 4.15f, 0.0f, 1.7f, 4.95f, 0.42f, 3.2f, SHAPE_BOTTOM | SHAPE_BACK | SHAPE_FRONT);
     box(s, ROOM_SOFA, 4.72f, 0.42f, 1.7f, 4.95f, 0.85f, 3.2f, SHAPE_BOTTOM);
     box(s, ROOM_SOFA, 4.15f, 0.0f, 1.55f, 4.95f, 0.6f, 1.7f, SHAPE_BOTTOM);
     box(s, ROOM_SOFA, 4.15f, 0.0f, 3.2f, 4.95f, 0.6f, 3.35f, SHAPE_BOTTOM);
@@ -172,11 +163,10 @@ static void add_sofa(struct shapes *s) {
 static void add_lamps(struct shapes *s) {
     const vec3 x = {1.0f, 0.0f, 0.0f}, y = {0.0f, 1.0f, 0.0f}, z = {0.0f, 0.0f, 1.0f};
     box(s, ROOM_WALL_EMITTER, 0.0f, 1.1f, 1.4f, 0.03f, 2.0f, 2.6f, 63 & ~SHAPE_RIGHT);
-    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(0.0f, 1.1f, 1.4f), vec3_make(0.06f, 2.0f, 2.6f), z, y,
-              0.06f, SHAPE_LEFT);
+    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(0.0f, 1.1f, 1.4f), vec3_make(0.06f, 2.0f, 2.6f), z, y, 0.06f, SHAPE_LEFT);
     box(s, ROOM_CEILING_EMITTER, 2.1f, 2.76f, 1.6f, 2.9f, ROOM_HEIGHT, 2.4f, 63 & ~SHAPE_BOTTOM);
-    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(2.1f, 2.73f, 1.6f), vec3_make(2.9f, ROOM_HEIGHT, 2.4f),
-              x, z, 0.05f, SHAPE_TOP);
+    add_frame(s, ROOM_LAMP_FRAMES, vec3_make(2.1f, 2.73f, 1.6f), vec3_make(2.9f, ROOM_HEIGHT, 2.4f), x, z, 0.05f,
+              SHAPE_TOP);
 }
 
 /* --- textures ----------------------------------------------------------------------------- */
@@ -187,8 +177,7 @@ struct painting {
 
 /* One row of the texture: the mean of four samples per valid texel. */
 static void paint_row(void *user, size_t y, int thread) {
-    static const float place[4][2] = {
-        {0.125f, 0.375f}, {0.625f, 0.125f}, {0.375f, 0.875f}, {0.875f, 0.625f}};
+    static const float place[4][2] = {{0.125f, 0.375f}, {0.625f, 0.125f}, {0.375f, 0.875f}, {0.875f, 0.625f}};
     struct room *room = ((struct painting *)user)->room;
     struct texture *texture = &room->materials.base_color;
     (void)thread;
@@ -200,9 +189,8 @@ static void paint_row(void *user, size_t y, int thread) {
         for (int i = 0; i < 4; i++) {
             uint32_t t;
             float b1, b2;
-            bool valid = inverse_uv_lookup(&room->inverse, &room->atlas,
-                                           (float)x + place[i][0], (float)y + place[i][1], &t,
-                                           &b1, &b2);
+            bool valid = inverse_uv_lookup(&room->inverse, &room->atlas, (float)x + place[i][0], (float)y + place[i][1],
+                                           &t, &b1, &b2);
             assert(valid);
             (void)valid;
             const uint32_t *v = room->mesh.index[t];
@@ -218,25 +206,21 @@ static void paint_row(void *user, size_t y, int thread) {
     }
 }
 
-static void make_materials(struct room *room, float wall_radiance, float ceiling_radiance,
-                           struct parallel *pool) {
-    materials_init(&room->materials, &room->inverse, room->segments.count, rgb_gray(0.5f), 0.5f,
-                   0.5f);
+static void make_materials(struct room *room, float wall_radiance, float ceiling_radiance, struct parallel *pool) {
+    materials_init(&room->materials, &room->inverse, room->segments.count, rgb_gray(0.5f), 0.5f, 0.5f);
     for (size_t i = 0; i < ROOM_OBJECT_COUNT; i++) {
         room->materials.roughness[i] = object[i].roughness;
         room->materials.specular[i] = object[i].specular;
     }
     /* The ceiling lamp is warm, the wall emitter daylight. */
-    room->materials.emission[ROOM_WALL_EMITTER] = rgb_scale(rgb_make(0.92f, 1.0f, 1.08f),
-                                                            wall_radiance);
-    room->materials.emission[ROOM_CEILING_EMITTER] = rgb_scale(rgb_make(1.1f, 1.0f, 0.85f),
-                                                               ceiling_radiance);
+    room->materials.emission[ROOM_WALL_EMITTER] = rgb_scale(rgb_make(0.92f, 1.0f, 1.08f), wall_radiance);
+    room->materials.emission[ROOM_CEILING_EMITTER] = rgb_scale(rgb_make(1.1f, 1.0f, 0.85f), ceiling_radiance);
     struct painting painting = {room};
     parallel_for(pool, room->atlas.height, paint_row, &painting);
 }
 
-enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance,
-                      float ceiling_radiance, struct parallel *pool, struct error *err) {
+enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance, float ceiling_radiance,
+                      struct parallel *pool, struct error *err) {
     struct shapes s;
     struct mesh_report report;
     memset(room, 0, sizeof *room);
@@ -260,8 +244,7 @@ enum status room_init(struct room *room, uint32_t texture_size, float wall_radia
         goto out;
     inverse_uv_make(&room->inverse, &room->atlas, room->mesh.triangle_count, pool);
     make_materials(room, wall_radiance, ceiling_radiance, pool);
-    status = world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials,
-                        NULL, pool, err);
+    status = world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials, NULL, pool, err);
 out:
     if (status != STATUS_OK)
         room_release(room);

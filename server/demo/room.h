@@ -35,8 +35,8 @@ const char *room_object_name(enum room_object object);
 const vec3 (*room_obstacles(size_t *count))[2];
 
 /* Builds geometry, textures of texture_size texels a side, and the acceleration structure. */
-enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance,
-                      float ceiling_radiance, struct parallel *pool, struct error *err);
+enum status room_init(struct room *room, uint32_t texture_size, float wall_radiance, float ceiling_radiance,
+                      struct parallel *pool, struct error *err);
 void room_release(struct room *room);
 
 #endif

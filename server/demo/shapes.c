@@ -11,9 +11,7 @@
 #define PLY_LIMIT ((size_t)1 << 28)
 #define TURN 6.28318530717958648f
 
-void shapes_init(struct shapes *s) {
-    memset(s, 0, sizeof *s);
-}
+void shapes_init(struct shapes *s) { memset(s, 0, sizeof *s); }
 
 static uint32_t add_vertex(struct shapes *s, vec3 position, vec3 normal) {
     struct mesh *m = &s->mesh;
@@ -58,13 +56,13 @@ static void add_quad(struct shapes *s, int64_t object, vec3 origin, vec3 u, vec3
 void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int without) {
     vec3 size = vec3_sub(upper, lower);
     vec3 x = {size.x, 0.0f, 0.0f}, y = {0.0f, size.y, 0.0f}, z = {0.0f, 0.0f, size.z};
-    const struct { int name; vec3 origin, u, v; } face[6] = {
-        {SHAPE_LEFT, lower, z, y},
-        {SHAPE_RIGHT, vec3_add(lower, x), y, z},
-        {SHAPE_BOTTOM, lower, x, z},
-        {SHAPE_TOP, vec3_add(lower, y), z, x},
-        {SHAPE_BACK, lower, y, x},
-        {SHAPE_FRONT, vec3_add(lower, z), x, y},
+    const struct {
+        int name;
+        vec3 origin, u, v;
+    } face[6] = {
+        {SHAPE_LEFT, lower, z, y},   {SHAPE_RIGHT, vec3_add(lower, x), y, z},
+        {SHAPE_BOTTOM, lower, x, z}, {SHAPE_TOP, vec3_add(lower, y), z, x},
+        {SHAPE_BACK, lower, y, x},   {SHAPE_FRONT, vec3_add(lower, z), x, y},
     };
     for (int i = 0; i < 6; i++) {
         if (without & face[i].name)
@@ -84,8 +82,7 @@ static vec2 profile_normal(const vec2 *profile, size_t count, size_t i) {
     return (vec2){along.y / length, -along.x / length};
 }
 
-void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count,
-                  int sides) {
+void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count, int sides) {
     uint32_t first = (uint32_t)s->mesh.vertex_count, ring = (uint32_t)sides + 1;
     for (size_t i = 0; i < count; i++) {
         vec2 n = profile_normal(profile, count, i);

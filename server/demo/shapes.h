@@ -19,13 +19,13 @@ struct shapes {
 
 /* Faces of a box to omit, where they rest on something. */
 enum {
-    SHAPE_LEFT = 1,    /* -x */
-    SHAPE_RIGHT = 2,   /* +x */
-    SHAPE_BOTTOM = 4,  /* -y */
-    SHAPE_TOP = 8,     /* +y */
-    SHAPE_BACK = 16,   /* -z */
-    SHAPE_FRONT = 32,  /* +z */
-    SHAPE_INWARD = 64  /* a room: faces point inwards */
+    SHAPE_LEFT = 1,   /* -x */
+    SHAPE_RIGHT = 2,  /* +x */
+    SHAPE_BOTTOM = 4, /* -y */
+    SHAPE_TOP = 8,    /* +y */
+    SHAPE_BACK = 16,  /* -z */
+    SHAPE_FRONT = 32, /* +z */
+    SHAPE_INWARD = 64 /* a room: faces point inwards */
 };
 
 void shapes_init(struct shapes *s);
@@ -35,8 +35,7 @@ void shapes_box(struct shapes *s, int64_t object, vec3 lower, vec3 upper, int wi
 
 /* Surface of revolution: the profile (x = radius, y = height, from bottom to top), rotated about the vertical axis
  * through `base` in `sides` steps. A radius of 0 at an end closes it. */
-void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count,
-                  int sides);
+void shapes_lathe(struct shapes *s, int64_t object, vec3 base, const vec2 *profile, size_t count, int sides);
 
 /* Writes positions, normals and object_id as binary little-endian PLY. */
 enum status shapes_write_ply(const struct mesh *mesh, const char *path, struct error *err);

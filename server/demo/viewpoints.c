@@ -10,11 +10,11 @@
 #include "common/rng.h"
 
 #define CANDIDATES 480
-#define POINTS 3000           /* surface points for measuring coverage */
-#define CLEARANCE_M 0.3f      /* to walls and furniture */
-#define NEAREST_M 0.7f        /* minimum distance of most of what a camera sees */
+#define POINTS 3000                /* surface points for measuring coverage */
+#define CLEARANCE_M 0.3f           /* to walls and furniture */
+#define NEAREST_M 0.7f             /* minimum distance of most of what a camera sees */
 #define HALF_ANGLE_TANGENT 0.7673f /* 75 degrees across */
-#define TEST_APART_M 0.25f    /* minimum distance of a test camera from all training cameras */
+#define TEST_APART_M 0.25f         /* minimum distance of a test camera from all training cameras */
 
 struct demo_point {
     vec3 position, normal;
@@ -24,10 +24,10 @@ struct viewpoint_chooser {
     const struct room *room;
     uint64_t seed;
     struct demo_point *point; /* [POINTS] */
-    struct camera *candidate;    /* [CANDIDATES] */
-    uint8_t *sees;               /* [CANDIDATES][POINTS] */
-    bool *taken;                 /* [CANDIDATES] */
-    float *count;                /* [POINTS] chosen views that see it */
+    struct camera *candidate; /* [CANDIDATES] */
+    uint8_t *sees;            /* [CANDIDATES][POINTS] */
+    bool *taken;              /* [CANDIDATES] */
+    float *count;             /* [POINTS] chosen views that see it */
 };
 
 static float uniform(const struct viewpoint_chooser *c, uint64_t stream, uint64_t i, uint64_t dimension) {
@@ -58,9 +58,8 @@ static bool is_clear(vec3 p) {
     const vec3(*box)[2] = room_obstacles(&count);
     for (size_t i = 0; i < count; i++) {
         const vec3 *b = box[i];
-        if (p.x > b[0].x - CLEARANCE_M && p.x < b[1].x + CLEARANCE_M &&
-            p.y > b[0].y - CLEARANCE_M && p.y < b[1].y + CLEARANCE_M &&
-            p.z > b[0].z - CLEARANCE_M && p.z < b[1].z + CLEARANCE_M)
+        if (p.x > b[0].x - CLEARANCE_M && p.x < b[1].x + CLEARANCE_M && p.y > b[0].y - CLEARANCE_M &&
+            p.y < b[1].y + CLEARANCE_M && p.z > b[0].z - CLEARANCE_M && p.z < b[1].z + CLEARANCE_M)
             return false;
     }
     return true;
@@ -77,9 +76,8 @@ static void aim(struct camera *camera, vec3 eye, vec3 forward, uint32_t width, u
     camera->fx = camera->fy = 0.5f * (float)width / HALF_ANGLE_TANGENT;
     camera->cx = 0.5f * (float)width;
     camera->cy = 0.5f * (float)height;
-    camera->world_from_camera = (struct rigid){{{right.x, down.x, forward.x},
-                                                {right.y, down.y, forward.y},
-                                                {right.z, down.z, forward.z}}, eye};
+    camera->world_from_camera =
+        (struct rigid){{{right.x, down.x, forward.x}, {right.y, down.y, forward.y}, {right.z, down.z, forward.z}}, eye};
     camera->camera_from_world = rigid_inverse(&camera->world_from_camera);
 }
 
@@ -92,8 +90,8 @@ static bool has_room_ahead(const struct viewpoint_chooser *c, const struct camer
         float x = (0.1f + 0.2f * (float)(i % 5)) * (float)camera->width;
         float y = (0.1f + 0.2f * (float)(i / 5)) * (float)camera->height;
         far += camera_direction(camera, x, y, &direction) &&
-               (!accel_intersect(c->room->world.accel, camera_origin(camera), direction, 0.0f,
-                                 100.0f, &hit) || hit.distance_m > NEAREST_M);
+               (!accel_intersect(c->room->world.accel, camera_origin(camera), direction, 0.0f, 100.0f, &hit) ||
+                hit.distance_m > NEAREST_M);
     }
     return far >= 22;
 }
@@ -114,8 +112,7 @@ static void draw_candidate(struct viewpoint_chooser *c, size_t i, uint32_t width
     }
 }
 
-static bool sees(const struct viewpoint_chooser *c, const struct camera *camera,
-                 const struct demo_point *p) {
+static bool sees(const struct viewpoint_chooser *c, const struct camera *camera, const struct demo_point *p) {
     float x, y, depth;
     vec3 to_eye = vec3_sub(camera_origin(camera), p->position);
     float distance = vec3_length(to_eye);
@@ -158,8 +155,7 @@ static bool is_apart(const struct camera *camera, const struct camera *others, s
 
 /* Before test cameras are chosen: resets the counts and excludes candidates near a training camera where enough
  * others remain. */
-static void prepare_tests(struct viewpoint_chooser *c, const struct camera *train, size_t train_count,
-                       size_t wanted) {
+static void prepare_tests(struct viewpoint_chooser *c, const struct camera *train, size_t train_count, size_t wanted) {
     size_t free_count = CANDIDATES - train_count;
     memset(c->count, 0, POINTS * sizeof *c->count);
     for (size_t i = 0; i < CANDIDATES && free_count > wanted; i++) {
@@ -170,9 +166,8 @@ static void prepare_tests(struct viewpoint_chooser *c, const struct camera *trai
     }
 }
 
-void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
-                       size_t train_count, size_t test_count, uint64_t seed,
-                       struct camera *camera) {
+void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height, size_t train_count, size_t test_count,
+                       uint64_t seed, struct camera *camera) {
     assert(train_count + test_count <= CANDIDATES / 2);
     struct viewpoint_chooser c = {.room = room, .seed = seed};
     c.point = mem_array(POINTS, sizeof *c.point);

@@ -13,8 +13,7 @@
 
 /* Fills camera[train_count + test_count], training cameras first: pinhole cameras of width x height pixels and 75
  * degrees horizontal field of view. Test cameras look at what training cameras see, from other positions. */
-void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height,
-                       size_t train_count, size_t test_count, uint64_t seed,
-                       struct camera *camera);
+void viewpoints_choose(const struct room *room, uint32_t width, uint32_t height, size_t train_count, size_t test_count,
+                       uint64_t seed, struct camera *camera);
 
 #endif

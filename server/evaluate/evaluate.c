@@ -27,9 +27,9 @@ struct evaluator {
     const char *room;
     struct scene scene;
     struct recovered recovered;
-    bool *emits;           /* [triangle_count] by the truth */
+    bool *emits; /* [triangle_count] by the truth */
     struct seen seen;
-    double median;         /* radiance of the training pixels */
+    double median; /* radiance of the training pixels */
 };
 
 struct evaluate_settings evaluate_default_settings(void) {
@@ -92,8 +92,7 @@ static enum status score_objects(struct evaluator *e, struct evaluation *v, stru
 /* --- photographs -------------------------------------------------------------------------- */
 
 /* Radiance of a pixel's channels; false when it is masked or not finite. */
-static bool pixel_radiance(const struct photograph *p, uint32_t x, uint32_t y,
-                           struct photograph_sample *sample) {
+static bool pixel_radiance(const struct photograph *p, uint32_t x, uint32_t y, struct photograph_sample *sample) {
     return photograph_sample(p, (float)x + 0.5f, (float)y + 0.5f, sample);
 }
 
@@ -123,10 +122,10 @@ static double training_median(const struct scene *scene) {
 }
 
 /* The photograph's radiance and the re-render, clipped alike. Masked pixels are NaN, which metrics_msre leaves out. */
-static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view,
-                      struct image *photograph, struct image *render) {
-    struct path_settings path = {.max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
-                                 .seed = e->settings->seed};
+static void make_pair(struct evaluator *e, const struct photograph *p, uint32_t view, struct image *photograph,
+                      struct image *render) {
+    struct path_settings path = {
+        .max_depth = (int)e->settings->max_depth, .roulette_depth = ROULETTE_DEPTH, .seed = e->settings->seed};
     struct image film; /* has standard errors too */
     uint32_t width = p->camera.width, height = p->camera.height;
     film_render(&e->recovered.world, &p->camera, e->settings->spp, &path, view, e->pool, &film);
@@ -169,9 +168,8 @@ static struct rgb_columns find_rgb(const struct image *image, const char *prefix
 }
 
 /* `a` beside `b`, of each the channels prefixR, prefixG and prefixB. */
-static enum status write_pair(const struct evaluator *e, const char *what, const char *stem,
-                              const struct image *a, const struct image *b, const char *prefix,
-                              float scale, struct error *err) {
+static enum status write_pair(const struct evaluator *e, const char *what, const char *stem, const struct image *a,
+                              const struct image *b, const char *prefix, float scale, struct error *err) {
     enum { GAP = 4 };
     struct image pair;
     const struct image *side[2] = {a, b};
@@ -181,8 +179,7 @@ static enum status write_pair(const struct evaluator *e, const char *what, const
         for (uint32_t y = 0; y < a->height; y++) {
             for (uint32_t x = 0; x < a->width; x++) {
                 size_t to = (size_t)y * pair.width + x + (k ? a->width + GAP : 0);
-                const float *from = side[k]->pixel +
-                                    ((size_t)y * a->width + x) * side[k]->channel_count;
+                const float *from = side[k]->pixel + ((size_t)y * a->width + x) * side[k]->channel_count;
                 for (int c = 0; c < 3; c++)
                     pair.pixel[3 * to + (size_t)c] = from[columns.at[c]];
             }
@@ -204,18 +201,16 @@ static char *stem_of(const char *name) {
     return mem_strndup(start, dot ? (size_t)(dot - start) : strlen(start));
 }
 
-static enum status read_truth(const struct evaluator *e, const struct photograph *p,
-                              const char *stem, struct image *truth, struct error *err) {
-    static const char *const needed[] = {"base_color.R", "base_color.G", "base_color.B",
-                                         "roughness", "specular", "emission.R", "emission.G",
-                                         "emission.B", "object_id"};
+static enum status read_truth(const struct evaluator *e, const struct photograph *p, const char *stem,
+                              struct image *truth, struct error *err) {
+    static const char *const needed[] = {"base_color.R", "base_color.G", "base_color.B", "roughness", "specular",
+                                         "emission.R",   "emission.G",   "emission.B",   "object_id"};
     char *path = mem_printf("%s/truth/%s.exr", e->room, stem);
     enum status status = image_read(path, truth, NULL, err);
     for (size_t i = 0; i < sizeof needed / sizeof *needed && status == STATUS_OK; i++)
         if (image_channel(truth, needed[i]) < 0)
             status = error_set(err, STATUS_INPUT, "%s: has no channel %s", path, needed[i]);
-    if (status == STATUS_OK &&
-        (truth->width != p->camera.width || truth->height != p->camera.height))
+    if (status == STATUS_OK && (truth->width != p->camera.width || truth->height != p->camera.height))
         status = error_set(err, STATUS_INPUT, "%s: is not of its photograph's size", path);
     mem_free(path);
     return status;
@@ -252,16 +247,15 @@ static enum status score_photograph(struct evaluator *e, const struct photograph
     return status;
 }
 
-static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view,
-                              struct evaluation *v, double *msre, struct error *err) {
+static enum status score_view(struct evaluator *e, const struct photograph *p, uint32_t view, struct evaluation *v,
+                              double *msre, struct error *err) {
     struct image truth = {0}, found = {0};
     char *stem = stem_of(p->name);
     uint8_t *flags = mem_array((size_t)p->camera.width * p->camera.height, 1);
     enum status status = read_truth(e, p, stem, &truth, err);
     if (status != STATUS_OK)
         goto out;
-    film_render_first_hits(&e->recovered.world, &p->camera, e->settings->samples,
-                           e->settings->seed, e->pool, &found);
+    film_render_first_hits(&e->recovered.world, &p->camera, e->settings->samples, e->settings->seed, e->pool, &found);
     seen_flags(&e->seen, &p->camera, e->pool, flags);
     mark_by_truth(&truth, flags);
     score_add(&v->score, &found, &truth, flags);
@@ -314,9 +308,8 @@ static enum status load_room(struct evaluator *e, struct error *err) {
     return STATUS_OK;
 }
 
-enum status evaluate_outputs(const char *room, const char *outputs,
-                             const struct evaluate_settings *settings, struct parallel *pool,
-                             struct evaluation *v, struct error *err) {
+enum status evaluate_outputs(const char *room, const char *outputs, const struct evaluate_settings *settings,
+                             struct parallel *pool, struct evaluation *v, struct error *err) {
     struct evaluator e = {.settings = settings, .pool = pool, .room = room};
     memset(v, 0, sizeof *v);
     size_t turned;
@@ -351,8 +344,7 @@ cJSON *evaluate_to_json(const struct evaluation *v) {
     json_add_int(root, "views", (int64_t)v->view_count);
     json_add_number(root, "base_color_psnr_db", score_psnr_db(s->base_color_seen));
     json_add_number(root, "base_color_psnr_all_db", score_psnr_db(s->base_color_all));
-    json_add_number(root, "seen_share",
-                    s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
+    json_add_number(root, "seen_share", s->plain_pixels ? (double)s->seen_pixels / (double)s->plain_pixels : 0.0);
     json_add_number(root, "roughness_psnr_db", score_psnr_db(s->roughness));
     json_add_number(root, "roughness_rms_error", sqrt(score_mean(s->roughness)));
     json_add_number(root, "specular_psnr_db", score_psnr_db(s->specular));

@@ -18,11 +18,11 @@
 #include "server/evaluate/score.h"
 
 struct evaluate_settings {
-    uint32_t samples;          /* first hits per pixel, at least 16 */
-    uint32_t spp;              /* paths per pixel of the re-renders, at least 64; 0: none, no MSRE */
-    uint32_t max_depth;        /* segments of a path */
+    uint32_t samples;   /* first hits per pixel, at least 16 */
+    uint32_t spp;       /* paths per pixel of the re-renders, at least 64; 0: none, no MSRE */
+    uint32_t max_depth; /* segments of a path */
     uint64_t seed;
-    const char *pictures_dir;  /* where side-by-sides go; NULL: none */
+    const char *pictures_dir; /* where side-by-sides go; NULL: none */
 };
 
 struct evaluate_settings evaluate_default_settings(void);
@@ -34,14 +34,13 @@ struct evaluation {
      * of which emits is a false emitter. */
     size_t emitters, emitters_found, emitters_missed, emitters_false;
     double msre, msre_deviation; /* mean over views and standard deviation; NaN without re-renders */
-    struct smooth_areas smooth; /* needs re-renders */
+    struct smooth_areas smooth;  /* needs re-renders */
     struct noise_floor floor;    /* views with a flat render in the truth; needs re-renders */
 };
 
 /* `room` and `outputs` are folders. */
-enum status evaluate_outputs(const char *room, const char *outputs,
-                             const struct evaluate_settings *settings, struct parallel *pool,
-                             struct evaluation *evaluation, struct error *err);
+enum status evaluate_outputs(const char *room, const char *outputs, const struct evaluate_settings *settings,
+                             struct parallel *pool, struct evaluation *evaluation, struct error *err);
 
 /* Every figure as an object; the caller's. */
 cJSON *evaluate_to_json(const struct evaluation *evaluation);

@@ -22,16 +22,15 @@ const struct flag evaluate_flags[] = {
 static void print_table(const struct evaluation *v) {
     const struct score *s = &v->score;
     printf("recovered against true, over %zu held-out views\n", v->view_count);
-    printf("  %-22s %6.2f dB   (%.1f %% of the pixels; with unseen surface %.2f dB)\n",
-           "base colour", score_psnr_db(s->base_color_seen),
+    printf("  %-22s %6.2f dB   (%.1f %% of the pixels; with unseen surface %.2f dB)\n", "base colour",
+           score_psnr_db(s->base_color_seen),
            s->plain_pixels ? 100.0 * (double)s->seen_pixels / (double)s->plain_pixels : 0.0,
            score_psnr_db(s->base_color_all));
     printf("  %-22s %6.2f dB   (off by %.3f)\n", "roughness", score_psnr_db(s->roughness),
            sqrt(score_mean(s->roughness)));
-    printf("  %-22s %6.2f dB   (off by %.3f)\n", "specular", score_psnr_db(s->specular),
-           sqrt(score_mean(s->specular)));
-    printf("  %-22s %zu of %zu found, %zu missed, %zu false\n", "emitters", v->emitters_found,
-           v->emitters, v->emitters_missed, v->emitters_false);
+    printf("  %-22s %6.2f dB   (off by %.3f)\n", "specular", score_psnr_db(s->specular), sqrt(score_mean(s->specular)));
+    printf("  %-22s %zu of %zu found, %zu missed, %zu false\n", "emitters", v->emitters_found, v->emitters,
+           v->emitters_missed, v->emitters_false);
     printf("  %-22s %6.3f of 1, log error %.2g\n", "emission, overlap", score_emission_iou(s),
            score_mean(s->emission_log));
     if (isfinite(v->msre))

@@ -32,8 +32,8 @@ static void charted_release(struct charted *c) {
 }
 
 /* Byte offset of a property within its element; false when there is none of that type or a list precedes it. */
-static bool find_property(const struct ply_header *h, const struct ply_element *e,
-                          const char *name, enum ply_type type, size_t *offset) {
+static bool find_property(const struct ply_header *h, const struct ply_element *e, const char *name, enum ply_type type,
+                          size_t *offset) {
     *offset = 0;
     for (size_t i = e->first; i < e->first + e->property_count; i++) {
         const struct ply_property *p = &h->property[i];
@@ -53,8 +53,8 @@ static size_t element_bytes(const struct ply_header *h, const struct ply_element
     return bytes;
 }
 
-static enum status read_vertices(struct charted *c, const struct ply_header *h,
-                                 struct ply_cursor *at, struct error *err) {
+static enum status read_vertices(struct charted *c, const struct ply_header *h, struct ply_cursor *at,
+                                 struct error *err) {
     const struct ply_element *e = &h->element[0];
     static const char *const name[5] = {"x", "y", "z", "s", "t"};
     size_t offset[5], stride = element_bytes(h, e);
@@ -77,18 +77,16 @@ static enum status read_vertices(struct charted *c, const struct ply_header *h,
 }
 
 /* Faces as mesh_ply.c writes them: a list of three corners, then properties of fixed size. */
-static enum status read_faces(struct charted *c, const struct ply_header *h, struct ply_cursor *at,
-                              struct error *err) {
+static enum status read_faces(struct charted *c, const struct ply_header *h, struct ply_cursor *at, struct error *err) {
     const struct ply_element *e = &h->element[1];
     const struct ply_property *list = &h->property[e->first];
     struct ply_element rest = {"", e->count, e->first + 1, e->property_count - 1};
     size_t segment;
-    if (strcmp(e->name, "face") != 0 || e->property_count < 2 || !list->is_list ||
-        list->count_type != PLY_UINT8 || ply_type_bytes(list->type) != sizeof(uint32_t) ||
+    if (strcmp(e->name, "face") != 0 || e->property_count < 2 || !list->is_list || list->count_type != PLY_UINT8 ||
+        ply_type_bytes(list->type) != sizeof(uint32_t) ||
         (!find_property(h, &rest, "segment", PLY_INT32, &segment) &&
          !find_property(h, &rest, "segment", PLY_UINT32, &segment)))
-        return error_set(err, STATUS_INPUT, "%s: its faces are not a list of corners and a segment",
-                         at->name);
+        return error_set(err, STATUS_INPUT, "%s: its faces are not a list of corners and a segment", at->name);
     size_t corners = 3 * sizeof(uint32_t), stride = 1 + corners + element_bytes(h, &rest);
     if (e->count > (at->size - at->at) / stride)
         return error_set(err, STATUS_INPUT, "%s: ends within its faces", at->name);
@@ -101,11 +99,9 @@ static enum status read_faces(struct charted *c, const struct ply_header *h, str
         memcpy(&c->segment[t], face + 1 + corners + segment, sizeof c->segment[t]);
         for (int k = 0; k < 3; k++)
             if (face[0] != 3 || c->index[t][k] >= c->vertex_count)
-                return error_set(err, STATUS_INPUT, "%s: face %zu is not a triangle of its vertices",
-                                 at->name, t);
+                return error_set(err, STATUS_INPUT, "%s: face %zu is not a triangle of its vertices", at->name, t);
         if (c->segment[t] >= c->triangle_count)
-            return error_set(err, STATUS_INPUT, "%s: face %zu names segment %u", at->name, t,
-                             c->segment[t]);
+            return error_set(err, STATUS_INPUT, "%s: face %zu names segment %u", at->name, t, c->segment[t]);
     }
     return STATUS_OK;
 }
@@ -142,19 +138,23 @@ static bool is_there(const struct charted *c, const struct mesh *mesh, size_t t,
 }
 
 /* The atlas and the segments of `mesh` from scene.ply. */
-static enum status read_charts(struct recovered *r, const struct charted *c, const struct mesh *mesh,
-                               uint32_t width, uint32_t height, struct error *err) {
+static enum status read_charts(struct recovered *r, const struct charted *c, const struct mesh *mesh, uint32_t width,
+                               uint32_t height, struct error *err) {
     if (c->triangle_count != mesh->triangle_count)
-        return error_set(err, STATUS_INPUT, "scene.ply has %zu triangles, the room %zu: the outputs "
-                         "belong to another room", c->triangle_count, mesh->triangle_count);
+        return error_set(err, STATUS_INPUT,
+                         "scene.ply has %zu triangles, the room %zu: the outputs "
+                         "belong to another room",
+                         c->triangle_count, mesh->triangle_count);
     r->atlas = (struct atlas){.width = width, .height = height};
     r->atlas.corner = mem_array(mesh->triangle_count, sizeof *r->atlas.corner);
     r->segments.of_triangle = mem_array(mesh->triangle_count, sizeof *r->segments.of_triangle);
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         bool swapped = !is_there(c, mesh, t, false);
         if (swapped && !is_there(c, mesh, t, true))
-            return error_set(err, STATUS_INPUT, "scene.ply: triangle %zu is not where the room "
-                             "has it: the outputs belong to another room", t);
+            return error_set(err, STATUS_INPUT,
+                             "scene.ply: triangle %zu is not where the room "
+                             "has it: the outputs belong to another room",
+                             t);
         for (size_t k = 0; k < 3; k++) {
             vec2 st = c->st[c->index[t][swapped ? (3 - k) % 3 : k]];
             r->atlas.corner[t][k] = vec2_make(st.x * (float)width, (1.0f - st.y) * (float)height);
@@ -171,13 +171,11 @@ static enum status read_charts(struct recovered *r, const struct charted *c, con
 
 /* --- textures ----------------------------------------------------------------------------- */
 
-static enum status read_texture(const char *dir, const char *name, struct image *image,
-                                struct error *err) {
+static enum status read_texture(const char *dir, const char *name, struct image *image, struct error *err) {
     char *path = file_join(dir, name);
     enum status status = image_read(path, image, NULL, err);
     if (status == STATUS_OK && image->channel_count != 3) {
-        status = error_set(err, STATUS_INPUT, "%s: has %u channels instead of R G B or Y", path,
-                           image->channel_count);
+        status = error_set(err, STATUS_INPUT, "%s: has %u channels instead of R G B or Y", path, image->channel_count);
         image_release(image);
     }
     mem_free(path);
@@ -185,12 +183,12 @@ static enum status read_texture(const char *dir, const char *name, struct image 
 }
 
 /* As read_texture, but of the atlas's size. */
-static enum status read_sized(const char *dir, const char *name, const struct atlas *atlas,
-                              struct image *image, struct error *err) {
+static enum status read_sized(const char *dir, const char *name, const struct atlas *atlas, struct image *image,
+                              struct error *err) {
     enum status status = read_texture(dir, name, image, err);
     if (status == STATUS_OK && (image->width != atlas->width || image->height != atlas->height)) {
-        status = error_set(err, STATUS_INPUT, "%s/%s: %u x %u texels, base_color.exr has %u x %u", dir,
-                           name, image->width, image->height, atlas->width, atlas->height);
+        status = error_set(err, STATUS_INPUT, "%s/%s: %u x %u texels, base_color.exr has %u x %u", dir, name,
+                           image->width, image->height, atlas->width, atlas->height);
         image_release(image);
     }
     return status;
@@ -209,8 +207,7 @@ static size_t *sample_texels(const struct recovered *r) {
     for (size_t s = 0; s < r->segments.count; s++)
         texel[s] = NO_TEXEL;
     for (size_t i = r->inverse.valid_count; i-- > 0;)
-        texel[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]]] =
-            r->inverse.valid[i];
+        texel[r->segments.of_triangle[r->inverse.triangle[r->inverse.valid[i]]]] = r->inverse.valid[i];
     return texel;
 }
 
@@ -295,8 +292,7 @@ static enum status read_emission(struct recovered *r, const char *dir, struct er
 }
 
 /* Distant light; most rooms have none. */
-static enum status take_environment(struct recovered *r, const char *dir, struct parallel *pool,
-                                    struct error *err) {
+static enum status take_environment(struct recovered *r, const char *dir, struct parallel *pool, struct error *err) {
     struct image map = {0};
     char *path = file_join(dir, "environment.exr");
     enum status status = image_read(path, &map, NULL, err);
@@ -307,8 +303,8 @@ static enum status take_environment(struct recovered *r, const char *dir, struct
     return status == STATUS_NOT_FOUND ? STATUS_OK : status;
 }
 
-enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
-                           struct recovered *r, struct error *err) {
+enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *r,
+                           struct error *err) {
     struct charted charted = {0};
     struct image base_color = {0};
     memset(r, 0, sizeof *r);

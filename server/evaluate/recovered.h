@@ -16,7 +16,7 @@
 
 struct recovered {
     struct segments segments;
-    struct atlas atlas;        /* no charts: corners only */
+    struct atlas atlas; /* no charts: corners only */
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
@@ -24,8 +24,8 @@ struct recovered {
 
 /* `mesh` is borrowed until recovered_release. Roughness and specular are constant per segment and read at one of its
  * texels. Emission is the mean over a segment's texels, with a pattern where they differ. */
-enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool,
-                           struct recovered *recovered, struct error *err);
+enum status recovered_load(const char *dir, const struct mesh *mesh, struct parallel *pool, struct recovered *recovered,
+                           struct error *err);
 void recovered_release(struct recovered *recovered);
 
 #endif

@@ -17,8 +17,8 @@
 #define ROULETTE_DEPTH 5
 
 struct relight_settings relight_default_settings(void) {
-    return (struct relight_settings){.view = "0", .environment_scale = 1.0f, .up = 'y', .lights = true,
-                                     .spp = 64, .max_depth = 16, .seed = 7};
+    return (struct relight_settings){
+        .view = "0", .environment_scale = 1.0f, .up = 'y', .lights = true, .spp = 64, .max_depth = 16, .seed = 7};
 }
 
 /* --- the camera --------------------------------------------------------------------------------- */
@@ -35,20 +35,21 @@ static const struct transforms_frame *find_frame(const struct transforms *t, con
     return NULL;
 }
 
-static enum status choose_camera(const struct transforms *t, const char *path, const char *view,
-                                 struct camera *camera, struct error *err) {
+static enum status choose_camera(const struct transforms *t, const char *path, const char *view, struct camera *camera,
+                                 struct error *err) {
     const struct transforms_frame *frame = find_frame(t, view);
     if (!frame)
-        return error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, view,
-                         t->frame_count);
+        return error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, view, t->frame_count);
     if (isnan(frame->lens.width) || isnan(frame->lens.height))
-        return error_set(err, STATUS_INPUT, "%s: frames[%zu] does not say how large its picture is: "
-                         "w and h are missing", path, frame->number);
+        return error_set(err, STATUS_INPUT,
+                         "%s: frames[%zu] does not say how large its picture is: "
+                         "w and h are missing",
+                         path, frame->number);
     return transforms_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, camera, err);
 }
 
-static enum status read_camera(const char *outputs, const struct relight_settings *settings,
-                               struct camera *camera, struct error *err) {
+static enum status read_camera(const char *outputs, const struct relight_settings *settings, struct camera *camera,
+                               struct error *err) {
     char *path = settings->cameras ? mem_strdup(settings->cameras) : file_join(outputs, "views.json");
     struct findings findings = {.problems = cJSON_CreateArray()};
     struct transforms t = {0};
@@ -100,8 +101,10 @@ static enum status read_environment(const char *path, struct image *picture, str
     if (status != STATUS_OK)
         return status;
     if (picture->channel_count < 3 || picture->height < 2)
-        status = error_set(err, STATUS_INPUT, "%s: a picture of %u x %u pixels in %u channels is no "
-                           "environment", path, picture->width, picture->height, picture->channel_count);
+        status = error_set(err, STATUS_INPUT,
+                           "%s: a picture of %u x %u pixels in %u channels is no "
+                           "environment",
+                           path, picture->width, picture->height, picture->channel_count);
     size_t values = (size_t)picture->width * picture->height * picture->channel_count;
     for (size_t i = 0; i < values && info.encoding == IMAGE_SRGB; i++)
         picture->pixel[i] = image_srgb_to_linear(picture->pixel[i]);
@@ -109,9 +112,8 @@ static enum status read_environment(const char *path, struct image *picture, str
 }
 
 /* Sets the requested environment. The recovered one is already in the room's frame. */
-static enum status change_environment(struct world *world, const char *outputs,
-                                      const struct relight_settings *settings, struct parallel *pool,
-                                      struct error *err) {
+static enum status change_environment(struct world *world, const char *outputs, const struct relight_settings *settings,
+                                      struct parallel *pool, struct error *err) {
     bool is_given = settings->environment != NULL;
     struct image picture = {0}, oriented = {0};
     if (is_given && strcmp(settings->environment, "none") == 0) {
@@ -137,8 +139,8 @@ static enum status change_environment(struct world *world, const char *outputs,
 
 enum status relight(const char *outputs, const struct relight_settings *settings, struct parallel *pool,
                     struct image *image, struct error *err) {
-    struct path_settings path = {.max_depth = (int)settings->max_depth, .roulette_depth = ROULETTE_DEPTH,
-                                 .seed = settings->seed};
+    struct path_settings path = {
+        .max_depth = (int)settings->max_depth, .roulette_depth = ROULETTE_DEPTH, .seed = settings->seed};
     struct mesh mesh = {0};
     struct recovered room = {0};
     struct camera camera;

@@ -21,7 +21,8 @@ static struct score_columns find_columns(const struct image *image) {
     return (struct score_columns){
         {column(image, "base_color.R"), column(image, "base_color.G"), column(image, "base_color.B")},
         {column(image, "emission.R"), column(image, "emission.G"), column(image, "emission.B")},
-        column(image, "roughness"), column(image, "specular"),
+        column(image, "roughness"),
+        column(image, "specular"),
     };
 }
 
@@ -42,8 +43,8 @@ static bool one_object(const struct image *truth, size_t object, uint32_t x, uin
     return true;
 }
 
-static void add_emission(struct score *score, const float *found, const float *truth,
-                         const struct score_columns *fc, const struct score_columns *tc) {
+static void add_emission(struct score *score, const float *found, const float *truth, const struct score_columns *fc,
+                         const struct score_columns *tc) {
     bool found_emits = false, truth_emits = false;
     for (int c = 0; c < 3; c++) {
         double a = (double)found[fc->emission[c]], b = (double)truth[tc->emission[c]];
@@ -57,8 +58,7 @@ static void add_emission(struct score *score, const float *found, const float *t
     score->emission_either += found_emits || truth_emits;
 }
 
-void score_add(struct score *score, const struct image *found, const struct image *truth,
-               const uint8_t *flags) {
+void score_add(struct score *score, const struct image *found, const struct image *truth, const uint8_t *flags) {
     assert(found->width == truth->width && found->height == truth->height);
     struct score_columns fc = find_columns(found), tc = find_columns(truth);
     size_t object = column(truth, "object_id");
@@ -87,9 +87,7 @@ void score_add(struct score *score, const struct image *found, const struct imag
     }
 }
 
-double score_mean(struct score_sum sum) {
-    return sum.count ? sum.sum / (double)sum.count : (double)NAN;
-}
+double score_mean(struct score_sum sum) { return sum.count ? sum.sum / (double)sum.count : (double)NAN; }
 
 double score_psnr_db(struct score_sum sum) {
     double mean = score_mean(sum);
@@ -97,6 +95,5 @@ double score_psnr_db(struct score_sum sum) {
 }
 
 double score_emission_iou(const struct score *score) {
-    return score->emission_either ? (double)score->emission_both / (double)score->emission_either
-                                  : 1.0;
+    return score->emission_either ? (double)score->emission_both / (double)score->emission_either : 1.0;
 }

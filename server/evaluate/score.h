@@ -32,16 +32,15 @@ struct score_sum {
 
 struct score {
     struct score_sum base_color_seen, base_color_all, roughness, specular, emission_log;
-    size_t emission_both, emission_either; /* pixels */
+    size_t emission_both, emission_either;    /* pixels */
     size_t pixels, plain_pixels, seen_pixels; /* seen: plain and seen */
 };
 
 /* Adds a view. Pictures are of one size; flags[height * width] as above. */
-void score_add(struct score *score, const struct image *found, const struct image *truth,
-               const uint8_t *flags);
+void score_add(struct score *score, const struct image *found, const struct image *truth, const uint8_t *flags);
 
-double score_mean(struct score_sum sum);    /* NaN when empty */
-double score_psnr_db(struct score_sum sum); /* infinite without error, NaN when empty */
+double score_mean(struct score_sum sum);              /* NaN when empty */
+double score_psnr_db(struct score_sum sum);           /* infinite without error, NaN when empty */
 double score_emission_iou(const struct score *score); /* 1 when neither emits anywhere */
 
 #endif

@@ -25,8 +25,7 @@ struct seen_edge_job {
     size_t train;
 };
 
-static struct seen_corner trace_corner(const struct seen *s, const struct camera *camera, uint32_t x,
-                                  uint32_t y) {
+static struct seen_corner trace_corner(const struct seen *s, const struct camera *camera, uint32_t x, uint32_t y) {
     struct seen_corner corner = {.object = NOTHING};
     vec3 origin = camera_origin(camera), direction;
     struct accel_hit hit;
@@ -115,8 +114,7 @@ static bool view_sees(const struct seen *s, size_t train, vec3 point, vec3 norma
     vec3 to_camera = vec3_sub(camera_origin(camera), point);
     float distance = vec3_length(to_camera);
     vec3 direction = vec3_scale(to_camera, 1.0f / distance);
-    return !accel_occluded(s->accel, accel_offset(point, normal, direction), direction, 0.0f,
-                           distance);
+    return !accel_occluded(s->accel, accel_offset(point, normal, direction), direction, 0.0f, distance);
 }
 
 /* Starts with the view that saw the previous point, which is close. */
@@ -148,8 +146,7 @@ static uint8_t pixel_flags(const struct flag_job *job, uint32_t x, uint32_t y, s
         vec3 direction;
         struct accel_hit hit;
         if (!camera_direction(job->camera, place.x, place.y, &direction) ||
-            !accel_intersect(s->accel, origin, direction, 0.0f, INFINITY, &hit) ||
-            s->emits[hit.triangle])
+            !accel_intersect(s->accel, origin, direction, 0.0f, INFINITY, &hit) || s->emits[hit.triangle])
             return 0;
         if (flags & SCORE_SEEN) {
             vec3 point = mesh_point(mesh, hit.triangle, hit.b1, hit.b2);
@@ -170,8 +167,7 @@ static void flag_row(void *user, size_t row, int thread) {
         job->flags[(size_t)y * width + x] = pixel_flags(job, x, y, &last);
 }
 
-void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool,
-                uint8_t *flags) {
+void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool, uint8_t *flags) {
     struct flag_job job = {seen, camera, flags};
     parallel_for(pool, camera->height, flag_row, &job);
 }

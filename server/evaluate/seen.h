@@ -22,19 +22,18 @@
 struct seen {
     const struct scene *scene; /* borrowed, all three */
     const struct accel *accel;
-    const bool *emits;         /* [triangle_count] of the truth */
+    const bool *emits; /* [triangle_count] of the truth */
     size_t train_count;
-    uint32_t *train;           /* [train_count] photographs; owned */
-    uint8_t **straddles;       /* [train_count][height * width] 1: the pixel lies on an edge; owned */
+    uint32_t *train;     /* [train_count] photographs; owned */
+    uint8_t **straddles; /* [train_count][height * width] 1: the pixel lies on an edge; owned */
 };
 
 /* The mesh of the scene has object_id. */
-void seen_init(struct seen *seen, const struct scene *scene, const struct accel *accel,
-               const bool *emits, struct parallel *pool);
+void seen_init(struct seen *seen, const struct scene *scene, const struct accel *accel, const bool *emits,
+               struct parallel *pool);
 void seen_release(struct seen *seen);
 
 /* flags[height * width] out: SCORE_PLAIN, SCORE_SEEN (score.h) of each pixel's samples. */
-void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool,
-                uint8_t *flags);
+void seen_flags(const struct seen *seen, const struct camera *camera, struct parallel *pool, uint8_t *flags);
 
 #endif

@@ -10,7 +10,7 @@
 /* Least-squares weights for the value of a quadratic at the window's centre: 1/49 - 4 (u^2 + v^2 - 8) / 588, with 4
  * the mean of u^2 and 588 the sum of (u^2 - 4)^2. The centre pixel contributes to its own estimate, so 1 - WEIGHT(0,
  * 0) of its noise variance remains in the difference. */
-#define WEIGHT(u, v) (1.0 / 49.0 - 4.0 * ((u) * (u) + (v) * (v) - 8.0) / 588.0)
+#define WEIGHT(u, v) (1.0 / 49.0 - 4.0 * ((u) * (u) + (v) * (v)-8.0) / 588.0)
 #define MAX_COLOR_DIFFERENCE 0.005f /* base colours that differ less are the same */
 #define MIN_ROUGHNESS 0.5f
 
@@ -55,10 +55,10 @@ static bool smoothed_pixel(const struct image *photograph, const struct image *t
 /* Makes a picture of expected values, NaN where the scene is not smooth, which metrics leave out. Returns the number
  * of smooth pixels. */
 static size_t smooth_picture(const struct image *photograph, const struct image *truth, struct image *smoothed) {
-    const struct truth_channels at = {
-        {image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"),
-         image_channel(truth, "base_color.B")},
-        image_channel(truth, "roughness"), image_channel(truth, "object_id")};
+    const struct truth_channels at = {{image_channel(truth, "base_color.R"), image_channel(truth, "base_color.G"),
+                                       image_channel(truth, "base_color.B")},
+                                      image_channel(truth, "roughness"),
+                                      image_channel(truth, "object_id")};
     size_t count = 0;
     image_init_rgb(smoothed, truth->width, truth->height);
     for (size_t i = 0; i < 3 * (size_t)truth->width * truth->height; i++)

@@ -7,8 +7,8 @@
 #include "server/export/mesh_obj.h"
 #include "server/export/mitsuba.h"
 
-static enum status write_glb(const char *dir, const struct export_input *input,
-                             const struct parts *parts, struct error *err) {
+static enum status write_glb(const char *dir, const struct export_input *input, const struct parts *parts,
+                             struct error *err) {
     char *path = file_join(dir, "scene.glb"), *base_color = file_join(dir, FORMATS_BASE_COLOR);
     char *emission = file_join(dir, FORMATS_EMISSION);
     enum status status = glb_write(path, input, parts, base_color, emission, err);
@@ -18,32 +18,32 @@ static enum status write_glb(const char *dir, const struct export_input *input,
     return status;
 }
 
-static enum status write_obj(const char *dir, const struct export_input *input,
-                             const struct parts *parts, struct error *err) {
+static enum status write_obj(const char *dir, const struct export_input *input, const struct parts *parts,
+                             struct error *err) {
     char *path = file_join(dir, "scene.obj");
     enum status status = mesh_obj_write(path, input, parts, err);
     mem_free(path);
     return status;
 }
 
-static enum status write_mtl(const char *dir, const struct export_input *input,
-                             const struct parts *parts, struct error *err) {
+static enum status write_mtl(const char *dir, const struct export_input *input, const struct parts *parts,
+                             struct error *err) {
     char *path = file_join(dir, "scene.mtl");
     enum status status = mesh_mtl_write(path, input, parts, FORMATS_BASE_COLOR, FORMATS_EMISSION, err);
     mem_free(path);
     return status;
 }
 
-static enum status write_xml(const char *dir, const struct export_input *input,
-                             const struct parts *parts, struct error *err) {
+static enum status write_xml(const char *dir, const struct export_input *input, const struct parts *parts,
+                             struct error *err) {
     char *path = file_join(dir, "scene.xml");
     enum status status = mitsuba_xml_write(path, input, parts, "scene.serialized", err);
     mem_free(path);
     return status;
 }
 
-static enum status write_shapes(const char *dir, const struct export_input *input,
-                                const struct parts *parts, struct error *err) {
+static enum status write_shapes(const char *dir, const struct export_input *input, const struct parts *parts,
+                                struct error *err) {
     char *path = file_join(dir, "scene.serialized");
     enum status status = mitsuba_shapes_write(path, input, parts, err);
     mem_free(path);
@@ -53,8 +53,8 @@ static enum status write_shapes(const char *dir, const struct export_input *inpu
 const struct format formats[FORMATS_COUNT] = {
     {"scene.glb", "model/gltf-binary", "the room as glTF 2.0, for Blender and others", write_glb},
     {"scene.obj", "model/obj", "the mesh with its atlas coordinates", write_obj},
-    {"scene.mtl", "model/mtl", "the materials of scene.obj; wants base_color.png and, where there is one, emission.png", write_mtl},
-    {"scene.xml", "application/xml", "the room for Mitsuba 3; wants scene.serialized and the textures",
-     write_xml},
+    {"scene.mtl", "model/mtl", "the materials of scene.obj; wants base_color.png and, where there is one, emission.png",
+     write_mtl},
+    {"scene.xml", "application/xml", "the room for Mitsuba 3; wants scene.serialized and the textures", write_xml},
     {"scene.serialized", "application/octet-stream", "the shapes of scene.xml", write_shapes},
 };

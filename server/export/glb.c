@@ -38,15 +38,16 @@ struct glb {
     const struct export_input *in;
     const struct parts *parts;
     const float *scales; /* [segment_count] see emission_texture.h; NULL: no emission pattern */
-    struct { uint64_t offset, length; int number; } view[VIEW_COUNT];
+    struct {
+        uint64_t offset, length;
+        int number;
+    } view[VIEW_COUNT];
     uint64_t length; /* of the bytes, padding included */
     cJSON *root, *accessors, *nodes, *children;
     int accessor_count, node_count;
 };
 
-static uint64_t padded(uint64_t length) {
-    return (length + 3) / 4 * 4;
-}
+static uint64_t padded(uint64_t length) { return (length + 3) / 4 * 4; }
 
 static void lay_out(struct glb *g, uint64_t base_color_bytes, uint64_t emission_bytes) {
     uint64_t vertices = g->parts->seams.vertex_count;
@@ -70,9 +71,7 @@ static void lay_out(struct glb *g, uint64_t base_color_bytes, uint64_t emission_
 
 /* --- JSON ----------------------------------------------------------------------------------- */
 
-static cJSON *add_object(cJSON *parent, const char *key) {
-    return cJSON_AddObjectToObject(parent, key);
-}
+static cJSON *add_object(cJSON *parent, const char *key) { return cJSON_AddObjectToObject(parent, key); }
 
 static cJSON *append(cJSON *array) {
     cJSON *object = cJSON_CreateObject();
@@ -124,8 +123,8 @@ static void add_pictures(struct glb *g) {
 }
 
 /* Returns its index. */
-static int add_accessor(struct glb *g, enum view view, size_t first, size_t count, const char *type,
-                        int64_t stride, const struct part *bounds) {
+static int add_accessor(struct glb *g, enum view view, size_t first, size_t count, const char *type, int64_t stride,
+                        const struct part *bounds) {
     cJSON *accessor = append(g->accessors);
     json_add_int(accessor, "bufferView", g->view[view].number);
     json_add_int(accessor, "byteOffset", (int64_t)first * stride);
@@ -149,18 +148,17 @@ static void add_mesh(struct glb *g, cJSON *mesh, size_t i, const char *name) {
     if (g->in->mesh->normal)
         json_add_int(attributes, "NORMAL", add_accessor(g, VIEW_NORMAL, first, count, "VEC3", 12, NULL));
     json_add_int(attributes, "TEXCOORD_0", add_accessor(g, VIEW_UV, first, count, "VEC2", 8, NULL));
-    json_add_int(primitive, "indices", add_accessor(g, VIEW_INDEX, 3 * part->first_triangle,
-                                                    3 * part->triangle_count, "SCALAR", 4, NULL));
+    json_add_int(primitive, "indices",
+                 add_accessor(g, VIEW_INDEX, 3 * part->first_triangle, 3 * part->triangle_count, "SCALAR", 4, NULL));
     json_add_int(primitive, "material", (int64_t)i);
 }
 
 static void add_emission(cJSON *material, cJSON *extensions, rgb emission) {
     float strength = rgb_max(emission);
     rgb factor = rgb_scale(emission, 1.0f / strength);
-    add_numbers(material, "emissiveFactor", (float[]){fminf(factor.r, 1.0f), fminf(factor.g, 1.0f),
-                                                      fminf(factor.b, 1.0f)}, 3);
-    json_add_number(add_object(extensions, "KHR_materials_emissive_strength"), "emissiveStrength",
-                    (double)strength);
+    add_numbers(material, "emissiveFactor",
+                (float[]){fminf(factor.r, 1.0f), fminf(factor.g, 1.0f), fminf(factor.b, 1.0f)}, 3);
+    json_add_number(add_object(extensions, "KHR_materials_emissive_strength"), "emissiveStrength", (double)strength);
 }
 
 static void add_material(const struct glb *g, cJSON *material, uint32_t s, const char *name) {
@@ -174,8 +172,7 @@ static void add_material(const struct glb *g, cJSON *material, uint32_t s, const
     json_add_bool(material, "doubleSided", !emits);
     cJSON *extensions = add_object(material, "extensions");
     double root = sqrt(0.08 * (double)m->specular[s]);
-    json_add_number(add_object(extensions, "KHR_materials_specular"), "specularFactor",
-                    root > 0.0 ? 1.0 : 0.0);
+    json_add_number(add_object(extensions, "KHR_materials_specular"), "specularFactor", root > 0.0 ? 1.0 : 0.0);
     json_add_number(add_object(extensions, "KHR_materials_ior"), "ior", (1.0 + root) / (1.0 - root));
     if (emits)
         add_emission(material, extensions, varies ? rgb_gray(g->scales[s]) : m->emission[s]);
@@ -212,16 +209,16 @@ static void add_camera(struct glb *g, cJSON *cameras, const struct export_compar
     vec3 at = c->world_from_camera.translation;
     cJSON *node = add_node(g, view->name);
     /* Our camera: x right, y down, z forward; glTF's: x right, y up, z back. Column-major. */
-    add_numbers(node, "matrix", (float[]){r[0][0], r[1][0], r[2][0], 0.0f, -r[0][1], -r[1][1], -r[2][1],
-                                          0.0f, -r[0][2], -r[1][2], -r[2][2], 0.0f, at.x, at.y, at.z,
-                                          1.0f}, 16);
+    add_numbers(node, "matrix",
+                (float[]){r[0][0], r[1][0], r[2][0], 0.0f, -r[0][1], -r[1][1], -r[2][1], 0.0f, -r[0][2], -r[1][2],
+                          -r[2][2], 0.0f, at.x, at.y, at.z, 1.0f},
+                16);
     json_add_int(node, "camera", cJSON_GetArraySize(cameras));
     cJSON *camera = append(cameras);
     json_add_string(camera, "name", view->name);
     json_add_string(camera, "type", "perspective");
     cJSON *lens = add_object(camera, "perspective");
-    json_add_number(lens, "aspectRatio",
-                    ((double)c->width / (double)c->fx) / ((double)c->height / (double)c->fy));
+    json_add_number(lens, "aspectRatio", ((double)c->width / (double)c->fx) / ((double)c->height / (double)c->fy));
     json_add_number(lens, "yfov", 2.0 * atan(0.5 * (double)c->height / (double)c->fy));
     json_add_number(lens, "znear", NEAR_M);
 }
@@ -241,7 +238,7 @@ static void add_cameras(struct glb *g) {
 /* The rotation, as a quaternion x y z w, that brings an axis to +y. */
 static const float *upright(vec3 up) {
     static const float rotation[6][4] = {
-        {0, 0, 0.70710678f, 0.70710678f}, {0, 0, 0, 1}, {-0.70710678f, 0, 0, 0.70710678f},
+        {0, 0, 0.70710678f, 0.70710678f},  {0, 0, 0, 1}, {-0.70710678f, 0, 0, 0.70710678f},
         {0, 0, -0.70710678f, 0.70710678f}, {1, 0, 0, 0}, {0.70710678f, 0, 0, 0.70710678f},
     };
     int axis = up.x != 0.0f ? 0 : up.z != 0.0f ? 2 : 1;
@@ -256,9 +253,10 @@ static void add_room(struct glb *g) {
     if (g->in->environment) {
         cJSON *extras = add_object(room, "extras");
         json_add_string(extras, "environment", "environment.exr");
-        json_add_string(extras, "environment_layout",
-                        "(column + 1/2) over width = atan2(x, -z) / 2 pi modulo 1, row over (height - 1) = acos(y) / pi: "
-                        "the first and the last row are the poles; in this node's axes");
+        json_add_string(
+            extras, "environment_layout",
+            "(column + 1/2) over width = atan2(x, -z) / 2 pi modulo 1, row over (height - 1) = acos(y) / pi: "
+            "the first and the last row are the poles; in this node's axes");
     }
     g->children = cJSON_AddArrayToObject(room, "children");
 }

@@ -23,21 +23,21 @@ struct export_comparison {
     const char *name;               /* the photograph's, for labels */
     const struct image *photograph; /* saturated and masked pixels unchanged */
     const struct image *render;
-    const struct camera *camera;    /* that took it */
+    const struct camera *camera; /* that took it */
 };
 
 /* All borrowed. */
 struct export_input {
-    const char *title;                 /* the job's or the scene's name */
+    const char *title; /* the job's or the scene's name */
     const struct mesh *mesh;
     const struct segments *segments;
     const struct atlas *atlas;
     const struct inverse_uv *inverse;
     const struct materials *materials;
-    const float *confidence_count;     /* [height][width] number of observations; NULL until known: */
-    const float *confidence_spread;    /* [height][width] their spread; then there is no preview of it */
-    const bool *is_emitter;            /* [segment_count] */
-    const struct image *environment;   /* R G B; NULL: no distant light; */
+    const float *confidence_count;              /* [height][width] number of observations; NULL until known: */
+    const float *confidence_spread;             /* [height][width] their spread; then there is no preview of it */
+    const bool *is_emitter;                     /* [segment_count] */
+    const struct image *environment;            /* R G B; NULL: no distant light; */
     const struct image *environment_confidence; /* count, spread; NULL together with environment */
     size_t comparison_count;
     const struct export_comparison *comparison;
@@ -47,9 +47,9 @@ struct export_input {
      *   "stages": [{"name": "refine", "seconds": 12.3}, ...]
      *   "views":  [{"name": ..., "msre": ..., ...}, ...] in the order of `comparison` */
     const cJSON *report;
-    vec3 up; /* the axis of the room that points up, see scene_up; 0: y */
-    bool has_materials;                /* false: materials are only their neutral start, which no preview shows */
-    const uint16_t (*radiance)[3];     /* [height][width] measured light, half precision; NULL while not known */
+    vec3 up;                       /* the axis of the room that points up, see scene_up; 0: y */
+    bool has_materials;            /* false: materials are only their neutral start, which no preview shows */
+    const uint16_t (*radiance)[3]; /* [height][width] measured light, half precision; NULL while not known */
 };
 
 #endif

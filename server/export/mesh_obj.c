@@ -58,9 +58,10 @@ enum status mesh_mtl_write(const char *path, const struct export_input *input, c
         uint32_t s = parts->part[p].segment;
         double specular = (double)m->specular[s], roughness = (double)m->roughness[s];
         double smooth = 1.0 - roughness;
-        sink_printf(&out, "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
-                    "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n", s, base_color, specular, specular,
-                    specular, MAX_NS * smooth * smooth, roughness);
+        sink_printf(&out,
+                    "newmtl segment_%u\nKd 1 1 1\nmap_Kd %s\nKs " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT
+                    "\nNi 1.5\nNs " SINK_FLOAT "\nPr " SINK_FLOAT "\n",
+                    s, base_color, specular, specular, specular, MAX_NS * smooth * smooth, roughness);
         bool varies = scales && scales[s] > 0.0f;
         rgb e = varies ? rgb_gray(scales[s]) : m->emission[s];
         if (rgb_max(e) > 0.0f)

@@ -15,14 +15,12 @@ static void put_header(struct sink *out, const struct mesh *mesh, size_t vertex_
                 "property list uchar int vertex_indices\n"
                 "property int segment\nproperty int face\n"
                 "end_header\n",
-                vertex_count,
-                mesh->normal ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
+                vertex_count, mesh->normal ? "property float nx\nproperty float ny\nproperty float nz\n" : "",
                 mesh->triangle_count);
 }
 
-enum status mesh_ply_write(const char *path, const struct mesh *mesh,
-                           const struct segments *segments, const struct atlas *atlas,
-                           struct error *err) {
+enum status mesh_ply_write(const char *path, const struct mesh *mesh, const struct segments *segments,
+                           const struct atlas *atlas, struct error *err) {
     struct seams seams;
     struct sink out;
     enum status status = sink_open(&out, path, 0, err);

@@ -15,8 +15,7 @@
 #include "server/scene/segment.h"
 
 /* Replaces the file atomically. The same input gives the same bytes. */
-enum status mesh_ply_write(const char *path, const struct mesh *mesh,
-                           const struct segments *segments, const struct atlas *atlas,
-                           struct error *err);
+enum status mesh_ply_write(const char *path, const struct mesh *mesh, const struct segments *segments,
+                           const struct atlas *atlas, struct error *err);
 
 #endif

@@ -23,12 +23,15 @@ static void put_sensor(struct sink *out, size_t number, const struct camera *c) 
     const vec3 at = c->world_from_camera.translation;
     const float origin[3] = {at.x, at.y, at.z};
     double width = (double)c->width, height = (double)c->height;
-    sink_printf(out, "  <sensor type=\"perspective\" id=\"view_%zu\">\n"
-                "    <transform name=\"to_world\"><matrix value=\"", number);
+    sink_printf(out,
+                "  <sensor type=\"perspective\" id=\"view_%zu\">\n"
+                "    <transform name=\"to_world\"><matrix value=\"",
+                number);
     for (int i = 0; i < 3; i++)
         sink_printf(out, SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT " ", -(double)r[i][0],
                     -(double)r[i][1], (double)r[i][2], (double)origin[i]);
-    sink_printf(out, "0 0 0 1\"/></transform>\n"
+    sink_printf(out,
+                "0 0 0 1\"/></transform>\n"
                 "    <string name=\"fov_axis\" value=\"x\"/>\n"
                 "    <float name=\"fov\" value=\"" SINK_FLOAT "\"/>\n"
                 "    <float name=\"principal_point_offset_x\" value=\"" SINK_FLOAT "\"/>\n"
@@ -43,17 +46,18 @@ static void put_sensor(struct sink *out, size_t number, const struct camera *c) 
                 "    </film>\n"
                 "    <sampler type=\"independent\"><integer name=\"sample_count\" value=\"$spp\"/></sampler>\n"
                 "  </sensor>\n",
-                2.0 * atan(0.5 * width / (double)c->fx) * 180.0 / PI,
-                (0.5 * width - (double)c->cx) / width, (0.5 * height - (double)c->cy) / height, c->width,
-                c->height);
+                2.0 * atan(0.5 * width / (double)c->fx) * 180.0 / PI, (0.5 * width - (double)c->cx) / width,
+                (0.5 * height - (double)c->cy) / height, c->width, c->height);
 }
 
 static void put_emitter(struct sink *out, rgb radiance, bool varies) {
     if (varies)
         sink_printf(out, "    <emitter type=\"area\"><ref name=\"radiance\" id=\"emission\"/></emitter>\n");
     else
-        sink_printf(out, "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" SINK_FLOAT " " SINK_FLOAT
-                    " " SINK_FLOAT "\"/></emitter>\n", (double)radiance.r, (double)radiance.g, (double)radiance.b);
+        sink_printf(out,
+                    "    <emitter type=\"area\"><rgb name=\"radiance\" value=\"" SINK_FLOAT " " SINK_FLOAT
+                    " " SINK_FLOAT "\"/></emitter>\n",
+                    (double)radiance.r, (double)radiance.g, (double)radiance.b);
 }
 
 static void put_shape(struct sink *out, const struct export_input *in, const char *shapes, size_t number,
@@ -69,8 +73,8 @@ static void put_shape(struct sink *out, const struct export_input *in, const cha
                 "      <float name=\"roughness\" value=\"" SINK_FLOAT "\"/>\n"
                 "      <float name=\"specular\" value=\"" SINK_FLOAT "\"/>\n"
                 "    </bsdf></bsdf>\n",
-                segment, shapes, number, in->mesh->normal ? "false" : "true",
-                (double)m->roughness[segment], (double)m->specular[segment]);
+                segment, shapes, number, in->mesh->normal ? "false" : "true", (double)m->roughness[segment],
+                (double)m->specular[segment]);
     if (rgb_max(m->emission[segment]) > 0.0f)
         put_emitter(out, m->emission[segment], varies);
     sink_printf(out, "  </shape>\n");
@@ -95,21 +99,21 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
         if (in->comparison[i].camera->model == CAMERA_OPENCV)
             put_sensor(&out, i, in->comparison[i].camera);
     sink_printf(&out, "  <texture type=\"bitmap\" id=\"base_color\">\n"
-                "    <string name=\"filename\" value=\"base_color.exr\"/>\n"
-                "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
-                "  </texture>\n");
+                      "    <string name=\"filename\" value=\"base_color.exr\"/>\n"
+                      "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
+                      "  </texture>\n");
     float *scales = emission_texture_scales(in);
     if (scales)
         sink_printf(&out, "  <texture type=\"bitmap\" id=\"emission\">\n"
-                    "    <string name=\"filename\" value=\"emission.exr\"/>\n"
-                    "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
-                    "  </texture>\n");
+                          "    <string name=\"filename\" value=\"emission.exr\"/>\n"
+                          "    <string name=\"wrap_mode\" value=\"clamp\"/>\n"
+                          "  </texture>\n");
     for (size_t p = 0; p < parts->count; p++)
         put_shape(&out, in, shapes, p, parts->part[p].segment, scales && scales[parts->part[p].segment] > 0.0f);
     mem_free(scales);
     if (in->environment)
         sink_printf(&out, "  <emitter type=\"envmap\"><string name=\"filename\" value=\"environment.exr\"/>"
-                    "</emitter>\n");
+                          "</emitter>\n");
     sink_printf(&out, "</scene>\n");
     return sink_close(&out, STATUS_OK, err);
 }
@@ -197,8 +201,8 @@ static void pack_part(struct packer *p, const struct export_input *in, const str
             pack_u32(p, seams->index[parts->order[i]][c] - (uint32_t)part->first_vertex);
 }
 
-enum status mitsuba_shapes_write(const char *path, const struct export_input *in,
-                                 const struct parts *parts, struct error *err) {
+enum status mitsuba_shapes_write(const char *path, const struct export_input *in, const struct parts *parts,
+                                 struct error *err) {
     struct sink out;
     enum status status = sink_open(&out, path, 0, err);
     if (status != STATUS_OK)

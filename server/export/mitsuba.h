@@ -15,9 +15,9 @@
 #include "server/export/parts.h"
 
 /* The same input gives the same bytes. `shapes` is the name of scene.serialized. */
-enum status mitsuba_xml_write(const char *path, const struct export_input *input,
-                              const struct parts *parts, const char *shapes, struct error *err);
-enum status mitsuba_shapes_write(const char *path, const struct export_input *input,
-                                 const struct parts *parts, struct error *err);
+enum status mitsuba_xml_write(const char *path, const struct export_input *input, const struct parts *parts,
+                              const char *shapes, struct error *err);
+enum status mitsuba_shapes_write(const char *path, const struct export_input *input, const struct parts *parts,
+                                 struct error *err);
 
 #endif

@@ -24,8 +24,8 @@
 #define MIME_PLY "model/ply"
 #define MIME_HTML "text/html; charset=utf-8"
 
-#define PAGE_LIMIT ((size_t)1 << 29)  /* bytes */
-#define PAGE_COMPARISONS 24           /* side-by-sides embedded in the page; files of all are written */
+#define PAGE_LIMIT ((size_t)1 << 29) /* bytes */
+#define PAGE_COMPARISONS 24          /* side-by-sides embedded in the page; files of all are written */
 
 struct output_kind {
     enum picture_kind kind;
@@ -35,15 +35,12 @@ struct output_kind {
 };
 
 static const struct output_kind kinds[] = {
-    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour",
-     "linear Rec. 709 reflectance by texel"},
+    {PICTURE_BASE_COLOR, "base_color", IMAGE_HALF, "Base colour", "linear Rec. 709 reflectance by texel"},
     {PICTURE_EMISSION, "emission", IMAGE_HALF, "Emission",
      "radiance of each emitter's front side, exactly 0 elsewhere; compressed by 1 / (1 + maximum) "
      "in the preview"},
-    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness",
-     "by segment, 0 to 1; the microfacet width is its square"},
-    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular",
-     "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
+    {PICTURE_ROUGHNESS, "roughness", IMAGE_HALF, "Roughness", "by segment, 0 to 1; the microfacet width is its square"},
+    {PICTURE_SPECULAR, "specular", IMAGE_HALF, "Specular", "by segment, 0 to 1; 0.5 is an index of refraction of 1.5"},
     {PICTURE_CONFIDENCE, "confidence", IMAGE_FLOAT, "Confidence",
      "observations by texel and the spread of their radiance; in the preview from blue (few) to "
      "yellow (many), red where no photograph sees the surface"},
@@ -61,14 +58,14 @@ struct export {
 
 /* --- putting files in place --------------------------------------------------------------- */
 
-static enum status announce_file(const struct export *e, const char *type, const char *name,
-                           const char *content_type, struct error *err) {
+static enum status announce_file(const struct export *e, const char *type, const char *name, const char *content_type,
+                                 struct error *err) {
     return e->announce ? e->announce(e->user, type, name, content_type, err) : STATUS_OK;
 }
 
 /* Lists a finished file in the report and announces it. */
-static enum status list_file(struct export *e, const char *type, const char *name,
-                        const char *content_type, const char *about, struct error *err) {
+static enum status list_file(struct export *e, const char *type, const char *name, const char *content_type,
+                             const char *about, struct error *err) {
     if (e->files) {
         cJSON *file = cJSON_CreateObject();
         json_add_string(file, "name", name);
@@ -81,16 +78,14 @@ static enum status list_file(struct export *e, const char *type, const char *nam
 
 enum image_format { FORMAT_PNG, FORMAT_EXR_HALF, FORMAT_EXR_FLOAT };
 
-static enum status put_image(struct export *e, const char *type, const char *name,
-                             const struct image *image, enum image_format format,
-                             const char *about, struct error *err) {
+static enum status put_image(struct export *e, const char *type, const char *name, const struct image *image,
+                             enum image_format format, const char *about, struct error *err) {
     char *path = file_join(e->dir, name), *temporary = mem_printf("%s.part", path);
     enum status status;
     if (format == FORMAT_PNG)
         status = image_write_png(temporary, image, 1.0f, err);
     else
-        status = image_write_exr(temporary, image,
-                                 format == FORMAT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true, err);
+        status = image_write_exr(temporary, image, format == FORMAT_EXR_HALF ? IMAGE_HALF : IMAGE_FLOAT, true, err);
     if (status == STATUS_OK)
         status = file_put_in_place(temporary, path, err);
     else
@@ -128,8 +123,8 @@ static enum status replace_checked(const char *path, const void *data, size_t le
     return status;
 }
 
-static enum status put_bytes(struct export *e, const char *name, const char *content_type,
-                             const void *data, size_t length, struct error *err) {
+static enum status put_bytes(struct export *e, const char *name, const char *content_type, const void *data,
+                             size_t length, struct error *err) {
     char *path = file_join(e->dir, name);
     enum status status = replace_checked(path, data, length, err);
     if (status == STATUS_OK)
@@ -148,8 +143,8 @@ static enum status make_folder(const struct export *e, const char *name, struct 
 /* --- distant light ------------------------------------------------------------------------ */
 
 #define ENVIRONMENT_TITLE "Distant light"
-#define ENVIRONMENT_ABOUT                                                                     \
-    "by latitude and longitude, what the photographs show where they look out of the room; "  \
+#define ENVIRONMENT_ABOUT                                                                                              \
+    "by latitude and longitude, what the photographs show where they look out of the room; "                           \
     "dimmed in the preview where it was filled in"
 
 static enum status put_environment_preview(struct export *e, struct error *err) {
@@ -157,8 +152,8 @@ static enum status put_environment_preview(struct export *e, struct error *err) 
     if (!e->input->environment)
         return STATUS_OK;
     picture_environment(e->input, &image);
-    enum status status = put_image(e, EVENT_PREVIEW, "preview/environment.png", &image, FORMAT_PNG,
-                                   ENVIRONMENT_ABOUT, err);
+    enum status status =
+        put_image(e, EVENT_PREVIEW, "preview/environment.png", &image, FORMAT_PNG, ENVIRONMENT_ABOUT, err);
     image_release(&image);
     return status;
 }
@@ -167,13 +162,13 @@ static enum status put_environment(struct export *e, struct error *err) {
     const struct export_input *in = e->input;
     if (!in->environment)
         return STATUS_OK;
-    enum status status = put_image(e, EVENT_OUTPUT, "environment.exr", in->environment, FORMAT_EXR_FLOAT,
-                                   ENVIRONMENT_ABOUT, err);
+    enum status status =
+        put_image(e, EVENT_OUTPUT, "environment.exr", in->environment, FORMAT_EXR_FLOAT, ENVIRONMENT_ABOUT, err);
     if (status == STATUS_OK)
-        status = put_image(e, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence,
-                           FORMAT_EXR_FLOAT,
+        status = put_image(e, EVENT_OUTPUT, "environment_confidence.exr", in->environment_confidence, FORMAT_EXR_FLOAT,
                            "photographs by direction, 0 where it was filled in, and the spread of what "
-                           "they show", err);
+                           "they show",
+                           err);
     return status;
 }
 
@@ -182,8 +177,9 @@ static enum status put_radiance_preview(struct export *e, struct error *err) {
     if (!e->input->radiance)
         return STATUS_OK;
     picture_radiance(e->input, &image);
-    enum status status = put_image(e, EVENT_PREVIEW, "preview/radiance.png", &image, FORMAT_PNG,
-                                   "measured light: what the photographs show of each texel, its median at mid grey", err);
+    enum status status =
+        put_image(e, EVENT_PREVIEW, "preview/radiance.png", &image, FORMAT_PNG,
+                  "measured light: what the photographs show of each texel, its median at mid grey", err);
     image_release(&image);
     return status;
 }
@@ -214,9 +210,11 @@ static enum status put_emission_png(struct export *e, const uint32_t *source, st
     if (!scales)
         return STATUS_OK;
     emission_texture(e->input, source, scales, &image);
-    enum status status = put_image(e, EVENT_OUTPUT, FORMATS_EMISSION, &image, FORMAT_PNG,
-                                   "what emitters show that are not equally bright all over, each over the brightest of "
-                                   "it, in 8 bits, sRGB", err);
+    enum status status =
+        put_image(e, EVENT_OUTPUT, FORMATS_EMISSION, &image, FORMAT_PNG,
+                  "what emitters show that are not equally bright all over, each over the brightest of "
+                  "it, in 8 bits, sRGB",
+                  err);
     image_release(&image);
     mem_free(scales);
     return status;
@@ -231,11 +229,10 @@ static enum status put_textures(struct export *e, struct error *err) {
         snprintf(name, sizeof name, "%s.exr", kinds[k].stem);
         picture_texture(e->input, kinds[k].kind, source, &image);
         status = put_image(e, EVENT_OUTPUT, name, &image,
-                           kinds[k].type == IMAGE_HALF ? FORMAT_EXR_HALF : FORMAT_EXR_FLOAT,
-                           kinds[k].about, err);
+                           kinds[k].type == IMAGE_HALF ? FORMAT_EXR_HALF : FORMAT_EXR_FLOAT, kinds[k].about, err);
         if (kinds[k].kind == PICTURE_BASE_COLOR && status == STATUS_OK)
-            status = put_image(e, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, FORMAT_PNG,
-                               "the same in 8 bits, sRGB", err);
+            status =
+                put_image(e, EVENT_OUTPUT, FORMATS_BASE_COLOR, &image, FORMAT_PNG, "the same in 8 bits, sRGB", err);
         image_release(&image);
     }
     if (status == STATUS_OK)
@@ -250,7 +247,7 @@ static enum status put_mesh(struct export *e, struct error *err) {
     enum status status = mesh_ply_write(path, in->mesh, in->segments, in->atlas, err);
     if (status == STATUS_OK)
         status = list_file(e, EVENT_OUTPUT, "scene.ply", MIME_PLY,
-                          "the mesh with its atlas coordinates s, t and its segments", err);
+                           "the mesh with its atlas coordinates s, t and its segments", err);
     mem_free(path);
     return status;
 }
@@ -307,16 +304,14 @@ static enum status put_views(struct export *e, struct error *err) {
     enum status status = replace_checked(path, text, strlen(text), err);
     if (status == STATUS_OK)
         status = list_file(e, EVENT_OUTPUT, "views.json", MIME_JSON,
-                      "the cameras of the held-out views, as transforms.json has them", err);
+                           "the cameras of the held-out views, as transforms.json has them", err);
     mem_free(path);
     mem_free(text);
     cJSON_Delete(views);
     return status;
 }
 
-static void comparison_file(char name[64], size_t i) {
-    snprintf(name, 64, "compare/%03zu.png", i);
-}
+static void comparison_file(char name[64], size_t i) { snprintf(name, 64, "compare/%03zu.png", i); }
 
 static enum status put_comparisons(struct export *e, struct error *err) {
     size_t count = e->input->comparison_count;
@@ -385,8 +380,7 @@ static cJSON *describe_segments(const struct export_input *in) {
         json_add_number(entry, "roughness", (double)in->materials->roughness[s]);
         json_add_number(entry, "specular", (double)in->materials->specular[s]);
         json_add_bool(entry, "emitter", in->is_emitter[s]);
-        json_add(entry, "emission",
-                 cJSON_CreateDoubleArray((double[]){(double)e.r, (double)e.g, (double)e.b}, 3));
+        json_add(entry, "emission", cJSON_CreateDoubleArray((double[]){(double)e.r, (double)e.g, (double)e.b}, 3));
         json_add_bool(entry, "emission_varies", scales && scales[s] > 0.0f);
         cJSON_AddItemToArray(list, entry);
     }
@@ -406,16 +400,14 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
     size_t texture_count = KIND_COUNT + (e->input->environment ? 1 : 0);
     struct report_picture *comparison = mem_array(shown, sizeof *comparison);
     for (size_t k = 0; k < KIND_COUNT; k++)
-        texture[k] = (struct report_picture){
-            mem_printf("%s/preview/%s.png", e->dir, kinds[k].stem), kinds[k].title,
-            kinds[k].about};
-    texture[KIND_COUNT] = (struct report_picture){file_join(e->dir, "preview/environment.png"),
-                                                  ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
+        texture[k] = (struct report_picture){mem_printf("%s/preview/%s.png", e->dir, kinds[k].stem), kinds[k].title,
+                                             kinds[k].about};
+    texture[KIND_COUNT] =
+        (struct report_picture){file_join(e->dir, "preview/environment.png"), ENVIRONMENT_TITLE, ENVIRONMENT_ABOUT};
     for (size_t i = 0; i < shown; i++) {
         char name[64];
         comparison_file(name, i);
-        comparison[i] = (struct report_picture){file_join(e->dir, name),
-                                                e->input->comparison[i].name, NULL};
+        comparison[i] = (struct report_picture){file_join(e->dir, name), e->input->comparison[i].name, NULL};
     }
     struct report_page page = {e->input->title, report, texture_count, shown, texture, comparison};
     struct buf html;
@@ -450,14 +442,14 @@ static enum status put_report(struct export *e, struct error *err) {
 
 /* --- entry points ------------------------------------------------------------------------- */
 
-enum status export_preview(const char *dir, const struct export_input *input,
-                           export_announce *announce, void *user, struct error *err) {
+enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
+                           struct error *err) {
     struct export e = {dir, input, announce, user, NULL, NULL};
     return put_previews(&e, err);
 }
 
-enum status export_outputs(const char *dir, const struct export_input *input,
-                           export_announce *announce, void *user, struct error *err) {
+enum status export_outputs(const char *dir, const struct export_input *input, export_announce *announce, void *user,
+                           struct error *err) {
     struct export e = {dir, input, announce, user, cJSON_CreateArray(), cJSON_CreateArray()};
     enum status status = put_previews(&e, err);
     if (status == STATUS_OK)

@@ -39,15 +39,15 @@
 
 /* Called after each file is complete under its final name; `type` is EVENT_PREVIEW or EVENT_OUTPUT, `name` is
  * relative to the folder. A failure ends the export. NULL: no announcements. */
-typedef enum status export_announce(void *user, const char *type, const char *name,
-                                    const char *content_type, struct error *err);
+typedef enum status export_announce(void *user, const char *type, const char *name, const char *content_type,
+                                    struct error *err);
 
 /* Writes what is known by now to preview/ under the folder `dir`, which exists. Needs no report and no comparisons. */
-enum status export_preview(const char *dir, const struct export_input *input,
-                           export_announce *announce, void *user, struct error *err);
+enum status export_preview(const char *dir, const struct export_input *input, export_announce *announce, void *user,
+                           struct error *err);
 
 /* Writes all files, previews first and the report last. */
-enum status export_outputs(const char *dir, const struct export_input *input,
-                           export_announce *announce, void *user, struct error *err);
+enum status export_outputs(const char *dir, const struct export_input *input, export_announce *announce, void *user,
+                           struct error *err);
 
 #endif

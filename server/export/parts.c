@@ -6,8 +6,7 @@
 
 #define NONE UINT32_MAX
 
-void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *atlas,
-                const uint32_t *order) {
+void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *atlas, const uint32_t *order) {
     size_t corner_count = 3 * mesh->triangle_count, size = 16;
     while (size < 2 * corner_count)
         size *= 2;
@@ -23,8 +22,7 @@ void seams_make(struct seams *s, const struct mesh *mesh, const struct atlas *at
         size_t slot = rng_key(vertex, chart, 0) & (size - 1);
         for (; table[slot] != NONE; slot = (slot + 1) & (size - 1)) {
             uint32_t other = s->corner[table[slot]];
-            if (mesh->index[other / 3][other % 3] == vertex &&
-                atlas->chart_of_triangle[other / 3] == chart)
+            if (mesh->index[other / 3][other % 3] == vertex && atlas->chart_of_triangle[other / 3] == chart)
                 break;
         }
         if (table[slot] == NONE) {
@@ -63,10 +61,8 @@ static void measure(struct parts *p, const struct mesh *mesh, struct part *part,
         for (int c = 0; c < 3; c++) {
             size_t vertex = p->seams.index[p->order[i]][c];
             vec3 at = seams_position(&p->seams, mesh, vertex);
-            part->lower = (vec3){fminf(part->lower.x, at.x), fminf(part->lower.y, at.y),
-                                 fminf(part->lower.z, at.z)};
-            part->upper = (vec3){fmaxf(part->upper.x, at.x), fmaxf(part->upper.y, at.y),
-                                 fmaxf(part->upper.z, at.z)};
+            part->lower = (vec3){fminf(part->lower.x, at.x), fminf(part->lower.y, at.y), fminf(part->lower.z, at.z)};
+            part->upper = (vec3){fmaxf(part->upper.x, at.x), fmaxf(part->upper.y, at.y), fmaxf(part->upper.z, at.z)};
             if (vertex - first_vertex >= part->vertex_count)
                 part->vertex_count = vertex - first_vertex + 1;
         }
@@ -80,8 +76,10 @@ enum status parts_make(struct parts *p, const struct mesh *mesh, const struct se
     for (size_t s = 0; s < segments->count; s++)
         p->count += begin[s + 1] > begin[s];
     if (p->count > PARTS_MAX) {
-        enum status status = error_set(err, STATUS_LIMIT, "the room has %zu segments, a file of objects "
-                                       "%d at most", p->count, PARTS_MAX);
+        enum status status = error_set(err, STATUS_LIMIT,
+                                       "the room has %zu segments, a file of objects "
+                                       "%d at most",
+                                       p->count, PARTS_MAX);
         mem_free(begin);
         mem_free(p->order);
         return status;
@@ -92,8 +90,8 @@ enum status parts_make(struct parts *p, const struct mesh *mesh, const struct se
     for (size_t s = 0; s < segments->count; s++) {
         if (begin[s + 1] == begin[s])
             continue;
-        *part = (struct part){.segment = (uint32_t)s, .first_triangle = begin[s],
-                              .triangle_count = begin[s + 1] - begin[s]};
+        *part = (struct part){
+            .segment = (uint32_t)s, .first_triangle = begin[s], .triangle_count = begin[s + 1] - begin[s]};
         measure(p, mesh, part, first_vertex);
         first_vertex += part->vertex_count;
         part++;

@@ -21,8 +21,7 @@ struct seams {
 };
 
 /* `order` is a permutation of the triangles that defines the order of vertices; NULL: identity. */
-void seams_make(struct seams *seams, const struct mesh *mesh, const struct atlas *atlas,
-                const uint32_t *order);
+void seams_make(struct seams *seams, const struct mesh *mesh, const struct atlas *atlas, const uint32_t *order);
 void seams_release(struct seams *seams);
 
 /* A non-empty segment. Charts belong to one segment, so parts share no vertices. */
@@ -35,7 +34,7 @@ struct part {
 
 struct parts {
     struct seams seams;
-    uint32_t *order;   /* [triangle_count] triangles grouped by segment, otherwise in order; owned */
+    uint32_t *order; /* [triangle_count] triangles grouped by segment, otherwise in order; owned */
     size_t count;
     struct part *part; /* [count] in order of segments; owned */
 };

@@ -92,16 +92,17 @@ static rgb value_at(const struct export_input *input, enum picture_kind kind, si
     return rgb_make(input->confidence_count[texel], input->confidence_spread[texel], 0.0f);
 }
 
-void picture_texture(const struct export_input *input, enum picture_kind kind,
-                     const uint32_t *source, struct image *image) {
+void picture_texture(const struct export_input *input, enum picture_kind kind, const uint32_t *source,
+                     struct image *image) {
     static const char *const rgb_channel[] = {"R", "G", "B"};
     static const char *const gray_channel[] = {"Y"};
     static const char *const confidence_channel[] = {"count", "spread"};
-    static const struct { uint32_t count; const char *const *name; } channels[] = {
-        [PICTURE_BASE_COLOR] = {3, rgb_channel},
-        [PICTURE_EMISSION] = {3, rgb_channel},
-        [PICTURE_ROUGHNESS] = {1, gray_channel},
-        [PICTURE_SPECULAR] = {1, gray_channel},
+    static const struct {
+        uint32_t count;
+        const char *const *name;
+    } channels[] = {
+        [PICTURE_BASE_COLOR] = {3, rgb_channel},        [PICTURE_EMISSION] = {3, rgb_channel},
+        [PICTURE_ROUGHNESS] = {1, gray_channel},        [PICTURE_SPECULAR] = {1, gray_channel},
         [PICTURE_CONFIDENCE] = {2, confidence_channel},
     };
     const struct inverse_uv *inverse = input->inverse;
@@ -122,15 +123,16 @@ void picture_texture(const struct export_input *input, enum picture_kind kind,
 
 /* Five anchors of the viridis map (van der Walt and Smith 2015), sRGB values. */
 static rgb ramp(float t) {
-    static const rgb anchor[5] = {{0.267f, 0.005f, 0.329f}, {0.231f, 0.322f, 0.545f},
-                                  {0.128f, 0.567f, 0.551f}, {0.369f, 0.789f, 0.383f},
+    static const rgb anchor[5] = {{0.267f, 0.005f, 0.329f},
+                                  {0.231f, 0.322f, 0.545f},
+                                  {0.128f, 0.567f, 0.551f},
+                                  {0.369f, 0.789f, 0.383f},
                                   {0.993f, 0.906f, 0.144f}};
     float place = clampf(t, 0.0f, 1.0f) * 4.0f;
     int i = place >= 3.0f ? 3 : (int)place;
     float f = place - (float)i;
     rgb c = rgb_mad(rgb_scale(anchor[i], 1.0f - f), f, anchor[i + 1]);
-    return rgb_make(image_srgb_to_linear(c.r), image_srgb_to_linear(c.g),
-                    image_srgb_to_linear(c.b));
+    return rgb_make(image_srgb_to_linear(c.r), image_srgb_to_linear(c.g), image_srgb_to_linear(c.b));
 }
 
 /* Display colour of a mean value. */
@@ -197,8 +199,7 @@ static rgb preview_look(const void *user, rgb mean) {
     return show(p->kind, mean, p->count_max);
 }
 
-void picture_preview(const struct export_input *input, enum picture_kind kind,
-                     struct image *image) {
+void picture_preview(const struct export_input *input, enum picture_kind kind, struct image *image) {
     const struct inverse_uv *inverse = input->inverse;
     struct preview p = {input, kind, 0.0f};
     if (kind == PICTURE_CONFIDENCE)
@@ -300,8 +301,7 @@ static rgb difference_color(rgb photograph, rgb render, float floor) {
     if (!isfinite(d))
         return rgb_gray(NAN);
     float fade = 1.0f - fabsf(d);
-    return d > 0.0f ? rgb_make(0.85f, 0.85f * fade, 0.85f * fade)
-                    : rgb_make(0.85f * fade, 0.85f * fade, 0.85f);
+    return d > 0.0f ? rgb_make(0.85f, 0.85f * fade, 0.85f * fade) : rgb_make(0.85f * fade, 0.85f * fade, 0.85f);
 }
 
 void picture_comparison(const struct export_comparison *comparison, struct image *image) {
@@ -317,8 +317,7 @@ void picture_comparison(const struct export_comparison *comparison, struct image
             rgb p = pixel_at(photograph, pixel), r = pixel_at(render, pixel);
             put(image, x, y, rgb_scale(p, scale));
             put(image, x + width + COMPARISON_GAP, y, rgb_scale(r, scale));
-            put(image, x + 2 * (width + COMPARISON_GAP), y,
-                difference_color(p, r, 0.01f / scale));
+            put(image, x + 2 * (width + COMPARISON_GAP), y, difference_color(p, r, 0.01f / scale));
         }
     }
 }

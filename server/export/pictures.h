@@ -21,14 +21,13 @@ enum picture_kind {
 uint32_t *picture_margin(const struct inverse_uv *inverse);
 
 /* The full-size texture; `source` is from picture_margin. Confidence has no margin. */
-void picture_texture(const struct export_input *input, enum picture_kind kind,
-                     const uint32_t *source, struct image *image);
+void picture_texture(const struct export_input *input, enum picture_kind kind, const uint32_t *source,
+                     struct image *image);
 
 /* At most EXPORT_PREVIEW_SIZE texels a side, mean over valid texels, R G B for image_write_png with scale 1: base
  * colour unchanged, roughness and specular as grey, emission compressed by 1 / (1 + maximum), confidence from dark
  * blue (few observations) to yellow (many), red where a surface was never observed. */
-void picture_preview(const struct export_input *input, enum picture_kind kind,
-                     struct image *image);
+void picture_preview(const struct export_input *input, enum picture_kind kind, struct image *image);
 
 /* The measured light, as large as the others, its median at mid grey. It must be there. */
 void picture_radiance(const struct export_input *input, struct image *image);

@@ -64,8 +64,8 @@ struct curve {
     size_t count;
     struct curve_point *point; /* [count] owned */
     bool logarithmic;
-    double top, range;   /* of values, or of their logarithms */
-    double steps;        /* from the first to the last */
+    double top, range; /* of values, or of their logarithms */
+    double steps;      /* from the first to the last */
 };
 
 static void curve_init(struct curve *c, const cJSON *series) {
@@ -86,11 +86,13 @@ static void put_axes(struct buf *out, const struct curve *c) {
     for (int i = 0; i <= 4; i++) {
         double y = TOP + (HEIGHT - TOP - BOTTOM) * i / 4.0;
         double value = c->top - c->range * i / 4.0;
-        buf_printf(out, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
+        buf_printf(out,
+                   "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\"/>"
                    "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>",
                    LEFT, WIDTH - RIGHT, y, y, LEFT - 6, y + 4.0, c->logarithmic ? exp(value) : value);
     }
-    buf_printf(out, "<text x=\"%d\" y=\"%d\">%.4g</text>"
+    buf_printf(out,
+               "<text x=\"%d\" y=\"%d\">%.4g</text>"
                "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text>",
                LEFT, HEIGHT - 6, c->point[0].step, WIDTH - RIGHT, HEIGHT - 6, c->point[c->count - 1].step);
 }
@@ -146,8 +148,7 @@ static void begin_card(struct buf *out, const char *classes, const char *name) {
 
 /* --- sections ----------------------------------------------------------------------------- */
 
-static enum status put_textures(struct buf *out, const struct report_page *page,
-                                struct error *err) {
+static enum status put_textures(struct buf *out, const struct report_page *page, struct error *err) {
     enum status status = STATUS_OK;
     buf_puts(out, "<h2>Textures</h2><div class=grid>");
     for (size_t i = 0; i < page->texture_count && status == STATUS_OK; i++) {
@@ -166,8 +167,7 @@ static enum status put_textures(struct buf *out, const struct report_page *page,
     return status;
 }
 
-static enum status put_comparisons(struct buf *out, const struct report_page *page,
-                                   struct error *err) {
+static enum status put_comparisons(struct buf *out, const struct report_page *page, struct error *err) {
     if (page->comparison_count == 0)
         return STATUS_OK;
     const cJSON *view = cJSON_GetObjectItemCaseSensitive(page->report, "views");
@@ -228,7 +228,8 @@ static void put_stages(struct buf *out, const cJSON *stages) {
             continue;
         buf_puts(out, "<tr><th>");
         html_key(out, name);
-        buf_printf(out, "</th><td class=n>%.2f s</td><td style=\"width:60%%\"><span class=bar "
+        buf_printf(out,
+                   "</th><td class=n>%.2f s</td><td style=\"width:60%%\"><span class=bar "
                    "style=\"width:%.1f%%\"></span></td></tr>",
                    seconds, longest > 0.0 ? fmax(100.0 * seconds / longest, 0.3) : 0.0);
     }
@@ -280,10 +281,12 @@ static void put_segments(struct buf *out, const cJSON *segments) {
         emitters += cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter"));
     buf_puts(out, "<h2>Segments</h2>");
     begin_card(out, "", "segments");
-    buf_printf(out, "<p class=soft>%d segments, %d of them "
+    buf_printf(out,
+               "<p class=soft>%d segments, %d of them "
                "emitters.</p><table><tr><th>object</th><th class=n>area, m²</th><th class=n>texels"
                "</th><th class=n>roughness</th><th class=n>specular</th><th>mean base colour</th>"
-               "<th>emission, radiance</th></tr>", count, emitters);
+               "<th>emission, radiance</th></tr>",
+               count, emitters);
     for (int pass = 1; pass >= 0; pass--) {
         for (const cJSON *s = segments->child; s && rows < SEGMENT_ROWS; s = s->next) {
             if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(s, "emitter")) != pass)

@@ -7,7 +7,7 @@
 #include "common/json.h"
 
 struct report_picture {
-    const char *path;    /* of a PNG to embed */
+    const char *path; /* of a PNG to embed */
     const char *title;
     const char *caption; /* may be NULL */
 };

@@ -13,8 +13,8 @@
 #include "common/mem.h"
 
 enum status sink_open(struct sink *s, const char *path, uint64_t limit, struct error *err) {
-    *s = (struct sink){.path = mem_strdup(path), .temporary = mem_printf("%s.part", path),
-                       .limit = limit ? limit : UINT64_MAX};
+    *s = (struct sink){
+        .path = mem_strdup(path), .temporary = mem_printf("%s.part", path), .limit = limit ? limit : UINT64_MAX};
     s->file = fopen(s->temporary, "wbe");
     if (s->file)
         return STATUS_OK;
@@ -132,8 +132,8 @@ enum status sink_close(struct sink *s, enum status status, struct error *err) {
     if ((fclose(s->file) != 0 || had_failed) && s->status == STATUS_OK)
         fail(s, had_failed ? EIO : errno);
     if (status == STATUS_OK && s->status == STATUS_LIMIT)
-        status = error_set(err, STATUS_LIMIT, "%s would be larger than %llu bytes", s->path,
-                           (unsigned long long)s->limit);
+        status =
+            error_set(err, STATUS_LIMIT, "%s would be larger than %llu bytes", s->path, (unsigned long long)s->limit);
     else if (status == STATUS_OK && s->status != STATUS_OK)
         status = error_set_errno(err, s->error_number, "cannot write %s", s->path);
     if (status == STATUS_OK)

@@ -18,8 +18,8 @@ struct sink {
     FILE *file;
     uint64_t written, limit; /* bytes */
     uint32_t checksum;       /* CRC-32 of the bytes so far */
-    enum status status;     /* of the writes so far */
-    int error_number;             /* errno of the failure; 0 for STATUS_LIMIT */
+    enum status status;      /* of the writes so far */
+    int error_number;        /* errno of the failure; 0 for STATUS_LIMIT */
 };
 
 /* `limit` is the maximum size in bytes (beyond it STATUS_LIMIT); 0: none. */

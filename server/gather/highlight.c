@@ -9,14 +9,14 @@
 #include "server/render/light.h"
 #include "server/render/sampler.h"
 
-enum { PAIR_HALF = 8 }; /* sample dimension of the lobes, after those of incident.c */
-#define MIN_COSINE 1e-3f /* between view and shading normal; more grazing views have no highlight; by hand */
+enum { PAIR_HALF = 8 };     /* sample dimension of the lobes, after those of incident.c */
+#define MIN_COSINE 1e-3f    /* between view and shading normal; more grazing views have no highlight; by hand */
 #define ALBEDO_SAMPLES 1024 /* pairs of a view direction and a lobe sample; by hand */
 #define KEY_ALBEDO 11
 
 /* Adds the light from one direction to every level, with the density of the whole mixture of samplers. */
-static void add(struct highlight *h, const struct highlight_levels *levels, const struct bsdf *lobe,
-                const float *eta, vec3 wo, vec3 wi, rgb light, float samples_a_level, float light_density) {
+static void add(struct highlight *h, const struct highlight_levels *levels, const struct bsdf *lobe, const float *eta,
+                vec3 wo, vec3 wi, rgb light, float samples_a_level, float light_density) {
     float lobe_value[HIGHLIGHT_ROUGHNESSES], density = light_density, cos_d = 0.0f;
     for (size_t k = 0; k < levels->roughness_count; k++) {
         struct bsdf_ggx t = bsdf_ggx(lobe[k].alpha, wo, wi);
@@ -33,9 +33,8 @@ static void add(struct highlight *h, const struct highlight_levels *levels, cons
 }
 
 void highlight_gather(struct highlight *h, struct incident *in, const struct light_field *field,
-                      const struct surface_point *at, vec3 wo_world,
-                      const struct highlight_levels *levels, uint32_t key, size_t samples,
-                      size_t light_samples) {
+                      const struct surface_point *at, vec3 wo_world, const struct highlight_levels *levels,
+                      uint32_t key, size_t samples, size_t light_samples) {
     assert(samples + light_samples <= INCIDENT_CHUNK);
     memset(h, 0, sizeof *h);
     vec3 frame[3];

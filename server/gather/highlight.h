@@ -26,10 +26,9 @@ struct highlight {
 
 /* Gathers the reflected radiance towards unit `wo` from `samples` directions of the lobes, divided among the roughness
  * levels, and `light_samples` of the lights; together at most INCIDENT_CHUNK. */
-void highlight_gather(struct highlight *highlight, struct incident *scratch,
-                      const struct light_field *field, const struct surface_point *at, vec3 wo,
-                      const struct highlight_levels *levels, uint32_t key, size_t samples,
-                      size_t light_samples);
+void highlight_gather(struct highlight *highlight, struct incident *scratch, const struct light_field *field,
+                      const struct surface_point *at, vec3 wo, const struct highlight_levels *levels, uint32_t key,
+                      size_t samples, size_t light_samples);
 
 /* Hemispherical-hemispherical albedo of the lobe under uniform illumination. */
 float highlight_albedo(float roughness, float specular);

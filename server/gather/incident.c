@@ -17,7 +17,7 @@ enum {
     PAIR_REFLECTED_LIGHT = 48,
     PAIR_ROULETTE = 56
 };
-#define MAX_BOUNCES 4 /* continuations of a ray, from backs and from specular fronts; by hand */
+#define MAX_BOUNCES 4    /* continuations of a ray, from backs and from specular fronts; by hand */
 #define MIN_COSINE 1e-3f /* to a normal; more grazing rays are not continued by the lobe; by hand */
 /* Probability to continue by the lobe over the specular share of what is reflected; by hand */
 #define ROULETTE_FACTOR 2.0f
@@ -38,8 +38,7 @@ vec3 incident_cosine_direction(const vec3 frame[3], vec2 u) {
 static vec2 place_at(const struct world *world, const struct accel_hit *hit) {
     const vec2 *c = world->triangle[hit->triangle].corner;
     float b0 = 1.0f - hit->b1 - hit->b2;
-    return (vec2){b0 * c[0].x + hit->b1 * c[1].x + hit->b2 * c[2].x,
-                  b0 * c[0].y + hit->b1 * c[1].y + hit->b2 * c[2].y};
+    return (vec2){b0 * c[0].x + hit->b1 * c[1].x + hit->b2 * c[2].x, b0 * c[0].y + hit->b1 * c[1].y + hit->b2 * c[2].y};
 }
 
 static size_t texel_at(const struct world *world, const struct accel_hit *hit) {
@@ -57,7 +56,7 @@ static bool is_light(const struct world *world, const struct world_triangle *t) 
 
 /* Radiance along a ray that escapes or meets a front, and the density with which the light sampler draws it. */
 static rgb incoming_radiance(const struct light_field *field, const struct accel_ray *ray, const struct accel_hit *hit,
-                float *light_pdf) {
+                             float *light_pdf) {
     const struct world *world = field->world;
     *light_pdf = 0.0f;
     if (hit->triangle == ACCEL_NONE) {
@@ -115,7 +114,7 @@ static vec3 position_at(const struct world_triangle *t, const struct accel_ray *
 
 /* Continues from a back by a cosine-distributed direction. */
 static void spawn_from_back(struct wavefront *w, const struct accel_ray *ray, const struct accel_hit *hit,
-                      struct incident_path path) {
+                            struct incident_path path) {
     const struct world *world = w->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
@@ -169,7 +168,7 @@ static void sample_light(struct wavefront *w, const struct reflection *m, struct
 
 /* Russian roulette: the probability to continue, small where the specular share of the reflected light is. */
 static float continuation_probability(const struct world *world, const struct incident_lobe *lobe,
-                                  const struct accel_hit *hit, float cosine) {
+                                      const struct accel_hit *hit, float cosine) {
     const float *base = world->materials->base_color.texel[texel_at(world, hit)];
     float diffuse = (base[0] + base[1] + base[2]) * (1.0f / 3.0f);
     float fresnel = bsdf_fresnel(cosine, bsdf_eta(lobe->specular));
@@ -178,14 +177,14 @@ static float continuation_probability(const struct world *world, const struct in
 
 /* Continues from a front by its specular lobe. */
 static void spawn_specular(struct wavefront *w, const struct accel_ray *ray, const struct accel_hit *hit,
-                        struct incident_path path) {
+                           struct incident_path path) {
     const struct world *world = w->field->world;
     const struct world_triangle *t = &world->triangle[hit->triangle];
     const struct incident_lobe *lobe = &w->field->lobe[t->segment];
     struct reflection m = {position_at(t, ray, hit), t->normal,
-                       .frame[2] = surface_shading(world->mesh, hit->triangle, hit->b1, hit->b2, t->normal),
-                       .lobe = bsdf_lobe(lobe->roughness, lobe->specular),
-                       .wide = bsdf_lobe(fmaxf(lobe->roughness, WIDE_ROUGHNESS), lobe->specular)};
+                           .frame[2] = surface_shading(world->mesh, hit->triangle, hit->b1, hit->b2, t->normal),
+                           .lobe = bsdf_lobe(lobe->roughness, lobe->specular),
+                           .wide = bsdf_lobe(fmaxf(lobe->roughness, WIDE_ROUGHNESS), lobe->specular)};
     vec3_frame(m.frame[2], &m.frame[0], &m.frame[1]);
     m.wo = vec3_to_frame(m.frame, vec3_neg(ray->direction));
     if (!(m.wo.z > MIN_COSINE))
@@ -200,8 +199,8 @@ static void spawn_specular(struct wavefront *w, const struct accel_ray *ray, con
     struct lobe_values r = reflect(&m, wi);
     if (r.pdf > 0.0f && vec3_dot(direction, m.normal) > 0.0f)
         spawn_ray(w, m.position, m.normal, direction,
-              (struct incident_path){path.index, rgb_scale(path.beta, r.lobe / r.pdf), false, true,
-                                    rgb_scale(path.beta, r.wide), r.pdf});
+                  (struct incident_path){path.index, rgb_scale(path.beta, r.lobe / r.pdf), false, true,
+                                         rgb_scale(path.beta, r.wide), r.pdf});
 }
 
 /* Adds the radiance that ray `k` finds and continues it; escapes and light_pdf are those of the first hit. */
@@ -239,12 +238,12 @@ static void add_unoccluded_lights(const struct wavefront *w) {
     }
 }
 
-void incident_trace(struct incident *in, const struct light_field *field,
-                    const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count) {
+void incident_trace(struct incident *in, const struct light_field *field, const struct surface_point *at, uint32_t key,
+                    uint32_t first_sample, size_t count) {
     struct wavefront w = {in, field, key, first_sample, 0, 0, 0};
     for (size_t i = 0; i < count; i++) {
         spawn_ray(&w, at->position, at->normal, in->direction[i],
-              (struct incident_path){(uint32_t)i, rgb_gray(1.0f), .is_first = true});
+                  (struct incident_path){(uint32_t)i, rgb_gray(1.0f), .is_first = true});
         in->radiance[i] = rgb_gray(0.0f);
         in->light_pdf[i] = 0.0f;
         in->escapes[i] = false;
@@ -259,9 +258,8 @@ void incident_trace(struct incident *in, const struct light_field *field,
     }
 }
 
-void incident_sample_lights(struct incident *in, const struct light_field *field,
-                            const struct surface_point *at, uint32_t key, uint32_t first_sample,
-                            size_t from, size_t count) {
+void incident_sample_lights(struct incident *in, const struct light_field *field, const struct surface_point *at,
+                            uint32_t key, uint32_t first_sample, size_t from, size_t count) {
     const struct world *world = field->world;
     for (size_t i = 0; i < count; i++) {
         uint32_t sample = first_sample + (uint32_t)i;

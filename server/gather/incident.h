@@ -37,21 +37,21 @@ struct incident {
     vec3 direction[INCIDENT_CHUNK]; /* unit, world */
     rgb radiance[INCIDENT_CHUNK];
     float light_pdf[INCIDENT_CHUNK]; /* density of the light sampler, by solid angle */
-    bool escapes[INCIDENT_CHUNK];     /* the first ray meets no surface */
+    bool escapes[INCIDENT_CHUNK];    /* the first ray meets no surface */
     struct accel_ray ray[INCIDENT_CHUNK];
     struct accel_hit hit[INCIDENT_CHUNK];
     struct incident_path {
-        uint32_t index;   /* of the direction */
-        rgb beta;         /* throughput */
-        bool is_first;    /* the ray starts at the point itself */
-        bool is_specular; /* lights were sampled at its origin; emitters it meets count by the next two: */
-        rgb light_beta;   /* throughput of the widened lobe, times pdf */
-        float pdf;    /* density with which this direction was drawn */
+        uint32_t index;     /* of the direction */
+        rgb beta;           /* throughput */
+        bool is_first;      /* the ray starts at the point itself */
+        bool is_specular;   /* lights were sampled at its origin; emitters it meets count by the next two: */
+        rgb light_beta;     /* throughput of the widened lobe, times pdf */
+        float pdf;          /* density with which this direction was drawn */
     } path[INCIDENT_CHUNK]; /* of the current bounce's rays */
     struct incident_light_sample {
         uint32_t index;
         rgb radiance;
-    } light_sample[INCIDENT_CHUNK]; /* lights to be reflected unless they are occluded */
+    } light_sample[INCIDENT_CHUNK];          /* lights to be reflected unless they are occluded */
     struct accel_ray shadow[INCIDENT_CHUNK]; /* towards them */
     uint8_t occluded[INCIDENT_CHUNK];
 };
@@ -61,13 +61,12 @@ vec3 incident_cosine_direction(const vec3 frame[3], vec2 u);
 
 /* Fills radiance, light_pdf and escapes for direction[0..count). Random numbers are those of `key`, samples
  * first_sample and up. */
-void incident_trace(struct incident *in, const struct light_field *field,
-                    const struct surface_point *at, uint32_t key, uint32_t first_sample, size_t count);
+void incident_trace(struct incident *in, const struct light_field *field, const struct surface_point *at, uint32_t key,
+                    uint32_t first_sample, size_t count);
 
 /* Appends `count` light samples after the first `from` entries of direction, radiance and light_pdf. Random numbers as
  * above. */
-void incident_sample_lights(struct incident *in, const struct light_field *field,
-                            const struct surface_point *at, uint32_t key, uint32_t first_sample,
-                            size_t from, size_t count);
+void incident_sample_lights(struct incident *in, const struct light_field *field, const struct surface_point *at,
+                            uint32_t key, uint32_t first_sample, size_t from, size_t count);
 
 #endif

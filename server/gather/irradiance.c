@@ -17,9 +17,20 @@ enum { PAIR_DIRECTION }; /* sample dimension, before those of incident.c */
 /* Integrands of the moments for light from direction w at cosine c. */
 static void moment_basis(vec3 w, float c, float basis[IRRADIANCE_MOMENTS]) {
     float f = c * bsdf_schlick(c);
-    const float value[IRRADIANCE_MOMENTS] = {
-        c,          c * w.x,       c * w.y,       c * w.z,       f,             f * w.x,       f * w.y,
-        f * w.z,    f * w.x * w.x, f * w.y * w.y, f * w.z * w.z, f * w.x * w.y, f * w.x * w.z, f * w.y * w.z};
+    const float value[IRRADIANCE_MOMENTS] = {c,
+                                             c * w.x,
+                                             c * w.y,
+                                             c * w.z,
+                                             f,
+                                             f * w.x,
+                                             f * w.y,
+                                             f * w.z,
+                                             f * w.x * w.x,
+                                             f * w.y * w.y,
+                                             f * w.z * w.z,
+                                             f * w.x * w.y,
+                                             f * w.x * w.z,
+                                             f * w.y * w.z};
     memcpy(basis, value, sizeof value);
 }
 
@@ -45,9 +56,8 @@ static bool is_enclosed(struct incident *in, const struct light_field *field, co
     return true;
 }
 
-void irradiance_gather(struct irradiance *irradiance, struct incident *in,
-                       const struct light_field *field, const struct surface_point *at, uint32_t key,
-                       size_t samples) {
+void irradiance_gather(struct irradiance *irradiance, struct incident *in, const struct light_field *field,
+                       const struct surface_point *at, uint32_t key, size_t samples) {
     const size_t rays_per_chunk = INCIDENT_CHUNK * 2 / 3;
     vec3 frame[3];
     frame[2] = at->shading;
@@ -114,11 +124,9 @@ struct along {
 };
 
 static struct along along(const float (*q)[3], vec3 d, int c) {
-    return (struct along){
-        q[1][c] * d.x + q[2][c] * d.y + q[3][c] * d.z,
-        q[5][c] * d.x + q[6][c] * d.y + q[7][c] * d.z,
-        q[8][c] * d.x * d.x + q[9][c] * d.y * d.y + q[10][c] * d.z * d.z +
-            2.0f * (q[11][c] * d.x * d.y + q[12][c] * d.x * d.z + q[13][c] * d.y * d.z)};
+    return (struct along){q[1][c] * d.x + q[2][c] * d.y + q[3][c] * d.z, q[5][c] * d.x + q[6][c] * d.y + q[7][c] * d.z,
+                          q[8][c] * d.x * d.x + q[9][c] * d.y * d.y + q[10][c] * d.z * d.z +
+                              2.0f * (q[11][c] * d.x * d.y + q[12][c] * d.x * d.z + q[13][c] * d.y * d.z)};
 }
 
 /* bsdf_diffuse written out by powers of F(wi) and m = wi . wo: with cos_d^2 = (1 + m) / 2, its

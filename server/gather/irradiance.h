@@ -22,9 +22,8 @@ struct irradiance {
 
 /* Gathers from `samples` cosine-distributed directions and half as many light samples. Zero inside closed bodies, where
  * every ray meets a back. */
-void irradiance_gather(struct irradiance *irradiance, struct incident *scratch,
-                       const struct light_field *field, const struct surface_point *at, uint32_t key,
-                       size_t samples);
+void irradiance_gather(struct irradiance *irradiance, struct incident *scratch, const struct light_field *field,
+                       const struct surface_point *at, uint32_t key, size_t samples);
 
 /* Adds light from one unit direction; `flux` is its irradiance on a surface that faces it. */
 void irradiance_add(struct irradiance *irradiance, vec3 shading, vec3 direction, rgb flux);

@@ -13,7 +13,7 @@
  * By hand. */
 #define UNSEEN_WEIGHT 0.01f
 #define LEAST_WEIGHT 1e-6f /* of any probe around, so that no texel is without light */
-#define CHUNK 16 /* probes a work item */
+#define CHUNK 16           /* probes a work item */
 
 /* The best probe position of each chart in one block: a seen texel nearest to the block's centre. */
 struct places {
@@ -35,8 +35,7 @@ static void offer_place(struct places *p, uint32_t texel, uint32_t chart, bool s
 }
 
 static void find_places(struct places *places, uint32_t column, uint32_t row, uint32_t spacing,
-                        const struct atlas *atlas, const struct inverse_uv *inverse,
-                        const struct fused *fused) {
+                        const struct atlas *atlas, const struct inverse_uv *inverse, const struct fused *fused) {
     places->count = 0;
     uint32_t x0 = column * spacing, y0 = row * spacing;
     float middle = 0.5f * (float)(spacing - 1);
@@ -48,7 +47,7 @@ static void find_places(struct places *places, uint32_t column, uint32_t row, ui
                 continue;
             float dx = (float)(x - x0) - middle, dy = (float)(y - y0) - middle;
             offer_place(places, texel, atlas->chart_of_triangle[triangle], fused->count[texel] > 0.0f,
-                  dx * dx + dy * dy);
+                        dx * dx + dy * dy);
         }
     }
 }
@@ -66,8 +65,8 @@ void probes_init(struct probes *p, uint32_t spacing, const struct mesh *mesh, co
     p->probe = mem_array(capacity, sizeof *p->probe);
     for (size_t block = 0; block < block_count; block++) {
         p->first[block] = (uint32_t)p->count;
-        find_places(&places, (uint32_t)(block % p->columns), (uint32_t)(block / p->columns), spacing,
-                    atlas, inverse, fused);
+        find_places(&places, (uint32_t)(block % p->columns), (uint32_t)(block / p->columns), spacing, atlas, inverse,
+                    fused);
         if (p->count + places.count > capacity) {
             capacity = 2 * (p->count + places.count);
             p->probe = mem_realloc_array(p->probe, capacity, sizeof *p->probe);
@@ -122,20 +121,18 @@ static void gather_chunk(void *user, size_t chunk, int thread) {
 }
 
 void probes_gather(struct probes *p, const struct light_field *field, const struct mesh *mesh,
-                   const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed,
-                   size_t samples, size_t first, size_t count, struct parallel *pool) {
+                   const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed, size_t samples,
+                   size_t first, size_t count, struct parallel *pool) {
     struct gather_job job = {p, field, mesh, atlas, inverse, NULL, seed, samples, first, count};
     job.scratch = mem_array((size_t)parallel_thread_count(pool), sizeof *job.scratch);
     parallel_for(pool, (count + CHUNK - 1) / CHUNK, gather_chunk, &job);
     mem_free(job.scratch);
 }
 
-static float tent(float distance) {
-    return fmaxf(0.0f, 1.0f - fabsf(distance) * (1.0f / FILTER_RADIUS));
-}
+static float tent(float distance) { return fmaxf(0.0f, 1.0f - fabsf(distance) * (1.0f / FILTER_RADIUS)); }
 
-void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,
-                uint32_t texel, const struct surface_point *at, struct probe_mix *mix) {
+void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused, uint32_t texel,
+                const struct surface_point *at, struct probe_mix *mix) {
     uint32_t width = fused->width, x = texel % width, y = texel / width;
     uint32_t chart = atlas->chart_of_triangle[at->triangle];
     bool seen = fused->count[texel] > 0.0f;

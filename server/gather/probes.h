@@ -26,11 +26,11 @@ struct probe {
 };
 
 struct probes {
-    uint32_t spacing;        /* texels a side of a block */
-    uint32_t columns, rows;  /* of blocks */
+    uint32_t spacing;       /* texels a side of a block */
+    uint32_t columns, rows; /* of blocks */
     size_t count;
-    struct probe *probe;     /* [count] by block, row by row; owned */
-    uint32_t *first;         /* [columns * rows + 1] first probe of a block; owned */
+    struct probe *probe; /* [count] by block, row by row; owned */
+    uint32_t *first;     /* [columns * rows + 1] first probe of a block; owned */
 };
 
 /* Index of the probe of a chart in the block of texel (x, y); UINT32_MAX: none. */
@@ -51,12 +51,12 @@ void probes_release(struct probes *p);
 
 /* Gathers the light at probes [first, first + count) with `samples` directions each. */
 void probes_gather(struct probes *p, const struct light_field *field, const struct mesh *mesh,
-                   const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed,
-                   size_t samples, size_t first, size_t count, struct parallel *pool);
+                   const struct atlas *atlas, const struct inverse_uv *inverse, uint64_t seed, size_t samples,
+                   size_t first, size_t count, struct parallel *pool);
 
 /* Interpolation weights for a valid texel; `at` is its surface point. */
-void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused,
-                uint32_t texel, const struct surface_point *at, struct probe_mix *mix);
+void probes_mix(const struct probes *p, const struct atlas *atlas, const struct fused *fused, uint32_t texel,
+                const struct surface_point *at, struct probe_mix *mix);
 /* *out: the interpolated irradiance, by the weights of `mix`. */
 void probes_irradiance(const struct probes *p, const struct probe_mix *mix, struct irradiance *out);
 

@@ -23,9 +23,7 @@ static vec3 disc_direction(const struct sun *sun, float angle, float part) {
     return vec3_normalize(vec3_mad(d, r * sinf(angle), up));
 }
 
-vec3 sun_sample(const struct sun *sun, vec2 u) {
-    return disc_direction(sun, 2.0f * BSDF_PI * u.x, sqrtf(u.y));
-}
+vec3 sun_sample(const struct sun *sun, vec2 u) { return disc_direction(sun, 2.0f * BSDF_PI * u.x, sqrtf(u.y)); }
 
 /* Ray `i` of `rays`, on Vogel's spiral. */
 static vec3 seed_direction(const struct sun *sun, int i, int rays) {
@@ -64,8 +62,10 @@ void sun_add_light(const struct sun *sun, const struct accel *accel, const struc
 
 /* Doubles the resolution, by bilinear interpolation or, with `nearest`, by the nearest pixel. */
 static void refine_image(struct image *image, bool nearest) {
-    struct image fine = {.width = 2 * image->width, .height = 2 * image->height,
-                         .channel_count = image->channel_count, .channel = image->channel};
+    struct image fine = {.width = 2 * image->width,
+                         .height = 2 * image->height,
+                         .channel_count = image->channel_count,
+                         .channel = image->channel};
     size_t channels = image->channel_count, stride = image->width * channels;
     image_allocate(&fine);
     for (uint32_t row = 0; row < fine.height; row++) {

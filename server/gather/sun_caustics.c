@@ -11,7 +11,7 @@
 /* Photons in all, about, and at most from one texel; by hand. */
 #define MAX_PHOTONS 1000000
 #define MAX_PHOTONS_PER_TEXEL 64
-#define CHUNK 1024 /* texels a work item */
+#define CHUNK 1024           /* texels a work item */
 #define KEY_CAUSTICS 0x3a11u /* separates these random numbers from others of a texel */
 /* Least cosine by which a photon's flux is converted to radiance at a probe: bounds the weight of grazing photons,
  * whose flux is kept. By hand. */
@@ -35,7 +35,7 @@ struct caustics {
     bool *lit;               /* [valid_count] polished and sunlit */
     size_t count, rays;      /* source texels, and photons of each */
     uint32_t *texel;         /* [count] */
-    float texels_per_source;        /* sunlit texels that each source represents */
+    float texels_per_source; /* sunlit texels that each source represents */
     struct photon *photon;   /* [count][rays] */
 };
 
@@ -82,7 +82,7 @@ static void choose_texels(struct caustics *m) {
 
 /* Samples the lobe: the fraction of the light that the photon carries; 0 where it would enter the surface. */
 static float sample_lobe(const struct caustics *m, const struct surface_point *at, uint32_t segment, uint32_t key,
-                  uint32_t ray, vec3 *direction) {
+                         uint32_t ray, vec3 *direction) {
     const struct materials *materials = m->world->materials;
     vec3 frame[3] = {[2] = at->shading};
     vec3_frame(at->shading, &frame[0], &frame[1]);
@@ -112,8 +112,9 @@ static void trace_texel(void *user, size_t index, int thread) {
         struct accel_hit hit;
         *photon = (struct photon){.probe = UINT32_MAX};
         float part = sample_lobe(m, &at, segment, key, i, &photon->direction);
-        if (!(part > 0.0f) || !accel_intersect(world->accel, accel_offset(at.position, at.normal, photon->direction),
-                                               photon->direction, 0.0f, INFINITY, &hit) ||
+        if (!(part > 0.0f) ||
+            !accel_intersect(world->accel, accel_offset(at.position, at.normal, photon->direction), photon->direction,
+                             0.0f, INFINITY, &hit) ||
             !(vec3_dot(world->triangle[hit.triangle].normal, photon->direction) < 0.0f))
             continue;
         vec2 place = atlas_point(world->atlas, hit.triangle, hit.b1, hit.b2);

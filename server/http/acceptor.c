@@ -23,7 +23,7 @@ struct acceptor {
     atomic_size_t count;
     atomic_bool stopping;
     bool is_in_trouble; /* of the thread: the last try failed */
-    bool runs; /* there is a thread */
+    bool runs;          /* there is a thread */
     pthread_t thread;
 };
 
@@ -95,9 +95,7 @@ void acceptor_ended(struct acceptor *a) {
         eventfd_write(a->wake_fd, 1);
 }
 
-size_t acceptor_count(struct acceptor *a) {
-    return atomic_load(&a->count);
-}
+size_t acceptor_count(struct acceptor *a) { return atomic_load(&a->count); }
 
 void acceptor_stop(struct acceptor *a) {
     if (a->runs) {

@@ -10,9 +10,7 @@
 
 static const uint8_t v4_prefix[12] = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff};
 
-static bool is_v4(const struct address *a) {
-    return memcmp(a->bytes, v4_prefix, sizeof v4_prefix) == 0;
-}
+static bool is_v4(const struct address *a) { return memcmp(a->bytes, v4_prefix, sizeof v4_prefix) == 0; }
 
 /* An address alone. */
 static bool parse_bare(const char *text, size_t length, struct address *a) {
@@ -88,8 +86,10 @@ enum status proxies_parse(struct proxies *p, const char *list, const char *field
         if (p->count == ADDRESS_PROXIES_MAX)
             return error_set(err, STATUS_INPUT, "trusted_proxies has more than %d addresses", ADDRESS_PROXIES_MAX);
         if (!parse_net(at, length, &p->net[p->count].base, &p->net[p->count].bits))
-            return error_set(err, STATUS_INPUT, "trusted_proxies must be addresses like 127.0.0.1, ::1 or 10.0.0.0/8, "
-                             "not \"%.*s\"", (int)length, at);
+            return error_set(err, STATUS_INPUT,
+                             "trusted_proxies must be addresses like 127.0.0.1, ::1 or 10.0.0.0/8, "
+                             "not \"%.*s\"",
+                             (int)length, at);
         p->count++;
         at += length;
     }
@@ -100,8 +100,7 @@ bool proxies_trust(const struct proxies *p, const struct address *a) {
     for (size_t i = 0; i < p->count; i++) {
         unsigned bytes = p->net[i].bits / 8, bits = p->net[i].bits % 8;
         const uint8_t *base = p->net[i].base.bytes;
-        if (memcmp(base, a->bytes, bytes) == 0 &&
-            (bits == 0 || (base[bytes] ^ a->bytes[bytes]) >> (8 - bits) == 0))
+        if (memcmp(base, a->bytes, bytes) == 0 && (bits == 0 || (base[bytes] ^ a->bytes[bytes]) >> (8 - bits) == 0))
             return true;
     }
     return false;

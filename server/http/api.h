@@ -27,33 +27,34 @@ enum api_access {
 struct api_config {
     const char *data_dir;
     int max_attempts;
-    size_t queue_limit;        /* queued jobs */
-    size_t user_queue_limit;   /* of them, of one user; 0: no limit */
-    size_t user_max_jobs;      /* that one user keeps; 0: no limit */
-    uint64_t user_max_bytes;   /* that one user keeps; 0: no limit */
+    size_t queue_limit;      /* queued jobs */
+    size_t user_queue_limit; /* of them, of one user; 0: no limit */
+    size_t user_max_jobs;    /* that one user keeps; 0: no limit */
+    uint64_t user_max_bytes; /* that one user keeps; 0: no limit */
     uint64_t max_upload_bytes;
-    uint64_t min_free_bytes;   /* of the disk; uploads never eat into it */
-    uint64_t admin_free_bytes; /* more of it, which is kept for admins */
+    uint64_t min_free_bytes;      /* of the disk; uploads never eat into it */
+    uint64_t admin_free_bytes;    /* more of it, which is kept for admins */
     unsigned user_pledge_percent; /* of the free space that one user's uploads may hold before they arrive; 0: all */
-    size_t max_streams;        /* event streams at once */
+    size_t max_streams;           /* event streams at once */
     size_t user_max_streams, user_max_uploads, user_max_checks; /* of one user; 0: no limit */
     double keepalive_sec;
     enum api_access access;
     const struct proxies *proxies; /* whose word on addresses counts (address.h); NULL: nobody's */
-    bool is_tls;               /* connections are encrypted by this daemon */
-    int64_t scene_keep_ms, job_keep_ms, upload_keep_ms, empty_upload_ms /* 0: as upload_keep_ms */; /* see store/retention.h */
-    const char *server_names;  /* besides loopback; separated by spaces or commas */
+    bool is_tls;                   /* connections are encrypted by this daemon */
+    int64_t scene_keep_ms, job_keep_ms, upload_keep_ms,
+        empty_upload_ms /* 0: as upload_keep_ms */; /* see store/retention.h */
+    const char *server_names;                       /* besides loopback; separated by spaces or commas */
     const struct api_library *libraries;
     size_t library_count;
 };
 
-struct hub;      /* hub.h */
-struct digests;  /* uploads/digests.h */
-struct resumables; /* uploads/resumable.h */
-struct listener; /* listener.h */
-struct request_counts;    /* request_counts.h */
-struct auth_throttle;    /* auth_throttle.h */
-struct readiness; /* readiness.h */
+struct hub;            /* hub.h */
+struct digests;        /* uploads/digests.h */
+struct resumables;     /* uploads/resumable.h */
+struct listener;       /* listener.h */
+struct request_counts; /* request_counts.h */
+struct auth_throttle;  /* auth_throttle.h */
+struct readiness;      /* readiness.h */
 
 struct api {
     struct api_config config; /* pointers in it are borrowed */
@@ -65,9 +66,9 @@ struct api {
     struct digests *digests;
     struct resumables *resumables;
     struct readiness *readiness;
-    struct listener *listener; /* NULL before it listens; for metrics */
+    struct listener *listener;             /* NULL before it listens; for metrics */
     struct request_counts *request_counts; /* of requests */
-    struct auth_throttle *auth_throttle; /* on wrong tokens */
+    struct auth_throttle *auth_throttle;   /* on wrong tokens */
     atomic_ullong uploaded_bytes;
 };
 

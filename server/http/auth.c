@@ -49,8 +49,8 @@ static bool read_token(const struct request *r, char token[TOKEN_SIZE]) {
 
 /* 401 with what a caller without a valid token is told. */
 static struct response *refuse(const struct request *r, const char *detail) {
-    struct response *reply = problem_full(r, 401, detail,
-        "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
+    struct response *reply = problem_full(
+        r, 401, detail, "`unbaked token add NAME` on the server makes a token, `unbake login` keeps it", NULL);
     response_field(reply, "WWW-Authenticate", "Bearer realm=\"unbaked\"");
     return reply;
 }
@@ -129,8 +129,7 @@ bool auth_job(struct api *api, const struct request *r, enum access needed, stru
     if (access >= needed)
         return true;
     job_release(job);
-    *refusal = access == ACCESS_NONE ? problem(r, 404, "there is no job %lld", (long long)id)
-                                     : may_only_look(r);
+    *refusal = access == ACCESS_NONE ? problem(r, 404, "there is no job %lld", (long long)id) : may_only_look(r);
     return false;
 }
 
@@ -143,8 +142,8 @@ int64_t auth_job_id(struct api *api, const struct request *r, enum access needed
     return id;
 }
 
-enum status auth_find_scene(struct api *api, const struct request *r, const char *id,
-                            struct scene_row *row, struct error *err) {
+enum status auth_find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
+                            struct error *err) {
     return store_scene_find(api->store, &r->caller, id, row, err);
 }
 

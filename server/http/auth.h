@@ -24,14 +24,13 @@ struct response *auth_reject(struct api *api, struct request *r);
 /* The job or scene that the path names at its third part. False with *refusal: 404 where there is
  * none that the caller may read, in the same words whether it exists or not; 403 where `needed`
  * is ACCESS_CHANGE and the caller may only read. What is found is the caller's to release. */
-bool auth_job(struct api *api, const struct request *r, enum access needed, struct job *job,
-              struct response **refusal);
+bool auth_job(struct api *api, const struct request *r, enum access needed, struct job *job, struct response **refusal);
 /* The job's number alone, 0 with *refusal. */
 int64_t auth_job_id(struct api *api, const struct request *r, enum access needed, struct response **refusal);
 bool auth_scene(struct api *api, const struct request *r, enum access needed, struct scene_row *row,
                 struct response **refusal);
 /* The scene of that id, or its beginning of 8 digits or more, where the caller may read it. */
-enum status auth_find_scene(struct api *api, const struct request *r, const char *id,
-                            struct scene_row *row, struct error *err);
+enum status auth_find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
+                            struct error *err);
 
 #endif

@@ -11,8 +11,8 @@
 #define BACKLOG 512
 
 enum status bind_listen(int *fd, const char *address, uint16_t *port, struct error *err) {
-    struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM,
-                             .ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE};
+    struct addrinfo hints = {
+        .ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE};
     struct addrinfo *found;
     char text[8];
     snprintf(text, sizeof text, "%u", *port);

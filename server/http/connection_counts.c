@@ -18,7 +18,7 @@ struct connection_counts {
     struct place {
         struct address from;
         size_t connections;
-    } *place; /* [room], count in use: not more than there are connections, so they are looked through */
+    } * place; /* [room], count in use: not more than there are connections, so they are looked through */
 };
 
 struct connection_counts *connection_counts_new(size_t connection_max, size_t of_one, const struct proxies *proxies) {

@@ -76,8 +76,7 @@ struct response *events_get(struct api *api, struct request *r) {
     reply = read_request(api, r, &what, &is_resumed);
     if (!reply && is_resumed && job_is_terminal(job.state)) {
         struct event_page page;
-        if (store_event_page(api->store, NULL, job.id, what.after, 1, 1, note_any, &has_more, &page, &err) !=
-            STATUS_OK)
+        if (store_event_page(api->store, NULL, job.id, what.after, 1, 1, note_any, &has_more, &page, &err) != STATUS_OK)
             reply = problem_from(r, &err);
         else if (!has_more && page.pruned_id <= what.after)
             reply = response_new(204); /* which an EventSource takes as the end */

@@ -19,8 +19,8 @@
 #include "server/http/request_counts.h"
 #include "server/http/tls.h"
 
-#define PIECE_BYTES ((size_t)256 << 10) /* of a body that is stored: so much goes to the disk at once, at most */
-#define DRAIN_BYTES ((size_t)64 << 20) /* read and forgotten after a refusal, so that it is seen */
+#define PIECE_BYTES ((size_t)256 << 10)      /* of a body that is stored: so much goes to the disk at once, at most */
+#define DRAIN_BYTES ((size_t)64 << 20)       /* read and forgotten after a refusal, so that it is seen */
 #define EVENT_BLOCK_BYTES ((size_t)32 << 10) /* that the library asks a stream for at once */
 #define FILE_BLOCK_BYTES ((size_t)64 << 10)
 
@@ -211,8 +211,7 @@ static struct MHD_Response *library_response(struct exchange *x) {
     if (reply->stream)
         return MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, EVENT_BLOCK_BYTES, read_stream, x, NULL);
     /* The text lives until the exchange is over, which the library says afterwards. */
-    return MHD_create_response_from_buffer(reply->length, reply->text ? reply->text : "",
-                                           MHD_RESPMEM_PERSISTENT);
+    return MHD_create_response_from_buffer(reply->length, reply->text ? reply->text : "", MHD_RESPMEM_PERSISTENT);
 }
 
 /* A reply that lacks its Location, say, must not look whole. Fields without a value are left out. */
@@ -248,9 +247,8 @@ static enum MHD_Result queue_reply(struct exchange *x) {
  * connection be reset before the client has read it. */
 static void reply_early(struct exchange *x) {
     bool is_tls = x->listener->tls != NULL;
-    const union MHD_ConnectionInfo *info =
-        MHD_get_connection_info(x->connection, is_tls ? MHD_CONNECTION_INFO_GNUTLS_SESSION
-                                                      : MHD_CONNECTION_INFO_CONNECTION_FD);
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(
+        x->connection, is_tls ? MHD_CONNECTION_INFO_GNUTLS_SESSION : MHD_CONNECTION_INFO_CONNECTION_FD);
     struct response *reply = x->reply;
     struct buf text;
     buf_init(&text, 16384);
@@ -318,8 +316,8 @@ static enum MHD_Result begin(struct exchange *x, const char *method, const char 
     struct request *r = &x->request;
     take_method(r, method);
     MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, take_field, r);
-    struct address peer = address_of_socket(
-        MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
+    struct address peer =
+        address_of_socket(MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
     r->address = l->api->config.proxies ? address_of_request(r, &peer, l->api->config.proxies) : peer;
     head_request_id(r);
     const char *length = request_field(r, "Content-Length");
@@ -374,7 +372,8 @@ static enum MHD_Result collect(struct exchange *x, const char *data, size_t *len
     x->piece_bytes += count;
     x->taken += count;
     *length -= count;
-    if (x->piece_bytes < PIECE_BYTES && x->request.content_length > 0 && x->taken == (uint64_t)x->request.content_length)
+    if (x->piece_bytes < PIECE_BYTES && x->request.content_length > 0 &&
+        x->taken == (uint64_t)x->request.content_length)
         return MHD_YES; /* the rest goes with the end */
     return x->piece_bytes == PIECE_BYTES || !has_more_to_read(x) ? give_piece(x) : MHD_YES;
 }
@@ -407,9 +406,8 @@ static enum MHD_Result finish(struct exchange *x) {
     return queue_reply(x);
 }
 
-enum MHD_Result exchange_on_request(void *user, struct MHD_Connection *connection, const char *url,
-                                    const char *method, const char *version, const char *data,
-                                    size_t *length, void **context) {
+enum MHD_Result exchange_on_request(void *user, struct MHD_Connection *connection, const char *url, const char *method,
+                                    const char *version, const char *data, size_t *length, void **context) {
     (void)user, (void)connection, (void)url;
     struct exchange *x = *context;
     if (!x->has_begun) {
@@ -446,14 +444,17 @@ static void log_request(const struct exchange *x, int status, bool is_whole) {
     snprintf(status_text, sizeof status_text, "%d", status);
     snprintf(duration, sizeof duration, "%.1f", 1000.0 * (clock_sec() - x->begun_sec));
     const struct log_field fields[] = {
-        {"request", r->id, false},         {"client", address, false},
+        {"request", r->id, false},
+        {"client", address, false},
         {"method", r->is_head ? "HEAD" : names[r->method], false},
-        {"path", r->target.path, false},   {"status", status_text, true},
-        {"ms", duration, true},            {"user", *r->caller.name ? r->caller.name : NULL, false},
+        {"path", r->target.path, false},
+        {"status", status_text, true},
+        {"ms", duration, true},
+        {"user", *r->caller.name ? r->caller.name : NULL, false},
         {"end", is_whole ? NULL : "cut short", false},
     };
-    log_fields(r->method == METHOD_GET || r->is_throttled ? LOG_DEBUG : LOG_INFO, fields, sizeof fields / sizeof *fields,
-               "answered");
+    log_fields(r->method == METHOD_GET || r->is_throttled ? LOG_DEBUG : LOG_INFO, fields,
+               sizeof fields / sizeof *fields, "answered");
 }
 
 void exchange_on_completed(void *user, struct MHD_Connection *connection, void **context,

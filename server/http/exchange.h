@@ -35,17 +35,17 @@ struct exchange {
     struct MHD_Connection *connection;
     struct guarded *guarded;
     struct request request;
-    struct error target_error;  /* what is wrong with the request target, if status is set */
-    struct response *reply;     /* kept until the library has sent it */
+    struct error target_error;    /* what is wrong with the request target, if status is set */
+    struct response *reply;       /* kept until the library has sent it */
     bool has_begun, is_beginning; /* a pool has begun with it, and the library asks again */
     bool has_replied_early;
-    char *piece;                /* [PIECE_BYTES] of a body that is stored; NULL before its first bytes */
+    char *piece; /* [PIECE_BYTES] of a body that is stored; NULL before its first bytes */
     size_t piece_bytes;
-    uint64_t taken, drained;    /* bytes of the body */
-    double begun_sec;           /* the request line was there */
+    uint64_t taken, drained; /* bytes of the body */
+    double begun_sec;        /* the request line was there */
     /* Under listener->mutex: */
     enum exchange_place place;
-    bool is_woken;              /* while it was not waiting */
+    bool is_woken;                    /* while it was not waiting */
     bool reply_pending;               /* a pool's reply, a short one, is on its way */
     struct exchange *next, *previous; /* among the waiting streams */
 };
@@ -54,18 +54,18 @@ struct listener {
     struct api *api;
     struct MHD_Daemon *daemon;
     struct guard *guard;
-    struct tls *tls; /* NULL: plain HTTP */
+    struct tls *tls;           /* NULL: plain HTTP */
     struct acceptor *acceptor; /* has the listening socket */
     struct connection_counts *connection_counts;
     uint16_t port;
     struct pool *quick, *slow; /* see route.h */
-    pthread_mutex_t mutex; /* guards what follows; nobody waits for anything else while he has it */
+    pthread_mutex_t mutex;     /* guards what follows; nobody waits for anything else while he has it */
     pthread_cond_t changed;
     bool is_closing;
-    struct exchange *waiting;  /* streams, doubly linked */
-    size_t working_count;      /* exchanges with a pool */
-    size_t stream_count;       /* event streams that are open */
-    size_t pending_reply_count;         /* exchanges that are owed a reply */
+    struct exchange *waiting;   /* streams, doubly linked */
+    size_t working_count;       /* exchanges with a pool */
+    size_t stream_count;        /* event streams that are open */
+    size_t pending_reply_count; /* exchanges that are owed a reply */
 };
 
 /* The library's callbacks: a request's line is there; its head, body or end; it is over. */

@@ -8,9 +8,7 @@
 
 #include "common/base64.h"
 
-static bool is_digit(char c) {
-    return c >= '0' && c <= '9';
-}
+static bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool field_is_token(const char *text) {
     if (*text == '\0')
@@ -117,9 +115,7 @@ bool field_digest(const char *repr_digest, char hex[65]) {
     return true;
 }
 
-static unsigned hex_value(char c) {
-    return (unsigned)(is_digit(c) ? c - '0' : c - 'a' + 10);
-}
+static unsigned hex_value(char c) { return (unsigned)(is_digit(c) ? c - '0' : c - 'a' + 10); }
 
 void field_digest_format(const char *hex, char text[64]) {
     uint8_t bytes[32];
@@ -144,9 +140,7 @@ bool field_number(const char *text, int64_t minimum, int64_t maximum, int64_t *v
     return *value >= minimum && *value <= maximum;
 }
 
-bool field_is_sha256(const char *text) {
-    return strspn(text, "0123456789abcdef") == 64 && text[64] == '\0';
-}
+bool field_is_sha256(const char *text) { return strspn(text, "0123456789abcdef") == 64 && text[64] == '\0'; }
 
 bool field_host(const char *host, size_t *length) {
     const char *at = host;

@@ -7,7 +7,8 @@
 
 #include "common/mem.h"
 
-#define AHEAD_BYTES ((size_t)256 << 10) /* read at once: a task of some 100 us from memory; each open download has so much */
+#define AHEAD_BYTES                                                                                                    \
+    ((size_t)256 << 10) /* read at once: a task of some 100 us from memory; each open download has so much */
 
 struct file_stream {
     struct stream base;

@@ -17,12 +17,12 @@
 struct guarded {
     int fd;
     enum guard_phase phase;
-    double phase_sec;       /* start of the phase */
-    double since_sec;       /* start of the window */
-    uint64_t window_bytes;  /* arrived in the window; in GUARD_REPLY: taken before it */
-    bool has_backlog;       /* GUARD_REPLY: there is a window */
+    double phase_sec;      /* start of the phase */
+    double since_sec;      /* start of the window */
+    uint64_t window_bytes; /* arrived in the window; in GUARD_REPLY: taken before it */
+    bool has_backlog;      /* GUARD_REPLY: there is a window */
     bool is_shut;
-    double held_sec;        /* since when it is held; 0: it is not */
+    double held_sec; /* since when it is held; 0: it is not */
     struct guarded *next, *previous;
 };
 
@@ -127,8 +127,8 @@ static void *run(void *user) {
     return NULL;
 }
 
-enum status guard_new(struct guard **out, const struct guard_limits *limits,
-                      void (*tick)(void *user), void *user, struct error *err) {
+enum status guard_new(struct guard **out, const struct guard_limits *limits, void (*tick)(void *user), void *user,
+                      struct error *err) {
     struct guard *g = mem_calloc(1, sizeof *g);
     g->limits = *limits;
     g->tick = tick;

@@ -32,8 +32,8 @@ struct guarded; /* one connection; opaque */
 
 /* Starts a thread that looks once a second while there are connections, and then calls
  * tick(user) too; it sleeps while there are none. */
-enum status guard_new(struct guard **g, const struct guard_limits *limits,
-                      void (*tick)(void *user), void *user, struct error *err);
+enum status guard_new(struct guard **g, const struct guard_limits *limits, void (*tick)(void *user), void *user,
+                      struct error *err);
 /* Stops the thread. All connections must be gone. */
 void guard_free(struct guard *g);
 
@@ -49,8 +49,8 @@ void guard_body(struct guard *g, struct guarded *c, size_t bytes); /* arrived ju
  * connection is closed. By the thread that serves it. */
 void guard_discard_unsent(struct guarded *c);
 
-size_t guard_count(struct guard *g);         /* connections */
-uint64_t guard_shut_count(struct guard *g);  /* shut down for being late, ever */
+size_t guard_count(struct guard *g);        /* connections */
+uint64_t guard_shut_count(struct guard *g); /* shut down for being late, ever */
 
 /* One look at all connections as of `now_sec` (CLOCK_MONOTONIC); the thread's step, for tests. */
 void guard_look(struct guard *g, double now_sec);

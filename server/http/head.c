@@ -30,10 +30,12 @@ static bool is_lost_framing(const char *name) {
 }
 
 static struct response *check_fields(const struct request *r) {
-    static const char *const singles[] = {"Content-Length", "Content-Type", "Host", "Range", "If-Match",
-        "If-Range", "Authorization", "Idempotency-Key", "Last-Event-ID", "Expect", "Origin", "X-Content-SHA256",
-        "Tus-Resumable", "Upload-Offset", "Upload-Length", "Upload-Metadata", "Upload-Checksum",
-        "X-HTTP-Method-Override"};
+    static const char *const singles[] = {"Content-Length",  "Content-Type",    "Host",
+                                          "Range",           "If-Match",        "If-Range",
+                                          "Authorization",   "Idempotency-Key", "Last-Event-ID",
+                                          "Expect",          "Origin",          "X-Content-SHA256",
+                                          "Tus-Resumable",   "Upload-Offset",   "Upload-Length",
+                                          "Upload-Metadata", "Upload-Checksum", "X-HTTP-Method-Override"};
     for (size_t i = 0; i < r->field_count; i++) {
         if (!field_is_token(r->fields[i].name))
             return refuse(r, 400, "a header field's name is not a word");
@@ -77,8 +79,7 @@ static bool is_server_name(const char *names, const char *host, size_t length) {
     return false;
 }
 
-static struct response *check_host(const struct request *r, const char *version,
-                                   const char *server_names) {
+static struct response *check_host(const struct request *r, const char *version, const char *server_names) {
     const char *host = request_field(r, "Host"), *authority = r->target.authority;
     size_t length;
     if (!host && strcmp(version, "HTTP/1.0") != 0)
@@ -92,8 +93,9 @@ static struct response *check_host(const struct request *r, const char *version,
     if (!host)
         return NULL;
     if (server_names && !field_is_loopback_host(host, length) && !is_server_name(server_names, host, length)) {
-        struct response *reply = problem_full(r, 403, "this daemon does not answer for that Host",
-            "behind a proxy, list the public name in server_names of the configuration", NULL);
+        struct response *reply =
+            problem_full(r, 403, "this daemon does not answer for that Host",
+                         "behind a proxy, list the public name in server_names of the configuration", NULL);
         reply->must_close = true;
         return reply;
     }

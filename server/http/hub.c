@@ -13,7 +13,7 @@
 #include "server/http/views.h"
 
 #define BATCH_EVENTS 64
-#define BATCH_BYTES ((size_t)64 << 10)  /* of data; a single event may have more */
+#define BATCH_BYTES ((size_t)64 << 10) /* of data; a single event may have more */
 #define TEXT_BYTES ((size_t)1 << 20)
 
 /* The part of a job's events that was rendered last: most streams of a job ask for the same one. */
@@ -40,17 +40,17 @@ struct subscriber {
     struct api *api;
     struct subscription what; /* its `after`: events up to here were rendered */
     struct caller caller;
-    double end_sec;       /* of a wait, as clock_sec; 0: never */
-    struct buf text;      /* rendered, not yet read */
+    double end_sec;  /* of a wait, as clock_sec; 0: never */
+    struct buf text; /* rendered, not yet read */
     size_t text_read;
     bool has_ended;
-    bool is_listed;       /* in the hub, from the first read on: wake is set by then */
+    bool is_listed; /* in the hub, from the first read on: wake is set by then */
     /* Shared, under hub->mutex: */
     struct subscriber *next, *previous;
-    bool is_dirty;        /* the database may hold more */
-    bool is_due;          /* for a keep-alive, or the end of its wait */
-    bool is_suspect;      /* its token may have been revoked */
-    double last_sec;      /* something was last handed over */
+    bool is_dirty;   /* the database may hold more */
+    bool is_due;     /* for a keep-alive, or the end of its wait */
+    bool is_suspect; /* its token may have been revoked */
+    double last_sec; /* something was last handed over */
 };
 
 struct hub *hub_new(double keepalive_sec) {
@@ -136,8 +136,7 @@ static void render(struct subscriber *s, const struct event_row *row, cJSON *dat
     }
     char *text = json_text(data);
     if (s->what.is_ndjson)
-        buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":%s}\n", (long long)row->id, row->type,
-                   text);
+        buf_printf(&s->text, "{\"id\":%lld,\"event\":\"%s\",\"data\":%s}\n", (long long)row->id, row->type, text);
     else
         buf_printf(&s->text, "id: %lld\nevent: %s\ndata: %s\n\n", (long long)row->id, row->type, text);
     mem_free(text);
@@ -171,15 +170,19 @@ static void render_start(struct subscriber *s) {
         buf_puts(&s->text, s->what.snapshot ? "retry: 3000\n" : "retry: 3000\n\n");
     if (s->what.snapshot) {
         const cJSON *attempt = cJSON_GetObjectItemCaseSensitive(s->what.snapshot, "attempt");
-        struct event_row row = {.id = s->what.after, .job_id = s->what.job_id, .at_ms = now_ms(), .type = EVENT_STATE,
+        struct event_row row = {.id = s->what.after,
+                                .job_id = s->what.job_id,
+                                .at_ms = now_ms(),
+                                .type = EVENT_STATE,
                                 .attempt = attempt->valueint};
         json_add_bool(s->what.snapshot, "snapshot", true);
         render(s, &row, s->what.snapshot);
         s->what.snapshot = NULL;
     }
     if (s->what.is_ahead)
-        render_resync(s, s->what.after, "no event has the id that was given, and this is the newest one: "
-                                        "GET shows the present state");
+        render_resync(s, s->what.after,
+                      "no event has the id that was given, and this is the newest one: "
+                      "GET shows the present state");
 }
 
 static void mark_dirty(struct subscriber *s) {
@@ -261,8 +264,7 @@ static void fetch(struct subscriber *s) {
     what->after = page.last_id;
     if (page.is_full && what->wait_sec <= 0.0)
         mark_dirty(s);
-    else if (what->is_past || (what->job_id && job_is_terminal(page.state)) ||
-             (what->wait_sec > 0.0 && page.count > 0))
+    else if (what->is_past || (what->job_id && job_is_terminal(page.state)) || (what->wait_sec > 0.0 && page.count > 0))
         s->has_ended = true;
 }
 

@@ -22,7 +22,7 @@ struct hub; /* the open streams; opaque; thread-safe */
 struct hub *hub_new(double keepalive_sec);
 void hub_free(struct hub *hub); /* all streams must be closed */
 
-void hub_changed(void *hub, int64_t job_id); /* for store_on_change */
+void hub_changed(void *hub, int64_t job_id);    /* for store_on_change */
 void hub_tick(struct hub *hub, double now_sec); /* about once a second: keep-alives, ends of waits */
 /* A token was revoked: the streams that were opened with it end. */
 void hub_recheck(struct hub *hub);
@@ -30,15 +30,15 @@ size_t hub_count(struct hub *hub);
 size_t hub_count_of(struct hub *hub, int64_t user_id); /* the streams of one user */
 
 struct subscription {
-    int64_t job_id;      /* 0: all that the caller may read */
-    int64_t after;       /* the newest event that the client has */
-    bool is_ahead;       /* it has seen later ones, which this database does not know: it was put back */
+    int64_t job_id; /* 0: all that the caller may read */
+    int64_t after;  /* the newest event that the client has */
+    bool is_ahead;  /* it has seen later ones, which this database does not know: it was put back */
     bool is_ndjson;
-    bool is_past;        /* ends with what is stored by now */
-    double wait_sec;     /* above 0: ends with the first events, or when so much time has passed */
-    int64_t revision;    /* not 0: no events, but the job itself, once its revision is another one or,
+    bool is_past;     /* ends with what is stored by now */
+    double wait_sec;  /* above 0: ends with the first events, or when so much time has passed */
+    int64_t revision; /* not 0: no events, but the job itself, once its revision is another one or,
                           * for -1, once it has ended; or when wait_sec have passed */
-    cJSON *snapshot;     /* data of a first `state` event; taken; NULL: none */
+    cJSON *snapshot;  /* data of a first `state` event; taken; NULL: none */
 };
 struct stream *hub_subscribe(struct api *api, const struct caller *caller, const struct subscription *what);
 

@@ -38,14 +38,16 @@ static void read_labels(struct job_request *w, const cJSON *member, cJSON *param
     size_t count = 0;
     bool good = cJSON_IsObject(member);
     for (const cJSON *label = good ? member->child : NULL; label; label = label->next, count++)
-        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES &&
-               *label->string && strlen(label->string) <= LABEL_MAX_BYTES && utf8_is_name(label->string) &&
+        good = good && cJSON_IsString(label) && strlen(label->valuestring) <= LABEL_MAX_BYTES && *label->string &&
+               strlen(label->string) <= LABEL_MAX_BYTES && utf8_is_name(label->string) &&
                utf8_is_name(label->valuestring);
     if (good && count <= LABELS_MAX)
         w->labels = json_text(member);
     else
-        problem_param(params, "labels", NULL, "must be an object of at most %d texts, each name and "
-                      "text of at most %d bytes without control characters", LABELS_MAX, LABEL_MAX_BYTES);
+        problem_param(params, "labels", NULL,
+                      "must be an object of at most %d texts, each name and "
+                      "text of at most %d bytes without control characters",
+                      LABELS_MAX, LABEL_MAX_BYTES);
 }
 
 static void read_priority(struct job_request *w, const cJSON *member, cJSON *params) {
@@ -53,8 +55,7 @@ static void read_priority(struct job_request *w, const cJSON *member, cJSON *par
     if (fabs(value) <= PRIORITY_MAX && value == floor(value))
         w->priority = (int)value;
     else
-        problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX,
-                      PRIORITY_MAX);
+        problem_param(params, "priority", NULL, "must be a whole number from %d to %d", -PRIORITY_MAX, PRIORITY_MAX);
 }
 
 static bool is_key(const char *base64) {
@@ -80,7 +81,8 @@ static void read_webhook(struct job_request *w, const cJSON *member, cJSON *para
              !is_key(secret + strlen(WEBHOOK_SECRET_PREFIX)))
         problem_param(params, "webhook", "printf 'whsec_%s' \"$(head -c 32 /dev/urandom | base64)\" makes one",
                       "has a secret that begins with " WEBHOOK_SECRET_PREFIX
-                      ", but what follows is not the base64 of %d to %d bytes", WEBHOOK_KEY_LEAST, WEBHOOK_KEY_MOST);
+                      ", but what follows is not the base64 of %d to %d bytes",
+                      WEBHOOK_KEY_LEAST, WEBHOOK_KEY_MOST);
     else if (url_parse(url, &parts, &err) != STATUS_OK)
         problem_param(params, "webhook", NULL, "%s", err.message);
     w->webhook_url = url;
@@ -134,9 +136,10 @@ struct response *job_request_read(const struct request *r, struct job_request *w
         else if (is_new && strcmp(name, "settings") == 0)
             w->settings = member;
         else
-            problem_param(params, name, is_new ? "known: scene, name, settings, priority, labels, webhook, shared"
-                                               : "known: name, priority, labels, shared, order, pinned, "
-                                                 "expires_at",
+            problem_param(params, name,
+                          is_new ? "known: scene, name, settings, priority, labels, webhook, shared"
+                                 : "known: name, priority, labels, shared, order, pinned, "
+                                   "expires_at",
                           "is unknown");
     }
     if (is_new && !cJSON_HasObjectItem(w->body, "scene"))

@@ -15,10 +15,10 @@ struct job_request {
     cJSON *body; /* owned */
     const char *scene, *name;
     const cJSON *settings;
-    char *labels; /* JSON text; owned; NULL: not given */
+    char *labels;                             /* JSON text; owned; NULL: not given */
     const char *webhook_url, *webhook_secret; /* NULL: none */
-    int priority; /* INT_MIN: not given */
-    int shared;   /* -1: not given */
+    int priority;                             /* INT_MIN: not given */
+    int shared;                               /* -1: not given */
     enum job_place place;
     int64_t before; /* with JOB_PLACE_BEFORE */
     struct retention retention;

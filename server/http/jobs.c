@@ -94,8 +94,8 @@ struct response *jobs_list(struct api *api, struct request *r) {
 
 /* The scene that the request names, if a job may use it; else an entry in params, or *refusal where the
  * database is at fault. */
-static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row,
-                       cJSON *params, struct response **refusal) {
+static bool find_scene(struct api *api, const struct request *r, const char *id, struct scene_row *row, cJSON *params,
+                       struct response **refusal) {
     size_t digits = strspn(id, "0123456789abcdef");
     struct error err;
     if (digits < 8 || digits > 64 || id[digits] != '\0') {
@@ -224,9 +224,8 @@ static int64_t expected_revision(const struct request *r, struct response **refu
     if (!match)
         *refusal = problem_full(r, 428, "a change needs If-Match",
                                 "send the job's ETag, or * to change whatever is there", NULL);
-    else if (strcmp(match, "*") != 0 &&
-             (sscanf(match, "\"rev-%20[0-9]\"%n", digits, &end) != 1 || end == 0 || match[end] != '\0' ||
-              !field_number(digits, 0, INT64_MAX, &revision)))
+    else if (strcmp(match, "*") != 0 && (sscanf(match, "\"rev-%20[0-9]\"%n", digits, &end) != 1 || end == 0 ||
+                                         match[end] != '\0' || !field_number(digits, 0, INT64_MAX, &revision)))
         *refusal = problem(r, 412, "If-Match names none of this job's revisions");
     return revision;
 }
@@ -246,8 +245,12 @@ struct response *jobs_patch(struct api *api, struct request *r) {
         params = NULL;
     }
     if (!reply) {
-        struct job_patch patch = {.name = w.name, .labels = w.labels, .priority = w.priority,
-                                  .shared = w.shared, .place = w.place, .before_id = w.before,
+        struct job_patch patch = {.name = w.name,
+                                  .labels = w.labels,
+                                  .priority = w.priority,
+                                  .shared = w.shared,
+                                  .place = w.place,
+                                  .before_id = w.before,
                                   .retention = w.retention};
         enum status status = store_job_patch(api->store, id, revision, &patch, &err);
         if (status == STATUS_CONFLICT)
@@ -353,8 +356,8 @@ struct response *jobs_retry(struct api *api, struct request *r) {
     bool keeps_checkpoint;
     int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
     if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
-        refusal = problem_full(r, 400, "from must name a stage",
-                               "load, prepare, fuse, solve, refine, report, export", NULL);
+        refusal =
+            problem_full(r, 400, "from must name a stage", "load, prepare, fuse, solve, refine, report, export", NULL);
     if (refusal)
         return refusal;
     struct error err;
@@ -436,8 +439,8 @@ static char *longer_settings(const struct request *r, const struct job *job, str
     if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK) {
         *refusal = problem(r, 400, "%s", err.message);
     } else if (!cJSON_IsObject(body) || cJSON_GetArraySize(body) != 1) {
-        *refusal = problem(r, 400,
-                           "the request body is not {\"looks\": N}, {\"iterations\": N} or {\"time_limit_sec\": SEC}");
+        *refusal =
+            problem(r, 400, "the request body is not {\"looks\": N}, {\"iterations\": N} or {\"time_limit_sec\": SEC}");
     } else if (read_settings(job, &settings, &full, &err) != STATUS_OK) {
         *refusal = problem_from(r, &err);
     } else {

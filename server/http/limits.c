@@ -11,12 +11,11 @@
 
 #define ADMIN_STREAMS 10 /* one in so many is kept for admins */
 
-bool limits_bind(const struct request *r) {
-    return r->caller.user_id > 0 && r->caller.role != ROLE_ADMIN;
-}
+bool limits_bind(const struct request *r) { return r->caller.user_id > 0 && r->caller.role != ROLE_ADMIN; }
 
 /* Names the option, and who can change it. */
-static struct response *refuse(const struct request *r, int status, const char *option, const char *hint, char *detail) {
+static struct response *refuse(const struct request *r, int status, const char *option, const char *hint,
+                               char *detail) {
     char *full = mem_printf("%s%san administrator can raise the option %s", hint, *hint ? "; " : "", option);
     struct response *reply = problem_full(r, status, detail, full, NULL);
     mem_free(full);
@@ -37,11 +36,12 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
     uint64_t share = ((room > keep ? room - keep : 0) + pledged) / 100 * api->config.user_pledge_percent;
     if (pledged + bytes <= share)
         return NULL;
-    return refuse(r, 507, "user_pledge_percent", "finish or remove an upload that is under way",
-                  mem_printf("your uploads under way reserve %llu MiB, and %llu MiB more are needed: the limit of one user"
-                             " is %u %% of the free space, %llu MiB",
-                             (unsigned long long)(pledged >> 20), (unsigned long long)(bytes >> 20),
-                             api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
+    return refuse(
+        r, 507, "user_pledge_percent", "finish or remove an upload that is under way",
+        mem_printf("your uploads under way reserve %llu MiB, and %llu MiB more are needed: the limit of one user"
+                   " is %u %% of the free space, %llu MiB",
+                   (unsigned long long)(pledged >> 20), (unsigned long long)(bytes >> 20),
+                   api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
 }
 
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes) {
@@ -52,9 +52,9 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
     if (most > 0 && store_user_checks(api->store, r->caller.user_id, &checks, &err) != STATUS_OK)
         return problem_from(r, &err);
     if (most > 0 && checks >= most)
-        return refuse(r, 429, "user_max_checks", "wait until some of them are checked",
-                      mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks,
-                                 most));
+        return refuse(
+            r, 429, "user_max_checks", "wait until some of them are checked",
+            mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks, most));
     return check_pledge(api, r, bytes);
 }
 

@@ -24,25 +24,17 @@
 #define SLOW_THREADS 8 /* they wait for the disk more than they compute */
 /* The acceptor keeps to the limit; the library's own, a share of it for each thread, must never be met. */
 #define LIBRARY_LIMIT_FACTOR (2 * LIBRARY_THREADS)
-#define POOL_BYTES ((size_t)64 << 10)  /* a connection's head and buffers; a larger head gets 431 */
-#define UNSENT_BYTES (256 << 10) /* of a reply that wait in the kernel for a slow reader */
-#define BEGIN_MS 1000 /* until the library has begun with what was accepted */
+#define POOL_BYTES ((size_t)64 << 10) /* a connection's head and buffers; a larger head gets 431 */
+#define UNSENT_BYTES (256 << 10)      /* of a reply that wait in the kernel for a slow reader */
+#define BEGIN_MS 1000                 /* until the library has begun with what was accepted */
 
-const char *listener_library_version(void) {
-    return MHD_get_version();
-}
+const char *listener_library_version(void) { return MHD_get_version(); }
 
-uint16_t listener_port(const struct listener *l) {
-    return l->port;
-}
+uint16_t listener_port(const struct listener *l) { return l->port; }
 
-size_t listener_connections(struct listener *l) {
-    return guard_count(l->guard);
-}
+size_t listener_connections(struct listener *l) { return guard_count(l->guard); }
 
-uint64_t listener_late(struct listener *l) {
-    return guard_shut_count(l->guard);
-}
+uint64_t listener_late(struct listener *l) { return guard_shut_count(l->guard); }
 
 static void on_connection(void *user, struct MHD_Connection *connection, void **socket_context,
                           enum MHD_ConnectionNotificationCode code) {
@@ -68,11 +60,11 @@ static void on_connection(void *user, struct MHD_Connection *connection, void **
 static bool turn_away(const struct listener *l, int fd, enum connection_answer answer) {
     static const char *const reply[] = {
         [CONNECTION_ADDRESS_FULL] = "HTTP/1.1 429 Too Many Requests\r\nRetry-After: 30\r\nContent-Type: text/plain\r\n"
-                               "Connection: close\r\n\r\nthis address has reached the limit of its connections; an"
-                               " administrator can raise the option address_max_connections\n",
+                                    "Connection: close\r\n\r\nthis address has reached the limit of its connections; an"
+                                    " administrator can raise the option address_max_connections\n",
         [CONNECTION_FULL] = "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Type: text/plain\r\n"
-                       "Connection: close\r\n\r\nthe limit of connections is reached; an administrator can"
-                       " raise the option max_connections\n"};
+                            "Connection: close\r\n\r\nthe limit of connections is reached; an administrator can"
+                            " raise the option max_connections\n"};
     if (!l->tls) /* whoever is not there to read it has not waited for it */
         (void)!send(fd, reply[answer], strlen(reply[answer]), MSG_NOSIGNAL | MSG_DONTWAIT);
     shutdown(fd, SHUT_WR);
@@ -97,8 +89,7 @@ static void on_tick(void *user) {
     hub_tick(l->api->hub, clock_sec());
 }
 
-__attribute__((format(printf, 2, 0)))
-static void log_library(void *user, const char *format, va_list args) {
+__attribute__((format(printf, 2, 0))) static void log_library(void *user, const char *format, va_list args) {
     (void)user;
     char text[512];
     vsnprintf(text, sizeof text, format, args);
@@ -117,20 +108,15 @@ static enum status start_library(struct listener *l, const struct listener_confi
         {MHD_OPTION_END, 0, NULL},
     };
     struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
-    l->daemon = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME | MHD_USE_ITC |
-            MHD_USE_ERROR_LOG | (l->tls ? (unsigned)MHD_USE_TLS : 0), 0, NULL,
-        NULL, exchange_on_request, l,
-        MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
-        MHD_OPTION_THREAD_POOL_SIZE, (unsigned)LIBRARY_THREADS,
-        MHD_OPTION_CONNECTION_LIMIT, LIBRARY_LIMIT_FACTOR * config->connection_max,
-        MHD_OPTION_CONNECTION_TIMEOUT, (unsigned)config->limits.idle_sec,
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, POOL_BYTES,
-        MHD_OPTION_URI_LOG_CALLBACK, exchange_on_target, l,
-        MHD_OPTION_NOTIFY_COMPLETED, exchange_on_completed, l,
-        MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
-        MHD_OPTION_ARRAY, l->tls ? tls : plain,
-        MHD_OPTION_END);
+    l->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
+                                     MHD_USE_ITC | MHD_USE_ERROR_LOG | (l->tls ? (unsigned)MHD_USE_TLS : 0),
+                                 0, NULL, NULL, exchange_on_request, l, MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
+                                 MHD_OPTION_THREAD_POOL_SIZE, (unsigned)LIBRARY_THREADS, MHD_OPTION_CONNECTION_LIMIT,
+                                 LIBRARY_LIMIT_FACTOR * config->connection_max, MHD_OPTION_CONNECTION_TIMEOUT,
+                                 (unsigned)config->limits.idle_sec, MHD_OPTION_CONNECTION_MEMORY_LIMIT, POOL_BYTES,
+                                 MHD_OPTION_URI_LOG_CALLBACK, exchange_on_target, l, MHD_OPTION_NOTIFY_COMPLETED,
+                                 exchange_on_completed, l, MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
+                                 MHD_OPTION_ARRAY, l->tls ? tls : plain, MHD_OPTION_END);
     return l->daemon ? STATUS_OK : error_set_errno(err, errno, "libmicrohttpd does not start");
 }
 

@@ -20,8 +20,8 @@
 #include "server/http/guard.h"
 
 struct listener_config {
-    const char *address; /* numeric: "127.0.0.1", "::1" */
-    uint16_t port;       /* 0: any free one */
+    const char *address;                     /* numeric: "127.0.0.1", "::1" */
+    uint16_t port;                           /* 0: any free one */
     const char *certificate_file, *key_file; /* HTTPS; certificate_file NULL: plain HTTP */
     unsigned connection_max;
     unsigned address_connection_max; /* of one address; 0: no limit. See connection_counts.h */

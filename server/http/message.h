@@ -37,21 +37,21 @@ struct upload;
 struct upload_patch;
 
 struct request {
-    int method; /* enum method; METHOD_COUNT for a word that no route knows */
+    int method;   /* enum method; METHOD_COUNT for a word that no route knows */
     bool is_head; /* HEAD: method is METHOD_GET and the body is left out */
     struct target target;
     struct field *fields; /* [field_count]; owned */
     size_t field_count;
     bool has_body;
-    int64_t content_length;   /* -1: not known (chunked) */
-    char id[REQUEST_ID_SIZE]; /* for X-Request-Id and logs */
-    struct address address;    /* where it comes from (address.h) */
-    bool is_throttled;            /* refused as one of too many wrong tokens */
-    const struct route *route; /* set by routes_begin; static storage */
-    struct caller caller;      /* who asks; set by routes_begin */
-    struct buf body;           /* what was collected of it, for routes that take JSON */
-    struct upload *upload;     /* a body that goes to disk; owned */
-    struct upload_patch *patch;       /* a body that goes on with an upload in parts; owned */
+    int64_t content_length;     /* -1: not known (chunked) */
+    char id[REQUEST_ID_SIZE];   /* for X-Request-Id and logs */
+    struct address address;     /* where it comes from (address.h) */
+    bool is_throttled;          /* refused as one of too many wrong tokens */
+    const struct route *route;  /* set by routes_begin; static storage */
+    struct caller caller;       /* who asks; set by routes_begin */
+    struct buf body;            /* what was collected of it, for routes that take JSON */
+    struct upload *upload;      /* a body that goes to disk; owned */
+    struct upload_patch *patch; /* a body that goes on with an upload in parts; owned */
 };
 
 /* After routes_drop_body, which knows what upload and patch are. */

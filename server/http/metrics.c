@@ -14,8 +14,8 @@
 #include "server/http/request_counts.h"
 
 static void metric(struct buf *b, const char *name, const char *type, const char *help, double value) {
-    buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\nunbaked_%s %.17g\n", name, help, name, type,
-               name, value);
+    buf_printf(b, "# HELP unbaked_%s %s\n# TYPE unbaked_%s %s\nunbaked_%s %.17g\n", name, help, name, type, name,
+               value);
 }
 
 static void metric_head(struct buf *b, const char *name, const char *type, const char *help) {
@@ -61,18 +61,15 @@ static void work_metrics(struct buf *b, const struct counters *f) {
                    (unsigned long long)atomic_load(&f->ends[i]));
     metric_head(b, "queue_wait_seconds", "summary", "How long jobs waited for their first attempt.");
     buf_printf(b, "unbaked_queue_wait_seconds_sum %.3f\nunbaked_queue_wait_seconds_count %llu\n",
-               (double)atomic_load(&f->first_wait_ms) * 1e-3,
-               (unsigned long long)atomic_load(&f->first_start_count));
+               (double)atomic_load(&f->first_wait_ms) * 1e-3, (unsigned long long)atomic_load(&f->first_start_count));
     metric_head(b, "checkpoint_seconds", "summary", "How long checkpoints took.");
     buf_printf(b, "unbaked_checkpoint_seconds_sum %.6f\nunbaked_checkpoint_seconds_count %llu\n",
-               (double)atomic_load(&f->checkpoint_us) * 1e-6,
-               (unsigned long long)atomic_load(&f->checkpoint_count));
+               (double)atomic_load(&f->checkpoint_us) * 1e-6, (unsigned long long)atomic_load(&f->checkpoint_count));
     metric(b, "checkpoint_bytes_total", "counter", "Bytes written to checkpoints.",
            (double)atomic_load(&f->checkpoint_bytes));
     metric(b, "iterations_total", "counter", "Optimiser steps.", (double)atomic_load(&f->iteration_count));
     metric(b, "rays_total", "counter", "Rays traced by the optimiser.", (double)atomic_load(&f->ray_count));
-    metric(b, "worker_cpu_seconds_total", "counter", "CPU time of attempts.",
-           (double)atomic_load(&f->cpu_ms) * 1e-3);
+    metric(b, "worker_cpu_seconds_total", "counter", "CPU time of attempts.", (double)atomic_load(&f->cpu_ms) * 1e-3);
 }
 
 struct response *system_metrics(struct api *api, struct request *r) {

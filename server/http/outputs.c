@@ -56,8 +56,7 @@ static void apply_range(const struct request *r, uint64_t size, struct response 
     const char *range = request_field(r, "Range");
     uint64_t first = 0, count = size;
     switch (field_range(range, size, &first, &count)) {
-    case FIELD_RANGE_WHOLE:
-        return;
+    case FIELD_RANGE_WHOLE: return;
     case FIELD_RANGE_PART:
         (*reply)->status = 206;
         (*reply)->offset = first;
@@ -101,7 +100,8 @@ static struct response *send_bytes(const struct request *r, int fd, const struct
 /* Whether a part is asked for of the content that has some digest, and what this file's is is not known yet. */
 static bool is_too_early(const struct request *r, const struct digests_file *file) {
     const char *if_range = request_field(r, "If-Range");
-    return !*file->hex && !r->is_head && request_field(r, "Range") && if_range && strncmp(if_range, "\"sha256-", 8) == 0;
+    return !*file->hex && !r->is_head && request_field(r, "Range") && if_range &&
+           strncmp(if_range, "\"sha256-", 8) == 0;
 }
 
 /* The reply that sends the open file; takes fd. */

@@ -40,8 +40,8 @@ static const struct problem_kind *kind_of(int status) {
     return kind_of(500);
 }
 
-struct response *problem_full(const struct request *r, int status, const char *detail,
-                              const char *hint, cJSON *members) {
+struct response *problem_full(const struct request *r, int status, const char *detail, const char *hint,
+                              cJSON *members) {
     const struct problem_kind *kind = kind_of(status);
     cJSON *body = members ? members : cJSON_CreateObject();
     char type[64];

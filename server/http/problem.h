@@ -11,8 +11,8 @@ struct response *problem(const struct request *r, int status, const char *detail
     __attribute__((format(printf, 3, 4)));
 /* The same with a hint ("" for none) and further members (an object, taken; NULL for none), which may have
  * their own type and title. */
-struct response *problem_full(const struct request *r, int status, const char *detail,
-                              const char *hint, cJSON *members);
+struct response *problem_full(const struct request *r, int status, const char *detail, const char *hint,
+                              cJSON *members);
 /* 422 with invalid_params (an array of {name, reason, hint?}; taken). */
 struct response *problem_invalid(const struct request *r, const char *detail, cJSON *params);
 /* Appends one entry to such an array; hint may be NULL. */

@@ -20,7 +20,7 @@ struct readiness {
     pthread_mutex_t mutex; /* guards what follows; not held while the disk is asked */
     pthread_cond_t changed;
     bool is_wanted, is_asking, stopping;
-    double asked_sec; /* when the one began that goes on */
+    double asked_sec;       /* when the one began that goes on */
     unsigned long answered; /* how often */
     struct error answer;    /* the last; its status STATUS_OK: all is well */
     uint64_t free_bytes;

@@ -12,7 +12,7 @@ static const int codes[] = {0,   200, 201, 202, 204, 206, 304, 400, 401, 403, 40
 #define CODES (sizeof codes / sizeof *codes)
 
 struct request_counts {
-    size_t route_count; /* the last row is for requests without a route */
+    size_t route_count;            /* the last row is for requests without a route */
     atomic_ullong (*count)[CODES]; /* [route_count + 1]; owned */
 };
 
@@ -38,8 +38,10 @@ void request_counts_add(struct request_counts *t, const struct request *r, int s
 }
 
 void request_counts_print(struct request_counts *t, const char *name, struct buf *b) {
-    static const char *const methods[] = {[METHOD_GET] = "GET", [METHOD_POST] = "POST",
-                                          [METHOD_PATCH] = "PATCH", [METHOD_DELETE] = "DELETE",
+    static const char *const methods[] = {[METHOD_GET] = "GET",
+                                          [METHOD_POST] = "POST",
+                                          [METHOD_PATCH] = "PATCH",
+                                          [METHOD_DELETE] = "DELETE",
                                           [METHOD_OPTIONS] = "OPTIONS"};
     size_t count;
     const struct route *table = routes_table(&count);
@@ -49,7 +51,7 @@ void request_counts_print(struct request_counts *t, const char *name, struct buf
             if (n == 0)
                 continue;
             buf_printf(b, "%s{method=\"%s\",route=\"%s\",code=\"%d\"} %llu\n", name,
-                       row < count ? methods[table[row].method] : "other",
-                       row < count ? table[row].pattern : "none", codes[i], n);
+                       row < count ? methods[table[row].method] : "other", row < count ? table[row].pattern : "none",
+                       codes[i], n);
         }
 }

@@ -31,7 +31,7 @@ struct route {
     struct response *(*handle)(struct api *api, struct request *r);
     enum route_body body;
     enum route_pace pace;
-    const char *query;   /* the names that it takes, separated by spaces */
+    const char *query; /* the names that it takes, separated by spaces */
 };
 
 #endif

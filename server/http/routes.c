@@ -115,12 +115,13 @@ static struct response *no_route(const struct request *r) {
         snprintf(allow + used, sizeof allow - used, "%s%s", used ? ", " : "", names[table[i].method]);
     }
     if (!*allow)
-        return problem_full(r, 404, "there is nothing at this path",
-                            "GET / and GET /openapi.json say what there is", NULL);
+        return problem_full(r, 404, "there is nothing at this path", "GET / and GET /openapi.json say what there is",
+                            NULL);
     char detail[96];
     snprintf(detail, sizeof detail, "this path supports only %s", allow);
     bool is_other = r->method == METHOD_COUNT && strstr(allow, "POST");
-    struct response *reply = problem_full(r, 405, detail, is_other ? "curl -T sends PUT unless -X POST is given" : "", NULL);
+    struct response *reply =
+        problem_full(r, 405, detail, is_other ? "curl -T sends PUT unless -X POST is given" : "", NULL);
     response_field(reply, "Allow", "%s", allow);
     return reply;
 }
@@ -135,8 +136,8 @@ static struct response *check_query(const struct request *r) {
             at += strspn(at, " ");
         }
         if (!*at)
-            return problem(r, 400, "unknown query parameter \"%.100s\"%s%s", name,
-                           *r->route->query ? "; known: " : "", r->route->query);
+            return problem(r, 400, "unknown query parameter \"%.100s\"%s%s", name, *r->route->query ? "; known: " : "",
+                           r->route->query);
     }
     return NULL;
 }
@@ -155,8 +156,10 @@ static struct response *check_media_type(const struct request *r) {
     const char *type = request_field(r, "Content-Type");
     const char *coding = request_field(r, "Content-Encoding");
     enum route_body body = body_of(r);
-    static const char *const accepted[] = {[ROUTE_BODY_IGNORED] = MIME_JSON, [ROUTE_BODY_JSON] = MIME_JSON,
-        [ROUTE_BODY_UPLOAD] = "application/octet-stream", [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
+    static const char *const accepted[] = {[ROUTE_BODY_IGNORED] = MIME_JSON,
+                                           [ROUTE_BODY_JSON] = MIME_JSON,
+                                           [ROUTE_BODY_UPLOAD] = "application/octet-stream",
+                                           [ROUTE_BODY_PATCH] = MIME_TUS ", " MIME_JSON};
     const char *detail = NULL;
     if (coding && r->has_body)
         detail = "a body with a Content-Encoding is not supported";

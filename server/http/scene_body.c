@@ -17,8 +17,8 @@ static struct response *check_request(const struct request *r) {
     const char *name = target_query(&r->target, "name");
     char hex[SHA256_HEX_SIZE];
     if (!r->has_body || r->content_length == 0)
-        return problem_full(r, 400, "the body, an archive of the bundle, is missing",
-                            "curl -T room.zip -X POST URL", NULL);
+        return problem_full(r, 400, "the body, an archive of the bundle, is missing", "curl -T room.zip -X POST URL",
+                            NULL);
     if (sha256 && (strspn(sha256, "0123456789abcdefABCDEF") != 64 || sha256[64] != '\0'))
         return problem(r, 400, "X-Content-SHA256 is not 64 hex digits");
     if (digest && !field_digest(digest, hex))

@@ -83,8 +83,8 @@ struct response *scenes_add(struct api *api, struct request *r) {
     if (!refusal)
         status = upload_publish(r->upload, api->folder.dir, id, &err);
     if (!refusal && status == STATUS_OK)
-        status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload),
-                                 r->caller.user_id, &existed, &err);
+        status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload), r->caller.user_id,
+                                 &existed, &err);
     pthread_mutex_unlock(&api->folder.scene_mutex);
     if (refusal)
         return refusal;
@@ -124,9 +124,7 @@ static void read_patch(const struct request *r, cJSON **body, const char **name,
 }
 
 /* As whom it is removed: see store_scene_delete. */
-static int64_t owner_of(const struct request *r) {
-    return r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id;
-}
+static int64_t owner_of(const struct request *r) { return r->caller.role == ROLE_ADMIN ? -1 : r->caller.user_id; }
 
 struct response *scenes_patch(struct api *api, struct request *r) {
     struct scene_row row;

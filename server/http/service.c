@@ -9,18 +9,12 @@
 #include "server/uploads/digests.h"
 #include "server/uploads/resumable.h"
 
-static void renew_reserve(void *store) {
-    store_reserve_renew(store);
-}
+static void renew_reserve(void *store) { store_reserve_renew(store); }
 
 /* An upload has become a scene: its check is to begin. */
-static void scene_added(void *scheduler) {
-    scheduler_wake(scheduler);
-}
+static void scene_added(void *scheduler) { scheduler_wake(scheduler); }
 
-static void maintain_uploads(void *resumables) {
-    resumables_maintain(resumables);
-}
+static void maintain_uploads(void *resumables) { resumables_maintain(resumables); }
 
 static enum status forget_upload(void *resumables, const char *id, struct error *err) {
     return resumable_forget(resumables, id, err);
@@ -30,8 +24,8 @@ static enum status forget_upload(void *resumables, const char *id, struct error 
 static enum status open_folder(struct api *api, struct error *err) {
     struct store *store = api->store;
     enum status status = folder_open(&api->folder, api->config.data_dir, renew_reserve, store, err);
-    api->resumables = resumables_new(&(struct resumables_config){store, &api->folder, api->config.empty_upload_ms,
-                                                                 scene_added, api->scheduler});
+    api->resumables = resumables_new(
+        &(struct resumables_config){store, &api->folder, api->config.empty_upload_ms, scene_added, api->scheduler});
     api->collector_config =
         (struct collector_config){store, &api->folder, maintain_uploads, forget_upload, api->resumables};
     if (status == STATUS_OK)
@@ -51,8 +45,7 @@ enum status service_new(struct api **out, const struct api_config *config, struc
     api->auth_throttle = auth_throttle_new();
     api->hub = hub_new(config->keepalive_sec);
     *out = api;
-    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms,
-                                    config->upload_keep_ms, err);
+    enum status status = store_keep(store, config->scene_keep_ms, config->job_keep_ms, config->upload_keep_ms, err);
     if (status == STATUS_OK)
         status = store_keep_empty(store, api->config.empty_upload_ms, err);
     if (status == STATUS_OK)

@@ -29,12 +29,12 @@ struct response *session_get(struct api *api, struct request *r) {
 }
 
 /* Over TLS, ours or (as it says) a proxy's, the cookie stays there. */
-static void set_cookie(const struct api *api, const struct request *r, struct response *reply,
-                       const char *token, int age_sec) {
+static void set_cookie(const struct api *api, const struct request *r, struct response *reply, const char *token,
+                       int age_sec) {
     const char *scheme = request_field(r, "X-Forwarded-Proto");
     bool is_tls = api->config.is_tls || (scheme && strcmp(scheme, "https") == 0);
-    response_field(reply, "Set-Cookie", AUTH_COOKIE "=%s; Path=/; Max-Age=%d; HttpOnly; SameSite=Strict%s",
-                   token, age_sec, is_tls ? "; Secure" : "");
+    response_field(reply, "Set-Cookie", AUTH_COOKIE "=%s; Path=/; Max-Age=%d; HttpOnly; SameSite=Strict%s", token,
+                   age_sec, is_tls ? "; Secure" : "");
 }
 
 struct response *session_add(struct api *api, struct request *r) {
@@ -42,8 +42,7 @@ struct response *session_add(struct api *api, struct request *r) {
     struct error err;
     struct caller caller;
     const char *token = NULL;
-    enum status status =
-        json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err);
+    enum status status = json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err);
     if (status == STATUS_OK)
         status = json_string(body, "token", "the request body", NULL, &token, &err);
     struct response *reply = NULL;

@@ -86,8 +86,9 @@ struct response *system_readyz(struct api *api, struct request *r) {
     uint64_t keep = api->config.min_free_bytes + (limits_bind(r) ? api->config.admin_free_bytes : 0);
     if (room >= keep && !waits)
         return status_reply("ready");
-    return problem_full(r, 503, waits ? "the disk of the data folder is nearly full: jobs wait"
-                                      : "the disk of the data folder is nearly full",
+    return problem_full(r, 503,
+                        waits ? "the disk of the data folder is nearly full: jobs wait"
+                              : "the disk of the data folder is nearly full",
                         "delete jobs or scenes that nobody needs", NULL);
 }
 

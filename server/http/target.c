@@ -68,12 +68,13 @@ static enum status parse_path(struct target *t, struct error *err) {
             return error_set(err, STATUS_INPUT, "the path has more than %d parts", TARGET_SEGMENTS_MAX);
         char *segment = decode(at, length, 0);
         if (!segment)
-            return error_set(err, STATUS_INPUT, "part %zu of the path has a broken %%-escape, or "
-                             "stands for a control byte or no UTF-8", t->segment_count + 1);
+            return error_set(err, STATUS_INPUT,
+                             "part %zu of the path has a broken %%-escape, or "
+                             "stands for a control byte or no UTF-8",
+                             t->segment_count + 1);
         t->segments[t->segment_count++] = segment;
         if (climbs(segment))
-            return error_set(err, STATUS_INPUT, "part %zu of the path is empty, \".\" or \"..\"",
-                             t->segment_count);
+            return error_set(err, STATUS_INPUT, "part %zu of the path is empty, \".\" or \"..\"", t->segment_count);
         at += length;
         if (*at == '/' && *++at == '\0')
             return error_set(err, STATUS_INPUT, "the path ends with a slash");
@@ -93,8 +94,10 @@ static enum status parse_query(struct target *t, const char *query, struct error
         if (!name || !value) {
             mem_free(name);
             mem_free(value);
-            return error_set(err, STATUS_INPUT, "query parameter %zu has a broken %%-escape, or "
-                             "stands for a control byte or no UTF-8", t->query_count + 1);
+            return error_set(err, STATUS_INPUT,
+                             "query parameter %zu has a broken %%-escape, or "
+                             "stands for a control byte or no UTF-8",
+                             t->query_count + 1);
         }
         int repeated = target_query(t, name) != NULL;
         t->names[t->query_count] = name;
@@ -173,8 +176,8 @@ char *target_encode(const char *text, int keep_slash) {
     size_t used = 0;
     for (; *text; text++) {
         unsigned char c = (unsigned char)*text;
-        if ((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-            strchr("-._~", c) || (c == '/' && keep_slash)) {
+        if ((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || strchr("-._~", c) ||
+            (c == '/' && keep_slash)) {
             out[used++] = (char)c;
         } else {
             out[used++] = '%';

@@ -17,7 +17,7 @@
 
 struct target {
     char *authority; /* of an absolute form, "host:port", not yet checked: it takes the place of Host; owned; or NULL */
-    char *path; /* as sent, without the query, '?' for what no URL may have; owned */
+    char *path;      /* as sent, without the query, '?' for what no URL may have; owned */
     char *segments[TARGET_SEGMENTS_MAX]; /* decoded; owned; none for "/" */
     size_t segment_count;
     char *names[TARGET_QUERY_MAX], *values[TARGET_QUERY_MAX]; /* decoded query; owned */

@@ -43,8 +43,8 @@ static enum status read_file(const char *path, gnutls_datum_t *datum, struct buf
 }
 
 /* GnuTLS looks whether a key belongs to a certificate only when it makes credentials of them. */
-static enum status check_match(const struct tls *tls, const gnutls_datum_t *chain,
-                               const gnutls_datum_t *key, struct error *err) {
+static enum status check_match(const struct tls *tls, const gnutls_datum_t *chain, const gnutls_datum_t *key,
+                               struct error *err) {
     gnutls_certificate_credentials_t credentials;
     int code = gnutls_certificate_allocate_credentials(&credentials);
     if (code != 0)
@@ -54,7 +54,8 @@ static enum status check_match(const struct tls *tls, const gnutls_datum_t *chai
     if (code >= 0)
         return STATUS_OK;
     error_set(err, STATUS_INPUT, "%s and %s: %s", tls->certificate_file, tls->key_file, gnutls_strerror(code));
-    return error_hint(err, "both are PEM: a certificate, then its chain; and the private key that belongs to it, without "
+    return error_hint(err,
+                      "both are PEM: a certificate, then its chain; and the private key that belongs to it, without "
                       "a passphrase");
 }
 
@@ -106,8 +107,7 @@ enum status tls_reload(struct tls *tls, struct error *err) {
     return STATUS_OK;
 }
 
-enum status tls_new(struct tls **out, const char *certificate_file, const char *key_file,
-                    struct error *err) {
+enum status tls_new(struct tls **out, const char *certificate_file, const char *key_file, struct error *err) {
     struct tls *tls = mem_calloc(1, sizeof *tls);
     tls->certificate_file = mem_strdup(certificate_file);
     tls->key_file = mem_strdup(key_file);
@@ -136,8 +136,8 @@ void tls_free(struct tls *tls) {
 }
 
 static int give_certificate(gnutls_session_t session, const gnutls_datum_t *authorities, int authority_count,
-                            const gnutls_pk_algorithm_t *algorithms, int algorithm_count,
-                            gnutls_pcert_st **chain, unsigned *count, gnutls_privkey_t *key) {
+                            const gnutls_pk_algorithm_t *algorithms, int algorithm_count, gnutls_pcert_st **chain,
+                            unsigned *count, gnutls_privkey_t *key) {
     (void)session, (void)authorities, (void)authority_count, (void)algorithms, (void)algorithm_count;
     struct tls *tls = atomic_load(&current);
     if (!tls)
@@ -149,9 +149,7 @@ static int give_certificate(gnutls_session_t session, const gnutls_datum_t *auth
     return 0;
 }
 
-void *tls_certificate_callback(void) {
-    return (void *)give_certificate;
-}
+void *tls_certificate_callback(void) { return (void *)give_certificate; }
 
 void tls_send(void *session, const void *data, size_t length) {
     /* A few hundred bytes; where they do not fit the socket, nobody reads. */

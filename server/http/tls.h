@@ -11,14 +11,13 @@
 #include "common/error.h"
 
 /* In GnuTLS's words. Of TLS 1.2 only what has forward secrecy: no static RSA, and no SHA-1, as a MAC or in a signature. */
-#define TLS_PRIORITIES \
+#define TLS_PRIORITIES                                                                                                 \
     "NORMAL:-VERS-ALL:+VERS-TLS1.3:+VERS-TLS1.2:-RSA:-SHA1:-SIGN-RSA-SHA1:-SIGN-DSA-SHA1:-SIGN-ECDSA-SHA1"
 
 struct tls; /* opaque */
 
 /* PEM files: a chain, the server's certificate first, and its key. */
-enum status tls_new(struct tls **tls, const char *certificate_file, const char *key_file,
-                    struct error *err);
+enum status tls_new(struct tls **tls, const char *certificate_file, const char *key_file, struct error *err);
 /* Reads the files again; connections that begin from now on get what they hold. On an error, what
  * was there before stays. */
 enum status tls_reload(struct tls *tls, struct error *err);

@@ -46,9 +46,9 @@ static struct response *check_version(const struct request *r, bool is_needed) {
     const char *version = request_field(r, "Tus-Resumable");
     if (version ? strcmp(version, TUS_VERSION) == 0 : !is_needed)
         return NULL;
-    struct response *reply = problem_full(r, 412, version ? "Tus-Resumable names another version"
-                                                          : "the field Tus-Resumable is missing",
-                                          "send Tus-Resumable: " TUS_VERSION, NULL);
+    struct response *reply =
+        problem_full(r, 412, version ? "Tus-Resumable names another version" : "the field Tus-Resumable is missing",
+                     "send Tus-Resumable: " TUS_VERSION, NULL);
     response_field(reply, "Tus-Version", TUS_VERSION);
     return reply;
 }
@@ -148,8 +148,10 @@ static struct response *read_metadata(const struct request *r, struct upload_row
         while (end > value && at[end - 1] == ' ')
             end--;
         if (key == 0 || !take_pair(row, at, key, at + value, end > value ? end - value : 0))
-            return problem_full(r, 400, "Upload-Metadata is not a list of keys with values in base64",
-                                "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits", NULL);
+            return problem_full(
+                r, 400, "Upload-Metadata is not a list of keys with values in base64",
+                "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits",
+                NULL);
         at += length;
         at += *at == ',';
         at += strspn(at, " ");

@@ -32,9 +32,7 @@ static void add_text(cJSON *object, const char *key, const char *text) {
     json_add(object, key, value ? value : cJSON_CreateNull());
 }
 
-static const char *or_null(const char *text) {
-    return text && *text ? text : NULL;
-}
+static const char *or_null(const char *text) { return text && *text ? text : NULL; }
 
 static void add_disk_bytes(cJSON *object, int64_t bytes) {
     if (bytes >= 0)

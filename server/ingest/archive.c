@@ -33,7 +33,7 @@
 struct unpacking {
     struct archive *archive;
     struct archive_entry *entry; /* our own: libarchive 3.6.2 does not check the allocation of its entry */
-    const char *name; /* for messages */
+    const char *name;            /* for messages */
     const struct archive_limits *limits;
     uint64_t packed_bytes, written_bytes, entry_count, file_count;
     int dir_fd;
@@ -55,8 +55,7 @@ static enum status library_error(struct unpacking *u, const char *entry) {
     if (entry)
         return error_set(u->err, status, "%s: \"%s\" is damaged: %s", u->name, entry, text);
     if (u->entry_count == 0)
-        return error_set(u->err, status,
-                         "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s", u->name,
+        return error_set(u->err, status, "%s cannot be read as a zip, tar, tar.gz or tar.zst archive: %s", u->name,
                          text);
     return error_set(u->err, status, "%s is damaged or cut off: %s", u->name, text);
 }
@@ -120,13 +119,11 @@ static enum status open_archive(struct unpacking *u, const char *path) {
     if (u->fd < 0 || fstat(u->fd, &info) != 0)
         return error_set_errno(u->err, errno, "cannot open %s", u->name);
     u->packed_bytes = (uint64_t)info.st_size;
-    if (archive_read_support_format_zip(a) != ARCHIVE_OK ||
-        archive_read_support_format_tar(a) != ARCHIVE_OK ||
+    if (archive_read_support_format_zip(a) != ARCHIVE_OK || archive_read_support_format_tar(a) != ARCHIVE_OK ||
         archive_read_support_filter_zstd(a) != ARCHIVE_OK) {
         if (archive_errno(a) == ENOMEM)
             mem_exhausted("libarchive");
-        return error_set(u->err, STATUS_INTERNAL, "libarchive lacks zip, tar or zstd: %s",
-                         archive_error_string(a));
+        return error_set(u->err, STATUS_INTERNAL, "libarchive lacks zip, tar or zstd: %s", archive_error_string(a));
     }
     errno = 0;
     return open_stream(u) == ARCHIVE_OK ? STATUS_OK : library_error(u, NULL);
@@ -151,8 +148,8 @@ static const char *forbidden_kind(struct archive_entry *entry) {
 static enum status check_entry(struct unpacking *u, struct archive_entry *entry, const char *path) {
     const char *kind = forbidden_kind(entry);
     if (kind)
-        return error_set(u->err, STATUS_INPUT, "%s: \"%s\" is %s; only files and folders are taken",
-                         u->name, path, kind);
+        return error_set(u->err, STATUS_INPUT, "%s: \"%s\" is %s; only files and folders are taken", u->name, path,
+                         kind);
     if (archive_entry_is_encrypted(entry)) {
         error_set(u->err, STATUS_INPUT, "%s: \"%s\" is encrypted", u->name, path);
         return error_hint(u->err, "pack it again without a password");
@@ -160,8 +157,8 @@ static enum status check_entry(struct unpacking *u, struct archive_entry *entry,
     if (archive_entry_size_is_set(entry) && archive_entry_size(entry) > 0 &&
         (uint64_t)archive_entry_size(entry) > u->limits->total_bytes)
         return error_set(u->err, STATUS_LIMIT,
-                         "%s: \"%s\" says it is %" PRId64 " bytes; a bundle may unpack to %" PRIu64,
-                         u->name, path, (int64_t)archive_entry_size(entry), u->limits->total_bytes);
+                         "%s: \"%s\" says it is %" PRId64 " bytes; a bundle may unpack to %" PRIu64, u->name, path,
+                         (int64_t)archive_entry_size(entry), u->limits->total_bytes);
     return STATUS_OK;
 }
 
@@ -184,8 +181,8 @@ static int open_folder(struct unpacking *u, const char *path, size_t length, enu
         start += n + 1;
     }
     if (at < 0 && (errno == ENOTDIR || errno == ELOOP))
-        *status = error_set(u->err, STATUS_INPUT, "%s: \"%.*s\" is both a file and a folder", u->name,
-                            (int)length, path);
+        *status =
+            error_set(u->err, STATUS_INPUT, "%s: \"%.*s\" is both a file and a folder", u->name, (int)length, path);
     else if (at < 0)
         *status = error_set_errno(u->err, errno, "cannot make folder %.*s", (int)length, path);
     return at;
@@ -194,13 +191,12 @@ static int open_folder(struct unpacking *u, const char *path, size_t length, enu
 static enum status count_bytes(struct unpacking *u, size_t bytes) {
     u->written_bytes += bytes;
     if (u->written_bytes > u->limits->total_bytes)
-        return error_set(u->err, STATUS_LIMIT, "%s unpacks to more than %" PRIu64 " bytes, the limit",
-                         u->name, u->limits->total_bytes);
+        return error_set(u->err, STATUS_LIMIT, "%s unpacks to more than %" PRIu64 " bytes, the limit", u->name,
+                         u->limits->total_bytes);
     if (u->written_bytes > ARCHIVE_RATIO_FREE_BYTES &&
         (double)u->written_bytes > u->limits->ratio * (double)u->packed_bytes)
-        return error_set(u->err, STATUS_LIMIT,
-                         "%s unpacks to more than %.0f times its size of %" PRIu64 " bytes", u->name,
-                         u->limits->ratio, u->packed_bytes);
+        return error_set(u->err, STATUS_LIMIT, "%s unpacks to more than %.0f times its size of %" PRIu64 " bytes",
+                         u->name, u->limits->ratio, u->packed_bytes);
     return STATUS_OK;
 }
 
@@ -248,8 +244,7 @@ static enum status unpack_entry(struct unpacking *u, struct archive_entry *entry
     if (!raw)
         raw = archive_entry_pathname(entry);
     if (!raw || raw[0] == '\0')
-        return error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " has no name in UTF-8", u->name,
-                         u->entry_count);
+        return error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " has no name in UTF-8", u->name, u->entry_count);
     char *path;
     enum status status = path_clean(raw, &path, u->err);
     if (status != STATUS_OK)
@@ -264,8 +259,8 @@ static enum status unpack_entry(struct unpacking *u, struct archive_entry *entry
         if (folder >= 0)
             close(folder);
     } else if (path[0] == '\0') {
-        status = error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " is a file without a name",
-                           u->name, u->entry_count);
+        status =
+            error_set(u->err, STATUS_INPUT, "%s: entry %" PRIu64 " is a file without a name", u->name, u->entry_count);
     } else {
         status = unpack_file(u, path);
     }
@@ -347,7 +342,8 @@ static enum status count_and_unpack(struct unpacking *u, const char *path, const
     if (mkdir(dir, 0700) != 0)
         return error_set_errno(u->err, errno, "cannot create folder %s", dir);
     u->dir_fd = open(dir, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    status = u->dir_fd < 0 ? error_set_errno(u->err, errno, "cannot open folder %s", dir) : read_archive(u, path, unpack_all);
+    status = u->dir_fd < 0 ? error_set_errno(u->err, errno, "cannot open folder %s", dir)
+                           : read_archive(u, path, unpack_all);
     if (u->dir_fd >= 0)
         close(u->dir_fd);
     if (status != STATUS_OK)
@@ -355,8 +351,8 @@ static enum status count_and_unpack(struct unpacking *u, const char *path, const
     return status;
 }
 
-enum status archive_unpack(const char *path, const char *name, const char *dir,
-                           const struct archive_limits *limits, struct error *err) {
+enum status archive_unpack(const char *path, const char *name, const char *dir, const struct archive_limits *limits,
+                           struct error *err) {
     struct unpacking u = {.name = name, .limits = limits, .err = err, .dir_fd = -1, .block = mem_alloc(BLOCK_BYTES)};
     /* libarchive converts names to the locale's character set and drops what it cannot convert; the daemon's "C"
      * locale is ASCII only. Set for this thread and this call. */

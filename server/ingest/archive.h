@@ -20,7 +20,7 @@ struct archive_limits {
  * messages. Writes nothing outside `dir`, only regular files and folders, with our modes and times; skips files of
  * operating systems (path_is_litter). On failure `dir` is removed. STATUS_INPUT: not such an archive, damaged,
  * encrypted, unsafe or duplicate names, links or devices; STATUS_LIMIT: a limit; STATUS_NO_SPACE: the disk is full. */
-enum status archive_unpack(const char *path, const char *name, const char *dir,
-                           const struct archive_limits *limits, struct error *err);
+enum status archive_unpack(const char *path, const char *name, const char *dir, const struct archive_limits *limits,
+                           struct error *err);
 
 #endif

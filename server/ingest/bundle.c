@@ -28,8 +28,7 @@ struct bundle_limits bundle_default_limits(void) {
     };
 }
 
-enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
-                          struct error *err) {
+enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits, struct error *err) {
     struct archive_limits own = {limits->file_count, limits->total_bytes, limits->ratio};
     return archive_unpack(archive, "the archive", dir, &own, err);
 }
@@ -72,8 +71,8 @@ static enum status find_root(const char *dir, char **root, struct error *err) {
 
 /* --- transforms -------------------------------------------------------------------------- */
 
-static enum status load_transforms(const char *root, const char *name, struct transforms *t,
-                                   struct findings *f, struct error *err) {
+static enum status load_transforms(const char *root, const char *name, struct transforms *t, struct findings *f,
+                                   struct error *err) {
     struct buf text;
     struct stat info;
     buf_init(&text, TRANSFORMS_MAX_BYTES);
@@ -189,20 +188,20 @@ static enum status search_mesh(const char *root, char **found, struct findings *
     } else if (c.first) {
         *found = mem_strdup(c.first);
     } else if (c.unknown) {
-        findings_problem(f, c.unknown, "no mesh: the format of %s is not read; a mesh must be "
-                         MESH_FILE_FORMATS, c.unknown);
+        findings_problem(f, c.unknown, "no mesh: the format of %s is not read; a mesh must be " MESH_FILE_FORMATS,
+                         c.unknown);
     } else {
-        findings_problem(f, "mesh.ply", c.point_cloud_count > 0
-                             ? "no mesh: the PLY files at the bundle's top are point clouds"
-                             : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
+        findings_problem(f, "mesh.ply",
+                         c.point_cloud_count > 0 ? "no mesh: the PLY files at the bundle's top are point clouds"
+                                                 : "no mesh: the bundle has no " MESH_FILE_FORMATS " file at its top");
     }
     file_free_names(c.name, c.count);
     return STATUS_OK;
 }
 
 /* Name of the mesh file, the caller's; NULL with a problem. */
-static enum status find_mesh(const char *root, const char *transforms_name, const struct transforms *t,
-                             char **found, struct findings *f, struct error *err) {
+static enum status find_mesh(const char *root, const char *transforms_name, const struct transforms *t, char **found,
+                             struct findings *f, struct error *err) {
     *found = NULL;
     if (t->mesh || t->point_cloud) {
         const char *name = t->mesh ? t->mesh : t->point_cloud;
@@ -222,8 +221,8 @@ static enum status find_mesh(const char *root, const char *transforms_name, cons
     return search_mesh(root, found, f, err);
 }
 
-static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit,
-                             struct scene *scene, struct findings *f, struct error *err) {
+static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit, struct scene *scene,
+                             struct findings *f, struct error *err) {
     struct faces_report report;
     struct error own;
     char *path = file_join(root, name);
@@ -235,8 +234,7 @@ static enum status load_mesh(const char *root, const char *name, uint64_t triang
     if (status != STATUS_OK)
         return findings_settle(f, name, status, &own, err);
     if (report.small_count > 0)
-        findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name,
-                         report.small_count);
+        findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name, report.small_count);
     if (scene->mesh_report.degenerate_count > 0)
         findings_warning(f, "%s: %zu triangles have no area and were left out", name,
                          scene->mesh_report.degenerate_count);
@@ -258,9 +256,10 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
         far_count += vec3_length(vec3_sub(origin, centre)) > reach;
     }
     if (far_count > 0)
-        findings_warning(f, "%zu of %zu cameras stand farther from the mesh's centre than twice its "
-                         "diagonal: are poses and mesh in the same units and axes?", far_count,
-                         scene->photograph_count);
+        findings_warning(f,
+                         "%zu of %zu cameras stand farther from the mesh's centre than twice its "
+                         "diagonal: are poses and mesh in the same units and axes?",
+                         far_count, scene->photograph_count);
 }
 
 /* --- all of it --------------------------------------------------------------------------- */
@@ -268,8 +267,7 @@ static void check_frames_meet_mesh(const struct scene *scene, struct findings *f
 static void move_warnings(struct findings *f, struct scene *scene) {
     if (f->warning_count > FINDINGS_MAX) {
         char *last = f->warning[FINDINGS_MAX - 1];
-        f->warning[FINDINGS_MAX - 1] =
-            mem_printf("... and %zu warnings more", f->warning_count - FINDINGS_MAX + 1);
+        f->warning[FINDINGS_MAX - 1] = mem_printf("... and %zu warnings more", f->warning_count - FINDINGS_MAX + 1);
         mem_free(last);
         f->warning_count = FINDINGS_MAX;
     }
@@ -298,8 +296,7 @@ static enum status sum_up(const struct findings *f, struct error *err) {
 }
 
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
-                        struct parallel *pool, struct scene *scene, cJSON *problems,
-                        struct error *err) {
+                        struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err) {
     struct findings f = {.problems = problems};
     struct transforms t;
     char *root = NULL, *mesh = NULL, *name = NULL;

@@ -16,9 +16,9 @@
 #define BUNDLE_TRANSFORMS "transforms.json"
 
 struct bundle_limits {
-    uint64_t file_count;     /* entries of an archive */
-    uint64_t total_bytes;    /* unpacked */
-    double ratio;            /* unpacked / packed */
+    uint64_t file_count;        /* entries of an archive */
+    uint64_t total_bytes;       /* unpacked */
+    double ratio;               /* unpacked / packed */
     uint64_t photograph_pixels; /* per photograph */
     uint64_t triangles;
 };
@@ -28,15 +28,13 @@ struct bundle_limits bundle_default_limits(void);
 /* Unpacks an archive (zip, tar, tar.gz, tar.zst) into the new folder `dir`. Refuses absolute paths, paths with "..",
  * links, devices, and anything over a limit. bundle_load accepts a single folder at the top. On failure `dir` is
  * removed; on success the caller makes the files durable. */
-enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits,
-                          struct error *err);
+enum status bundle_unpack(const char *archive, const char *dir, const struct bundle_limits *limits, struct error *err);
 
 /* Reads an unpacked bundle: cameras, mesh, photographs. Collects as many problems as possible, each an object
  * {"file", "reason"} with an optional "hint", in the array `problems`; then returns STATUS_INPUT with a summary in
  * *err. Other statuses are failures of the machine. `transforms` names the file to read instead of transforms.json
  * (NULL: default). On success the scene is the caller's (scene_release); otherwise it is empty. */
 enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
-                        struct parallel *pool, struct scene *scene, cJSON *problems,
-                        struct error *err);
+                        struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err);
 
 #endif

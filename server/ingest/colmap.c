@@ -37,8 +37,8 @@ static void invert(const double q[4], const double t[3], double m[3][4]) {
 }
 
 /* A faulty frame is left out with a problem; STATUS_INPUT for too many. */
-static enum status add_image(const struct colmap_cursor *r, struct images *in, const double pose[7],
-                             uint64_t camera, const char *name) {
+static enum status add_image(const struct colmap_cursor *r, struct images *in, const double pose[7], uint64_t camera,
+                             const char *name) {
     struct transforms *t = in->t;
     struct error own;
     char *clean = NULL, *full = mem_printf("%s%s", in->prefix, name);
@@ -54,10 +54,9 @@ static enum status add_image(const struct colmap_cursor *r, struct images *in, c
     else if (path_clean(full, &clean, &own) != STATUS_OK)
         findings_error(in->findings, r->name, &own);
     else if (!lens)
-        findings_problem(in->findings, r->name, "image %s: there is no camera %llu", clean,
-                         (unsigned long long)camera);
-    else if (pose_from_matrix((const double(*)[4])m, "its pose", POSE_RIGHT_DOWN_FORWARD,
-                              &frame.world_from_camera, &frame.camera_from_world, &scaled, &own) != STATUS_OK)
+        findings_problem(in->findings, r->name, "image %s: there is no camera %llu", clean, (unsigned long long)camera);
+    else if (pose_from_matrix((const double(*)[4])m, "its pose", POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
+                              &frame.camera_from_world, &scaled, &own) != STATUS_OK)
         findings_problem(in->findings, r->name, "image %s: %s", clean, own.message);
     else {
         if (t->frame_count == in->capacity) {
@@ -133,8 +132,8 @@ static int by_file(const void *a, const void *b) {
 }
 
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
-                                const struct colmap_cameras *cameras, const char *prefix,
-                                struct transforms *t, struct findings *f, struct error *err) {
+                                const struct colmap_cameras *cameras, const char *prefix, struct transforms *t,
+                                struct findings *f, struct error *err) {
     struct colmap_cursor r = {.name = name, .data = data, .size = size, .err = err};
     struct images in = {.cameras = cameras, .prefix = prefix, .t = t, .findings = f};
     *t = (struct transforms){0};

@@ -23,7 +23,7 @@ enum status colmap_read(const char *root, const char *images, struct transforms 
 
 /* Parses an images file in memory. `prefix` is prepended to the photographs' names. */
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
-                                const struct colmap_cameras *cameras, const char *prefix,
-                                struct transforms *t, struct findings *f, struct error *err);
+                                const struct colmap_cameras *cameras, const char *prefix, struct transforms *t,
+                                struct findings *f, struct error *err);
 
 #endif

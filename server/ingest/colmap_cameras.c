@@ -48,8 +48,7 @@ static int by_id(const void *a, const void *b) {
 
 static enum status add_camera(const struct colmap_cursor *r, struct colmap_cameras *c, uint64_t id,
                               const struct model *model, double width, double height, const double *value) {
-    struct lens lens = {.model = model->kind, .width = width, .height = height, .angle_x = NAN,
-                        .angle_y = NAN};
+    struct lens lens = {.model = model->kind, .width = width, .height = height, .angle_x = NAN, .angle_y = NAN};
     if (!(width >= 1.0 && width <= IMAGE_MAX_SIDE && height >= 1.0 && height <= IMAGE_MAX_SIDE) ||
         width != floor(width) || height != floor(height))
         return error_set(r->err, STATUS_INPUT, "%s: camera %llu is %.9g x %.9g pixels, which cannot be", r->name,
@@ -161,7 +160,6 @@ void colmap_cameras_free(struct colmap_cameras *c) {
 
 const struct lens *colmap_cameras_find(const struct colmap_cameras *c, uint32_t id) {
     const struct colmap_camera key = {.id = id};
-    const struct colmap_camera *found =
-        c->count == 0 ? NULL : bsearch(&key, c->camera, c->count, sizeof key, by_id);
+    const struct colmap_camera *found = c->count == 0 ? NULL : bsearch(&key, c->camera, c->count, sizeof key, by_id);
     return found ? &found->lens : NULL;
 }

@@ -14,9 +14,9 @@ struct colmap_cursor {
     const char *name;    /* for messages */
     const uint8_t *data; /* [size] borrowed */
     size_t size, at;
-    size_t line_end;     /* of the present line; `at` is within it */
-    size_t line;         /* its number, from 1; 0: before the first */
-    struct error *err;   /* receives error messages */
+    size_t line_end;   /* of the present line; `at` is within it */
+    size_t line;       /* its number, from 1; 0: before the first */
+    struct error *err; /* receives error messages */
 };
 
 /* Read an unsigned integer of `bytes` bytes, or doubles; false at the end of the file. */

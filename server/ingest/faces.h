@@ -11,15 +11,15 @@
 #include "server/scene/mesh.h"
 
 struct faces_report {
-    size_t polygon_count;  /* faces with more than four corners, cut into triangles */
-    size_t small_count;    /* faces with fewer than three corners, left out */
+    size_t polygon_count; /* faces with more than four corners, cut into triangles */
+    size_t small_count;   /* faces with fewer than three corners, left out */
 };
 
 struct faces {
     struct mesh *mesh;
-    const char *name;                     /* of the file, for messages */
-    size_t capacity, limit;               /* triangles */
-    bool has_object_id;                   /* whether mesh->object_id is filled */
+    const char *name;       /* of the file, for messages */
+    size_t capacity, limit; /* triangles */
+    bool has_object_id;     /* whether mesh->object_id is filled */
     struct faces_report report;
     size_t corner_count;                  /* the polygon to be added: */
     uint32_t corner[POLYGON_MAX_CORNERS]; /* its vertices */

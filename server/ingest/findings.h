@@ -13,7 +13,7 @@ struct findings {
     cJSON *problems; /* array of {"file", "reason"} or with "hint" too; borrowed */
     size_t problem_count;
     size_t warning_count;
-    char **warning;  /* [min(warning_count, FINDINGS_MAX)]; owned */
+    char **warning; /* [min(warning_count, FINDINGS_MAX)]; owned */
 };
 
 void findings_release(struct findings *f);
@@ -25,7 +25,6 @@ void findings_error(struct findings *f, const char *file, const struct error *er
  * *err, which may be NULL. */
 enum status findings_settle(struct findings *f, const char *file, enum status status, const struct error *own,
                             struct error *err);
-void findings_warning(struct findings *f, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
+void findings_warning(struct findings *f, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 #endif

@@ -22,25 +22,24 @@ struct gltf_reader {
     struct mesh *mesh;
     struct faces *faces;
     size_t vertex_capacity;
-    bool lacks_normals;       /* a primitive without normals */
-    bool *visited;       /* [nodes.count]; owned */
+    bool lacks_normals; /* a primitive without normals */
+    bool *visited;      /* [nodes.count]; owned */
     int64_t object_count;
     struct error *err;
 };
 
 /* --- primitives (3.7.2) --------------------------------------------------------------------- */
 
-static enum status open_attribute(struct gltf_reader *r, const cJSON *primitive, const char *key,
-                                  const char *where, bool *found, struct gltf_span *span) {
+static enum status open_attribute(struct gltf_reader *r, const cJSON *primitive, const char *key, const char *where,
+                                  bool *found, struct gltf_span *span) {
     const cJSON *attributes = cJSON_GetObjectItemCaseSensitive(primitive, "attributes");
     size_t accessor;
-    enum status status =
-        gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
+    enum status status = gltf_index(&r->file, attributes, key, where, &r->file.accessors, found, &accessor, r->err);
     if (status == STATUS_OK && *found)
         status = gltf_span(&r->file, accessor, "VEC3", span, r->err);
     if (status == STATUS_OK && *found && span->component != GLTF_FLOAT)
-        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats",
-                           r->file.name, accessor, where, key);
+        status = error_set(r->err, STATUS_INPUT, "%s: accessors[%zu] of %s.%s does not hold floats", r->file.name,
+                           accessor, where, key);
     return status;
 }
 
@@ -112,8 +111,8 @@ static enum status add_triangles(struct gltf_reader *r, const struct primitive *
             size_t at = corner[p->mirrored ? 2 - k : k];
             size_t vertex = p->is_indexed ? gltf_read_index(&p->indices, at) : at;
             if (vertex >= p->position.count)
-                return error_set(r->err, STATUS_INPUT, "%s: %s refers to vertex %zu, but there are %zu",
-                                 r->file.name, p->where, vertex, p->position.count);
+                return error_set(r->err, STATUS_INPUT, "%s: %s refers to vertex %zu, but there are %zu", r->file.name,
+                                 p->where, vertex, p->position.count);
             f->corner[k] = vertex_of(r, p, vertex);
             f->position[k] = r->mesh->position[f->corner[k]];
         }
@@ -129,18 +128,17 @@ static enum status open_primitive(struct gltf_reader *r, const cJSON *object, st
     bool found;
     const cJSON *extensions = cJSON_GetObjectItemCaseSensitive(object, "extensions");
     if (cJSON_GetObjectItemCaseSensitive(extensions, "KHR_draco_mesh_compression")) {
-        error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name,
-                  p->where);
+        error_set(r->err, STATUS_INPUT, "%s: %s is compressed by Draco, which is not read", r->file.name, p->where);
         return error_hint(r->err, "export it without compression");
     }
-    enum status status = gltf_index(&r->file, object, "indices", p->where, &r->file.accessors, &p->is_indexed,
-                                    &accessor, r->err);
+    enum status status =
+        gltf_index(&r->file, object, "indices", p->where, &r->file.accessors, &p->is_indexed, &accessor, r->err);
     if (status == STATUS_OK && p->is_indexed)
         status = gltf_span(&r->file, accessor, "SCALAR", &p->indices, r->err);
     enum gltf_component c = p->indices.component;
     if (status == STATUS_OK && p->is_indexed && c != GLTF_UBYTE && c != GLTF_USHORT && c != GLTF_UINT)
-        status = error_set(r->err, STATUS_INPUT, "%s: the indices of %s are not unsigned integers",
-                           r->file.name, p->where);
+        status =
+            error_set(r->err, STATUS_INPUT, "%s: the indices of %s are not unsigned integers", r->file.name, p->where);
     if (status == STATUS_OK)
         status = open_attribute(r, object, "POSITION", p->where, &found, &p->position);
     if (status == STATUS_OK && !found)
@@ -148,8 +146,8 @@ static enum status open_primitive(struct gltf_reader *r, const cJSON *object, st
     if (status == STATUS_OK)
         status = open_attribute(r, object, "NORMAL", p->where, &p->has_normal, &p->normal);
     if (status == STATUS_OK && p->has_normal && p->normal.count != p->position.count)
-        status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file.name,
-                           p->where, p->position.count, p->normal.count);
+        status = error_set(r->err, STATUS_INPUT, "%s: %s has %zu positions and %zu normals", r->file.name, p->where,
+                           p->position.count, p->normal.count);
     return status;
 }
 
@@ -212,8 +210,7 @@ static enum status visit(struct gltf_reader *r, size_t node, const struct affine
     if (r->visited[node])
         return error_set(r->err, STATUS_INPUT, "%s: %s has more than one parent", r->file.name, where);
     if (depth > MAX_DEPTH)
-        return error_set(r->err, STATUS_INPUT, "%s: %s lies more than %d nodes deep", r->file.name, where,
-                         MAX_DEPTH);
+        return error_set(r->err, STATUS_INPUT, "%s: %s lies more than %d nodes deep", r->file.name, where, MAX_DEPTH);
     r->visited[node] = true;
     enum status status = gltf_node_transform(&r->file, node, &own, r->err);
     if (status == STATUS_OK)
@@ -228,8 +225,8 @@ static enum status visit(struct gltf_reader *r, size_t node, const struct affine
         if (status != STATUS_OK)
             break;
         if (!(child >= 0.0 && child < (double)r->file.nodes.count) || child != floor(child))
-            return error_set(r->err, STATUS_INPUT, "%s: a child of %s is none of the %zu nodes",
-                             r->file.name, where, r->file.nodes.count);
+            return error_set(r->err, STATUS_INPUT, "%s: a child of %s is none of the %zu nodes", r->file.name, where,
+                             r->file.nodes.count);
         status = visit(r, (size_t)child, &t, depth + 1);
     }
     return status;
@@ -241,8 +238,8 @@ static enum status visit_list(struct gltf_reader *r, const cJSON *list, const ch
     cJSON_ArrayForEach(item, list) {
         double node = cJSON_GetNumberValue(item);
         if (!(node >= 0.0 && node < (double)r->file.nodes.count) || node != floor(node))
-            return error_set(r->err, STATUS_INPUT, "%s: a node of %s is none of the %zu nodes",
-                             r->file.name, of, r->file.nodes.count);
+            return error_set(r->err, STATUS_INPUT, "%s: a node of %s is none of the %zu nodes", r->file.name, of,
+                             r->file.nodes.count);
         enum status status = visit(r, (size_t)node, &identity, 0);
         if (status != STATUS_OK)
             return status;
@@ -274,8 +271,8 @@ static enum status visit_roots(struct gltf_reader *r) {
 static enum status read_scene(struct gltf_reader *r) {
     bool found;
     size_t scene;
-    enum status status = gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found,
-                                    &scene, r->err);
+    enum status status =
+        gltf_index(&r->file, r->file.json, "scene", "the file", &r->file.scenes, &found, &scene, r->err);
     if (status != STATUS_OK)
         return status;
     r->visited = mem_calloc(r->file.nodes.count + 1, sizeof *r->visited);
@@ -296,9 +293,8 @@ static void finish(struct gltf_reader *r) {
     }
 }
 
-enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder,
-                       size_t triangle_limit, struct mesh *mesh, struct faces_report *report,
-                       struct error *err) {
+enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                       struct mesh *mesh, struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     struct gltf_reader r = {.mesh = mesh, .err = err};
     r.faces = faces_new(mesh, name, triangle_limit, true);

@@ -16,8 +16,7 @@
 /* As ply_read and ply_parse; `folder` contains the file's external buffers, NULL: none are allowed. */
 enum status gltf_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                       struct faces_report *report, struct error *err);
-enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder,
-                       size_t triangle_limit, struct mesh *mesh, struct faces_report *report,
-                       struct error *err);
+enum status gltf_parse(const void *data, size_t size, const char *name, const char *folder, size_t triangle_limit,
+                       struct mesh *mesh, struct faces_report *report, struct error *err);
 
 #endif

@@ -27,14 +27,13 @@ struct chunks {
     size_t json_size, bin_size;
 };
 
-static enum status split_glb(const uint8_t *data, size_t size, const char *name, struct chunks *c,
-                             struct error *err) {
+static enum status split_glb(const uint8_t *data, size_t size, const char *name, struct chunks *c, struct error *err) {
     if (size < 20 || word_at(data + 4) != 2)
         return error_set(err, STATUS_INPUT, "%s is not a GLB of version 2", name);
     uint32_t length = word_at(data + 8);
     if (length > size)
-        return error_set(err, STATUS_INPUT, "%s is cut off: its header promises %u bytes, there are %zu", name,
-                         length, size);
+        return error_set(err, STATUS_INPUT, "%s is cut off: its header promises %u bytes, there are %zu", name, length,
+                         size);
     for (size_t at = 12, number = 0; at + 8 <= length; number++) {
         uint32_t chunk = word_at(data + at), type = word_at(data + at + 4);
         if (chunk > length - at - 8)
@@ -71,8 +70,7 @@ static void unescape(char *text) {
     *to = '\0';
 }
 
-static enum status open_file_buffer(struct gltf_file *g, struct gltf_buffer *b, const char *uri,
-                                    struct error *err) {
+static enum status open_file_buffer(struct gltf_file *g, struct gltf_buffer *b, const char *uri, struct error *err) {
     char *text = mem_strdup(uri), *clean = NULL;
     unescape(text);
     enum status status = path_clean(text, &clean, err);
@@ -113,8 +111,7 @@ static enum status open_buffer(struct gltf_file *g, size_t i, const struct chunk
 
 /* --- JSON ----------------------------------------------------------------------------------- */
 
-static enum status make_list(const struct gltf_file *g, struct gltf_list *list, const char *key,
-                             struct error *err) {
+static enum status make_list(const struct gltf_file *g, struct gltf_list *list, const char *key, struct error *err) {
     const cJSON *array = cJSON_GetObjectItemCaseSensitive(g->json, key), *item;
     list->key = key;
     if (!array)
@@ -133,7 +130,7 @@ static enum status make_list(const struct gltf_file *g, struct gltf_list *list, 
 /* Extensions that do not affect geometry. */
 static bool is_harmless(const char *extension) {
     static const char *const start[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_",
-                                        "KHR_animation_", "KHR_xmp", "EXT_lights_"};
+                                        "KHR_animation_", "KHR_xmp",      "EXT_lights_"};
     for (size_t i = 0; i < sizeof start / sizeof *start; i++)
         if (strncmp(extension, start[i], strlen(start[i])) == 0)
             return true;
@@ -173,8 +170,8 @@ static enum status read_json(struct gltf_file *g, const struct chunks *c, struct
     return status == STATUS_OK ? check_extensions(g, err) : status;
 }
 
-enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name,
-                           const char *folder, struct error *err) {
+enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name, const char *folder,
+                           struct error *err) {
     struct chunks c = {.json = data, .json_size = size};
     *g = (struct gltf_file){.name = name, .folder = folder};
     enum status status = STATUS_OK;
@@ -209,13 +206,12 @@ void gltf_file_release(struct gltf_file *g) {
 
 /* An integer from `least` to `most`; `fallback` when it is absent. */
 static enum status whole(const struct gltf_file *g, const cJSON *object, const char *key, const char *where,
-                         size_t index, double fallback, double least, double most, uint64_t *value,
-                         struct error *err) {
+                         size_t index, double fallback, double least, double most, uint64_t *value, struct error *err) {
     const cJSON *member = cJSON_GetObjectItemCaseSensitive(object, key);
     double number = member ? cJSON_GetNumberValue(member) : fallback;
     if (!(number >= least && number <= most) || number != floor(number))
-        return error_set(err, STATUS_INPUT, "%s: %s[%zu].%s is not a whole number from %.0f to %.0f", g->name,
-                         where, index, key, least, most);
+        return error_set(err, STATUS_INPUT, "%s: %s[%zu].%s is not a whole number from %.0f to %.0f", g->name, where,
+                         index, key, least, most);
     *value = (uint64_t)number;
     return STATUS_OK;
 }
@@ -229,8 +225,8 @@ enum status gltf_index(const struct gltf_file *g, const cJSON *object, const cha
     if (!member)
         return STATUS_OK;
     if (!(number >= 0.0 && number < (double)list->count) || number != floor(number))
-        return error_set(err, STATUS_INPUT, "%s: %s.%s is none of the %zu %s", g->name, where, key,
-                         list->count, list->key);
+        return error_set(err, STATUS_INPUT, "%s: %s.%s is none of the %zu %s", g->name, where, key, list->count,
+                         list->key);
     *index = (size_t)number;
     return STATUS_OK;
 }
@@ -273,15 +269,16 @@ static enum status view_of(const struct gltf_file *g, size_t index, size_t eleme
     if (status == STATUS_OK)
         status = whole(g, view, "byteLength", "bufferViews", v, -1.0, 0.0, MAX_BYTES, &view_size, err);
     if (status == STATUS_OK)
-        status = whole(g, view, "byteStride", "bufferViews", v, (double)element, (double)element, 252.0,
-                       &stride, err);
+        status = whole(g, view, "byteStride", "bufferViews", v, (double)element, (double)element, 252.0, &stride, err);
     if (status == STATUS_OK)
         status = whole(g, accessor, "byteOffset", "accessors", index, 0.0, 0.0, MAX_BYTES, &offset, err);
     if (status != STATUS_OK)
         return status;
     if (view_offset + view_size > g->buffer[b].size || offset > view_size)
-        return error_set(err, STATUS_INPUT, "%s: bufferViews[%zu] with accessors[%zu] does not lie within the "
-                         "%zu bytes of buffers[%zu]", g->name, v, index, g->buffer[b].size, b);
+        return error_set(err, STATUS_INPUT,
+                         "%s: bufferViews[%zu] with accessors[%zu] does not lie within the "
+                         "%zu bytes of buffers[%zu]",
+                         g->name, v, index, g->buffer[b].size, b);
     span->data = g->buffer[b].data + view_offset + offset;
     span->stride = (size_t)stride;
     *size = (size_t)(view_size - offset);
@@ -297,8 +294,8 @@ enum status gltf_span(const struct gltf_file *g, size_t index, const char *type,
     if (!own || strcmp(own, type) != 0)
         return error_set(err, STATUS_INPUT, "%s: accessors[%zu] is of type %.16s, wanted is %s", g->name, index,
                          own ? own : "none", type);
-    enum status status = whole(g, accessor, "componentType", "accessors", index, 0.0, GLTF_BYTE, GLTF_FLOAT,
-                               &component, err);
+    enum status status =
+        whole(g, accessor, "componentType", "accessors", index, 0.0, GLTF_BYTE, GLTF_FLOAT, &component, err);
     if (status == STATUS_OK)
         status = whole(g, accessor, "count", "accessors", index, -1.0, 1.0, UINT32_MAX - 1.0, &count, err);
     size_t element = component_bytes(component) * (strcmp(type, "VEC3") == 0 ? 3 : 1);
@@ -309,8 +306,10 @@ enum status gltf_span(const struct gltf_file *g, size_t index, const char *type,
     if (status != STATUS_OK)
         return status;
     if (size < element || count - 1 > (size - element) / span->stride)
-        return error_set(err, STATUS_INPUT, "%s: accessors[%zu] promises %llu elements, but its bufferView "
-                         "holds %zu", g->name, index, (unsigned long long)count,
+        return error_set(err, STATUS_INPUT,
+                         "%s: accessors[%zu] promises %llu elements, but its bufferView "
+                         "holds %zu",
+                         g->name, index, (unsigned long long)count,
                          size < element ? 0 : (size - element) / span->stride + 1);
     span->count = (size_t)count;
     span->component = (enum gltf_component)component;

@@ -24,7 +24,7 @@ struct gltf_buffer {
     const uint8_t *data; /* NULL: not available, for the reason `problem` */
     size_t size;
     struct mapping file;
-    uint8_t *decoded;    /* owned */
+    uint8_t *decoded; /* owned */
 };
 
 struct gltf_file {
@@ -35,8 +35,8 @@ struct gltf_file {
 };
 
 /* `data` must stay until gltf_file_release, which must also be called after a failure. */
-enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name,
-                           const char *folder, struct error *err);
+enum status gltf_file_open(struct gltf_file *g, const void *data, size_t size, const char *name, const char *folder,
+                           struct error *err);
 void gltf_file_release(struct gltf_file *g);
 
 /* The member as an index into a list: STATUS_INPUT when it is not one. `where` names the object in messages

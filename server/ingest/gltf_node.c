@@ -41,8 +41,7 @@ static enum status read_numbers(const struct gltf_file *g, size_t node, const ch
     return error_set(err, STATUS_INPUT, "%s: nodes[%zu].%s is not %d numbers", g->name, node, key, count);
 }
 
-enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t,
-                                struct error *err) {
+enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t, struct error *err) {
     static const double identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
     static const double none[4] = {0, 0, 0, 1}, one[3] = {1, 1, 1};
     double matrix[16], move[3], q[4], scale[3];

@@ -15,7 +15,6 @@ struct affine affine_multiply(const struct affine *a, const struct affine *b);
 void affine_cofactors(const struct affine *a, double c[3][3]);
 
 /* From the node's frame to its parent's, by its matrix or its translation, rotation and scale. */
-enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t,
-                                struct error *err);
+enum status gltf_node_transform(const struct gltf_file *g, size_t node, struct affine *t, struct error *err);
 
 #endif

@@ -13,9 +13,7 @@ struct intern_entry {
     size_t offset, length;
 };
 
-void intern_init(struct intern *in) {
-    *in = (struct intern){0};
-}
+void intern_init(struct intern *in) { *in = (struct intern){0}; }
 
 void intern_release(struct intern *in) {
     mem_free(in->entry);

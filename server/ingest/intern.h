@@ -7,12 +7,12 @@
 
 struct intern {
     size_t count;
-    size_t capacity;    /* of entries */
+    size_t capacity;            /* of entries */
     struct intern_entry *entry; /* [count]; owned */
     size_t table_size;
-    uint32_t *table;    /* entries by hash; owned */
+    uint32_t *table; /* entries by hash; owned */
     size_t used, room;
-    char *bytes;        /* of all strings, concatenated; owned */
+    char *bytes; /* of all strings, concatenated; owned */
 };
 
 void intern_init(struct intern *in);

@@ -7,8 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum status mapping_open(struct mapping *m, const char *path, const char *name, const char *kind,
-                         struct error *err) {
+enum status mapping_open(struct mapping *m, const char *path, const char *name, const char *kind, struct error *err) {
     enum status status = STATUS_OK;
     struct stat info;
     *m = (struct mapping){0};

@@ -13,8 +13,7 @@ struct mapping {
 };
 
 /* `name` and `kind` ("a PLY file") are for messages; an empty file is STATUS_INPUT. */
-enum status mapping_open(struct mapping *m, const char *path, const char *name, const char *kind,
-                         struct error *err);
+enum status mapping_open(struct mapping *m, const char *path, const char *name, const char *kind, struct error *err);
 void mapping_close(struct mapping *m);
 
 #endif

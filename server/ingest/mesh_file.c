@@ -8,8 +8,8 @@
 #include "server/ingest/path.h"
 #include "server/ingest/ply.h"
 
-typedef enum status mesh_reader(const char *path, const char *name, size_t triangle_limit,
-                                struct mesh *mesh, struct faces_report *report, struct error *err);
+typedef enum status mesh_reader(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
+                                struct faces_report *report, struct error *err);
 
 static const struct {
     const char *extension;
@@ -30,9 +30,7 @@ static mesh_reader *reader_of(const char *name) {
     return NULL;
 }
 
-bool mesh_file_is_known(const char *name) {
-    return reader_of(name) != NULL;
-}
+bool mesh_file_is_known(const char *name) { return reader_of(name) != NULL; }
 
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err) {

@@ -28,9 +28,9 @@ struct obj_reader {
     size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
     struct points position, normal;
     struct faces *faces;
-    bool lacks_normals;             /* a corner without normal */
-    struct intern pairs;       /* position and normal of each vertex of the mesh */
-    uint32_t (*pair)[2];       /* [pairs.count]; owned */
+    bool lacks_normals;  /* a corner without normal */
+    struct intern pairs; /* position and normal of each vertex of the mesh */
+    uint32_t (*pair)[2]; /* [pairs.count]; owned */
     size_t pair_capacity;
     struct intern labels, objects;
     uint32_t label[LABEL_COUNT]; /* current labels */
@@ -67,9 +67,7 @@ static bool next_line(struct obj_reader *r) {
     }
 }
 
-static bool is_blank(uint8_t c) {
-    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\\';
-}
+static bool is_blank(uint8_t c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\\'; }
 
 /* The next word of the line, "" at its end. A word too long for a number or corner is replaced by an invalid one. */
 static size_t next_token(struct obj_reader *r, char token[MAX_TOKEN]) {
@@ -126,14 +124,16 @@ static uint32_t object_of_face(struct obj_reader *r) {
 /* --- faces ---------------------------------------------------------------------------------- */
 
 /* Converts an index of the file (1 for the first of `count`, -1 for the last) to one from 0. */
-static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count,
-                           const char *kind, uint32_t *index) {
+static enum status resolve(const struct obj_reader *r, const char *text, char **end, size_t count, const char *kind,
+                           uint32_t *index) {
     long value = strtol(text, end, 10);
     if (*end == text)
         return line_error(r, "a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
     if (value == 0 || value > (long)count || value < -(long)count)
-        return error_set(r->err, STATUS_INPUT, "%s, line %zu: the face refers to %s %ld, but there are %zu "
-                         "above it", r->name, r->line, kind, value, count);
+        return error_set(r->err, STATUS_INPUT,
+                         "%s, line %zu: the face refers to %s %ld, but there are %zu "
+                         "above it",
+                         r->name, r->line, kind, value, count);
     *index = (uint32_t)(value > 0 ? value - 1 : (long)count + value);
     return STATUS_OK;
 }
@@ -231,8 +231,8 @@ static enum status check_whole(const struct obj_reader *r) {
     return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or curves");
 }
 
-enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err) {
+enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     if (size > MAX_BYTES)
         return error_set(err, STATUS_LIMIT, "%s is larger than %zu bytes", name, MAX_BYTES);

@@ -17,7 +17,7 @@
 /* As ply_read and ply_parse. Damage is STATUS_INPUT with the line of the file. */
 enum status obj_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                      struct faces_report *report, struct error *err);
-enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err);
+enum status obj_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err);
 
 #endif

@@ -82,9 +82,8 @@ enum status path_clean(const char *name, char **clean, struct error *err) {
 
 bool path_is_litter(const char *clean) {
     const char *base = path_base(clean);
-    return strncmp(clean, "__MACOSX", 8) == 0 || strstr(clean, "/__MACOSX") ||
-           strncmp(base, "._", 2) == 0 || strcmp(base, ".DS_Store") == 0 ||
-           strcasecmp(base, "Thumbs.db") == 0;
+    return strncmp(clean, "__MACOSX", 8) == 0 || strstr(clean, "/__MACOSX") || strncmp(base, "._", 2) == 0 ||
+           strcmp(base, ".DS_Store") == 0 || strcasecmp(base, "Thumbs.db") == 0;
 }
 
 const char *path_base(const char *path) {

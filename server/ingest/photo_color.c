@@ -11,7 +11,8 @@
 
 #define FACT_MAX ((size_t)1000)
 
-void photo_color_note(struct photo_color *color, const char *file, const struct image *image, const struct image_info *info) {
+void photo_color_note(struct photo_color *color, const char *file, const struct image *image,
+                      const struct image_info *info) {
     color->file = file;
     color->outside_count = info->outside_count;
     color->pixel_count = info->color_space[0] ? (size_t)image->width * image->height : 0;
@@ -34,8 +35,8 @@ static void warn_of_profiles(const struct photo_color *color, size_t count, stru
         for (size_t k = i + 1; k < count; k++)
             same += strcmp(color[k].warning, color[i].warning) == 0;
         if (same > 0)
-            findings_warning(f, "%s: %s; its colours are taken for those of sRGB (so are those of %zu others)", color[i].file,
-                             color[i].warning, same);
+            findings_warning(f, "%s: %s; its colours are taken for those of sRGB (so are those of %zu others)",
+                             color[i].file, color[i].warning, same);
         else
             findings_warning(f, "%s: %s; its colours are taken for those of sRGB", color[i].file, color[i].warning);
     }
@@ -50,8 +51,11 @@ void photo_color_warn(const struct photo_color *color, size_t count, struct find
         photographs += color[i].pixel_count > 0;
     }
     if ((double)outside > OUTSIDE_SHARE * (double)pixels)
-        findings_warning(f, "%.1f %% of the pixels of %zu photographs have colours outside of Rec. 709: their channels below 0 "
-                         "count as 0", 100.0 * (double)outside / (double)pixels, photographs);
+        findings_warning(
+            f,
+            "%.1f %% of the pixels of %zu photographs have colours outside of Rec. 709: their channels below 0 "
+            "count as 0",
+            100.0 * (double)outside / (double)pixels, photographs);
 }
 
 static bool is_of(const struct photograph *photo, const char *space) {

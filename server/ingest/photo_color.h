@@ -9,11 +9,12 @@
 /* Of one photograph, from its reader. */
 struct photo_color {
     const char *file; /* borrowed */
-    char warning[sizeof ((struct image_info *)NULL)->color_warning];
+    char warning[sizeof((struct image_info *)NULL)->color_warning];
     size_t outside_count, pixel_count;
 };
 
-void photo_color_note(struct photo_color *color, const char *file, const struct image *image, const struct image_info *info);
+void photo_color_note(struct photo_color *color, const char *file, const struct image *image,
+                      const struct image_info *info);
 
 /* Warns of damaged or unsupported profiles, grouped by reason, and of colours outside of Rec. 709. */
 void photo_color_warn(const struct photo_color *color, size_t count, struct findings *f);

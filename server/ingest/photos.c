@@ -19,7 +19,7 @@
 struct outcome {
     enum status status;
     struct error err;
-    bool mask_failed;       /* err is about the mask */
+    bool mask_failed; /* err is about the mask */
     int orientation;
     enum exposure_source source;
     size_t not_finite_count, clamped_count; /* pixels */
@@ -29,11 +29,11 @@ struct loading {
     const char *dir;
     const struct transforms *transforms;
     uint64_t pixel_limit;
-    char **path;            /* [frame_count] of the picture, below dir; NULL where absent */
+    char **path;                   /* [frame_count] of the picture, below dir; NULL where absent */
     struct photograph *photograph; /* [frame_count] */
     struct outcome *outcome;       /* [frame_count] */
     struct photo_color *color;     /* [frame_count] */
-    uint16_t *half_of_srgb; /* [65536] linear half value of a 16-bit sRGB code value */
+    uint16_t *half_of_srgb;        /* [65536] linear half value of a 16-bit sRGB code value */
     float clip;
 };
 
@@ -78,8 +78,8 @@ static void find_duplicates(const struct loading *l, const char *name, struct fi
         qsort(sorted, count, sizeof *sorted, by_file);
     for (size_t i = 1; i < count; i++)
         if (strcmp(sorted[i].file, sorted[i - 1].file) == 0)
-            findings_problem(f, name, "frames[%zu] and frames[%zu] both name %s",
-                             sorted[i - 1].number, sorted[i].number, sorted[i].file);
+            findings_problem(f, name, "frames[%zu] and frames[%zu] both name %s", sorted[i - 1].number,
+                             sorted[i].number, sorted[i].file);
     mem_free(sorted);
 }
 
@@ -92,8 +92,7 @@ static uint16_t *make_srgb_table(void) {
     return table;
 }
 
-static void convert_srgb(const struct loading *l, const struct image *image,
-                         struct photograph *photo) {
+static void convert_srgb(const struct loading *l, const struct image *image, struct photograph *photo) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
     for (size_t i = 0; i < count; i++)
         for (size_t c = 0; c < 3; c++) {
@@ -104,8 +103,7 @@ static void convert_srgb(const struct loading *l, const struct image *image,
 
 /* Values above the range of half become lower bounds, as clipped ones; negative ones (from filters or colours outside
  * of Rec. 709) become 0. */
-static void convert_linear(const struct image *image, struct photograph *photo,
-                           struct outcome *outcome) {
+static void convert_linear(const struct image *image, struct photograph *photo, struct outcome *outcome) {
     size_t count = (size_t)image->width * image->height, stride = image->channel_count;
     for (size_t i = 0; i < count; i++) {
         const float *in = image->pixel + i * stride;
@@ -134,8 +132,7 @@ static void mask_by_alpha(const struct image *image, struct photograph *photo) {
 }
 
 /* Black mask pixels are excluded (nerfstudio's convention). */
-static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo,
-                             struct error *err) {
+static enum status load_mask(const struct loading *l, const char *name, struct photograph *photo, struct error *err) {
     struct image image;
     if (!file_is_in(l->dir, name))
         return error_set(err, STATUS_INPUT, "the mask is not in the bundle");
@@ -144,8 +141,8 @@ static enum status load_mask(const struct loading *l, const char *name, struct p
     if (status != STATUS_OK)
         goto out;
     if (image.width != photo->camera.width || image.height != photo->camera.height)
-        status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u",
-                           image.width, image.height, photo->camera.width, photo->camera.height);
+        status = error_set(err, STATUS_INPUT, "the mask is %u x %u pixels, its photograph %u x %u", image.width,
+                           image.height, photo->camera.width, photo->camera.height);
     image_release(&image);
     if (status == STATUS_OK)
         status = image_read_stored(path, &image, err);
@@ -167,8 +164,8 @@ out:
 
 /* --- one photograph ---------------------------------------------------------------------- */
 
-static void set_exposure(const struct transforms_frame *frame, const struct image_info *info,
-                         struct photograph *photo, struct outcome *outcome) {
+static void set_exposure(const struct transforms_frame *frame, const struct image_info *info, struct photograph *photo,
+                         struct outcome *outcome) {
     double exposure = frame->exposure;
     outcome->source = frame->exposure_source;
     if (exposure <= 0.0 && photo->is_hdr) {
@@ -183,16 +180,15 @@ static void set_exposure(const struct transforms_frame *frame, const struct imag
     photo->exposure = photo->exposure_known ? single : 1.0f;
 }
 
-static enum status check_size(const struct loading *l, const struct transforms_frame *frame,
-                              const char *path, struct camera *camera, struct error *err) {
+static enum status check_size(const struct loading *l, const struct transforms_frame *frame, const char *path,
+                              struct camera *camera, struct error *err) {
     struct image image;
     enum status status = image_probe(path, &image, NULL, err);
     if (status != STATUS_OK)
         return status;
     uint64_t pixels = (uint64_t)image.width * image.height;
     if (pixels > l->pixel_limit)
-        status = error_set(err, STATUS_LIMIT,
-                           "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
+        status = error_set(err, STATUS_LIMIT, "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
                            pixels, l->pixel_limit);
     else
         status = transforms_camera(frame, image.width, image.height, camera, err);
@@ -279,20 +275,20 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
         sources[o->source]++;
         rotated += o->orientation > 1;
         if (o->not_finite_count > 0)
-            findings_warning(f, "%s: %zu pixels are not finite and are not used", name,
-                             o->not_finite_count);
+            findings_warning(f, "%s: %zu pixels are not finite and are not used", name, o->not_finite_count);
         if (o->clamped_count > 0)
-            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name,
-                             o->clamped_count);
+            findings_warning(f, "%s: %zu pixels are above 65504 and count as clipped there", name, o->clamped_count);
     }
     if (rotated > 0)
-        findings_warning(f, "the EXIF orientation of %zu photographs was ignored: poses are taken to "
-                         "be for the pixels as stored", rotated);
-    size_t given = sources[EXPOSURE_FACTOR] + sources[EXPOSURE_CAMERA] + sources[EXPOSURE_EXIF] +
-                   sources[EXPOSURE_HDR];
+        findings_warning(f,
+                         "the EXIF orientation of %zu photographs was ignored: poses are taken to "
+                         "be for the pixels as stored",
+                         rotated);
+    size_t given = sources[EXPOSURE_FACTOR] + sources[EXPOSURE_CAMERA] + sources[EXPOSURE_EXIF] + sources[EXPOSURE_HDR];
     for (int s = EXPOSURE_FACTOR; s <= EXPOSURE_HDR; s++) {
         if (sources[s] > 0 && sources[s] < given) {
-            findings_warning(f, "exposures come from different sources (%zu from \"exposure\", %zu "
+            findings_warning(f,
+                             "exposures come from different sources (%zu from \"exposure\", %zu "
                              "from \"exposure_time\", %zu from EXIF, %zu HDR taken as 1): they may "
                              "not agree in units",
                              sources[EXPOSURE_FACTOR], sources[EXPOSURE_CAMERA], sources[EXPOSURE_EXIF],
@@ -303,15 +299,16 @@ static void warn_about_pixels(const struct loading *l, struct findings *f) {
 }
 
 /* Turns each frame's outcome into problems, in the frames' order. */
-static enum status collect(struct loading *l, const char *name, struct findings *f,
-                           struct error *err) {
+static enum status collect(struct loading *l, const char *name, struct findings *f, struct error *err) {
     enum status status = STATUS_OK;
     for (size_t i = 0; i < l->transforms->frame_count; i++) {
         const struct transforms_frame *frame = &l->transforms->frame[i];
         struct outcome *o = &l->outcome[i];
         if (!l->path[i])
-            findings_warning(f, "%s: frames[%zu] names %s, which is not in the bundle; it was left "
-                             "out", name, frame->number, frame->file);
+            findings_warning(f,
+                             "%s: frames[%zu] names %s, which is not in the bundle; it was left "
+                             "out",
+                             name, frame->number, frame->file);
         if (o->status == STATUS_OK)
             continue;
         make_relative(&o->err, l->dir);
@@ -339,8 +336,7 @@ static void move_photographs(struct loading *l, struct scene *scene) {
     scene->photograph_count = kept;
 }
 
-static void check_count(const struct scene *scene, const char *name, size_t named_count,
-                        struct findings *f) {
+static void check_count(const struct scene *scene, const char *name, size_t named_count, struct findings *f) {
     size_t train_count = 0;
     for (size_t i = 0; i < scene->photograph_count; i++)
         train_count += !scene->photograph[i].is_test;
@@ -351,11 +347,12 @@ static void check_count(const struct scene *scene, const char *name, size_t name
         findings_problem(f, name, "every frame is held out as test: none is left to reconstruct from");
 }
 
-enum status photos_load(const char *dir, const char *name, const struct transforms *t,
-                        uint64_t pixel_limit, struct parallel *pool, struct scene *scene,
-                        struct findings *f, struct error *err) {
+enum status photos_load(const char *dir, const char *name, const struct transforms *t, uint64_t pixel_limit,
+                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err) {
     struct loading l = {
-        .dir = dir, .transforms = t, .pixel_limit = pixel_limit,
+        .dir = dir,
+        .transforms = t,
+        .pixel_limit = pixel_limit,
         .path = mem_calloc(t->frame_count, sizeof *l.path),
         .photograph = mem_calloc(t->frame_count, sizeof *l.photograph),
         .outcome = mem_calloc(t->frame_count, sizeof *l.outcome),

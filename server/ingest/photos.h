@@ -19,8 +19,7 @@
 /* Loads the picture and mask of every frame from folder `dir` into scene->photograph, in the frames' order; missing
  * pictures are left out with a warning. Faults of the files become problems in *f; other statuses than STATUS_OK are
  * failures of the machine. `name` is that of the transforms file. */
-enum status photos_load(const char *dir, const char *name, const struct transforms *t,
-                        uint64_t pixel_limit, struct parallel *pool, struct scene *scene,
-                        struct findings *f, struct error *err);
+enum status photos_load(const char *dir, const char *name, const struct transforms *t, uint64_t pixel_limit,
+                        struct parallel *pool, struct scene *scene, struct findings *f, struct error *err);
 
 #endif

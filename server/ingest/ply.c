@@ -29,9 +29,8 @@ struct ply_reader {
 
 static enum status value_error(struct ply_reader *r, const char *what) {
     bool ascii = r->header.format == PLY_ASCII;
-    return error_set(r->err, STATUS_INPUT, "%s, %s %zu: %s %" PRIu64 " %s", r->cursor.name,
-                     ascii ? "line" : "byte", ascii ? r->cursor.line : r->cursor.at, r->element,
-                     r->record, what);
+    return error_set(r->err, STATUS_INPUT, "%s, %s %zu: %s %" PRIu64 " %s", r->cursor.name, ascii ? "line" : "byte",
+                     ascii ? r->cursor.line : r->cursor.at, r->element, r->record, what);
 }
 
 static uint64_t load(const uint8_t *at, size_t bytes, bool big) {
@@ -65,9 +64,7 @@ static enum status read_binary(struct ply_reader *r, enum ply_type type, double 
     return STATUS_OK;
 }
 
-static bool is_blank(uint8_t c) {
-    return c == ' ' || c == '\t' || c == '\r';
-}
+static bool is_blank(uint8_t c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 static enum status read_ascii(struct ply_reader *r, double *value) {
     while (r->cursor.at < r->cursor.line_end && is_blank(r->cursor.data[r->cursor.at]))
@@ -202,8 +199,7 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
         if (usable)
             target[k] = (signed char)i;
         else if (i < 3)
-            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s",
-                             r->cursor.name, wanted[i]);
+            return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->cursor.name, wanted[i]);
         else
             has_normal = false;
     }
@@ -211,8 +207,7 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
     if (status != STATUS_OK)
         return status;
     if (e->count >= UINT32_MAX)
-        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit",
-                         r->cursor.name, e->count);
+        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit", r->cursor.name, e->count);
     mesh->vertex_count = (size_t)e->count;
     mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
     if (has_normal)
@@ -234,8 +229,7 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
     return STATUS_OK;
 }
 
-static enum status read_corners(struct ply_reader *r, const struct ply_property *p,
-                                struct faces *faces) {
+static enum status read_corners(struct ply_reader *r, const struct ply_property *p, struct faces *faces) {
     uint64_t count;
     enum status status = read_list_count(r, p, &count);
     if (status == STATUS_OK && count > POLYGON_MAX_CORNERS)
@@ -247,8 +241,8 @@ static enum status read_corners(struct ply_reader *r, const struct ply_property 
             break;
         if (!(value >= 0.0 && value < (double)faces->mesh->vertex_count) || value != floor(value)) {
             char what[128];
-            snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu",
-                     value, faces->mesh->vertex_count - 1);
+            snprintf(what, sizeof what, "refers to vertex %.15g, but vertices run from 0 to %zu", value,
+                     faces->mesh->vertex_count - 1);
             return value_error(r, faces->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
         }
         faces->corner[i] = (uint32_t)value;
@@ -258,21 +252,18 @@ static enum status read_corners(struct ply_reader *r, const struct ply_property 
     return status;
 }
 
-static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list,
-                                        size_t *id) {
+static enum status find_face_properties(struct ply_reader *r, const struct ply_element *e, size_t *list, size_t *id) {
     *list = find_property(r, e, "vertex_indices");
     if (*list == SIZE_MAX)
         *list = find_property(r, e, "vertex_index");
     if (*list == SIZE_MAX || !r->header.property[e->first + *list].is_list ||
         r->header.property[e->first + *list].type >= PLY_FLOAT32)
-        return error_set(r->err, STATUS_INPUT,
-                         "%s: its faces have no list vertex_indices of an integer type",
+        return error_set(r->err, STATUS_INPUT, "%s: its faces have no list vertex_indices of an integer type",
                          r->cursor.name);
     *id = find_property(r, e, "object_id");
     const struct ply_property *p = *id != SIZE_MAX ? &r->header.property[e->first + *id] : NULL;
     if (p && (p->is_list || p->type >= PLY_FLOAT32))
-        return error_set(r->err, STATUS_INPUT,
-                         "%s: the faces' object_id must be one integer per face", r->cursor.name);
+        return error_set(r->err, STATUS_INPUT, "%s: the faces' object_id must be one integer per face", r->cursor.name);
     return STATUS_OK;
 }
 
@@ -284,8 +275,8 @@ static enum status read_faces(struct ply_reader *r, const struct ply_element *e,
     if (status != STATUS_OK)
         return status;
     if (e->count > faces->limit)
-        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu",
-                         r->cursor.name, e->count, faces->limit);
+        return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " faces, more than the limit of %zu", r->cursor.name,
+                         e->count, faces->limit);
     faces->has_object_id = id != SIZE_MAX;
     faces_reserve(faces, (size_t)e->count);
     for (size_t i = 0; i < e->count; i++) {
@@ -343,7 +334,7 @@ static enum status read_body(struct ply_reader *r, struct faces *faces) {
         error_set(r->err, STATUS_INPUT, "%s has no %s: it has no \"element %s\"", r->cursor.name,
                   has_vertices ? "faces" : "vertices", has_vertices ? "face" : "vertex");
         return error_hint(r->err, "a mesh of triangles or polygons is needed, not a point cloud or "
-                          "triangle strips");
+                                  "triangle strips");
     }
     if (!later)
         return STATUS_OK;
@@ -352,8 +343,8 @@ static enum status read_body(struct ply_reader *r, struct faces *faces) {
     return read_faces(r, later, faces);
 }
 
-enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err) {
+enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err) {
     *mesh = (struct mesh){0};
     struct ply_reader *r = mem_calloc(1, sizeof *r);
     struct faces *faces = faces_new(mesh, name, triangle_limit, false);

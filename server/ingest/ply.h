@@ -19,8 +19,8 @@ enum status ply_read(const char *path, const char *name, size_t triangle_limit, 
                      struct faces_report *report, struct error *err);
 
 /* The same from memory. */
-enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit,
-                      struct mesh *mesh, struct faces_report *report, struct error *err);
+enum status ply_parse(const void *data, size_t size, const char *name, size_t triangle_limit, struct mesh *mesh,
+                      struct faces_report *report, struct error *err);
 
 /* Number of faces in the header; 0 for a point cloud. */
 enum status ply_count_faces(const char *path, const char *name, uint64_t *count, struct error *err);

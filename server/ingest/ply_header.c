@@ -12,9 +12,9 @@ static const struct {
     const char *name, *alias;
     uint8_t bytes;
 } type_table[] = {
-    [PLY_INT8] = {"char", "int8", 1},       [PLY_UINT8] = {"uchar", "uint8", 1},
-    [PLY_INT16] = {"short", "int16", 2},    [PLY_UINT16] = {"ushort", "uint16", 2},
-    [PLY_INT32] = {"int", "int32", 4},      [PLY_UINT32] = {"uint", "uint32", 4},
+    [PLY_INT8] = {"char", "int8", 1},        [PLY_UINT8] = {"uchar", "uint8", 1},
+    [PLY_INT16] = {"short", "int16", 2},     [PLY_UINT16] = {"ushort", "uint16", 2},
+    [PLY_INT32] = {"int", "int32", 4},       [PLY_UINT32] = {"uint", "uint32", 4},
     [PLY_FLOAT32] = {"float", "float32", 4}, [PLY_FLOAT64] = {"double", "float64", 8},
 };
 
@@ -38,9 +38,7 @@ bool ply_next_line(struct ply_cursor *c, const uint8_t **line, size_t *length) {
     return true;
 }
 
-size_t ply_type_bytes(enum ply_type type) {
-    return type_table[type].bytes;
-}
+size_t ply_type_bytes(enum ply_type type) { return type_table[type].bytes; }
 
 const struct ply_element *ply_find_element(const struct ply_header *header, const char *name) {
     for (size_t i = 0; i < header->element_count; i++)
@@ -60,8 +58,8 @@ static bool parse_type(const char *word, enum ply_type *type) {
 }
 
 static enum status header_error(struct parser *p, const char *what, const char *word) {
-    return error_set(p->err, STATUS_INPUT, "%s, line %zu: %s%s%s%s", p->cursor->name,
-                     p->cursor->line, what, word ? " \"" : "", word ? word : "", word ? "\"" : "");
+    return error_set(p->err, STATUS_INPUT, "%s, line %zu: %s%s%s%s", p->cursor->name, p->cursor->line, what,
+                     word ? " \"" : "", word ? word : "", word ? "\"" : "");
 }
 
 static enum status parse_element(struct parser *p, char *const *word, size_t words) {
@@ -85,8 +83,10 @@ static enum status parse_element(struct parser *p, char *const *word, size_t wor
 static enum status parse_property(struct parser *p, char *const *word, size_t words) {
     bool is_list = words >= 2 && strcmp(word[1], "list") == 0;
     if (words != (is_list ? 5 : 3))
-        return header_error(p, "expected \"property TYPE NAME\" or \"property list COUNT_TYPE "
-                            "TYPE NAME\"", NULL);
+        return header_error(p,
+                            "expected \"property TYPE NAME\" or \"property list COUNT_TYPE "
+                            "TYPE NAME\"",
+                            NULL);
     if (p->header->element_count == 0)
         return header_error(p, "a property before the first element", NULL);
     if (p->header->property_count == PLY_MAX_PROPERTIES)
@@ -132,13 +132,11 @@ static bool split_words(char *copy, char **word, size_t *words) {
     return true;
 }
 
-static enum status parse_header_line(struct parser *p, const uint8_t *line, size_t length,
-                                     bool *done) {
+static enum status parse_header_line(struct parser *p, const uint8_t *line, size_t length, bool *done) {
     static const char *const ignored[] = {"comment", "obj_info"};
     for (size_t i = 0; i < 2; i++) {
         size_t n = strlen(ignored[i]);
-        if (length >= n && memcmp(line, ignored[i], n) == 0 &&
-            (length == n || line[n] == ' ' || line[n] == '\t'))
+        if (length >= n && memcmp(line, ignored[i], n) == 0 && (length == n || line[n] == ' ' || line[n] == '\t'))
             return STATUS_OK;
     }
     char copy[512], *word[6];
@@ -167,8 +165,7 @@ enum status ply_header_parse(struct ply_cursor *c, struct ply_header *header, st
     struct parser p = {c, header, err};
     *header = (struct ply_header){.format = PLY_UNKNOWN};
     if (c->size < 4 || memcmp(c->data, "ply", 3) != 0 || !strchr("\r\n \t", c->data[3]))
-        return error_set(err, STATUS_INPUT, "%s is not a PLY file: it does not begin with \"ply\"",
-                         c->name);
+        return error_set(err, STATUS_INPUT, "%s is not a PLY file: it does not begin with \"ply\"", c->name);
     const uint8_t *line;
     size_t length;
     c->at = c->line = 0;
@@ -176,8 +173,7 @@ enum status ply_header_parse(struct ply_cursor *c, struct ply_header *header, st
     ply_next_line(c, &line, &length);
     for (bool done = false; !done;) {
         if (c->at > MAX_HEADER || !ply_next_line(c, &line, &length))
-            return error_set(err, STATUS_INPUT,
-                             "%s: the header ends at line %zu without \"end_header\"", c->name,
+            return error_set(err, STATUS_INPUT, "%s: the header ends at line %zu without \"end_header\"", c->name,
                              c->line);
         enum status status = parse_header_line(&p, line, length, &done);
         if (status != STATUS_OK)

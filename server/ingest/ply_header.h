@@ -13,9 +13,7 @@
 #define PLY_MAX_NAME 64
 
 /* Integer types first, so that `type >= PLY_FLOAT32` means floating point. */
-enum ply_type {
-    PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64
-};
+enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT32, PLY_FLOAT64 };
 
 struct ply_property {
     char name[PLY_MAX_NAME];
@@ -42,7 +40,7 @@ struct ply_header {
 
 /* A position in a file in memory. */
 struct ply_cursor {
-    const char *name;      /* of the file, for messages */
+    const char *name; /* of the file, for messages */
     const uint8_t *data;
     size_t size, at;       /* bytes */
     uint8_t newline;       /* '\n', or '\r' in files with old Macintosh lines */

@@ -44,14 +44,12 @@ static bool is_convex(const struct polygon_point *flat, size_t count) {
 /* Whether the corner at `at` of a ring of `left` corners is an ear: convex, with no other corner in its triangle.
  * Corners that coincide with one of the three are ignored (a bridge to a hole visits its ends twice). */
 static bool is_ear(const struct polygon_point *flat, const uint32_t *ring, size_t left, size_t at) {
-    struct polygon_point a = flat[ring[(at + left - 1) % left]], b = flat[ring[at]],
-                 c = flat[ring[(at + 1) % left]];
+    struct polygon_point a = flat[ring[(at + left - 1) % left]], b = flat[ring[at]], c = flat[ring[(at + 1) % left]];
     if (!(area2(a, b, c) > 0.0))
         return false;
     for (size_t i = 0; i < left; i++) {
         struct polygon_point p = flat[ring[i]];
-        if ((p.x == a.x && p.y == a.y) || (p.x == b.x && p.y == b.y) ||
-            (p.x == c.x && p.y == c.y))
+        if ((p.x == a.x && p.y == a.y) || (p.x == b.x && p.y == b.y) || (p.x == c.x && p.y == c.y))
             continue;
         if (area2(a, b, p) >= 0.0 && area2(b, c, p) >= 0.0 && area2(c, a, p) >= 0.0)
             return false;

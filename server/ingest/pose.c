@@ -8,8 +8,7 @@
 #define SHEAR_LIMIT 0.02 /* largest entry of R^T R - 1 that counts as rounding or estimation error */
 
 static double determinant(double m[3][3]) {
-    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
-           m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
            m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
 }
 
@@ -60,15 +59,15 @@ static const char *make_rotation(double m[3][3], double *scale) {
 }
 
 enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
-                             struct rigid *world_from_camera, struct rigid *camera_from_world,
-                             bool *scaled, struct error *err) {
+                             struct rigid *world_from_camera, struct rigid *camera_from_world, bool *scaled,
+                             struct error *err) {
     double m[3][3], t[3], scale = 1.0;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 4; j++)
             if (!isfinite(matrix[i][j]) || fabs(matrix[i][j]) > 1e9)
                 return error_set(err, STATUS_INPUT,
-                                 "%s holds a number that is not finite or too large in row %d, column %d",
-                                 what, i + 1, j + 1);
+                                 "%s holds a number that is not finite or too large in row %d, column %d", what, i + 1,
+                                 j + 1);
         t[i] = matrix[i][3];
         for (int j = 0; j < 3; j++)
             m[i][j] = matrix[i][j];

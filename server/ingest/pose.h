@@ -14,7 +14,7 @@ enum pose_axes { POSE_RIGHT_DOWN_FORWARD, POSE_RIGHT_UP_BACK /* OpenGL, nerfstud
  * errors. STATUS_INPUT: not finite, singular, mirrored, or not a rotation within 2 %; the message begins with `what`,
  * the user's name for the matrix. */
 enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
-                             struct rigid *world_from_camera, struct rigid *camera_from_world,
-                             bool *scaled, struct error *err);
+                             struct rigid *world_from_camera, struct rigid *camera_from_world, bool *scaled,
+                             struct error *err);
 
 #endif

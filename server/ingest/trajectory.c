@@ -60,16 +60,16 @@ static bool is_finite(double m[4][4]) {
 }
 
 /* Adds a frame; takes `file`. Faulty poses are problems, lost ones are counted. */
-static void add_frame(struct transforms *t, double m[4][4], const struct lens *lens, char *file,
-                      const char *name, const char *place, struct findings *f, size_t *lost_count) {
-    struct transforms_frame frame = {.number = t->named_count++, .file = file, .lens = *lens,
-                                     .exposure_source = EXPOSURE_UNKNOWN};
+static void add_frame(struct transforms *t, double m[4][4], const struct lens *lens, char *file, const char *name,
+                      const char *place, struct findings *f, size_t *lost_count) {
+    struct transforms_frame frame = {
+        .number = t->named_count++, .file = file, .lens = *lens, .exposure_source = EXPOSURE_UNKNOWN};
     struct error err;
     bool scaled;
     if (!is_finite(m)) {
         (*lost_count)++;
-    } else if (pose_from_matrix((const double(*)[4])m, "the matrix", POSE_RIGHT_DOWN_FORWARD,
-                                &frame.world_from_camera, &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
+    } else if (pose_from_matrix((const double(*)[4])m, "the matrix", POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
+                                &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
         findings_problem(f, name, "%s: %s", place, err.message);
     } else {
         t->frame[t->frame_count++] = frame;
@@ -132,9 +132,15 @@ static enum status read_parameters(const char *root, struct lens *lens, struct e
             status = error_set(err, STATUS_INPUT, PARAMETERS ": \"camera\" has no %s", key[i]);
     }
     if (status == STATUS_OK)
-        *lens = (struct lens){.model = CAMERA_OPENCV, .width = value[0], .height = value[1], .fl_x = value[2],
-                              .fl_y = value[3], .cx = value[4] + PIXEL_CENTRE, .cy = value[5] + PIXEL_CENTRE,
-                              .angle_x = NAN, .angle_y = NAN};
+        *lens = (struct lens){.model = CAMERA_OPENCV,
+                              .width = value[0],
+                              .height = value[1],
+                              .fl_x = value[2],
+                              .fl_y = value[3],
+                              .cx = value[4] + PIXEL_CENTRE,
+                              .cy = value[5] + PIXEL_CENTRE,
+                              .angle_x = NAN,
+                              .angle_y = NAN};
     cJSON_Delete(tree);
     mem_free(text);
     return status;

@@ -17,14 +17,13 @@ struct context {
     const char *name;          /* of the file */
     char place[256];           /* "frames[3] (images/003.png)" */
     struct findings *findings;
-    bool ok;                   /* no problem so far in this frame */
+    bool ok; /* no problem so far in this frame */
     size_t scaled_count;
-    const cJSON *list[3];      /* train_filenames, val_filenames, test_filenames or NULL */
+    const cJSON *list[3]; /* train_filenames, val_filenames, test_filenames or NULL */
     size_t unlisted_count;
 };
 
-__attribute__((format(printf, 2, 3)))
-static void problem(struct context *c, const char *format, ...) {
+__attribute__((format(printf, 2, 3))) static void problem(struct context *c, const char *format, ...) {
     char what[1024]; /* longer messages are truncated */
     va_list args;
     va_start(args, format);
@@ -93,9 +92,12 @@ static enum camera_model read_model(struct context *c) {
         const char *name;
         enum camera_model model;
     } models[] = {
-        {"PINHOLE", CAMERA_OPENCV},      {"SIMPLE_PINHOLE", CAMERA_OPENCV},
-        {"SIMPLE_RADIAL", CAMERA_OPENCV}, {"RADIAL", CAMERA_OPENCV},
-        {"OPENCV", CAMERA_OPENCV},       {"FULL_OPENCV", CAMERA_OPENCV},
+        {"PINHOLE", CAMERA_OPENCV},
+        {"SIMPLE_PINHOLE", CAMERA_OPENCV},
+        {"SIMPLE_RADIAL", CAMERA_OPENCV},
+        {"RADIAL", CAMERA_OPENCV},
+        {"OPENCV", CAMERA_OPENCV},
+        {"FULL_OPENCV", CAMERA_OPENCV},
         {"OPENCV_FISHEYE", CAMERA_OPENCV_FISHEYE},
     };
     const char *name = string(c, holder(c, "camera_model"), "camera_model");
@@ -112,8 +114,10 @@ static enum camera_model read_model(struct context *c) {
     for (size_t i = 0; i < sizeof models / sizeof *models; i++)
         if (strcmp(name, models[i].name) == 0)
             return models[i].model;
-    problem(c, "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
-               "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE", name);
+    problem(c,
+            "unknown camera_model \"%.80s\"; known are PINHOLE, SIMPLE_PINHOLE, SIMPLE_RADIAL, "
+            "RADIAL, OPENCV, FULL_OPENCV and OPENCV_FISHEYE",
+            name);
     return CAMERA_OPENCV;
 }
 
@@ -168,8 +172,7 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
     double stated_width = isnan(lens->width) ? width : lens->width;
     double stated_height = isnan(lens->height) ? height : lens->height;
     if (stated_width != width || stated_height != height)
-        return error_set(err, STATUS_INPUT,
-                         "the picture is %u x %u pixels, but frames[%zu] says %.0f x %.0f", width,
+        return error_set(err, STATUS_INPUT, "the picture is %u x %u pixels, but frames[%zu] says %.0f x %.0f", width,
                          height, frame->number, stated_width, stated_height);
     double fx = lens->fl_x, fy = lens->fl_y;
     if (isnan(fx) && !isnan(lens->angle_x))
@@ -183,16 +186,21 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
     double cy = isnan(lens->cy) ? 0.5 * height : lens->cy;
     if (!(fx > 1e-3 * width && fx < 1e4 * width && fy > 1e-3 * height && fy < 1e4 * height))
         return error_set(err, STATUS_INPUT,
-                         "a focal length of %.6g x %.6g pixels cannot belong to a picture of %u x %u",
-                         fx, fy, width, height);
+                         "a focal length of %.6g x %.6g pixels cannot belong to a picture of %u x %u", fx, fy, width,
+                         height);
     if (!(fabs(cx) < 10.0 * width && fabs(cy) < 10.0 * height))
-        return error_set(err, STATUS_INPUT,
-                         "the principal point %.6g, %.6g lies far outside the picture of %u x %u",
+        return error_set(err, STATUS_INPUT, "the principal point %.6g, %.6g lies far outside the picture of %u x %u",
                          cx, cy, width, height);
     *camera = (struct camera){
-        .model = lens->model, .width = width, .height = height,
-        .fx = (float)fx, .fy = (float)fy, .cx = (float)cx, .cy = (float)cy,
-        .world_from_camera = frame->world_from_camera, .camera_from_world = frame->camera_from_world,
+        .model = lens->model,
+        .width = width,
+        .height = height,
+        .fx = (float)fx,
+        .fy = (float)fy,
+        .cx = (float)cx,
+        .cy = (float)cy,
+        .world_from_camera = frame->world_from_camera,
+        .camera_from_world = frame->camera_from_world,
     };
     for (int i = 0; i < 6; i++)
         camera->k[i] = (float)lens->k[i];
@@ -229,8 +237,8 @@ static void read_pose(struct context *c, struct transforms_frame *frame) {
     }
     struct error err;
     bool scaled = false;
-    if (pose_from_matrix((const double(*)[4])m, "transform_matrix", POSE_RIGHT_UP_BACK,
-                         &frame->world_from_camera, &frame->camera_from_world, &scaled, &err) != STATUS_OK)
+    if (pose_from_matrix((const double(*)[4])m, "transform_matrix", POSE_RIGHT_UP_BACK, &frame->world_from_camera,
+                         &frame->camera_from_world, &scaled, &err) != STATUS_OK)
         problem(c, "%s", err.message);
     c->scaled_count += scaled;
 }
@@ -244,12 +252,8 @@ double transforms_exposure(double time_sec, double iso, double f_number) {
 static void read_exposure(struct context *c, struct transforms_frame *frame) {
     double factor = positive(c, "exposure"), time_sec = positive(c, "exposure_time");
     double iso = positive(c, "iso"), f_number = positive(c, "f_number");
-    frame->exposure = !isnan(factor) ? factor
-                      : isnan(time_sec) ? 0.0
-                                        : transforms_exposure(time_sec, iso, f_number);
-    frame->exposure_source = !isnan(factor) ? EXPOSURE_FACTOR
-                             : isnan(time_sec) ? EXPOSURE_UNKNOWN
-                                               : EXPOSURE_CAMERA;
+    frame->exposure = !isnan(factor) ? factor : isnan(time_sec) ? 0.0 : transforms_exposure(time_sec, iso, f_number);
+    frame->exposure_source = !isnan(factor) ? EXPOSURE_FACTOR : isnan(time_sec) ? EXPOSURE_UNKNOWN : EXPOSURE_CAMERA;
 }
 
 static bool is_listed(const cJSON *list, const char *clean) {
@@ -316,8 +320,7 @@ static bool read_frame(struct context *c, const cJSON *object, struct transforms
     frame->mask = path(c, object, "mask_path");
     struct lens *lens = &frame->lens;
     read_lens(c, lens);
-    if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) &&
-        isnan(lens->angle_y))
+    if (c->ok && isnan(lens->fl_x) && isnan(lens->fl_y) && isnan(lens->angle_x) && isnan(lens->angle_y))
         problem(c, "no focal length: expected fl_x, fl_y or camera_angle_x");
     read_pose(c, frame);
     read_exposure(c, frame);
@@ -372,9 +375,11 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
             frame_release(frame);
     }
     if (c.scaled_count > 0)
-        findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out",
-                         name, c.scaled_count);
+        findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out", name,
+                         c.scaled_count);
     if (c.unlisted_count > 0)
-        findings_warning(f, "%s: %zu frames are in none of train_filenames, val_filenames and "
-                         "test_filenames and were left out", name, c.unlisted_count);
+        findings_warning(f,
+                         "%s: %zu frames are in none of train_filenames, val_filenames and "
+                         "test_filenames and were left out",
+                         name, c.unlisted_count);
 }

@@ -31,24 +31,24 @@ enum exposure_source {
     EXPOSURE_FACTOR, /* "exposure" */
     EXPOSURE_CAMERA, /* "exposure_time", "iso", "f_number" */
     EXPOSURE_EXIF,
-    EXPOSURE_HDR     /* a linear picture without these: 1 */
+    EXPOSURE_HDR /* a linear picture without these: 1 */
 };
 
 struct transforms_frame {
-    size_t number;          /* position in `frames`, from 0 */
-    char *file, *mask;      /* clean paths (path_clean); mask may be NULL; owned */
+    size_t number;     /* position in `frames`, from 0 */
+    char *file, *mask; /* clean paths (path_clean); mask may be NULL; owned */
     bool is_test;
     struct lens lens;
     struct rigid world_from_camera, camera_from_world;
     enum exposure_source exposure_source;
-    double exposure;        /* 0 if unknown */
+    double exposure; /* 0 if unknown */
 };
 
 struct transforms {
-    char *mesh;             /* clean path or NULL; owned */
-    char *point_cloud;      /* ply_file_path, a mesh or a point cloud, or NULL; owned */
-    size_t named_count;     /* frames in the file */
-    size_t frame_count;     /* usable frames: faulty ones are left out */
+    char *mesh;         /* clean path or NULL; owned */
+    char *point_cloud;  /* ply_file_path, a mesh or a point cloud, or NULL; owned */
+    size_t named_count; /* frames in the file */
+    size_t frame_count; /* usable frames: faulty ones are left out */
     struct transforms_frame *frame;
 };
 

@@ -13,7 +13,7 @@
 #include "server/job/memory.h"
 #include "server/job/oom.h"
 
-#define EVENTS_MAX 500000 /* of one attempt; at 2 a second, which is much, of three days */
+#define EVENTS_MAX 500000      /* of one attempt; at 2 a second, which is much, of three days */
 #define CHECK_LIMIT_SEC 3600.0 /* a scene's check that takes longer is taken for stuck */
 
 static enum status write_order(const char *dir, cJSON *order, struct error *err) {
@@ -34,11 +34,10 @@ static cJSON *new_order(const char *kind, const struct scheduler_config *config,
     return order;
 }
 
-static enum status order_job(struct attempt *a, const struct scheduler_config *config,
-                             const struct job *job, int thread_count, struct error *err) {
+static enum status order_job(struct attempt *a, const struct scheduler_config *config, const struct job *job,
+                             int thread_count, struct error *err) {
     cJSON *settings;
-    enum status status =
-        json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
+    enum status status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
         return status;
     char *out = layout_out(a->dir), *scene = layout_scene(config->data_dir, job->scene_id);
@@ -87,12 +86,12 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
     enum status status = store_scene_get(store, scene_id, &row, err);
     if (status == STATUS_OK && row.state != SCENE_READY) {
         cJSON *problems = cJSON_Parse(row.problems);
-        const char *first = cJSON_GetStringValue(
-            cJSON_GetObjectItemCaseSensitive(cJSON_GetArrayItem(problems, 0), "reason"));
+        const char *first =
+            cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(cJSON_GetArrayItem(problems, 0), "reason"));
         error_set(err, STATUS_INPUT, "the scene %.12s was rejected%s%.300s", scene_id, first ? ": " : "",
                   first ? first : "");
-        status = error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.",
-                            scene_id, scene_id);
+        status = error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.", scene_id,
+                            scene_id);
         cJSON_Delete(problems);
     }
     scene_row_release(&row);
@@ -100,8 +99,7 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
 }
 
 /* What a retry from a stage asks for; done before the process starts, so it is done once. */
-static enum status restart(struct attempt *a, struct store *store, const struct job *job,
-                           struct error *err) {
+static enum status restart(struct attempt *a, struct store *store, const struct job *job, struct error *err) {
     bool keeps_checkpoint;
     if (!job->restart_from[0])
         return STATUS_OK;
@@ -112,15 +110,13 @@ static enum status restart(struct attempt *a, struct store *store, const struct 
 }
 
 /* Enters that an attempt could not even begin. */
-static enum status enter_false_start(struct store *store, int64_t job_id, int number,
-                                     const struct error *why, struct error *err) {
+static enum status enter_false_start(struct store *store, int64_t job_id, int number, const struct error *why,
+                                     struct error *err) {
     switch (why->status) {
     case STATUS_INPUT:
-    case STATUS_NOT_FOUND:
-        return store_job_fail(store, job_id, number, why->message, why->hint, err);
+    case STATUS_NOT_FOUND: return store_job_fail(store, job_id, number, why->message, why->hint, err);
     case STATUS_NO_SPACE:
-        return store_job_block(store, job_id, number, why->message,
-                               "Free some space, then resume the job.", err);
+        return store_job_block(store, job_id, number, why->message, "Free some space, then resume the job.", err);
     case STATUS_LIMIT:
         return store_job_block(store, job_id, number, why->message,
                                "Delete jobs or scenes that you do not need, then resume the job.", err);
@@ -133,9 +129,8 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
     }
 }
 
-enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config,
-                              struct store *store, struct counters *counters, int64_t job_id,
-                              int thread_count, struct error *err) {
+enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                              struct counters *counters, int64_t job_id, int thread_count, struct error *err) {
     struct job job;
     struct error why = {0};
     int number;
@@ -144,7 +139,9 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         return STATUS_OK; /* its user was faster: paused, cancelled, deleted */
     if (status != STATUS_OK)
         return status;
-    *a = (struct attempt){.job_id = job_id, .number = number, .iteration = -1.0,
+    *a = (struct attempt){.job_id = job_id,
+                          .number = number,
+                          .iteration = -1.0,
                           .event_max = config->attempt_events_max > 0 ? config->attempt_events_max : EVENTS_MAX,
                           .worker = {.pid_fd = -1, .pipe_fd = -1},
                           .dir = layout_job(config->data_dir, job_id)};
@@ -172,8 +169,8 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     job_release(&job);
     if (status == STATUS_OK) {
         a->phase = ATTEMPT_ALIVE;
-        log_info("job %lld: attempt %d runs as process %d with %d threads", (long long)job_id,
-                 number, (int)a->worker.pid, thread_count);
+        log_info("job %lld: attempt %d runs as process %d with %d threads", (long long)job_id, number,
+                 (int)a->worker.pid, thread_count);
         return STATUS_OK;
     }
     log_warning("job %lld: attempt %d could not begin: %s", (long long)job_id, number, why.message);
@@ -181,12 +178,14 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     return enter_false_start(store, job_id, number, &why, err);
 }
 
-enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config,
-                                const struct unchecked *scene, int thread_count, struct error *err) {
+enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, const struct unchecked *scene,
+                                int thread_count, struct error *err) {
     struct error why = {0};
     const char *scene_id = scene->id;
-    *a = (struct attempt){.owner_id = scene->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
-                          .dir = layout_scene(config->data_dir, scene_id), .user_max_bytes = config->user_max_bytes,
+    *a = (struct attempt){.owner_id = scene->owner_id,
+                          .worker = {.pid_fd = -1, .pipe_fd = -1},
+                          .dir = layout_scene(config->data_dir, scene_id),
+                          .user_max_bytes = config->user_max_bytes,
                           .problems = cJSON_CreateArray()};
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);

@@ -17,7 +17,7 @@ struct checks {
     size_t count;
     struct {
         int64_t owner_id;
-        uint64_t begun; /* the clock then */
+        uint64_t begun;   /* the clock then */
     } last[CHECKS_USERS]; /* [count] */
 };
 

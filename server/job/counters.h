@@ -9,7 +9,7 @@
 /* How attempts end. */
 enum attempt_end {
     END_SUCCEEDED,
-    END_INPUT,   /* the input was at fault */
+    END_INPUT, /* the input was at fault */
     END_CRASHED,
     END_MEMORY,  /* it ran out of memory */
     END_STOPPED, /* paused, cancelled, or the daemon stopped */

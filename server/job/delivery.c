@@ -29,14 +29,15 @@ static void clear_away(struct delivery *d) {
     d->dir = NULL;
 }
 
-static void forget(struct delivery *d) {
-    *d = (struct delivery){.worker = {.pid_fd = -1, .pipe_fd = -1}};
-}
+static void forget(struct delivery *d) { *d = (struct delivery){.worker = {.pid_fd = -1, .pipe_fd = -1}}; }
 
-enum status delivery_start(struct delivery *d, const struct scheduler_config *config,
-                           const struct outbox_row *row, struct error *err) {
+enum status delivery_start(struct delivery *d, const struct scheduler_config *config, const struct outbox_row *row,
+                           struct error *err) {
     char number[32];
-    *d = (struct delivery){.id = row->id, .job_id = row->job_id, .owner_id = row->owner_id, .worker = {.pid_fd = -1, .pipe_fd = -1},
+    *d = (struct delivery){.id = row->id,
+                           .job_id = row->job_id,
+                           .owner_id = row->owner_id,
+                           .worker = {.pid_fd = -1, .pipe_fd = -1},
                            .kill_at_sec = clock_sec() + (row->tries > 0 ? LIMIT_AGAIN_SEC : LIMIT_SEC),
                            .dir = layout_message(config->data_dir, row->id)};
     cJSON *order = cJSON_CreateObject();
@@ -87,8 +88,12 @@ static void take_line(void *user, const char *text, size_t length) {
 static bool settle(struct delivery *d, struct store *store) {
     struct error err;
     bool gave_up;
-    const struct outbox_outcome outcome = {.delivered = d->delivered, .is_final = d->is_final, .status = d->status,
-                                           .reason = d->delivered ? NULL : d->reason[0] ? d->reason : "it timed out"};
+    const struct outbox_outcome outcome = {.delivered = d->delivered,
+                                           .is_final = d->is_final,
+                                           .status = d->status,
+                                           .reason = d->delivered   ? NULL
+                                                     : d->reason[0] ? d->reason
+                                                                    : "it timed out"};
     if (store_outbox_settle(store, d->id, &outcome, &gave_up, &err) != STATUS_OK) {
         if (!d->complained)
             log_warning("a webhook's outcome cannot be recorded: %s", err.message);

@@ -18,17 +18,17 @@ struct delivery {
     double kill_at_sec;
     struct worker worker;
     char *dir;
-    char reason[256]; /* why it failed, by its own words */
-    int64_t owner_id;   /* of the job */
-    int status;         /* that was answered; 0: none */
-    bool is_final;      /* it said that another try would end like this one */
+    char reason[256];          /* why it failed, by its own words */
+    int64_t owner_id;          /* of the job */
+    int status;                /* that was answered; 0: none */
+    bool is_final;             /* it said that another try would end like this one */
     bool has_ended, delivered; /* its process; the message, then */
     bool complained;           /* that could not be entered, and the log says so */
 };
 
 /* Starts the message of that row. */
-enum status delivery_start(struct delivery *d, const struct scheduler_config *config,
-                           const struct outbox_row *row, struct error *err);
+enum status delivery_start(struct delivery *d, const struct scheduler_config *config, const struct outbox_row *row,
+                           struct error *err);
 /* Notices its end, or brings it about, and enters it. True when it is empty again. */
 bool delivery_listen(struct delivery *d, struct store *store);
 /* Ends it; it is empty then. */

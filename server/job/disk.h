@@ -11,11 +11,11 @@
 #define DISK_LOOK_SEC 2.0
 
 struct disk_watch {
-    uint64_t low_bytes;  /* 0: never low */
+    uint64_t low_bytes; /* 0: never low */
     bool is_low;
-    bool was_seen;       /* it was looked at once */
-    double looked_at;    /* as clock_sec */
-    char reason[128];    /* for jobs that wait; the same text as long as low_bytes is the same */
+    bool was_seen;    /* it was looked at once */
+    double looked_at; /* as clock_sec */
+    char reason[128]; /* for jobs that wait; the same text as long as low_bytes is the same */
 };
 
 #define DISK_REASON "the disk is nearly full" /* how every such reason begins */

@@ -66,7 +66,8 @@ void housekeeping_after_kill(const struct scheduler_config *config, struct store
     struct error err;
     size_t count = sizeof jobs / sizeof *jobs;
     for (int64_t before = 0; count == sizeof jobs / sizeof *jobs;) {
-        if (store_job_list(store, NULL, JOB_RUNNING, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) != STATUS_OK) {
+        if (store_job_list(store, NULL, JOB_RUNNING, before, sizeof jobs / sizeof *jobs, jobs, &count, &err) !=
+            STATUS_OK) {
             log_warning("what killed jobs left cannot be removed: %s", err.message);
             return;
         }

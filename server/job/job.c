@@ -8,9 +8,8 @@
 #include "common/protocol.h"
 
 static const char *const job_names[JOB_STATE_COUNT] = {
-    [JOB_QUEUED] = JOB_STATE_QUEUED,       [JOB_RUNNING] = JOB_STATE_RUNNING,
-    [JOB_PAUSED] = JOB_STATE_PAUSED,       [JOB_SUCCEEDED] = JOB_STATE_SUCCEEDED,
-    [JOB_FAILED] = JOB_STATE_FAILED,       [JOB_CANCELLED] = JOB_STATE_CANCELLED,
+    [JOB_QUEUED] = JOB_STATE_QUEUED,       [JOB_RUNNING] = JOB_STATE_RUNNING, [JOB_PAUSED] = JOB_STATE_PAUSED,
+    [JOB_SUCCEEDED] = JOB_STATE_SUCCEEDED, [JOB_FAILED] = JOB_STATE_FAILED,   [JOB_CANCELLED] = JOB_STATE_CANCELLED,
 };
 
 static const char *const scene_names[SCENE_STATE_COUNT] = {
@@ -60,8 +59,11 @@ bool job_is_terminal(enum job_state state) {
 bool job_may_become(enum job_state from, enum job_state to) {
     static const bool arrow[JOB_STATE_COUNT][JOB_STATE_COUNT] = {
         [JOB_QUEUED] = {[JOB_RUNNING] = true, [JOB_PAUSED] = true, [JOB_CANCELLED] = true},
-        [JOB_RUNNING] = {[JOB_QUEUED] = true, [JOB_PAUSED] = true, [JOB_SUCCEEDED] = true,
-                         [JOB_FAILED] = true, [JOB_CANCELLED] = true},
+        [JOB_RUNNING] = {[JOB_QUEUED] = true,
+                         [JOB_PAUSED] = true,
+                         [JOB_SUCCEEDED] = true,
+                         [JOB_FAILED] = true,
+                         [JOB_CANCELLED] = true},
         [JOB_PAUSED] = {[JOB_QUEUED] = true, [JOB_CANCELLED] = true},
         [JOB_SUCCEEDED] = {[JOB_QUEUED] = true},
         [JOB_FAILED] = {[JOB_QUEUED] = true},
@@ -74,7 +76,7 @@ bool job_stage_parse(const char *name, bool *keeps_checkpoint) {
     static const struct {
         const char *name;
         bool keeps_checkpoint;
-    } stages[] = {{"load", false},  {"prepare", false}, {"fuse", false},  {"solve", false},
+    } stages[] = {{"load", false},   {"prepare", false}, {"fuse", false}, {"solve", false},
                   {"refine", false}, {"report", true},   {"export", true}};
     for (size_t i = 0; i < sizeof stages / sizeof *stages; i++) {
         if (strcmp(name, stages[i].name) == 0) {

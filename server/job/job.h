@@ -51,33 +51,33 @@ bool job_stage_parse(const char *name, bool *keeps_checkpoint);
 /* A row of the jobs table. Strings are owned; job_release frees them. */
 struct job {
     int64_t id;
-    int64_t revision;          /* grows by one with every change; the ETag */
+    int64_t revision; /* grows by one with every change; the ETag */
     char scene_id[SCENE_ID_SIZE];
-    int64_t owner_id;          /* the user who made it; 0: nobody */
-    char *owner;               /* that user's name; "" */
-    bool is_shared;            /* with the lab: every caller may read it */
+    int64_t owner_id; /* the user who made it; 0: nobody */
+    char *owner;      /* that user's name; "" */
+    bool is_shared;   /* with the lab: every caller may read it */
     char *name;
-    char *labels;              /* JSON object text */
-    char *settings;            /* JSON object text, as submitted */
-    int priority;              /* larger first */
-    int64_t turn;              /* among jobs of one priority: smaller first */
+    char *labels;   /* JSON object text */
+    char *settings; /* JSON object text, as submitted */
+    int priority;   /* larger first */
+    int64_t turn;   /* among jobs of one priority: smaller first */
     enum job_state state;
     enum job_wanted wanted;
-    int attempt;               /* of the present or last run; 0 before the first */
+    int attempt; /* of the present or last run; 0 before the first */
     int attempts_left;
     int64_t created_ms, started_ms, finished_ms; /* Unix time, 0: not yet */
-    char *stage;               /* last reported; "" before */
-    char *restart_from;        /* the stage that the next attempt begins with; "": where it was */
-    int memory_step;           /* how often its working set was made smaller; see job/memory.h */
+    char *stage;                                 /* last reported; "" before */
+    char *restart_from;                          /* the stage that the next attempt begins with; "": where it was */
+    int memory_step;                             /* how often its working set was made smaller; see job/memory.h */
     bool is_pinned;
-    int64_t expires_ms;        /* Unix time as of now, 0: never; see store/retention.h */
-    int64_t disk_bytes;        /* that its folder takes, as of the end of its last attempt; -1: not known */
-    double progress;           /* 0..1, of the stage */
-    double eta_sec;            /* negative: unknown */
-    char *delivery;            /* what became of its messages: JSON object text; "": it has no webhook */
-    char *webhook;             /* the URL that is told of its states; "": none */
-    char *reason;              /* why it failed or is paused, in plain words; "" if not */
-    char *hint;                /* what to do about it; "" if nothing is known */
+    int64_t expires_ms; /* Unix time as of now, 0: never; see store/retention.h */
+    int64_t disk_bytes; /* that its folder takes, as of the end of its last attempt; -1: not known */
+    double progress;    /* 0..1, of the stage */
+    double eta_sec;     /* negative: unknown */
+    char *delivery;     /* what became of its messages: JSON object text; "": it has no webhook */
+    char *webhook;      /* the URL that is told of its states; "": none */
+    char *reason;       /* why it failed or is paused, in plain words; "" if not */
+    char *hint;         /* what to do about it; "" if nothing is known */
 };
 
 void job_release(struct job *job);

@@ -23,8 +23,7 @@ enum status measure_job(struct store *store, int64_t job_id, const char *dir, st
 }
 
 static void measure(const struct scheduler_config *config, struct disk_use *use) {
-    char *dir = use->job_id ? layout_job(config->data_dir, use->job_id)
-                            : layout_scene(config->data_dir, use->scene_id);
+    char *dir = use->job_id ? layout_job(config->data_dir, use->job_id) : layout_scene(config->data_dir, use->scene_id);
     use->bytes = measure_folder(dir);
     mem_free(dir);
 }

@@ -15,8 +15,7 @@ static double halved(double value, int times, double least) {
 }
 
 /* Replaces one setting where `smaller` is. */
-static void replace(cJSON *settings, const char *name, double present, double smaller,
-                    struct buf *what) {
+static void replace(cJSON *settings, const char *name, double present, double smaller, struct buf *what) {
     if (smaller >= present)
         return;
     cJSON_DeleteItemFromObjectCaseSensitive(settings, name);

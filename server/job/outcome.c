@@ -67,12 +67,8 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
         else
             say(v, OUTCOME_CRASH, "the worker ended without a result", "");
         return;
-    case PROGRESS_EXIT_INPUT:
-        say(v, OUTCOME_INPUT, message[0] ? message : "the input is at fault", hint);
-        return;
-    case PROGRESS_EXIT_MEMORY:
-        say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY);
-        return;
+    case PROGRESS_EXIT_INPUT: say(v, OUTCOME_INPUT, message[0] ? message : "the input is at fault", hint); return;
+    case PROGRESS_EXIT_MEMORY: say(v, OUTCOME_MEMORY, "out of memory", HINT_MEMORY); return;
     case PROGRESS_EXIT_NO_SPACE:
         snprintf(text, sizeof text, "disk full: %.900s", message);
         say(v, OUTCOME_BLOCKED, text, "Free some space, then resume the job.");
@@ -89,8 +85,7 @@ static void judge_exit(const struct attempt *a, struct verdict *v) {
             return;
         }
         break;
-    default:
-        break;
+    default: break;
     }
     snprintf(text, sizeof text, "the worker ended with status %d", code);
     say(v, OUTCOME_CRASH, text, "");
@@ -117,8 +112,8 @@ static void judge(const struct attempt *a, struct verdict *v) {
 }
 
 /* Enters an attempt that ran out of memory: the next one gets by with less, where it can. */
-static enum status settle_memory(const struct attempt *a, struct store *store,
-                                 const struct verdict *v, struct error *err) {
+static enum status settle_memory(const struct attempt *a, struct store *store, const struct verdict *v,
+                                 struct error *err) {
     struct buf reason, what;
     cJSON *settings = cJSON_Parse(a->settings); /* as its order was made of them */
     int step = a->memory_step;
@@ -129,8 +124,7 @@ static enum status settle_memory(const struct attempt *a, struct store *store,
         step++;
         buf_printf(&reason, "; a further attempt works with %s", buf_text(&what));
     }
-    enum status status = store_job_crash(store, a->job_id, a->number, buf_text(&reason), v->hint,
-                                         step, err);
+    enum status status = store_job_crash(store, a->job_id, a->number, buf_text(&reason), v->hint, step, err);
     cJSON_Delete(settings);
     buf_release(&reason);
     buf_release(&what);
@@ -141,10 +135,8 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
                               struct error *err) {
     switch (v->outcome) {
     case OUTCOME_OK: return store_job_succeed_but(store, a->job_id, a->number, v->reason, err);
-    case OUTCOME_INPUT:
-        return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
-    case OUTCOME_BLOCKED:
-        return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
+    case OUTCOME_INPUT: return store_job_fail(store, a->job_id, a->number, v->reason, v->hint, err);
+    case OUTCOME_BLOCKED: return store_job_block(store, a->job_id, a->number, v->reason, v->hint, err);
     case OUTCOME_STOPPED: return store_job_stop(store, a->job_id, a->number, "", err);
     case OUTCOME_MEMORY: return settle_memory(a, store, v, err);
     case OUTCOME_CRASH: break;
@@ -184,9 +176,9 @@ static enum status settle_size(struct attempt *a, struct store *store, struct er
     struct error why = {0};
     struct disk_use use = {.bytes = measure_folder(a->dir)};
     memcpy(use.scene_id, a->scene_id, sizeof use.scene_id);
-    enum status status = use.bytes < 0 ? STATUS_OK
-                                       : store_share_check_scene(store, a->scene_id, (uint64_t)use.bytes,
-                                                                 a->user_max_bytes, &why);
+    enum status status =
+        use.bytes < 0 ? STATUS_OK
+                      : store_share_check_scene(store, a->scene_id, (uint64_t)use.bytes, a->user_max_bytes, &why);
     if (status == STATUS_OK)
         return store_disk_enter(store, &use, 1, err);
     if (status != STATUS_LIMIT)
@@ -201,8 +193,7 @@ static bool is_good(const struct attempt *a, const struct verdict *v) {
     return v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts;
 }
 
-static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v,
-                                struct error *err) {
+static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v, struct error *err) {
     if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
         return STATUS_OK;
     enum status status = is_good(a, v) ? settle_size(a, store, err) : STATUS_OK;
@@ -241,8 +232,8 @@ bool outcome_lacks_room(const struct attempt *a) {
 static enum status make_up(struct attempt *a, struct store *store, struct error *err) {
     enum status status = worker_messages_retry(a, store, err);
     struct job job = {0};
-    bool is_unwanted = status == STATUS_NO_SPACE && a->job_id && store_job_get(store, a->job_id, &job, NULL) == STATUS_OK &&
-                       job.wanted != JOB_WANT_RUN;
+    bool is_unwanted = status == STATUS_NO_SPACE && a->job_id &&
+                       store_job_get(store, a->job_id, &job, NULL) == STATUS_OK && job.wanted != JOB_WANT_RUN;
     job_release(&job);
     if (is_unwanted)
         log_warning("job %lld: %d announced files are dropped, since it is stopped: %s", (long long)a->job_id,
@@ -264,20 +255,19 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct counte
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;
     static const enum attempt_end ends[] = {
-        [OUTCOME_OK] = END_SUCCEEDED,   [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
+        [OUTCOME_OK] = END_SUCCEEDED,  [OUTCOME_INPUT] = END_INPUT,     [OUTCOME_CRASH] = END_CRASHED,
         [OUTCOME_MEMORY] = END_MEMORY, [OUTCOME_STOPPED] = END_STOPPED, [OUTCOME_BLOCKED] = END_DISK};
     if (a->job_id)
         atomic_fetch_add(&counters->ends[ends[verdict.outcome]], 1);
     static const char *const words[] = {
-        [OUTCOME_OK] = "is done", [OUTCOME_INPUT] = "is refused", [OUTCOME_CRASH] = "broke off",
-        [OUTCOME_MEMORY] = "broke off",
-        [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};
+        [OUTCOME_OK] = "is done",       [OUTCOME_INPUT] = "is refused",    [OUTCOME_CRASH] = "broke off",
+        [OUTCOME_MEMORY] = "broke off", [OUTCOME_STOPPED] = "was stopped", [OUTCOME_BLOCKED] = "cannot go on"};
     if (a->job_id)
-        log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number,
-                 words[verdict.outcome], verdict.reason[0] ? ": " : "", verdict.reason);
-    else
-        log_info("scene %.12s: its check %s%s%s", a->scene_id, words[verdict.outcome],
+        log_info("job %lld: attempt %d %s%s%s", (long long)a->job_id, a->number, words[verdict.outcome],
                  verdict.reason[0] ? ": " : "", verdict.reason);
+    else
+        log_info("scene %.12s: its check %s%s%s", a->scene_id, words[verdict.outcome], verdict.reason[0] ? ": " : "",
+                 verdict.reason);
     attempt_empty(a);
     return STATUS_OK;
 }

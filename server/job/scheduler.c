@@ -31,8 +31,8 @@
 #include "server/job/outcome.h"
 
 #define HOUSEKEEPING_SEC 600.0
-#define DELIVERIES 8      /* webhooks that are called at the same time */
-#define USER_DELIVERIES 2 /* of them, of one user: a receiver that hangs holds up no other user's */
+#define DELIVERIES 8          /* webhooks that are called at the same time */
+#define USER_DELIVERIES 2     /* of them, of one user: a receiver that hangs holds up no other user's */
 #define RETRY_SEC 5.0         /* after the store or a start failed */
 #define NO_PIDFD_POLL_SEC 0.2 /* where the kernel cannot tell us that a process has ended */
 
@@ -47,18 +47,18 @@ struct scheduler {
     size_t job_slots, slot_count;
     struct attempt *slot; /* [slot_count]; the first job_slots are of jobs */
     struct checks checks;
-    bool must_retry;      /* something failed that may work later */
+    bool must_retry;        /* something failed that may work later */
     double housekeeping_at; /* as clock_sec */
     struct disk_watch disk;
     atomic_bool waits_for_disk; /* disk.is_low, for other threads */
-    uint64_t check_room;   /* free bytes with which scenes that had too little are checked again; 0: none wait */
+    uint64_t check_room;        /* free bytes with which scenes that had too little are checked again; 0: none wait */
     struct delivery delivery[DELIVERIES];
-    double outbox_at;       /* when the next message's time comes, as clock_sec */
-    struct pollfd *poll;  /* [1 + 2 * slot_count + DELIVERIES] */
+    double outbox_at;    /* when the next message's time comes, as clock_sec */
+    struct pollfd *poll; /* [1 + 2 * slot_count + DELIVERIES] */
 };
 
-enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config,
-                          struct store *store, struct error *err) {
+enum status scheduler_new(struct scheduler **out, const struct scheduler_config *config, struct store *store,
+                          struct error *err) {
     *out = NULL;
     int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     if (fd < 0)
@@ -103,17 +103,11 @@ void scheduler_stop(struct scheduler *s) {
     scheduler_wake(s);
 }
 
-const struct counters *scheduler_counters(const struct scheduler *s) {
-    return &s->counters;
-}
+const struct counters *scheduler_counters(const struct scheduler *s) { return &s->counters; }
 
-int scheduler_running(const struct scheduler *s) {
-    return atomic_load(&s->running);
-}
+int scheduler_running(const struct scheduler *s) { return atomic_load(&s->running); }
 
-bool scheduler_waits_for_disk(const struct scheduler *s) {
-    return atomic_load(&s->waits_for_disk);
-}
+bool scheduler_waits_for_disk(const struct scheduler *s) { return atomic_load(&s->waits_for_disk); }
 
 /* Something failed that is not the job's fault: say so once per round and try again. */
 static void retry_later(struct scheduler *s, const char *what, const struct error *err) {
@@ -158,8 +152,7 @@ static void start_jobs(struct scheduler *s) {
             if (status == STATUS_NOT_FOUND)
                 return;
             if (status == STATUS_OK)
-                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id, thread_share(s),
-                                           &err);
+                status = attempt_start_job(&s->slot[i], &s->config, s->store, &s->counters, id, thread_share(s), &err);
             if (status != STATUS_OK) {
                 retry_later(s, "cannot start a job", &err);
                 return;
@@ -282,8 +275,8 @@ static void watch_disk(struct scheduler *s) {
         return;
     for (size_t i = 0; s->disk.is_low && i < s->job_slots; i++)
         ask_to_stop(s, &s->slot[i]);
-    if (store_job_explain(s->store, s->disk.is_low ? s->disk.reason : "", DISK_REASON,
-                          s->disk.is_low ? DISK_HINT : "", &err) != STATUS_OK)
+    if (store_job_explain(s->store, s->disk.is_low ? s->disk.reason : "", DISK_REASON, s->disk.is_low ? DISK_HINT : "",
+                          &err) != STATUS_OK)
         retry_later(s, "cannot say why jobs wait", &err);
 }
 
@@ -319,9 +312,7 @@ static int keep_deadlines(struct scheduler *s) {
     return isinf(sleep) ? -1 : (int)ceil(sleep * 1000.0); /* rounded down it would spin */
 }
 
-unsigned long scheduler_rounds(const struct scheduler *s) {
-    return atomic_load(&s->rounds);
-}
+unsigned long scheduler_rounds(const struct scheduler *s) { return atomic_load(&s->rounds); }
 
 static void wait_for_something(struct scheduler *s, int timeout_ms) {
     atomic_fetch_add(&s->rounds, 1);
@@ -365,7 +356,8 @@ static size_t busy_users(const struct scheduler *s, int64_t users[DELIVERIES]) {
     for (size_t i = 0; i < DELIVERIES; i++) {
         size_t same = 0;
         for (size_t k = 0; k <= i; k++)
-            same += s->delivery[i].id != 0 && s->delivery[k].id != 0 && s->delivery[k].owner_id == s->delivery[i].owner_id;
+            same +=
+                s->delivery[i].id != 0 && s->delivery[k].id != 0 && s->delivery[k].owner_id == s->delivery[i].owner_id;
         if (same == USER_DELIVERIES)
             users[count++] = s->delivery[i].owner_id;
     }

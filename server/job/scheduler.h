@@ -17,17 +17,17 @@ struct scheduler; /* opaque */
 
 /* Nothing runs yet. What `config` points to and the store are borrowed; fails where the system has no
  * descriptor left. */
-enum status scheduler_new(struct scheduler **s, const struct scheduler_config *config,
-                          struct store *store, struct error *err);
+enum status scheduler_new(struct scheduler **s, const struct scheduler_config *config, struct store *store,
+                          struct error *err);
 void scheduler_free(struct scheduler *s);
 /* Reconciles, then works until scheduler_stop; running workers checkpoint and their jobs go back
  * to the queue before it returns. */
 enum status scheduler_run(struct scheduler *s, struct error *err);
-void scheduler_wake(struct scheduler *s); /* from any thread: look at the store again */
-void scheduler_stop(struct scheduler *s); /* from any thread or a signal handler */
-bool scheduler_waits_for_disk(const struct scheduler *s); /* any thread */
+void scheduler_wake(struct scheduler *s);                             /* from any thread: look at the store again */
+void scheduler_stop(struct scheduler *s);                             /* from any thread or a signal handler */
+bool scheduler_waits_for_disk(const struct scheduler *s);             /* any thread */
 const struct counters *scheduler_counters(const struct scheduler *s); /* any thread */
-int scheduler_running(const struct scheduler *s); /* workers alive; any thread */
+int scheduler_running(const struct scheduler *s);                     /* workers alive; any thread */
 /* How often it has looked at the store; any thread. After scheduler_wake it grows, or it hangs. */
 unsigned long scheduler_rounds(const struct scheduler *s);
 

@@ -21,10 +21,10 @@
 #include "server/data/layout.h"
 #include "server/worker/progress.h"
 
-#define LOG_KEEP 65536       /* of earlier attempts, when the log has grown past LOG_LARGE */
+#define LOG_KEEP 65536 /* of earlier attempts, when the log has grown past LOG_LARGE */
 #define LOG_LARGE (1 << 20)
 #define LINES_AT_ONCE (256 * 1024) /* bytes read before the scheduler looks at others again */
-#define FIRST_FREE_FD 10     /* the child's own descriptors are below */
+#define FIRST_FREE_FD 10           /* the child's own descriptors are below */
 
 /* A descriptor that the child's dup2 calls cannot run over; closed on exec. */
 static int out_of_the_way(int fd) {
@@ -57,9 +57,23 @@ static enum status trim_log(const char *path, int fd, struct error *err) {
  * sanitizers behave, what tests slip under it. Not the rest: it may hold a token or another secret. The caller's
  * (mem_free); the strings are the environment's. */
 static char **worker_environment(void) {
-    static const char *const kept[] = {"PATH=", "LANG=", "LC_", "TZ=", "LD_", "GLIBC_TUNABLES=", "MALLOC_", "RES_OPTIONS=",
-                                       "LOCALDOMAIN=", "ASAN_OPTIONS=", "LSAN_OPTIONS=", "TSAN_OPTIONS=",
-                                       "UBSAN_OPTIONS=", "GCOV_", "UNBAKE_FAULTS", "UNBAKE_CLOCK=", "UNBAKE_BOOT_ID="};
+    static const char *const kept[] = {"PATH=",
+                                       "LANG=",
+                                       "LC_",
+                                       "TZ=",
+                                       "LD_",
+                                       "GLIBC_TUNABLES=",
+                                       "MALLOC_",
+                                       "RES_OPTIONS=",
+                                       "LOCALDOMAIN=",
+                                       "ASAN_OPTIONS=",
+                                       "LSAN_OPTIONS=",
+                                       "TSAN_OPTIONS=",
+                                       "UBSAN_OPTIONS=",
+                                       "GCOV_",
+                                       "UNBAKE_FAULTS",
+                                       "UNBAKE_CLOCK=",
+                                       "UNBAKE_BOOT_ID="};
     size_t total = 0, count = 0;
     while (environ[total])
         total++;
@@ -107,19 +121,22 @@ static void become_worker(const struct spawn *spawn) {
     _exit(127);
 }
 
-enum status supervisor_start(struct worker *w, const char *binary, const char *dir,
-                             struct error *err) {
+enum status supervisor_start(struct worker *w, const char *binary, const char *dir, struct error *err) {
     *w = (struct worker){.pid_fd = -1, .pipe_fd = -1, .log_path = layout_log(dir)};
     buf_init(&w->line, PROGRESS_LINE_MAX);
     char *argv[] = {mem_strdup("unbaked"), mem_strdup("worker"), mem_strdup(dir), NULL};
     char **environment = worker_environment();
-    struct spawn spawn = {.binary = binary, .argv = argv, .environment = environment, .null_fd = -1, .log_fd = -1,
-                          .pipe_fd = -1, .parent = getpid()};
+    struct spawn spawn = {.binary = binary,
+                          .argv = argv,
+                          .environment = environment,
+                          .null_fd = -1,
+                          .log_fd = -1,
+                          .pipe_fd = -1,
+                          .parent = getpid()};
     int ends[2] = {-1, -1};
     enum status status = STATUS_OK;
     spawn.null_fd = out_of_the_way(open("/dev/null", O_RDONLY | O_CLOEXEC));
-    spawn.log_fd = out_of_the_way(
-        open(w->log_path, O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600));
+    spawn.log_fd = out_of_the_way(open(w->log_path, O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (spawn.null_fd < 0 || spawn.log_fd < 0) {
         status = error_set_errno(err, errno, "cannot open %s", w->log_path);
         goto out;
@@ -188,8 +205,8 @@ static void take(struct worker *w, const char *data, size_t length,
 }
 
 /* Reads up to `limit` bytes. */
-static void read_pipe(struct worker *w, size_t limit,
-                      void (*each)(void *user, const char *line, size_t length), void *user) {
+static void read_pipe(struct worker *w, size_t limit, void (*each)(void *user, const char *line, size_t length),
+                      void *user) {
     char chunk[16384];
     for (size_t total = 0; w->pipe_fd >= 0 && total < limit;) {
         ssize_t got = read(w->pipe_fd, chunk, sizeof chunk);
@@ -207,8 +224,7 @@ static void read_pipe(struct worker *w, size_t limit,
     }
 }
 
-void supervisor_read(struct worker *w, void (*each)(void *user, const char *line, size_t length),
-                     void *user) {
+void supervisor_read(struct worker *w, void (*each)(void *user, const char *line, size_t length), void *user) {
     read_pipe(w, LINES_AT_ONCE, each, user);
 }
 
@@ -217,19 +233,18 @@ void supervisor_signal(struct worker *w, int signal_number) {
         kill(w->pid, signal_number);
 }
 
-bool supervisor_reap(struct worker *w, int *wait_status,
-                     void (*each)(void *user, const char *line, size_t length), void *user) {
+bool supervisor_reap(struct worker *w, int *wait_status, void (*each)(void *user, const char *line, size_t length),
+                     void *user) {
     siginfo_t info = {0};
-    if (w->pid <= 0 || waitid(P_PID, (id_t)w->pid, &info, WEXITED | WNOHANG | WNOWAIT) != 0 ||
-        info.si_pid == 0)
+    if (w->pid <= 0 || waitid(P_PID, (id_t)w->pid, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
         return false;
     /* Not yet reaped, so its number still names its session and nobody else's. */
     kill(-w->pid, SIGKILL);
     read_pipe(w, (size_t)64 << 20, each, user);
     struct rusage used = {0};
     wait4(w->pid, wait_status, 0, &used);
-    w->cpu_sec = (double)used.ru_utime.tv_sec + 1e-6 * (double)used.ru_utime.tv_usec +
-                 (double)used.ru_stime.tv_sec + 1e-6 * (double)used.ru_stime.tv_usec;
+    w->cpu_sec = (double)used.ru_utime.tv_sec + 1e-6 * (double)used.ru_utime.tv_usec + (double)used.ru_stime.tv_sec +
+                 1e-6 * (double)used.ru_stime.tv_usec;
     w->pid = 0;
     return true;
 }

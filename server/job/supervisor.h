@@ -18,11 +18,11 @@
 #include "common/error.h"
 
 struct worker {
-    pid_t pid;       /* 0: none, or reaped */
-    int pid_fd;      /* readable when the process has ended; -1 where the kernel has none */
-    int pipe_fd;     /* -1 after its end */
-    struct buf line; /* what has come of the present line */
-    bool skipping;   /* the present line is too long: dropped up to its end */
+    pid_t pid;         /* 0: none, or reaped */
+    int pid_fd;        /* readable when the process has ended; -1 where the kernel has none */
+    int pipe_fd;       /* -1 after its end */
+    struct buf line;   /* what has come of the present line */
+    bool skipping;     /* the present line is too long: dropped up to its end */
     size_t long_lines; /* that were dropped so */
     char *log_path;
     double cpu_sec;  /* that it took in all, once it is reaped */
@@ -31,19 +31,17 @@ struct worker {
 
 /* Starts the process in the folder `dir`; *w is to be reaped and released. Where it fails *w is as
  * released. Nothing of the arguments is kept. */
-enum status supervisor_start(struct worker *w, const char *binary, const char *dir,
-                             struct error *err);
+enum status supervisor_start(struct worker *w, const char *binary, const char *dir, struct error *err);
 
 /* Hands every complete line that has come to `each`, without its newline. */
-void supervisor_read(struct worker *w, void (*each)(void *user, const char *line, size_t length),
-                     void *user);
+void supervisor_read(struct worker *w, void (*each)(void *user, const char *line, size_t length), void *user);
 
 void supervisor_signal(struct worker *w, int signal);
 
 /* True, once, when the process has ended: everything it left behind in its session is killed,
  * the rest of its pipe read through `each`, *wait_status is as waitpid gives it. */
-bool supervisor_reap(struct worker *w, int *wait_status,
-                     void (*each)(void *user, const char *line, size_t length), void *user);
+bool supervisor_reap(struct worker *w, int *wait_status, void (*each)(void *user, const char *line, size_t length),
+                     void *user);
 
 /* CPU time of the process so far, or in all. */
 double supervisor_cpu_sec(const struct worker *w);

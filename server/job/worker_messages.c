@@ -52,8 +52,10 @@ static void say_thinned(struct attempt *a, struct store *store) {
     if (a->said_thinned)
         return;
     a->said_thinned = true;
-    char *message = mem_printf("this attempt has reported %ld events: from here on its metrics and log lines are dropped, "
-                               "and progress is entered once a second; outputs are all there", a->event_max);
+    char *message =
+        mem_printf("this attempt has reported %ld events: from here on its metrics and log lines are dropped, "
+                   "and progress is entered once a second; outputs are all there",
+                   a->event_max);
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "level", "warning");
     json_add_string(data, "message", message);
@@ -222,8 +224,7 @@ static void note_checkpoint(const struct message_listener *l, const cJSON *line)
         atomic_fetch_add(&l->counters->checkpoint_us, (unsigned long long)(seconds * 1e6));
     }
     cJSON *data = cJSON_CreateObject();
-    char *message = mem_printf("checkpoint at iteration %.0f: %.1f MB in %.2f s", iteration,
-                               bytes * 1e-6, seconds);
+    char *message = mem_printf("checkpoint at iteration %.0f: %.1f MB in %.2f s", iteration, bytes * 1e-6, seconds);
     json_add_string(data, "level", "info");
     json_add_string(data, "message", message);
     enter_event(l, EVENT_LOG, data);
@@ -285,8 +286,7 @@ static void take_line(void *user, const char *text, size_t length) {
     else if (strcmp(type, "metric") == 0) {
         if (!note_counters(l, line))
             enter_event(l, EVENT_METRIC, line);
-    }
-    else if (strcmp(type, "log") == 0)
+    } else if (strcmp(type, "log") == 0)
         enter_event(l, EVENT_LOG, line);
     else if (strcmp(type, "preview") == 0)
         enter_file(l, EVENT_PREVIEW, line);

@@ -9,12 +9,12 @@
 #include "server/render/sampler.h"
 #include "server/scene/surface.h"
 
-#define PLACES 96          /* texels that are asked */
+#define PLACES 96 /* texels that are asked */
 #define PLACES_LEAST 24
 #define PHOTOGRAPHS_LEAST 4.0f
 /* Standard deviation of the logarithm of what photographs show, from which on it is worth asking. */
 #define SPREAD_LEAST 0.8f
-#define SHARE_LEAST 0.1f   /* of the places; where fewer spread so far none is asked */
+#define SHARE_LEAST 0.1f /* of the places; where fewer spread so far none is asked */
 /* Of what white paint would show: black is less, lit is more. */
 #define BLACK 0.25f
 #define LIT 0.6f
@@ -24,8 +24,8 @@
  * changes. Within a picture it is darker here and there. */
 #define RING_PIXELS 6.0f
 #define RING_LIT 0.35f
-#define MIN_OBSERVATIONS 2      /* of either kind */
-#define OBSERVATIONS_TESTED 4      /* whether they may be highlights */
+#define MIN_OBSERVATIONS 2    /* of either kind */
+#define OBSERVATIONS_TESTED 4 /* whether they may be highlights */
 /* The glossiest surface that is no metal; what is lit must be so many times brighter than its highlight. */
 #define SPECULAR 1.0f
 #define BRIGHTER 2.0f

@@ -119,8 +119,7 @@ static void observe_segment(void *user, size_t segment, int thread) {
     mem_free(shown);
 }
 
-void emitters_observe(const struct reconstruction *r, const struct views *views,
-                      struct emitter_evidence *evidence) {
+void emitters_observe(const struct reconstruction *r, const struct views *views, struct emitter_evidence *evidence) {
     struct evidence_job job = {.r = (struct reconstruction *)r, .views = views, .evidence = evidence};
     by_segment_sort(&job.texels, &r->segments, &r->inverse);
     parallel_for(r->pool, r->segments.count, observe_segment, &job);
@@ -131,8 +130,8 @@ void emitters_light_bright(struct reconstruction *r, const struct views *views,
                            const struct emitter_evidence *evidence) {
     for (size_t i = 0; i < r->segments.count; i++) {
         rgb shown = evidence[i].radiance;
-        bool shines = evidence[i].is_hidden || evidence[i].is_unbounded ||
-                      rgb_mean(shown) > BRIGHT * views->median_radiance;
+        bool shines =
+            evidence[i].is_hidden || evidence[i].is_unbounded || rgb_mean(shown) > BRIGHT * views->median_radiance;
         r->materials.emission[i] = shines ? shown : rgb_gray(0.0f);
     }
     world_update_lights(&r->world);

@@ -8,8 +8,7 @@
 
 /* Fills `shown`, `least`, `bound`, `seen` and `mixed` of evidence[segment_count] from up to a few hundred texels of
  * each; not those of hidden lamps, nor `shown` of what is unbound. */
-void emitters_observe(const struct reconstruction *r, const struct views *views,
-                      struct emitter_evidence *evidence);
+void emitters_observe(const struct reconstruction *r, const struct views *views, struct emitter_evidence *evidence);
 
 /* Makes lights of what outshines the room, before it is known what emits: its emission is what is shown of it,
  * own and reflected light together; that of all else is 0. */

@@ -42,8 +42,8 @@ struct lamp_candidate {
 };
 
 struct lamp_search {
-    bool is_open;          /* one looks out of it to where no photograph does */
-    struct lamps lamps;    /* that were found; and all places */
+    bool is_open;       /* one looks out of it to where no photograph does */
+    struct lamps lamps; /* that were found; and all places */
     struct light_places few;
     size_t candidate_count;
     struct lamp_candidate *candidate; /* [candidate_count]; owned */

@@ -93,9 +93,7 @@ struct lamp *lamps_add(struct lamps *l, uint32_t segment, rgb radiance) {
     return lamp;
 }
 
-static bool is_near(float a, float b, float share) {
-    return fabsf(a - b) <= share * fmaxf(a, b);
-}
+static bool is_near(float a, float b, float share) { return fabsf(a - b) <= share * fmaxf(a, b); }
 
 /* Whether two lamps have the same size and observed radiance, and the same saturated channels. */
 static bool is_alike(const struct lamps *l, const struct lamp *lamp, uint32_t segment) {
@@ -240,9 +238,7 @@ void lamps_hand_over(const struct lamps *l, size_t count) {
     }
 }
 
-static bool is_brightened(const struct environment *e) {
-    return e->map.pixel && rgb_mean(e->brightened) > 1.0f;
-}
+static bool is_brightened(const struct environment *e) { return e->map.pixel && rgb_mean(e->brightened) > 1.0f; }
 
 bool lamps_are_estimated(const struct reconstruction *r) {
     bool any = false;

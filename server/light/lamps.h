@@ -26,9 +26,9 @@ struct lamp {
     size_t segment_count;
     uint32_t segment[LAMPS_ALIKE_MOST];
     rgb radiance;
-    rgb least;    /* observed radiance, a lower bound */
+    rgb least;           /* observed radiance, a lower bound */
     bool is_measured[3]; /* by channel: not saturated, so that `least` is the radiance */
-    float *lit;   /* [places.count] Lambert radiance at albedo 1 by a lamp of radiance 1; owned */
+    float *lit;          /* [places.count] Lambert radiance at albedo 1 by a lamp of radiance 1; owned */
 };
 
 struct lamps {

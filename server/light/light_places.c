@@ -38,12 +38,11 @@ static void gather_place(void *user, size_t index, int thread) {
     struct light_place *p = &g->place[index];
     uint32_t texel = survey->texel[index];
     struct irradiance light;
-    *p = (struct light_place){
-        .segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
+    *p = (struct light_place){.segment = reconstruction_segment(r, texel), .shown = shown_of(g, index), .weight = 1.0f};
     if (!surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &p->at))
         return;
-    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at,
-                      sampler_key(KEY_SUN, texel, 0), RAYS_PER_POINT);
+    irradiance_gather(&light, &survey->scratch[thread], &survey->field, &p->at, sampler_key(KEY_SUN, texel, 0),
+                      RAYS_PER_POINT);
     sun_add_light(&r->sun, r->world.accel, &p->at, &light);
     p->white = irradiance_diffuse(&light, p->at.shading, 1.0f, p->at.shading);
 }
@@ -82,9 +81,7 @@ static void floor_light(struct light_places *s) {
     mem_free(mean);
 }
 
-static float log_base(const struct light_place *p) {
-    return logf(rgb_mean(p->shown) / rgb_mean(p->white));
-}
+static float log_base(const struct light_place *p) { return logf(rgb_mean(p->shown) / rgb_mean(p->white)); }
 
 void light_places_leave_out_lamps(struct light_places *s) {
     size_t kept = 0;

@@ -17,7 +17,7 @@ struct light_place {
     uint32_t segment;
     struct surface_point at;
     rgb shown, white;
-    float residual;    /* log(base colour / (median of the segment, or that of white paint)), without missing light */
+    float residual; /* log(base colour / (median of the segment, or that of white paint)), without missing light */
     /* Of the search: */
     float weight; /* at most 1 */
     float lit;    /* Lambert radiance at albedo 1 by the hypothetical light at strength 1 */

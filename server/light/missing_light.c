@@ -55,9 +55,7 @@ static float part_of(const struct light_place *p, float strength, int channel) {
     return light > 0.0f ? light / (light + channel_of(p->white, channel)) : 0.0f;
 }
 
-float missing_light_part(const struct light_place *p, float strength) {
-    return part_of(p, strength, MISSING_MEAN);
-}
+float missing_light_part(const struct light_place *p, float strength) { return part_of(p, strength, MISSING_MEAN); }
 
 /* Robust loss in [0, 1) (Geman and McClure). */
 static double oddity(float off, float spread) {
@@ -82,9 +80,7 @@ static void find_base(const struct missing_light *m, size_t first, size_t end, f
 }
 
 /* Spread of base colours about a median. */
-static float spread_about(float median) {
-    return SPREAD_WITHIN + HIGHLIGHT_ALLOWANCE * expf(-median);
-}
+static float spread_about(float median) { return SPREAD_WITHIN + HIGHLIGHT_ALLOWANCE * expf(-median); }
 
 void missing_light_renew(struct missing_light *m) {
     for (size_t first = 0, end; first < m->places->count; first = end) {

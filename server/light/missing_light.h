@@ -13,7 +13,7 @@
 
 struct missing_light {
     const struct light_places *places; /* borrowed */
-    float max_albedo;                       /* base colours beyond it are odd */
+    float max_albedo;                  /* base colours beyond it are odd */
     bool in_patches;                   /* see missing_light_init */
     float *spread;                     /* [places->count] of a segment, at its first place; owned */
     float *weight;                     /* [places->count] 1, or how far a place is asked; owned */

@@ -9,7 +9,7 @@
 struct segment_light {
     const struct reconstruction *r; /* borrowed */
     struct texels_by_segment texels;
-    float *area_m2;                 /* [segment_count]; owned */
+    float *area_m2; /* [segment_count]; owned */
 };
 
 void segment_light_init(struct segment_light *l, const struct reconstruction *r);

@@ -10,12 +10,12 @@
 #include "server/render/sampler.h"
 
 #define PLACES 64
-#define POINTS 1024        /* all over the room; those with this share of unseen directions tell of them */
+#define POINTS 1024 /* all over the room; those with this share of unseen directions tell of them */
 #define SHARE_LEAST 0.1f
 #define LEAST_POINTS 64
-#define RAYS_PER_POINT 256           /* directions at a place */
+#define RAYS_PER_POINT 256 /* directions at a place */
 #define BRIGHTER_PLACES 0.75
-#define KEY_PLACES 31      /* keep these random numbers apart from others of the triangle */
+#define KEY_PLACES 31 /* keep these random numbers apart from others of the triangle */
 #define KEY_RAYS 37
 #define KEY_SUN 41
 /* Assumed ratio of true to observed radiance where all photographs saturate. High, since overestimated light only makes
@@ -25,7 +25,7 @@
 #define SUN_DIRECTIONS 2048
 #define SUN_BEST 8
 #define SUN_STEPS 96
-#define SUN_STEP 0.05f     /* radians, about half the spacing of the directions */
+#define SUN_STEP 0.05f /* radians, about half the spacing of the directions */
 #define SUN_SMALLEST 0.003f
 /* It is found where it reaches this much more of the part than of what is beside it. */
 #define SUN_CONTRAST 0.6f
@@ -74,8 +74,7 @@ static void trace_ways(const struct shining *s, const struct shining_place *plac
     vec3_frame(place->normal, &frame[0], &frame[1]);
     for (uint32_t i = 0; i < RAYS_PER_POINT; i++) {
         vec3 direction = incident_cosine_direction(frame, sampler_pair(key, i, 0));
-        ray[i] = (struct accel_ray){accel_offset(place->position, place->normal, direction), 0.0f, direction,
-                                    INFINITY};
+        ray[i] = (struct accel_ray){accel_offset(place->position, place->normal, direction), 0.0f, direction, INFINITY};
     }
     accel_intersect_many(s->r->world.accel, RAYS_PER_POINT, ray, hit);
 }
@@ -232,8 +231,7 @@ struct sunlight {
 /* Whether light may come from far away in a direction. */
 static bool is_open(const struct accel *accel, const struct shining_place *place, vec3 direction) {
     vec3 origin = accel_offset(place->position, place->normal, direction);
-    return vec3_dot(direction, place->normal) > 0.0f &&
-           !accel_occluded(accel, origin, direction, 0.0f, INFINITY);
+    return vec3_dot(direction, place->normal) > 0.0f && !accel_occluded(accel, origin, direction, 0.0f, INFINITY);
 }
 
 static float share_open(const struct sunlight *sun, const struct shining_place *place, size_t count, vec3 direction) {

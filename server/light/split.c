@@ -55,8 +55,8 @@ struct split_level {
     size_t triangle_count;
     uint32_t segment;
     float bright;
-    uint32_t *lit, *unlit;    /* [triangle_count] scratch: a part; what is darker than the level */
-    float *value;             /* [triangle_count] scratch, as below */
+    uint32_t *lit, *unlit; /* [triangle_count] scratch: a part; what is darker than the level */
+    float *value;          /* [triangle_count] scratch, as below */
     struct member *member;
 };
 
@@ -72,9 +72,7 @@ static bool is_lit(const struct split_level *l, uint32_t t) {
     return !l->job->settled[t] && l->job->light.observed[t] >= l->bright;
 }
 
-static bool is_rest(const struct split_level *l, uint32_t t) {
-    return l->job->part[t] == 0;
-}
+static bool is_rest(const struct split_level *l, uint32_t t) { return l->job->part[t] == 0; }
 
 /* Joins neighbouring triangles of the set. */
 static void connect(const struct split_level *l, bool (*belongs)(const struct split_level *l, uint32_t t)) {
@@ -187,8 +185,7 @@ static void try_part(const struct split_level *l, size_t lit_count, const struct
         return;
     }
     lit_count = settle(l, lit_count, lit.shown);
-    if (unlit->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * lit.pixels) &&
-        lit.shown >= LEAST_CONTRAST * unlit->shown &&
+    if (unlit->pixels >= fmaxf(LEAST_PIXELS, LEAST_SHARE * lit.pixels) && lit.shown >= LEAST_CONTRAST * unlit->shown &&
         !shining_is_sunlit(&job->shining, l->lit, lit_count, l->unlit, unlit_count))
         make_part(l, lit_count);
 }
@@ -234,8 +231,11 @@ static void try_segment(void *user, size_t segment, int thread) {
     (void)thread;
     struct split_job *job = user;
     size_t count = job->first[segment + 1] - job->first[segment];
-    struct split_level l = {.job = job, .triangle = job->triangle + job->first[segment], .triangle_count = count,
-                      .segment = (uint32_t)segment, .bright = job->first_level};
+    struct split_level l = {.job = job,
+                            .triangle = job->triangle + job->first[segment],
+                            .triangle_count = count,
+                            .segment = (uint32_t)segment,
+                            .bright = job->first_level};
     float most = brightest(job, l.triangle, count);
     if (!(most >= l.bright))
         return;

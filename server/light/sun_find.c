@@ -35,8 +35,8 @@ struct sun_search {
     float median_radiance; /* of the room */
     struct light_places places;
     struct missing_light missing;
-    struct sun sun;        /* that is tried */
-    int rays;              /* a point, to see how much of it is open */
+    struct sun sun; /* that is tried */
+    int rays;       /* a point, to see how much of it is open */
 };
 
 /* A direction and the misfit of the places that it lights. */
@@ -50,9 +50,9 @@ struct sun_candidate {
 struct asked {
     const struct sun_search *s;
     size_t count;
-    uint32_t *place;           /* [count] */
-    float *weight;             /* [count] places of the room that it stands for */
-    double mean, deviation;    /* of how odd places are */
+    uint32_t *place;        /* [count] */
+    float *weight;          /* [count] places of the room that it stands for */
+    double mean, deviation; /* of how odd places are */
     struct sun_candidate *candidate;
 };
 

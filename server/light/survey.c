@@ -82,8 +82,8 @@ static void choose_points(struct survey *s, const bool *without, size_t points) 
     }
 }
 
-void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field,
-                 const bool *without, size_t points) {
+void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field, const bool *without,
+                 size_t points) {
     size_t texels = (size_t)r->fused.width * r->fused.height;
     *s = (struct survey){.r = r, .radiance = mem_calloc_large(texels, sizeof *s->radiance)};
     memcpy(s->radiance, field ? field->radiance : (const uint16_t(*)[3])r->fused.radiance,

@@ -28,8 +28,8 @@ void survey_lights_off(struct reconstruction *r);
 /* Outgoing radiance is that of `field`; with NULL it is fused radiance, and for unobserved texels the mean of their
  * segment, or of the room. Segments of without[segment_count] (NULL: none; borrowed) send out nothing, but polished
  * surfaces mirror them. At most `points` points. */
-void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field,
-                 const bool *without, size_t points);
+void survey_init(struct survey *s, const struct reconstruction *r, const struct light_field *field, const bool *without,
+                 size_t points);
 void survey_release(struct survey *s);
 
 #endif

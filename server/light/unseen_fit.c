@@ -34,7 +34,7 @@
 struct fit {
     const struct unseen_point *point; /* [count] */
     size_t count, segment_count;
-    double *cell;                     /* [CELLS] the logarithm of the map */
+    double *cell; /* [CELLS] the logarithm of the map */
     double start[CELLS];
 };
 

@@ -11,7 +11,7 @@
 
 #define POINTS 2048
 #define RAYS_PER_POINT 512 /* directions a point */
-#define KEY_UNSEEN 23 /* keeps these random numbers apart from others of the texel */
+#define KEY_UNSEEN 23      /* keeps these random numbers apart from others of the texel */
 /* A point speaks of the unseen directions where they have this share of its rays; so many must. */
 #define SHARE_LEAST 0.1f
 #define LEAST_POINTS 64
@@ -28,9 +28,9 @@ struct unseen {
     struct reconstruction *r;
     const struct survey *survey; /* while points are gathered */
     size_t count;
-    struct unseen_point *point;  /* [count] */
+    struct unseen_point *point; /* [count] */
     double log_radiance[UNSEEN_CELLS];
-    float *angle;                /* [map height][map width] to what is seen; NULL where there is no map */
+    float *angle; /* [map height][map width] to what is seen; NULL where there is no map */
 };
 
 /* The share of what was filled in that is kept. */
@@ -144,8 +144,7 @@ void unseen_light_estimate(struct reconstruction *r, const struct views *views) 
     r->unseen_share = unseen_share(&u);
     keep_telling_points(&u);
     double base_color = unseen_base_color(u.point, u.count, NOT_IMPOSSIBLE, NULL);
-    bool matters = u.count >= LEAST_POINTS &&
-                   (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
+    bool matters = u.count >= LEAST_POINTS && (base_color > IMPOSSIBLE_BASE_COLOR || r->unseen_share > MOSTLY_UNSEEN);
     if (matters)
         relight(&u);
     r->sky_is_fitted = matters;

@@ -14,8 +14,8 @@
 /* Cleanly measured share of a segment's texels at which its own mean and its surroundings count alike. */
 #define SHARE_KNOWN 0.003
 #define MIN_WEIGHT 8.0 /* clean texels in a cube from which it is used */
-#define STRIDE 3         /* every third valid texel is used, for time */
-#define LEVELS 7         /* grids; the finest has 2^(LEVELS - 1) cubes along the longest side of the room */
+#define STRIDE 3       /* every third valid texel is used, for time */
+#define LEVELS 7       /* grids; the finest has 2^(LEVELS - 1) cubes along the longest side of the room */
 
 /* Weighted sums over measured texels. */
 struct chart_evidence {
@@ -24,7 +24,7 @@ struct chart_evidence {
 
 struct grids {
     vec3 lower;
-    float scale; /* cubes of the finest grid per metre */
+    float scale;                         /* cubes of the finest grid per metre */
     struct chart_evidence *cell[LEVELS]; /* [2^k][2^k][2^k]; owned */
 };
 
@@ -41,8 +41,8 @@ static void evidence_add(struct chart_evidence *e, const struct measured *m) {
 static struct color_prior prior_of(const struct chart_evidence *e) {
     if (!(e->weight > 0.0))
         return (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f};
-    rgb mean = rgb_make((float)(e->color[0] / e->weight), (float)(e->color[1] / e->weight),
-                        (float)(e->color[2] / e->weight));
+    rgb mean =
+        rgb_make((float)(e->color[0] / e->weight), (float)(e->color[1] / e->weight), (float)(e->color[2] / e->weight));
     float variance = (float)(e->squares / e->weight) - rgb_dot(mean, mean);
     return (struct color_prior){mean, fmaxf(variance, MIN_VARIANCE)};
 }
@@ -84,8 +84,7 @@ static void grids_fill(struct grids *g, const struct reconstruction *r, const st
     for (size_t i = 0; i < r->inverse.valid_count; i += STRIDE) {
         uint32_t texel = r->inverse.valid[i];
         struct surface_point at;
-        if (!is_known(r, measured, texel) ||
-            !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
+        if (!is_known(r, measured, texel) || !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at))
             continue;
         for (int k = 0; k < LEVELS; k++)
             evidence_add(grids_cell(g, k, at.position), &measured[texel]);
@@ -119,7 +118,7 @@ static struct chart_evidence *around_charts(const struct reconstruction *r, cons
 
 /* Sums over each segment, and its number of texels. */
 static struct chart_evidence *of_segments(const struct reconstruction *r, const struct measured *measured,
-                                    size_t *texels) {
+                                          size_t *texels) {
     struct chart_evidence *own = mem_calloc(r->segments.count, sizeof *own);
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
@@ -146,10 +145,9 @@ struct color_prior *color_priors(const struct reconstruction *r, const struct me
     for (size_t i = 0; i < r->scene->mesh.triangle_count; i++) {
         size_t chart = r->atlas.chart_of_triangle[i], segment = r->segments.of_triangle[i];
         double share = own[segment].weight / ((double)texels[segment] + 1.0) / SHARE_KNOWN;
-        prior[chart] = r->is_emitter[segment]
-                           ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
-                           : mix(prior_of(&around[chart]), prior_of(&own[segment]),
-                                 (float)(share * share / (1.0 + share * share)));
+        prior[chart] = r->is_emitter[segment] ? (struct color_prior){rgb_gray(NEUTRAL_BASE_COLOR), 1.0f}
+                                              : mix(prior_of(&around[chart]), prior_of(&own[segment]),
+                                                    (float)(share * share / (1.0 + share * share)));
     }
     mem_free(around);
     mem_free(own);

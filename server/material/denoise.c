@@ -10,11 +10,11 @@
 #include "common/mem.h"
 #include "server/material/wiener.h"
 
-#define TILE 512          /* texels a side; does not change results */
+#define TILE 512 /* texels a side; does not change results */
 #define FINE_LEVELS 5
-#define FINE_WINDOW 80    /* largest radius of the window over which power is averaged, texels */
-#define GRID 8            /* texels between samples of the coarse scales: a quarter of the finest one's step */
-#define COARSE_WINDOW 24  /* the same radius on the coarse scales, samples of the grid */
+#define FINE_WINDOW 80   /* largest radius of the window over which power is averaged, texels */
+#define GRID 8           /* texels between samples of the coarse scales: a quarter of the finest one's step */
+#define COARSE_WINDOW 24 /* the same radius on the coarse scales, samples of the grid */
 #define COARSE_STEP ((1 << FINE_LEVELS) / GRID)
 
 struct box {
@@ -69,8 +69,8 @@ static void tile_read(struct wiener *t, const struct denoise_job *job, const str
                 m = job->measured[(size_t)y * job->inverse->width + (size_t)x];
             rgb value = measured_value(&m);
             rgb noise = rgb_from_half(m.noise);
-            const float plane[WIENER_PLANES] = {value.r, value.g, value.b, noise.r, noise.g, noise.b,
-                                                image_float_from_half(m.mixing), 1.0f};
+            const float plane[WIENER_PLANES] = {
+                value.r, value.g, value.b, noise.r, noise.g, noise.b, image_float_from_half(m.mixing), 1.0f};
             for (int p = 0; p < WIENER_PLANES; p++)
                 t->plane[p][at] = m.weight * plane[p];
             for (int c = 0; c < 3; c++)
@@ -107,8 +107,8 @@ static void filter_fine(void *user, size_t index, int thread) {
 /* --- coarse scales ------------------------------------------------------------------------------ */
 
 static void layer_init(struct layer *l, struct box box) {
-    *l = (struct layer){.box = box, .width = (size_t)((box.x1 - box.x0) / GRID + 1),
-                        .height = (size_t)((box.y1 - box.y0) / GRID + 1)};
+    *l = (struct layer){
+        .box = box, .width = (size_t)((box.x1 - box.x0) / GRID + 1), .height = (size_t)((box.y1 - box.y0) / GRID + 1)};
     for (int p = 0; p < WIENER_PLANES; p++)
         l->plane[p] = mem_array(l->width * l->height, sizeof(float));
     l->smooth = mem_array(l->width * l->height, sizeof *l->smooth);
@@ -249,8 +249,8 @@ static size_t list_items(const struct denoise_job *job, struct item *item) {
 }
 
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
-             const struct measured *measured, const struct color_prior *prior, const bool *wanted,
-             struct texture *out, struct parallel *pool) {
+             const struct measured *measured, const struct color_prior *prior, const bool *wanted, struct texture *out,
+             struct parallel *pool) {
     struct denoise_job job = {.atlas = atlas, .inverse = inverse, .measured = measured, .prior = prior, .out = out};
     const size_t threads = (size_t)parallel_thread_count(pool);
     const size_t side = TILE + 2 * wiener_reach(1, FINE_LEVELS, FINE_WINDOW);

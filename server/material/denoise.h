@@ -28,7 +28,7 @@ struct color_prior {
 /* Writes the valid texels of `out` from measured[height][width] and prior[chart_count]: those of the charts for which
  * wanted[chart_count] is true, or of all where it is NULL. The same for any number of threads. */
 void denoise(const struct atlas *atlas, const struct inverse_uv *inverse, size_t triangle_count,
-             const struct measured *measured, const struct color_prior *prior, const bool *wanted,
-             struct texture *out, struct parallel *pool);
+             const struct measured *measured, const struct color_prior *prior, const bool *wanted, struct texture *out,
+             struct parallel *pool);
 
 #endif

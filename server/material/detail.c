@@ -67,7 +67,7 @@ static size_t chunks_of(const struct detail *d) { return (d->r->inverse.valid_co
 
 /* The texels in the footprint of a pixel that shows a triangle; false where too few of them are known. */
 static bool pixel_footprint(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, uint32_t triangle,
-                           struct footprint_texels *t) {
+                            struct footprint_texels *t) {
     const struct reconstruction *r = d->r;
     struct footprint f;
     return triangle != NONE &&
@@ -82,9 +82,7 @@ static void add_to(_Atomic int32_t *sum, float what) {
 
 /* --- residuals ---------------------------------------------------------------------------------- */
 
-static rgb divided(rgb over, rgb under) {
-    return rgb_make(over.r / under.r, over.g / under.g, over.b / under.b);
-}
+static rgb divided(rgb over, rgb under) { return rgb_make(over.r / under.r, over.g / under.g, over.b / under.b); }
 
 /* The triangle that a pixel shows; NONE for emitters, mixed pixels, fireflies and saturated pixels. */
 static uint32_t pixel_triangle(const struct detail *d, uint32_t train, uint32_t x, uint32_t y, rgb *observed) {
@@ -279,7 +277,8 @@ static void sum_weights(struct detail *d) {
 /* Finds the share of each texel's residual on which the photographs agree. Expects the sums over all photographs, as
  * sum_weights leaves them. */
 static void find_shares(struct detail *d, size_t texels) {
-    struct agreement_job a = {.detail = d, .residual = mem_calloc_large(texels, sizeof *a.residual),
+    struct agreement_job a = {.detail = d,
+                              .residual = mem_calloc_large(texels, sizeof *a.residual),
                               .agreement = mem_calloc_large(texels, sizeof *a.agreement)};
     for (size_t i = 0; i < d->r->inverse.valid_count; i++)
         a.residual[d->r->inverse.valid[i]] = (float)scaled(d, d->r->inverse.valid[i], RESIDUAL);
@@ -330,9 +329,7 @@ static void step_row(void *user, size_t row, int thread) {
 }
 
 /* Base colour stays at least 0, or at its start if that is less. */
-static float bounded(float change, float start) {
-    return fmaxf(change, fminf(-start, 0.0f));
-}
+static float bounded(float change, float start) { return fmaxf(change, fminf(-start, 0.0f)); }
 
 static void step_texel(struct detail *d, uint32_t texel) {
     float scale = 1.0f / (d->sum_scale * d->weight_sum[texel]);
@@ -341,8 +338,8 @@ static void step_texel(struct detail *d, uint32_t texel) {
     rgb change = rgb_scale(rgb_add(extrapolated(d, texel), step), d->signal_share[texel]);
     rgb start = measured_value(&d->measured[texel]);
     memcpy(d->change[texel][1], d->change[texel][0], sizeof d->change[texel][0]);
-    rgb_to_half(d->change[texel][0], rgb_make(bounded(change.r, start.r), bounded(change.g, start.g),
-                                              bounded(change.b, start.b)));
+    rgb_to_half(d->change[texel][0],
+                rgb_make(bounded(change.r, start.r), bounded(change.g, start.g), bounded(change.b, start.b)));
 }
 
 static void step_chunk(void *user, size_t chunk, int thread) {

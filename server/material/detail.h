@@ -22,7 +22,7 @@
 #include "server/state/reconstruction.h"
 
 struct detail {
-    const struct reconstruction *r;  /* borrowed, as the next three */
+    const struct reconstruction *r; /* borrowed, as the next three */
     const struct views *views;
     const uint16_t (*lambert)[3]; /* [height][width] radiance at albedo 1 (divide.h); 0: not known */
     struct measured *measured;    /* [height][width] value and noise are written */
@@ -37,7 +37,7 @@ struct detail {
     float *signal_share;       /* share of the residual that is not noise; 0: the texel is not changed */
     uint16_t (*change)[2][3];  /* change of base colour after the last step and after the one before */
     float sum_scale;
-    float t, momentum;              /* FISTA's t and momentum */
+    float t, momentum; /* FISTA's t and momentum */
 };
 
 /* Mean number of texels that a pixel covers; up to one, nothing is blurred at the texture's resolution. */

@@ -58,8 +58,7 @@ static bool light_without_sun(const struct divide *d, uint32_t texel, struct sur
     return true;
 }
 
-static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at,
-                     struct irradiance *light) {
+static bool light_at(const struct divide *d, uint32_t texel, struct surface_point *at, struct irradiance *light) {
     if (!light_without_sun(d, texel, at, light))
         return false;
     sun_add_light(&d->r->sun, d->r->world.accel, at, light);
@@ -76,8 +75,7 @@ bool divide_lambert(const struct divide *d, uint32_t texel, rgb *lambert) {
 }
 
 static rgb divide_channels(rgb over, rgb under, float least) {
-    return rgb_make(over.r / fmaxf(under.r, least), over.g / fmaxf(under.g, least),
-                    over.b / fmaxf(under.b, least));
+    return rgb_make(over.r / fmaxf(under.r, least), over.g / fmaxf(under.g, least), over.b / fmaxf(under.b, least));
 }
 
 /* Reads a photograph with a bicubic filter where all of its support shows one surface; else leaves `shown` and returns
@@ -104,20 +102,20 @@ struct divide_candidates {
 
 /* Adds photograph `train` of the texel if it has a valid sample there and is among the best. */
 static void add_candidate(const struct divide *d, uint32_t segment, const struct surface_point *at,
-                       const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
+                          const struct irradiance *light, uint32_t train, struct divide_candidates *of) {
     const struct photograph *photo = &d->r->scene->photograph[d->views->train[train]];
     struct divide_candidate c;
     struct photograph_sample s;
     if (!views_faces(d->views, train, at->position, at->normal, &c.view))
         return;
     c.unit_diffuse = irradiance_diffuse(light, at->shading, d->r->materials.roughness[segment],
-                                 views_direction(d->views, train, at->position));
+                                        views_direction(d->views, train, at->position));
     rgb typical = rgb_scale(c.unit_diffuse, TYPICAL_BASE_COLOR);
     /* An upper bound of the weight: edges and mixing only lower it. Saves the visibility ray. */
     if (!best_takes(&of->best, c.view.weight * noise_weight(d->noise, d->views, &c.view, typical, 0.0f), train) ||
         !views_unoccluded(d->views, train, at->position, at->normal) ||
-        photograph_has_firefly(photo, c.view.x, c.view.y) ||
-        !photograph_sample(photo, c.view.x, c.view.y, &s) || photograph_sample_saturates(&s))
+        photograph_has_firefly(photo, c.view.x, c.view.y) || !photograph_sample(photo, c.view.x, c.view.y, &s) ||
+        photograph_sample_saturates(&s))
         return;
     c.observed = s.radiance;
     c.mixing = views_mixing(d->views, &c.view, at->triangle, c.observed);
@@ -131,7 +129,7 @@ static void add_candidate(const struct divide *d, uint32_t segment, const struct
 }
 
 static struct robust_sample observation_of(const struct divide *d, uint32_t texel, const struct surface_point *at,
-                                    const struct divide_candidate *c, struct incident *scratch) {
+                                           const struct divide_candidate *c, struct incident *scratch) {
     const struct materials *m = &d->r->materials;
     uint32_t segment = reconstruction_segment(d->r, texel);
     float median = d->views->median_radiance, weight = c->weight;
@@ -152,19 +150,18 @@ static struct robust_sample observation_of(const struct divide *d, uint32_t texe
     rgb base = rgb_clamp(divide_channels(rgb_sub(c->observed, specular), unit_diffuse, MIN_LAMBERT * median),
                          -MAX_ALBEDO, MAX_ALBEDO);
     rgb noise = rgb_clamp(divide_channels(deviation, unit_diffuse, MIN_LAMBERT * median), 0.0f, MAX_ALBEDO);
-    return (struct robust_sample){
-        .value = base,
-        .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
-        .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
-        .weight = weight,
-        .source = c->view.train,
-        .sharp = c->view.weight,
-        .noise = rgb_scale(noise, noise_draw(&c->view, c->sharp)),
-        .mixing = c->mixing * rgb_dot(base, base)};
+    return (struct robust_sample){.value = base,
+                                  .gray = logf(fmaxf(rgb_mean(base), 0.0f) + OUTLIER_FLOOR),
+                                  .deviation = rgb_mean(noise) / (rgb_mean(usual) + OUTLIER_FLOOR),
+                                  .weight = weight,
+                                  .source = c->view.train,
+                                  .sharp = c->view.weight,
+                                  .noise = rgb_scale(noise, noise_draw(&c->view, c->sharp)),
+                                  .mixing = c->mixing * rgb_dot(base, base)};
 }
 
-static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch,
-                        struct irradiance *light, struct measured_observations *observations) {
+static void observe_all(const struct divide *d, uint32_t texel, struct incident *scratch, struct irradiance *light,
+                        struct measured_observations *observations) {
     struct surface_point at;
     struct divide_candidates candidates;
     observations->count = 0;
@@ -199,8 +196,8 @@ static uint32_t source_texel(const struct divide *d, uint32_t texel) {
     uint32_t width = r->atlas.width, x = texel % width, y = texel / width;
     uint32_t other = (y - y % d->stride) * width + x - x % d->stride;
     uint32_t triangle = r->inverse.triangle[other];
-    bool same = triangle != INVERSE_UV_NONE && r->atlas.chart_of_triangle[triangle] ==
-                                                   r->atlas.chart_of_triangle[r->inverse.triangle[texel]];
+    bool same = triangle != INVERSE_UV_NONE &&
+                r->atlas.chart_of_triangle[triangle] == r->atlas.chart_of_triangle[r->inverse.triangle[texel]];
     return same ? other : texel;
 }
 
@@ -321,8 +318,8 @@ static void keep_measured(struct divide *d, const struct color_prior *prior) {
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i];
         const struct measured *m = &d->measured[texel];
-        rgb value = m->weight > 0.0f ? measured_value(m)
-                                     : prior[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]].mean;
+        rgb value =
+            m->weight > 0.0f ? measured_value(m) : prior[r->atlas.chart_of_triangle[r->inverse.triangle[texel]]].mean;
         float *to = r->materials.base_color.texel[texel];
         to[0] = clampf(value.r, 0.0f, 1.0f);
         to[1] = clampf(value.g, 0.0f, 1.0f);

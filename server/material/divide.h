@@ -20,10 +20,10 @@
 #include "server/state/reconstruction.h"
 
 struct divide {
-    struct reconstruction *r;         /* borrowed, as all below; r->materials.base_color is written */
+    struct reconstruction *r; /* borrowed, as all below; r->materials.base_color is written */
     const struct views *views;
     const struct probes *probes;
-    const struct light_field *field;  /* for highlights */
+    const struct light_field *field; /* for highlights */
     const struct noise *noise;
     bool denoises;             /* else base colour is as measured */
     size_t highlight_samples;  /* directions of one highlight (divide_highlight_samples) */

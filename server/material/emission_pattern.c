@@ -59,20 +59,19 @@ static float weight_of(const struct emitter *e, const struct view *view, float m
 }
 
 static struct robust_sample observation_of(const struct emitter *e, const struct view *view, float mixing, rgb observed,
-                                    bool sharp, rgb fused) {
+                                           bool sharp, rgb fused) {
     const struct finder *f = e->finder;
     rgb value = rgb_scale(observed, e->scale);
     float times_typical = rgb_mean(value);
     rgb noise = rgb_scale(noise_deviation(&f->r->noise, f->views, view, fused), e->scale);
-    return (struct robust_sample){
-        .value = value,
-        .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
-        .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
-        .weight = weight_of(e, view, mixing * times_typical * times_typical),
-        .source = view->train,
-        .sharp = view->weight,
-        .noise = rgb_scale(noise, noise_draw(view, sharp)),
-        .mixing = mixing * rgb_dot(value, value)};
+    return (struct robust_sample){.value = value,
+                                  .gray = logf(fmaxf(rgb_mean(value), 0.0f) + LOG_FLOOR),
+                                  .deviation = rgb_mean(noise) / (e->scale * rgb_mean(fused) + LOG_FLOOR),
+                                  .weight = weight_of(e, view, mixing * times_typical * times_typical),
+                                  .source = view->train,
+                                  .sharp = view->weight,
+                                  .noise = rgb_scale(noise, noise_draw(view, sharp)),
+                                  .mixing = mixing * rgb_dot(value, value)};
 }
 
 /* Observations of a texel away from edges, those of the greatest weights. Saturated ones are lower bounds: the greatest
@@ -94,8 +93,7 @@ static void observe_all(const struct emitter *e, uint32_t texel, struct measured
         const struct photograph *photo = &r->scene->photograph[views->train[t]];
         struct view view;
         struct photograph_sample s;
-        if (!views_faces(views, t, at.position, at.normal, &view) ||
-            !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
+        if (!views_faces(views, t, at.position, at.normal, &view) || !best_takes(&best, weight_of(e, &view, 0.0f), t) ||
             views_edge(views, &view, at.triangle) >= VIEWS_EDGE - 1 ||
             !views_unoccluded(views, t, at.position, at.normal) || !photograph_sample(photo, view.x, view.y, &s))
             continue;
@@ -232,10 +230,13 @@ static void finder_init(struct finder *f, struct reconstruction *r, const struct
     for (size_t s = 0; s < r->segments.count; s++) {
         const struct emitter_evidence *e = &r->evidence[s];
         size_t first = f->texels.first[s], count = f->texels.first[s + 1] - first;
-        if (r->is_emitter[s] && !e->is_hidden && !e->is_unbounded && count >= MIN_TEXELS && rgb_mean(e->observed) > 0.0f)
-            f->emitter[f->emitter_count++] = (struct emitter){
-                .finder = f, .segment = s, .count = count, .texel = f->texels.texel + first,
-                .scale = 1.0f / rgb_mean(e->observed)};
+        if (r->is_emitter[s] && !e->is_hidden && !e->is_unbounded && count >= MIN_TEXELS &&
+            rgb_mean(e->observed) > 0.0f)
+            f->emitter[f->emitter_count++] = (struct emitter){.finder = f,
+                                                              .segment = s,
+                                                              .count = count,
+                                                              .texel = f->texels.texel + first,
+                                                              .scale = 1.0f / rgb_mean(e->observed)};
     }
     /* Only few charts are written; untouched pages take no memory. */
     f->measured = mem_calloc(texels, sizeof *f->measured);
@@ -287,7 +288,7 @@ static float max_base_color(const struct materials *m, const struct emitter_evid
 
 /* DARK_OUTLIERS quantile of max_base_color; INFINITY where there is no pattern. */
 static float max_segment_base_color(const struct materials *m, const struct emitter_evidence *e, const uint32_t *texel,
-                               size_t count) {
+                                    size_t count) {
     if (!m->emission_pattern || count == 0 || rgb_is_black(rgb_from_half(m->emission_pattern[texel[0]])))
         return INFINITY;
     float *most = mem_array(count, sizeof *most);

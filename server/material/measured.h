@@ -11,15 +11,13 @@
 
 /* Half precision except for the weight, since there may be many millions. Variances are summed over the channels. */
 struct measured {
-    float weight;      /* inverse variance, up to a factor of the capture; 0: not measured */
+    float weight; /* inverse variance, up to a factor of the capture; 0: not measured */
     uint16_t value[3];
     uint16_t noise[3]; /* a sample of the value's noise */
     uint16_t mixing;   /* variance by light of other surfaces; correlated between neighbours */
 };
 
-static inline rgb measured_value(const struct measured *m) {
-    return rgb_from_half(m->value);
-}
+static inline rgb measured_value(const struct measured *m) { return rgb_from_half(m->value); }
 
 /* Observations of one texel, one a photograph, of at most this many photographs: those of the greatest weights
  * (best.h). The limit bounds the time of highlights, and memory to 3 KiB a thread. In redkitchen 18 % of the observed

@@ -156,8 +156,8 @@ static struct candidate_levels best_of(const struct segment_points *e) {
 }
 
 /* Misfit of candidate `a` less that of `b`: as a part of a's, and in standard errors over the points. */
-static void compare(const struct segment_points *e, struct candidate_levels a, struct candidate_levels b,
-                    double *part, double *errors) {
+static void compare(const struct segment_points *e, struct candidate_levels a, struct candidate_levels b, double *part,
+                    double *errors) {
     double total = 0.0, gain = 0.0, squares = 0.0, n = (double)e->count;
     for (size_t i = 0; i < e->count; i++) {
         double without = (double)e->misfit[i][a.k][a.m], d = without - (double)e->misfit[i][b.k][b.m];
@@ -277,7 +277,7 @@ static void fit_segment(void *user, size_t segment, int thread) {
 }
 
 void specular_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
-               const struct light_field *field) {
+                  const struct light_field *field) {
     struct specular_job job = {.materials = &r->materials};
     specular_observer_init(&job.observer, r, views, probes, field);
     job.points = mem_array((size_t)parallel_thread_count(r->pool), sizeof *job.points);

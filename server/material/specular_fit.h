@@ -19,6 +19,6 @@
 
 /* Writes r->materials.roughness and .specular. */
 void specular_fit(struct reconstruction *r, const struct views *views, const struct probes *probes,
-               const struct light_field *field);
+                  const struct light_field *field);
 
 #endif

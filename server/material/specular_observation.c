@@ -64,8 +64,8 @@ static void patch_around(const struct specular_observer *l, uint32_t texel, floa
 
 /* Mean radiance of the patch in a photograph. False unless every place faces the camera, has a valid sample and is no
  * nearer to an edge than class `edge`. */
-static bool patch_observed(const struct views *views, const struct view *view, const struct specular_patch *patch, int edge,
-                        rgb *observed) {
+static bool patch_observed(const struct views *views, const struct view *view, const struct specular_patch *patch,
+                           int edge, rgb *observed) {
     const struct photograph *photo = &views->scene->photograph[views->train[view->train]];
     *observed = rgb_gray(0.0f);
     for (size_t i = 0; i < patch->count; i++) {
@@ -84,8 +84,8 @@ static bool patch_observed(const struct views *views, const struct view *view, c
 }
 
 /* Radiance that each candidate reflects towards a photograph, mean over the patch. */
-static void predict(const struct specular_observer *l, const struct specular_patch *patch, uint32_t texel, uint32_t train,
-                    struct incident *scratch, struct specular_observation *observation) {
+static void predict(const struct specular_observer *l, const struct specular_patch *patch, uint32_t texel,
+                    uint32_t train, struct incident *scratch, struct specular_observation *observation) {
     float share = 1.0f / (float)patch->count;
     memset(observation->unit_diffuse, 0, sizeof observation->unit_diffuse);
     memset(&observation->highlight, 0, sizeof observation->highlight);
@@ -154,7 +154,7 @@ size_t specular_observe(const struct specular_observer *l, size_t segment, struc
 }
 
 void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
-                       const struct probes *probes, const struct light_field *field) {
+                            const struct probes *probes, const struct light_field *field) {
     *l = (struct specular_observer){.r = r, .views = views, .probes = probes, .field = field};
     l->scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *l->scratch);
     by_segment_sort(&l->texels, &r->segments, &r->inverse);

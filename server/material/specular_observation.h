@@ -46,7 +46,7 @@ struct specular_observer {
 };
 
 void specular_observer_init(struct specular_observer *l, const struct reconstruction *r, const struct views *views,
-                       const struct probes *probes, const struct light_field *field);
+                            const struct probes *probes, const struct light_field *field);
 void specular_observer_release(struct specular_observer *l);
 
 /* What a point must fulfil. */

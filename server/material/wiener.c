@@ -115,9 +115,7 @@ static float detail_power(const struct wiener *w, int first, size_t at) {
     return power;
 }
 
-static bool counts(const struct wiener *w, size_t at) {
-    return w->inside[at] && w->plane[WIENER_WEIGHT][at] > 0.0f;
-}
+static bool counts(const struct wiener *w, size_t at) { return w->inside[at] && w->plane[WIENER_WEIGHT][at] > 0.0f; }
 
 /* Noise variance of a sample's detail: local noise power, scaled by the sample's own weight. */
 static float noise_variance(const struct wiener *w, size_t at) {

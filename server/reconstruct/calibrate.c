@@ -68,8 +68,7 @@ static void find_light(struct reconstruction *r, struct views *views, const stru
         photo->gain = claim[i].gain;
         memcpy(photo->vignette, claim[i].vignette, sizeof photo->vignette);
     }
-    calibrate_light(r->scene, views, &r->atlas, &r->inverse, settings_bool(r->settings, "calibrate"),
-                    r->pool, found);
+    calibrate_light(r->scene, views, &r->atlas, &r->inverse, settings_bool(r->settings, "calibrate"), r->pool, found);
     views_update_median(views);
 }
 
@@ -83,8 +82,7 @@ static void update_edges(struct reconstruction *r, struct views *views, const st
 /* Corrects poses and calibrates light again, which wrong correspondences had biased. Cross-validated: all cameras stay
  * unless photographs agree better at surface points that were not used for the poses. */
 static void find_poses(struct reconstruction *r, struct views *views, const struct tracks *tracks,
-                       const struct photograph *claim, struct light_found *light,
-                       struct poses_found *found) {
+                       const struct photograph *claim, struct light_found *light, struct poses_found *found) {
     double spread = light->spread_after;
     calibrate_poses(r->scene, tracks, r->pool, found);
     if (found->moved_count == 0)
@@ -103,7 +101,7 @@ static void find_poses(struct reconstruction *r, struct views *views, const stru
 }
 
 static void log_poses(const struct poses_found *poses, const struct blur_found *blur,
-                       const struct reconstruct_hooks *hooks) {
+                      const struct reconstruct_hooks *hooks) {
     char line[240], held_out[80] = "";
     if (poses->held_out_moved_count > 0)
         snprintf(held_out, sizeof held_out, "; of %zu that are held out, by %.2f px", poses->held_out_moved_count,

@@ -15,8 +15,7 @@ static bool pixel_is_finite(const float *a, const float *b) {
 
 /* Mean of `square` over the channels of valid pixels. */
 static double mean_square(const struct image *photograph, const struct image *render,
-                          double (*square)(float photograph, float render, double parameter),
-                          double parameter) {
+                          double (*square)(float photograph, float render, double parameter), double parameter) {
     size_t pixels = (size_t)photograph->width * photograph->height, count = 0;
     double sum = 0.0;
     for (size_t i = 0; i < pixels; i++) {
@@ -63,13 +62,11 @@ double metrics_psnr_db(const struct image *photograph, const struct image *rende
 
 static double luminance(const struct image *image, size_t pixel, double exposure) {
     const float *p = image->pixel + 3 * pixel;
-    return 0.2126 * displayed(p[0], exposure) + 0.7152 * displayed(p[1], exposure) +
-           0.0722 * displayed(p[2], exposure);
+    return 0.2126 * displayed(p[0], exposure) + 0.7152 * displayed(p[1], exposure) + 0.0722 * displayed(p[2], exposure);
 }
 
 /* Similarity of one window; NaN when it holds a non-finite pixel. */
-static double window_ssim(const struct image *a, const struct image *b, uint32_t x0, uint32_t y0,
-                          double exposure) {
+static double window_ssim(const struct image *a, const struct image *b, uint32_t x0, uint32_t y0, double exposure) {
     const double n = WINDOW * WINDOW, c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
     double sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
     for (uint32_t y = y0; y < y0 + WINDOW; y++) {

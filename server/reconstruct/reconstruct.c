@@ -47,7 +47,7 @@ struct stage_run {
     const struct reconstruct_hooks *hooks;
     struct views views;
     struct optimiser *optimiser; /* of listing1 or refine; owned */
-    size_t flipped;               /* flipped triangles */
+    size_t flipped;              /* flipped triangles */
     const char *normals;         /* their source: given, estimated, none */
     float mesh_noise_m;          /* standard deviation of the vertices' noise; 0: not denoised */
     float roughness;             /* of a mesh whose normals are estimated */
@@ -129,8 +129,8 @@ static enum status map_surface(struct reconstruction *r, const float *density, s
     if (status != STATUS_OK)
         return status;
     inverse_uv_make(&r->inverse, &r->atlas, mesh->triangle_count, r->pool);
-    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR),
-                   NEUTRAL_ROUGHNESS, NEUTRAL_SPECULAR);
+    materials_init(&r->materials, &r->inverse, r->segments.count, rgb_gray(NEUTRAL_BASE_COLOR), NEUTRAL_ROUGHNESS,
+                   NEUTRAL_SPECULAR);
     r->is_emitter = mem_calloc(r->segments.count, sizeof *r->is_emitter);
     r->evidence = mem_calloc(r->segments.count, sizeof *r->evidence);
     return world_init(&r->world, mesh, &r->segments, &r->atlas, &r->materials, NULL, r->pool, err);
@@ -240,8 +240,7 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
     if (settings_is(r->settings, "segmentation", "given") && !mesh->object_id)
-        return error_set(err, STATUS_INPUT,
-                         "segmentation=given, but the mesh has no object_id per face");
+        return error_set(err, STATUS_INPUT, "segmentation=given, but the mesh has no object_id per face");
     hold_out(r);
     enum status status = orient_mesh(r->scene, r->pool, &run->flipped, err);
     if (status != STATUS_OK)
@@ -309,15 +308,13 @@ static enum status solve(struct stage_run *run, struct error *err) {
     return status == STATUS_OK ? refine_start(run->optimiser, err) : status;
 }
 
-static enum status optimise(struct stage_run *run, struct error *err) {
-    return optimiser_run(run->optimiser, err);
-}
+static enum status optimise(struct stage_run *run, struct error *err) { return optimiser_run(run->optimiser, err); }
 
 /* The stages that checkpoints cover; those that are done are skipped. */
 static enum status run_resumable(struct stage_run *run, struct error *err) {
     bool found = false, solves = settings_is(run->r->settings, "method", "solve");
-    run->optimiser = solves ? refine_new(run->r, &run->views, run->hooks)
-                            : listing1_new(run->r, &run->views, run->hooks);
+    run->optimiser =
+        solves ? refine_new(run->r, &run->views, run->hooks) : listing1_new(run->r, &run->views, run->hooks);
     enum status status = optimiser_load(run->optimiser, &found, err);
     if (status == STATUS_OK && solves && !found)
         status = run_stage(run, "solve", solve, err);
@@ -348,11 +345,9 @@ static enum status report(struct stage_run *run, struct error *err) {
     return status;
 }
 
-enum status reconstruct_run(struct scene *scene, const struct settings *settings,
-                            struct parallel *pool, const struct reconstruct_hooks *hooks,
-                            struct reconstruction *r, struct error *err) {
-    *r = (struct reconstruction){.scene = scene, .settings = settings, .pool = pool,
-                                  .sky_factor = rgb_gray(1.0f)};
+enum status reconstruct_run(struct scene *scene, const struct settings *settings, struct parallel *pool,
+                            const struct reconstruct_hooks *hooks, struct reconstruction *r, struct error *err) {
+    *r = (struct reconstruction){.scene = scene, .settings = settings, .pool = pool, .sky_factor = rgb_gray(1.0f)};
     r->report = cJSON_CreateObject();
     json_add_string(r->report, "unbake_version", UNBAKE_VERSION);
     json_add_string(r->report, "ray_library", accel_library_version());

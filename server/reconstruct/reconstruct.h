@@ -16,9 +16,8 @@
 /* Runs all stages up to `report`. Solves unknown exposures in `scene`, flips triangles that photographs see from
  * behind, estimates missing normals. STATUS_CANCELLED when stopped (a checkpoint was saved). Whatever it returns, *r
  * must be released. */
-enum status reconstruct_run(struct scene *scene, const struct settings *settings,
-                            struct parallel *pool, const struct reconstruct_hooks *hooks,
-                            struct reconstruction *r, struct error *err);
+enum status reconstruct_run(struct scene *scene, const struct settings *settings, struct parallel *pool,
+                            const struct reconstruct_hooks *hooks, struct reconstruction *r, struct error *err);
 void reconstruct_release(struct reconstruction *r);
 
 #endif

@@ -99,8 +99,8 @@ static void render_radiance(struct reconstruction *r, const struct camera *camer
 }
 
 /* Standard deviation of a photograph's noise, given its radiance `image`; NaN where that is. */
-static void photograph_noise(const struct reconstruction *r, const struct photograph *photo,
-                             const struct image *image, struct image *noise) {
+static void photograph_noise(const struct reconstruction *r, const struct photograph *photo, const struct image *image,
+                             struct image *noise) {
     image_init_rgb(noise, image->width, image->height);
     for (size_t i = 0; i < (size_t)image->width * image->height; i++) {
         const float *p = image->pixel + 3 * i;
@@ -112,8 +112,8 @@ static void photograph_noise(const struct reconstruction *r, const struct photog
     }
 }
 
-static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view,
-                        uint32_t samples, double median) {
+static void render_view(struct reconstruction *r, struct photograph *photo, struct held_out *view, uint32_t samples,
+                        double median) {
     const struct settings *set = r->settings;
     struct path_settings path = {
         .max_depth = (int)settings_number(set, "max_depth"),
@@ -155,8 +155,8 @@ static double pixels_of(const struct photograph *photo) {
     return (double)photo->camera.width * (double)photo->camera.height;
 }
 
-enum status report_held_out(struct reconstruction *r, const struct views *views,
-                            const struct reconstruct_hooks *hooks, struct error *err) {
+enum status report_held_out(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
+                            struct error *err) {
     struct scene *scene = r->scene;
     size_t total = scene->photograph_count - views->train_count;
     cJSON *list = cJSON_AddArrayToObject(r->report, "views");

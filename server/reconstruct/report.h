@@ -8,8 +8,8 @@
 /* Renders every held-out view into r->held_out and adds "views" and "metrics" to r->report. A photograph of unknown
  * exposure is compared at the exposure that fits it best; so it is in all, and in white balance, where these drift.
  * STATUS_CANCELLED when stopped. */
-enum status report_held_out(struct reconstruction *r, const struct views *views,
-                            const struct reconstruct_hooks *hooks, struct error *err);
+enum status report_held_out(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
+                            struct error *err);
 
 /* Adds "emitters" to r->report: the segments that emit or nearly do, with their evidence. */
 void report_emitters(struct reconstruction *r);

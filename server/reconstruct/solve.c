@@ -131,8 +131,8 @@ static enum status gather(struct solve *s, int pass, struct error *err) {
     s->samples = planned_samples(s, pass);
     for (size_t first = 0; first < s->probes.count && status == STATUS_OK; first += SLICE_PROBES) {
         size_t count = s->probes.count - first < SLICE_PROBES ? s->probes.count - first : SLICE_PROBES;
-        probes_gather(&s->probes, &s->field, &r->scene->mesh, &r->atlas, &r->inverse, seed, s->samples, first,
-                      count, r->pool);
+        probes_gather(&s->probes, &s->field, &r->scene->mesh, &r->atlas, &r->inverse, seed, s->samples, first, count,
+                      r->pool);
         status = advance(s, PLAN_GATHER, (double)(count * s->samples), err);
     }
     return status;
@@ -303,10 +303,13 @@ static void solve_init(struct solve *s, struct reconstruction *r, const struct v
     s->isotropic = (struct light_field){&r->world, (const uint16_t(*)[3])s->outgoing.total, NULL, NULL};
     probes_init(&s->probes, spacing_for(&r->atlas), &r->scene->mesh, &r->atlas, &r->inverse, &r->fused);
     s->texels_per_pixel = detail_texels_per_pixel(r, views);
-    s->divide = (struct divide){
-        .r = r, .views = views, .probes = &s->probes, .field = &s->isotropic, .noise = &r->noise,
-        .denoises = settings_bool(r->settings, "denoise"),
-        .highlight_samples = divide_highlight_samples(s->texels_per_pixel)};
+    s->divide = (struct divide){.r = r,
+                                .views = views,
+                                .probes = &s->probes,
+                                .field = &s->isotropic,
+                                .noise = &r->noise,
+                                .denoises = settings_bool(r->settings, "denoise"),
+                                .highlight_samples = divide_highlight_samples(s->texels_per_pixel)};
     s->divide.scratch = mem_array((size_t)parallel_thread_count(r->pool), sizeof *s->divide.scratch);
     s->divide.measured = mem_calloc_large(texels, sizeof *s->divide.measured);
     s->divide.typical = mem_array(r->segments.count, sizeof *s->divide.typical);
@@ -405,8 +408,8 @@ static void report(const struct solve *s) {
     json_add_number(figures, "texels_measured", (double)known / (double)s->r->inverse.valid_count);
 }
 
-enum status solve_run(struct reconstruction *r, const struct views *views,
-                      const struct reconstruct_hooks *hooks, struct error *err) {
+enum status solve_run(struct reconstruction *r, const struct views *views, const struct reconstruct_hooks *hooks,
+                      struct error *err) {
     struct solve s;
     enum status status = STATUS_OK;
     solve_init(&s, r, views, hooks);

@@ -20,9 +20,7 @@ struct adam {
 static inline float *adam_record(const struct adam *a, size_t entry) {
     return a->record + entry * (1 + 2 * (size_t)a->width);
 }
-static inline float adam_touches(const struct adam *a, size_t entry) {
-    return adam_record(a, entry)[0];
-}
+static inline float adam_touches(const struct adam *a, size_t entry) { return adam_record(a, entry)[0]; }
 static inline size_t adam_bytes(const struct adam *a) {
     return a->count * (1 + 2 * (size_t)a->width) * sizeof *a->record;
 }

@@ -12,8 +12,8 @@
 /* Relative variance of an observation without noise of the photograph: that of a render with few paths. */
 #define RENDER_VARIANCE 0.1f
 
-struct comparison comparison_make(const struct photograph_sample *reference, const rgb *radiance,
-                        int sample_count, rgb expected, rgb noise, float median_radiance) {
+struct comparison comparison_make(const struct photograph_sample *reference, const rgb *radiance, int sample_count,
+                                  rgb expected, rgb noise, float median_radiance) {
     float observed[3] = {0}, rendered[3] = {0}, clip[3] = {0};
     bool saturated[3] = {false};
     float each = 1.0f / (float)sample_count;

@@ -75,8 +75,11 @@ static void find_neighbours(struct correction *c, size_t block) {
 
 void correction_init(struct correction *c, struct texture *base_color, const struct inverse_uv *inverse,
                      const uint32_t *chart_of_triangle, uint32_t spacing) {
-    *c = (struct correction){.base_color = base_color, .inverse = inverse, .chart_of_triangle = chart_of_triangle,
-                             .spacing = spacing, .columns = (inverse->width + spacing - 1) / spacing,
+    *c = (struct correction){.base_color = base_color,
+                             .inverse = inverse,
+                             .chart_of_triangle = chart_of_triangle,
+                             .spacing = spacing,
+                             .columns = (inverse->width + spacing - 1) / spacing,
                              .rows = (inverse->height + spacing - 1) / spacing};
     size_t blocks = (size_t)c->columns * c->rows, capacity = blocks;
     c->first = mem_calloc(blocks + 1, sizeof *c->first);
@@ -143,9 +146,7 @@ static float mean_by(const float value[3], const float weight[3]) {
     return weights > 0.0f ? sum / weights : 0.0f;
 }
 
-static float mean_of(const float value[3]) {
-    return (value[0] + value[1] + value[2]) / 3.0f;
-}
+static float mean_of(const float value[3]) { return (value[0] + value[1] + value[2]) / 3.0f; }
 
 void correction_add(struct correction *c, uint32_t texel, const struct comparison *comparison, float weight) {
     struct correction_sums *s = &c->sums[cell_of(c, texel)];
@@ -225,11 +226,10 @@ static void log_ratios(const struct correction_sums *s, float log_ratio[3]) {
 /* Adds to factor[count][3] the logarithms of one kind (and channel, of a tint). Starts from 0, not from the previous
  * solution, so that applying twice gives the same result. */
 static void add_kind(const struct correction *c, int kind, int channel, float room, float (*factor)[3]) {
-    struct normal_equations l = {
-        .correction = c,
-        .prior = 1.0 / (factor_deviation[kind] * factor_deviation[kind]),
-        .smoothness = 1.0 / (difference_deviation[kind] * difference_deviation[kind]),
-        .precision = mem_array(c->count, sizeof *l.precision)};
+    struct normal_equations l = {.correction = c,
+                                 .prior = 1.0 / (factor_deviation[kind] * factor_deviation[kind]),
+                                 .smoothness = 1.0 / (difference_deviation[kind] * difference_deviation[kind]),
+                                 .precision = mem_array(c->count, sizeof *l.precision)};
     const struct conjugate_system system = {c->count, equations_multiply, equations_precondition, &l};
     double *value = mem_calloc(c->count, sizeof *value), *residual = mem_array(c->count, sizeof *residual);
     for (size_t i = 0; i < c->count; i++) {

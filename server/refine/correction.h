@@ -27,29 +27,29 @@ enum { CORRECTION_GRAY, CORRECTION_TINT, CORRECTION_KINDS };
 
 struct correction_cell {
     uint32_t chart;
-    uint32_t neighbour[4];              /* cells of the chart left, right, above, below; UINT32_MAX: none */
+    uint32_t neighbour[4]; /* cells of the chart left, right, above, below; UINT32_MAX: none */
 };
 
 /* Sums over the observations of a cell. */
 struct correction_sums {
     float weight[3];                 /* at most 1 an observation, by channel */
-    float observed[3], rendered[3];     /* weighted, over the expected radiance; rendered with solve's base colour */
+    float observed[3], rendered[3];  /* weighted, over the expected radiance; rendered with solve's base colour */
     float squared[CORRECTION_KINDS]; /* squared residuals, weighted by the mean of the channels */
     float factor[3];                 /* logarithm of the factor in force */
 };
 
 struct correction {
-    struct texture *base_color;      /* borrowed, as the next two */
+    struct texture *base_color; /* borrowed, as the next two */
     const struct inverse_uv *inverse;
     const uint32_t *chart_of_triangle;
-    uint32_t spacing;                /* texels a side of a block */
-    uint32_t columns, rows;          /* of blocks */
-    uint32_t *first;                 /* [columns * rows + 1] first cell of a block; owned, as all below */
+    uint32_t spacing;       /* texels a side of a block */
+    uint32_t columns, rows; /* of blocks */
+    uint32_t *first;        /* [columns * rows + 1] first cell of a block; owned, as all below */
     size_t count;
-    struct correction_cell *cell;    /* [count] by block */
-    struct correction_sums *sums;    /* [count] */
-    uint16_t (*solved)[3];           /* [height][width] base colour before correction */
-    rgb *light;                      /* [count] mean observed radiance of a cell over its mean base colour */
+    struct correction_cell *cell; /* [count] by block */
+    struct correction_sums *sums; /* [count] */
+    uint16_t (*solved)[3];        /* [height][width] base colour before correction */
+    rgb *light;                   /* [count] mean observed radiance of a cell over its mean base colour */
 };
 
 /* Cells of `spacing` texels. */

@@ -66,7 +66,6 @@ void emitter_decision_make(struct reconstruction *r, struct observation_batch *b
         r->is_emitter[s] = e->is_hidden || e->emitted_share >= EMITTER_SHARE;
         rgb own = rgb_sub(e->radiance, rgb_scale(e->lambert, NEUTRAL_BASE_COLOR));
         r->materials.emission[s] =
-            r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f))
-                             : rgb_gray(0.0f);
+            r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f)) : rgb_gray(0.0f);
     }
 }

@@ -16,8 +16,7 @@ static float stored_variance(float v) {
     return step * step / 12.0f + PHOTON_VARIANCE * v;
 }
 
-float loss_weight(const struct photograph *photo, const struct photograph_sample *reference,
-                  float median_radiance) {
+float loss_weight(const struct photograph *photo, const struct photograph_sample *reference, float median_radiance) {
     float mean = rgb_mean(reference->radiance);
     float variance = 0.0f;
     if (!photo->is_hdr) {
@@ -34,9 +33,8 @@ static float residual(float half, float all, float reference, bool saturated, fl
     return all >= clip ? 0.0f : half - clip;
 }
 
-float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance,
-                rgb *d_radiance) {
+float loss_pair(const struct photograph *photo, const struct photograph_sample *reference, const rgb *radiance,
+                int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance) {
     rgb half[2] = {{0, 0, 0}, {0, 0, 0}}, target = {0, 0, 0}, clip = {0, 0, 0};
     bool saturated[3] = {false};
     int count[2] = {(sample_count + 1) / 2, sample_count / 2};

@@ -14,14 +14,12 @@
 #include "server/scene/photograph.h"
 
 /* Weight of a reference value in the loss, 1 / radiance^2. */
-float loss_weight(const struct photograph *photo, const struct photograph_sample *reference,
-                  float median_radiance);
+float loss_weight(const struct photograph *photo, const struct photograph_sample *reference, float median_radiance);
 
 /* Loss of one observation with sample_count paths, even ones half A, odd ones half B; with `one_estimate` all paths are
  * used for both halves, and noise adds to the loss. Writes d_radiance[sample_count], the derivative of the loss by each
  * path's radiance, and returns the unbiased estimate of the loss (it may be negative). */
-float loss_pair(const struct photograph *photo, const struct photograph_sample *reference,
-                const rgb *radiance, int sample_count, bool one_estimate, float median_radiance,
-                rgb *d_radiance);
+float loss_pair(const struct photograph *photo, const struct photograph_sample *reference, const rgb *radiance,
+                int sample_count, bool one_estimate, float median_radiance, rgb *d_radiance);
 
 #endif

@@ -10,10 +10,14 @@
 #define MIXED_WEIGHT 0.02f
 
 void observation_batch_init(struct observation_batch *b, const struct reconstruction *r, const struct views *views,
-                     const struct path_settings *path, int cameras, int samples, size_t texels) {
+                            const struct path_settings *path, int cameras, int samples, size_t texels) {
     size_t observations = texels * (size_t)cameras, paths = observations * (size_t)samples;
-    *b = (struct observation_batch){.r = r, .views = views, .path = *path, .cameras = cameras,
-                             .samples = samples, .observation_capacity = observations};
+    *b = (struct observation_batch){.r = r,
+                                    .views = views,
+                                    .path = *path,
+                                    .cameras = cameras,
+                                    .samples = samples,
+                                    .observation_capacity = observations};
     b->observation = mem_array(observations, sizeof *b->observation);
     b->paths = path->derivatives ? path_batch_new(paths, path->max_depth) : path_batch_new_forward(paths);
     b->ray = mem_array(paths, sizeof *b->ray);
@@ -34,21 +38,18 @@ void observation_batch_release(struct observation_batch *b) {
     *b = (struct observation_batch){0};
 }
 
-void observation_batch_clear(struct observation_batch *b) {
-    b->observation_count = 0;
-}
+void observation_batch_clear(struct observation_batch *b) { b->observation_count = 0; }
 
 /* Sets up the paths of observation `at`, whose first sample has number `sample_number`. False when one cannot be used:
  * outside the picture, masked, a firefly, or a mixed pixel while that of the texel's centre is clean. */
-static bool connect(struct observation_batch *b, size_t at, const struct view *view, uint32_t texel,
-                    uint64_t iteration, uint32_t sample_number) {
+static bool connect(struct observation_batch *b, size_t at, const struct view *view, uint32_t texel, uint64_t iteration,
+                    uint32_t sample_number) {
     const struct reconstruction *r = b->r;
     const struct photograph *photo = &r->scene->photograph[b->views->train[view->train]];
     bool clean = views_clean(b->views, view);
     uint32_t x = texel % r->atlas.width, y = texel / r->atlas.width;
     for (int i = 0; i < b->samples; i++) {
-        struct path_key key = {texel, (uint32_t)(2 * iteration) + (uint32_t)(i & 1),
-                               sample_number + (uint32_t)i / 2};
+        struct path_key key = {texel, (uint32_t)(2 * iteration) + (uint32_t)(i & 1), sample_number + (uint32_t)i / 2};
         /* A random place in the texel: the photograph shows all of it, not its centre. */
         uint64_t bits = rng_key(b->path.seed ^ key.iteration, key.index, key.sample);
         uint32_t triangle;
@@ -67,8 +68,8 @@ static bool connect(struct observation_batch *b, size_t at, const struct view *v
         b->ray[path] = (struct ray){origin, vec3_normalize(vec3_sub(point, origin))};
         b->key[path] = key;
     }
-    b->observation[at] = (struct observation){texel, reconstruction_segment(r, texel), photo, *view,
-                                clean ? 1.0f : MIXED_WEIGHT};
+    b->observation[at] =
+        (struct observation){texel, reconstruction_segment(r, texel), photo, *view, clean ? 1.0f : MIXED_WEIGHT};
     return true;
 }
 

@@ -16,8 +16,8 @@
 struct observation {
     uint32_t texel, segment;
     const struct photograph *photograph; /* borrowed */
-    struct view view; /* of the texel's centre */
-    float weight;      /* weight: 1, or MIXED_WEIGHT where the photograph's pixel mixes surfaces */
+    struct view view;                    /* of the texel's centre */
+    float weight;                        /* weight: 1, or MIXED_WEIGHT where the photograph's pixel mixes surfaces */
 };
 
 /* The observations of one work item and their paths; used by one thread. */
@@ -25,10 +25,10 @@ struct observation_batch {
     const struct reconstruction *r; /* borrowed, both */
     const struct views *views;
     struct path_settings path;
-    int cameras, samples;           /* photographs of a texel, paths of an observation */
+    int cameras, samples; /* photographs of a texel, paths of an observation */
     size_t observation_count, observation_capacity;
-    struct observation *observation;              /* [observation_capacity] owned */
-    struct path_batch *paths;       /* owned, as all below; observation k has paths [k * samples, (k + 1) * samples) */
+    struct observation *observation; /* [observation_capacity] owned */
+    struct path_batch *paths;        /* owned, as all below; observation k has paths [k * samples, (k + 1) * samples) */
     struct ray *ray;
     struct path_key *key;
     struct photograph_sample *reference;
@@ -37,7 +37,7 @@ struct observation_batch {
 
 /* Room for `texels` texels. */
 void observation_batch_init(struct observation_batch *b, const struct reconstruction *r, const struct views *views,
-                     const struct path_settings *path, int cameras, int samples, size_t texels);
+                            const struct path_settings *path, int cameras, int samples, size_t texels);
 void observation_batch_release(struct observation_batch *b);
 void observation_batch_clear(struct observation_batch *b);
 

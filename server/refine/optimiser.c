@@ -164,8 +164,7 @@ static void resume_plan(struct optimiser *o) {
 }
 
 enum status optimiser_load(struct optimiser *o, bool *found, struct error *err) {
-    enum status status =
-        o->hooks->checkpoint_load(o->hooks->user, o->state, o->state_count, found, err);
+    enum status status = o->hooks->checkpoint_load(o->hooks->user, o->state, o->state_count, found, err);
     if (status != STATUS_OK)
         return status;
     /* The plan's first part always has work; without any the checkpoint is of format 1, whose curve is over seconds. */
@@ -264,10 +263,8 @@ static void report(const struct optimiser *o) {
     json_add_int(figures, "paths", (int64_t)c->path_count);
     json_add_int(figures, "rays_this_attempt", (int64_t)rays);
     json_add_int(figures, "non_finite_samples_dropped_this_attempt", (int64_t)dropped);
-    json_add_number(figures, "paths_per_second",
-                    c->iterate_sec > 0.0 ? (double)c->path_count / c->iterate_sec : 0.0);
-    json_add_number(figures, "paths_per_texel",
-                    (double)c->path_count / (double)o->r->inverse.valid_count);
+    json_add_number(figures, "paths_per_second", c->iterate_sec > 0.0 ? (double)c->path_count / c->iterate_sec : 0.0);
+    json_add_number(figures, "paths_per_texel", (double)c->path_count / (double)o->r->inverse.valid_count);
     cJSON *series = cJSON_AddObjectToObject(o->r->report, "series");
     json_add(series, "loss", curve_points(c));
 }

@@ -48,17 +48,17 @@ struct optimiser_plan {
 };
 
 struct optimiser {
-    struct reconstruction *r;              /* borrowed, all three */
+    struct reconstruction *r; /* borrowed, all three */
     const struct views *views;
     const struct reconstruct_hooks *hooks;
     const struct optimiser_method *method;
-    void *self;                            /* the method's; owned, given to method->free */
+    void *self; /* the method's; owned, given to method->free */
     struct pass pass;
     struct emission emission;
     struct optimiser_counters counters;
     struct optimiser_plan plan;
-    uint64_t surface;                      /* hash of the surface parametrisation (STATE_SURFACE) */
-    uint64_t iteration_limit;              /* 0: the number of observations ends the run */
+    uint64_t surface;         /* hash of the surface parametrisation (STATE_SURFACE) */
+    uint64_t iteration_limit; /* 0: the number of observations ends the run */
     size_t state_count;
     struct state_array state[OPTIMISER_ARRAYS]; /* arrays of a checkpoint */
 };

@@ -23,8 +23,8 @@ void params_init(struct params *p, struct materials *materials, const struct inv
                  const struct segments *segments, struct emission *emission, int level) {
     const struct texture *texture = &materials->base_color;
     size_t count = materials->segment_count;
-    *p = (struct params){.materials = materials, .inverse = inverse, .segments = segments,
-                         .emission = emission, .level = level};
+    *p = (struct params){
+        .materials = materials, .inverse = inverse, .segments = segments, .emission = emission, .level = level};
     adam_init(&p->base_color, blocks_count(texture, 0), 3, BASE_BETA1, BASE_BETA2);
     adam_init(&p->roughness, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
     adam_init(&p->specular, count, 1, SEGMENT_BETA1, SEGMENT_BETA2);
@@ -157,8 +157,7 @@ static size_t sum_blocks(struct params *p, const struct gradient *gradient) {
     return count;
 }
 
-static void step_segments(struct params *p, const struct gradient *gradient,
-                          const struct params_rates *rates) {
+static void step_segments(struct params *p, const struct gradient *gradient, const struct params_rates *rates) {
     struct materials *m = p->materials;
     for (size_t s = 0; s < m->segment_count; s++) {
         float step[3];
@@ -166,8 +165,7 @@ static void step_segments(struct params *p, const struct gradient *gradient,
         float d_specular = (float)gradient->d_specular[s];
         if (d_roughness != 0.0f) {
             adam_touch(&p->roughness, s, &d_roughness, step);
-            m->roughness[s] = clampf(m->roughness[s] + rates->roughness * step[0],
-                                     PARAMS_ROUGHNESS_MIN, 1.0f);
+            m->roughness[s] = clampf(m->roughness[s] + rates->roughness * step[0], PARAMS_ROUGHNESS_MIN, 1.0f);
         }
         if (d_specular != 0.0f) {
             adam_touch(&p->specular, s, &d_specular, step);
@@ -177,9 +175,7 @@ static void step_segments(struct params *p, const struct gradient *gradient,
     emission_step(p->emission, gradient->d_emission, rates->emission);
 }
 
-void params_free_segments(struct params *p) {
-    p->frees_segments = true;
-}
+void params_free_segments(struct params *p) { p->frees_segments = true; }
 
 void params_step(struct params *p, const struct gradient *gradient, const struct params_rates *rates,
                  struct parallel *pool) {
@@ -187,6 +183,5 @@ void params_step(struct params *p, const struct gradient *gradient, const struct
         step_segments(p, gradient, rates);
     struct step_job job = {.p = p, .gradient = gradient, .rate = rates->base_color};
     job.count = p->level > 0 ? sum_blocks(p, gradient) : gradient->texel_count;
-    parallel_for(pool, (job.count + CHUNK - 1) / CHUNK, p->level > 0 ? step_blocks : step_texels,
-                 &job);
+    parallel_for(pool, (job.count + CHUNK - 1) / CHUNK, p->level > 0 ? step_blocks : step_texels, &job);
 }

@@ -37,10 +37,10 @@ struct params {
     struct adam roughness, specular;  /* an entry a segment; owned */
     int level;                        /* blocks of 2^level texels a side share a factor */
     /* Scratch of the coarse levels; NULL at level 0; owned. */
-    float (*block_sum)[3];            /* [blocks at level 1] zero between steps */
-    uint32_t *block_stamp;            /* [blocks at level 1] the step that last listed the block */
+    float (*block_sum)[3]; /* [blocks at level 1] zero between steps */
+    uint32_t *block_stamp; /* [blocks at level 1] the step that last listed the block */
     uint32_t stamp;
-    uint32_t *block;                  /* [block_capacity] blocks touched in this step */
+    uint32_t *block; /* [block_capacity] blocks touched in this step */
     size_t block_capacity;
 };
 

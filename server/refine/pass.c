@@ -12,13 +12,12 @@ void pass_init(struct pass *p, const struct reconstruction *r, const struct view
     *p = (struct pass){.r = r, .views = views};
     p->by_pixels = settings_is(set, "choose", "pixels");
     p->one_estimate = settings_is(set, "estimates", "one");
-    chooser_init(&p->chooser, r->inverse.valid_count,
-                 (size_t)settings_number(set, "texels_per_iteration"), path->seed);
+    chooser_init(&p->chooser, r->inverse.valid_count, (size_t)settings_number(set, "texels_per_iteration"), path->seed);
     int threads = parallel_thread_count(r->pool);
     p->batch = mem_calloc((size_t)threads, sizeof *p->batch);
     for (int t = 0; t < threads; t++)
         observation_batch_init(&p->batch[t], r, views, path, (int)settings_number(set, "cameras_per_texel"),
-                        (int)settings_number(set, "samples_per_camera"), PASS_CHUNK_TEXELS);
+                               (int)settings_number(set, "samples_per_camera"), PASS_CHUNK_TEXELS);
     p->observation_capacity = p->batch[0].observation_capacity;
     p->chunk_count = (p->chooser.stratum_count + PASS_CHUNK_TEXELS - 1) / PASS_CHUNK_TEXELS;
     p->chunk = mem_calloc(p->chunk_count, sizeof *p->chunk);

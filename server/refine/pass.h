@@ -35,11 +35,11 @@ struct pass {
     const struct reconstruction *r; /* borrowed, both */
     const struct views *views;
     struct chooser chooser;
-    bool by_pixels, one_estimate; /* settings choose and estimates */
-    struct observation_batch *batch;     /* [threads of r->pool] owned */
-    size_t observation_capacity;         /* of a chunk */
+    bool by_pixels, one_estimate;    /* settings choose and estimates */
+    struct observation_batch *batch; /* [threads of r->pool] owned */
+    size_t observation_capacity;     /* of a chunk */
     size_t chunk_count;
-    struct pass_chunk *chunk;     /* [chunk_count] owned */
+    struct pass_chunk *chunk; /* [chunk_count] owned */
 };
 
 /* The amounts are settings of `r`. */

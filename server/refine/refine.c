@@ -22,9 +22,9 @@ struct stored_comparison {
 struct refine {
     struct optimiser *o; /* borrowed: its owner */
     struct correction correction;
-    double next_observations;        /* number of observations of the next correction */
-    struct stored_comparison *observation;  /* [chunk_count][observation_capacity] of the last pass */
-    double (*d_emission)[3];  /* [segment_count] */
+    double next_observations;              /* number of observations of the next correction */
+    struct stored_comparison *observation; /* [chunk_count][observation_capacity] of the last pass */
+    double (*d_emission)[3];               /* [segment_count] */
     float emission_rate;
 };
 
@@ -36,10 +36,10 @@ static void store_comparisons(void *self, size_t chunk, struct observation_batch
         size_t first = k * (size_t)b->samples;
         rgb expected = correction_expected(&f->correction, observation->texel);
         rgb noise = noise_deviation(&f->o->r->noise, f->o->views, &observation->view, expected);
-        f->observation[chunk * b->observation_capacity + k] = (struct stored_comparison){
-            observation->texel, observation->weight,
-            comparison_make(b->reference + first, b->radiance + first, b->samples, expected, noise,
-                       f->o->views->median_radiance)};
+        f->observation[chunk * b->observation_capacity + k] =
+            (struct stored_comparison){observation->texel, observation->weight,
+                                       comparison_make(b->reference + first, b->radiance + first, b->samples, expected,
+                                                       noise, f->o->views->median_radiance)};
     }
 }
 

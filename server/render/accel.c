@@ -35,13 +35,9 @@ struct accel {
 
 #if RTC_VERSION_MAJOR >= 4
 
-static void query_intersect(RTCScene scene, struct RTCRayHit *ray) {
-    rtcIntersect1(scene, ray, NULL);
-}
+static void query_intersect(RTCScene scene, struct RTCRayHit *ray) { rtcIntersect1(scene, ray, NULL); }
 
-static void query_occluded(RTCScene scene, struct RTCRay *ray) {
-    rtcOccluded1(scene, ray, NULL);
-}
+static void query_occluded(RTCScene scene, struct RTCRay *ray) { rtcOccluded1(scene, ray, NULL); }
 
 static void query_intersect_8(const int *valid, RTCScene scene, struct RTCRayHit8 *ray) {
     rtcIntersect8(valid, scene, ray, NULL);
@@ -93,9 +89,7 @@ static void query_intersect_16_coherent(const int *valid, RTCScene scene, struct
 
 #endif
 
-static void no_memory(void) {
-    mem_exhausted("the ray tracing library");
-}
+static void no_memory(void) { mem_exhausted("the ray tracing library"); }
 
 /* TBB, which Embree uses, dlopens its allocator, and that one's constructor dlopens itself again. If that fails for
  * lack of memory for the error message, glibc 2.36 takes its out-of-memory marker for an address. So a dlopen that
@@ -106,7 +100,7 @@ static void open_allocator(void) {
     const char *why = dlsym(RTLD_DEFAULT, absent) ? NULL : dlerror();
     if (why && strcmp(why, "out of memory") == 0)
         no_memory();
-    dlsym(RTLD_DEFAULT, absent); /* dlerror must follow, or the message is freed */
+    dlsym(RTLD_DEFAULT, absent);           /* dlerror must follow, or the message is freed */
     dlopen("libtbbmalloc.so.2", RTLD_NOW); /* TBB falls back to malloc without it */
 }
 
@@ -115,7 +109,7 @@ static void on_terminate(void) {
     const struct {
         const void *table;
         const char *name;
-    } *type; /* std::type_info, as the C++ ABI lays it out */
+    } * type; /* std::type_info, as the C++ ABI lays it out */
     void *(*find_type)(void);
     *(void **)&find_type = dlsym(RTLD_DEFAULT, "__cxa_current_exception_type");
     type = find_type ? find_type() : NULL;
@@ -143,14 +137,13 @@ static enum status device_error(enum RTCError code, const char *doing, struct er
     if (code == RTC_ERROR_OUT_OF_MEMORY)
         no_memory();
     enum status status = code == RTC_ERROR_UNSUPPORTED_CPU ? STATUS_UNAVAILABLE : STATUS_INTERNAL;
-    return error_set(err, status, "the ray tracing library failed while %s (its code %d)", doing,
-                     (int)code);
+    return error_set(err, status, "the ray tracing library failed while %s (its code %d)", doing, (int)code);
 }
 
 /* Embree reads 16 bytes per vertex, so vertices are copied: the last vec3 of the mesh may end at a page boundary. */
 static bool attach_mesh(RTCGeometry geometry, const struct mesh *mesh) {
-    float *position = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                              RTC_FORMAT_FLOAT3, sizeof(vec3), mesh->vertex_count);
+    float *position = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(vec3),
+                                              mesh->vertex_count);
     if (!position)
         return false;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
@@ -164,8 +157,7 @@ static bool attach_mesh(RTCGeometry geometry, const struct mesh *mesh) {
     return true;
 }
 
-enum status accel_new(struct accel **result, const struct mesh *mesh, struct parallel *pool,
-                      struct error *err) {
+enum status accel_new(struct accel **result, const struct mesh *mesh, struct parallel *pool, struct error *err) {
     (void)pool;
     *result = NULL;
     struct accel *a = mem_calloc(1, sizeof *a);
@@ -248,31 +240,31 @@ bool accel_occluded(const struct accel *a, vec3 origin, vec3 direction, float ne
 
 /* Copies rays[0..count) into a packet of `width` (8 or 16), a structure of arrays; the remaining lanes are masked
  * off. */
-#define PACKET_SET(width, packet, rays, count)                                                     \
-    for (size_t lane = 0; lane < (width); lane++) {                                                \
-        const struct accel_ray *from = &(rays)[lane < (count) ? lane : 0];                         \
-        valid[lane] = lane < (count) ? -1 : 0;                                                     \
-        (packet)->org_x[lane] = from->origin.x;                                                    \
-        (packet)->org_y[lane] = from->origin.y;                                                    \
-        (packet)->org_z[lane] = from->origin.z;                                                    \
-        (packet)->tnear[lane] = from->near_m;                                                      \
-        (packet)->dir_x[lane] = from->direction.x;                                                 \
-        (packet)->dir_y[lane] = from->direction.y;                                                 \
-        (packet)->dir_z[lane] = from->direction.z;                                                 \
-        (packet)->time[lane] = 0.0f;                                                               \
-        (packet)->tfar[lane] = from->far_m;                                                        \
-        (packet)->mask[lane] = UINT32_MAX;                                                         \
-        (packet)->id[lane] = 0;                                                                    \
-        (packet)->flags[lane] = 0;                                                                 \
+#define PACKET_SET(width, packet, rays, count)                                                                         \
+    for (size_t lane = 0; lane < (width); lane++) {                                                                    \
+        const struct accel_ray *from = &(rays)[lane < (count) ? lane : 0];                                             \
+        valid[lane] = lane < (count) ? -1 : 0;                                                                         \
+        (packet)->org_x[lane] = from->origin.x;                                                                        \
+        (packet)->org_y[lane] = from->origin.y;                                                                        \
+        (packet)->org_z[lane] = from->origin.z;                                                                        \
+        (packet)->tnear[lane] = from->near_m;                                                                          \
+        (packet)->dir_x[lane] = from->direction.x;                                                                     \
+        (packet)->dir_y[lane] = from->direction.y;                                                                     \
+        (packet)->dir_z[lane] = from->direction.z;                                                                     \
+        (packet)->time[lane] = 0.0f;                                                                                   \
+        (packet)->tfar[lane] = from->far_m;                                                                            \
+        (packet)->mask[lane] = UINT32_MAX;                                                                             \
+        (packet)->id[lane] = 0;                                                                                        \
+        (packet)->flags[lane] = 0;                                                                                     \
     }
 
-#define PACKET_GET(packet, count, hits)                                                            \
-    for (size_t lane = 0; lane < (count); lane++) {                                                \
-        bool missed = (packet)->hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID;                       \
-        (hits)[lane].distance_m = (packet)->ray.tfar[lane];                                        \
-        (hits)[lane].triangle = missed ? ACCEL_NONE : (packet)->hit.primID[lane];                  \
-        (hits)[lane].b1 = (packet)->hit.u[lane];                                                   \
-        (hits)[lane].b2 = (packet)->hit.v[lane];                                                   \
+#define PACKET_GET(packet, count, hits)                                                                                \
+    for (size_t lane = 0; lane < (count); lane++) {                                                                    \
+        bool missed = (packet)->hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID;                                           \
+        (hits)[lane].distance_m = (packet)->ray.tfar[lane];                                                            \
+        (hits)[lane].triangle = missed ? ACCEL_NONE : (packet)->hit.primID[lane];                                      \
+        (hits)[lane].b1 = (packet)->hit.u[lane];                                                                       \
+        (hits)[lane].b2 = (packet)->hit.v[lane];                                                                       \
     }
 
 /* Whether sixteen rays share their origin and are within about 15 degrees of the first. Embree's frustum traversal
@@ -286,8 +278,7 @@ static bool is_coherent(const struct accel_ray *ray) {
     return coherent;
 }
 
-void accel_intersect_many(const struct accel *a, size_t count, const struct accel_ray *ray,
-                          struct accel_hit *hit) {
+void accel_intersect_many(const struct accel *a, size_t count, const struct accel_ray *ray, struct accel_hit *hit) {
     _Alignas(64) int valid[16];
     for (size_t i = 0; i < count;) {
         if (count - i >= 16 && is_coherent(ray + i)) {
@@ -311,8 +302,7 @@ void accel_intersect_many(const struct accel *a, size_t count, const struct acce
     }
 }
 
-void accel_occluded_many(const struct accel *a, size_t count, const struct accel_ray *ray,
-                         uint8_t *occluded) {
+void accel_occluded_many(const struct accel *a, size_t count, const struct accel_ray *ray, uint8_t *occluded) {
     _Alignas(32) int valid[8];
     for (size_t i = 0; i < count; i += 8) {
         size_t lanes = count - i < 8 ? count - i : 8;
@@ -324,6 +314,4 @@ void accel_occluded_many(const struct accel *a, size_t count, const struct accel
     }
 }
 
-const char *accel_library_version(void) {
-    return "Embree " RTC_VERSION_STRING;
-}
+const char *accel_library_version(void) { return "Embree " RTC_VERSION_STRING; }

@@ -25,9 +25,9 @@
 struct bsdf {
     rgb base_color;
     float roughness;
-    float alpha;            /* GGX width */
-    float eta;              /* index of refraction */
-    float specular_chance;  /* probability with which sampling takes the GGX lobe */
+    float alpha;           /* GGX width */
+    float eta;             /* index of refraction */
+    float specular_chance; /* probability with which sampling takes the GGX lobe */
 };
 
 /* f cos = base * diffuse + specular, and the density of bsdf_sample. */
@@ -40,19 +40,15 @@ struct bsdf_value {
  * per channel. */
 struct bsdf_derivative {
     float diffuse, specular;
-    float diffuse_by_roughness;  /* times base_color */
+    float diffuse_by_roughness; /* times base_color */
     float specular_by_roughness;
     float specular_by_specular;
 };
 
 /* fmaxf without NaN handling, which prevents vectorisation. */
-static inline float bsdf_max(float a, float b) {
-    return a > b ? a : b;
-}
+static inline float bsdf_max(float a, float b) { return a > b ? a : b; }
 
-static inline float bsdf_eta(float specular) {
-    return 2.0f / (1.0f - sqrtf(0.08f * specular)) - 1.0f;
-}
+static inline float bsdf_eta(float specular) { return 2.0f / (1.0f - sqrtf(0.08f * specular)) - 1.0f; }
 
 /* Schlick's weight (1 - c)^5. */
 static inline float bsdf_schlick(float c) {
@@ -104,10 +100,10 @@ static inline struct bsdf bsdf_lobe(float roughness, float specular) {
 
 /* GGX terms shared by eval, pdf and derivatives; h need not be normalised. */
 struct bsdf_ggx {
-    float cos_d;  /* wo . h = wi . h */
-    float d;      /* D(h) */
-    float q;      /* (hx^2 + hy^2 + alpha^2 hz^2) / |h|^2 */
-    float hz2;    /* hz^2 / |h|^2 */
+    float cos_d;          /* wo . h = wi . h */
+    float d;              /* D(h) */
+    float q;              /* (hx^2 + hy^2 + alpha^2 hz^2) / |h|^2 */
+    float hz2;            /* hz^2 / |h|^2 */
     float root_o, root_i; /* sqrt(z^2 + alpha^2 (x^2 + y^2)) of wo, wi */
 };
 
@@ -143,8 +139,7 @@ static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi
     struct bsdf_value v;
     v.diffuse = bsdf_diffuse(b->roughness, t.cos_d, wo.z, cos_i);
     v.specular = f * t.d * cos_i * over_o / (cos_i + t.root_i);
-    v.pdf = (1.0f - b->specular_chance) * cos_i * (1.0f / BSDF_PI) +
-            b->specular_chance * 0.5f * t.d * over_o;
+    v.pdf = (1.0f - b->specular_chance) * cos_i * (1.0f / BSDF_PI) + b->specular_chance * 0.5f * t.d * over_o;
     float lit = wi.z > 0.0f ? 1.0f : 0.0f;
     v.diffuse *= lit;
     v.specular *= lit;
@@ -155,8 +150,7 @@ static inline struct bsdf_value bsdf_eval(const struct bsdf *b, vec3 wo, vec3 wi
 /* Derivatives of bsdf_eval; `specular` is the parameter that b was made from. As specular -> 0 the lobe goes to 0
  * linearly while d eta / d specular diverges: below 1e-4 the derivative at 1e-4 is used, within 0.3 % of the limit
  * except near grazing. Where roughness^2 < 0.001, alpha is constant. */
-static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float specular, vec3 wo,
-                                                   vec3 wi) {
+static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float specular, vec3 wo, vec3 wi) {
     float cos_i = bsdf_max(wi.z, 1e-12f);
     vec3 above = {wi.x, wi.y, cos_i};
     float alpha = b->alpha;
@@ -173,12 +167,11 @@ static inline struct bsdf_derivative bsdf_backward(const struct bsdf *b, float s
     float sum_o = wo.z + t.root_o, sum_i = cos_i + t.root_i;
     float v = cos_i / (sum_o * sum_i);
     float log_d = 2.0f / alpha - 4.0f * alpha * t.hz2 / t.q;
-    float log_v = -alpha * ((wo.x * wo.x + wo.y * wo.y) / (t.root_o * sum_o) +
-                            (wi.x * wi.x + wi.y * wi.y) / (t.root_i * sum_i));
+    float log_v =
+        -alpha * ((wo.x * wo.x + wo.y * wo.y) / (t.root_o * sum_o) + (wi.x * wi.x + wi.y * wi.y) / (t.root_i * sum_i));
     float dv = t.d * v;
     d.specular = bsdf_fresnel(t.cos_d, b->eta) * dv;
-    float alpha_by_roughness =
-        b->roughness * b->roughness > BSDF_MIN_ALPHA ? 2.0f * b->roughness : 0.0f;
+    float alpha_by_roughness = b->roughness * b->roughness > BSDF_MIN_ALPHA ? 2.0f * b->roughness : 0.0f;
     d.specular_by_roughness = d.specular * (log_d + log_v) * alpha_by_roughness;
 
     float x = sqrtf(0.08f * bsdf_max(specular, 1e-4f)), one = 1.0f - x;
@@ -220,8 +213,8 @@ static inline vec3 bsdf_sample(const struct bsdf *b, vec3 wo, float lobe, float 
 
     /* Visible normals (Heitz 2018): wo stretched to the unit hemisphere's configuration. */
     float a = b->alpha;
-    vec3 stretched = vec3_scale((vec3){a * wo.x, a * wo.y, wo.z},
-                                1.0f / sqrtf(a * a * (wo.x * wo.x + wo.y * wo.y) + wo.z * wo.z));
+    vec3 stretched =
+        vec3_scale((vec3){a * wo.x, a * wo.y, wo.z}, 1.0f / sqrtf(a * a * (wo.x * wo.x + wo.y * wo.y) + wo.z * wo.z));
     float across2 = stretched.x * stretched.x + stretched.y * stretched.y;
     float over = across2 > 1e-14f ? 1.0f / sqrtf(bsdf_max(across2, 1e-14f)) : 0.0f;
     vec3 t1 = {over > 0.0f ? -stretched.y * over : 1.0f, stretched.x * over, 0.0f};
@@ -235,8 +228,7 @@ static inline vec3 bsdf_sample(const struct bsdf *b, vec3 wo, float lobe, float 
     vec3 mirror = vec3_mad(vec3_neg(wo), 2.0f * vec3_dot(wo, h), h);
 
     bool shiny = lobe < b->specular_chance;
-    return (vec3){shiny ? mirror.x : cosine.x, shiny ? mirror.y : cosine.y,
-                  shiny ? mirror.z : cosine.z};
+    return (vec3){shiny ? mirror.x : cosine.x, shiny ? mirror.y : cosine.y, shiny ? mirror.z : cosine.z};
 }
 
 #endif

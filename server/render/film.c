@@ -68,8 +68,7 @@ static void render_row(void *user, size_t row, int thread) {
             s->ray[count].origin = origin;
             s->key[count] = key;
             s->pixel[count] = x;
-            if (camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y,
-                                 &s->ray[count].direction))
+            if (camera_direction(f->camera, (float)x + jitter.x, (float)y + jitter.y, &s->ray[count].direction))
                 count++;
             if (count == BATCH) {
                 trace(f, s, count);
@@ -82,8 +81,8 @@ static void render_row(void *user, size_t row, int thread) {
 }
 
 uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
-                     const struct path_settings *settings, uint32_t iteration,
-                     struct parallel *pool, struct image *image) {
+                     const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                     struct image *image) {
     static const char *const names[] = {"R", "G", "B", "err.R", "err.G", "err.B"};
     image_init(image, camera->width, camera->height, 6, names);
     int thread_count = parallel_thread_count(pool);
@@ -115,11 +114,22 @@ uint64_t film_render(const struct world *world, const struct camera *camera, uin
     return dropped;
 }
 
-enum { BASE_R, BASE_G, BASE_B, ROUGHNESS, SPECULAR, EMISSION_R, EMISSION_G, EMISSION_B, SEGMENT,
-       DEPTH, COVERAGE, CHANNELS };
+enum {
+    BASE_R,
+    BASE_G,
+    BASE_B,
+    ROUGHNESS,
+    SPECULAR,
+    EMISSION_R,
+    EMISSION_G,
+    EMISSION_B,
+    SEGMENT,
+    DEPTH,
+    COVERAGE,
+    CHANNELS
+};
 
-static void add_hit(const struct film *f, const struct accel_hit *hit, float depth_m, bool first,
-                    float *out) {
+static void add_hit(const struct film *f, const struct accel_hit *hit, float depth_m, bool first, float *out) {
     const struct materials *m = f->world->materials;
     const struct world_triangle *t = &f->world->triangle[hit->triangle];
     struct texture_taps taps;
@@ -127,7 +137,7 @@ static void add_hit(const struct film *f, const struct accel_hit *hit, float dep
     texture_taps(&m->base_color, place.x, place.y, &taps);
     rgb base = texture_gather(&m->base_color, &taps);
     rgb emission = materials_emission(m, t->segment, place.x, place.y);
-    const float value[] = {base.r, base.g, base.b, m->roughness[t->segment], m->specular[t->segment],
+    const float value[] = {base.r,     base.g,     base.b,    m->roughness[t->segment], m->specular[t->segment],
                            emission.r, emission.g, emission.b};
     for (int c = 0; c < SEGMENT; c++)
         out[c] += value[c];
@@ -165,11 +175,11 @@ static void first_hit_row(void *user, size_t row, int thread) {
     }
 }
 
-void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp,
-                            uint64_t seed, struct parallel *pool, struct image *image) {
-    static const char *const names[CHANNELS] = {
-        "base_color.R", "base_color.G", "base_color.B", "roughness", "specular", "emission.R",
-        "emission.G",   "emission.B",   "segment",      "depth",     "coverage"};
+void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp, uint64_t seed,
+                            struct parallel *pool, struct image *image) {
+    static const char *const names[CHANNELS] = {"base_color.R", "base_color.G", "base_color.B", "roughness",
+                                                "specular",     "emission.R",   "emission.G",   "emission.B",
+                                                "segment",      "depth",        "coverage"};
     image_init(image, camera->width, camera->height, CHANNELS, names);
     struct path_settings settings = {.max_depth = 1, .roulette_depth = 1, .seed = seed};
     struct film film = {world, camera, &settings, spp, 0, image, NULL};

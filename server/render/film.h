@@ -17,13 +17,13 @@
  * the number of threads. */
 #define FILM_GROUPS 4
 uint64_t film_render(const struct world *world, const struct camera *camera, uint32_t spp,
-                     const struct path_settings *settings, uint32_t iteration,
-                     struct parallel *pool, struct image *image);
+                     const struct path_settings *settings, uint32_t iteration, struct parallel *pool,
+                     struct image *image);
 
 /* First-hit attributes, averaged over `spp` jittered rays per pixel: channels base_color.R G B, roughness, specular,
  * emission.R G B, segment (of the pixel's first sample, -1 for a miss), depth (along the optical axis, over hits),
  * coverage (share of samples that hit). */
-void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp,
-                            uint64_t seed, struct parallel *pool, struct image *image);
+void film_render_first_hits(const struct world *world, const struct camera *camera, uint32_t spp, uint64_t seed,
+                            struct parallel *pool, struct image *image);
 
 #endif

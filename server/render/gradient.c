@@ -31,7 +31,7 @@ struct gradient_tile {
 struct sorted_log {
     size_t capacity;
     struct gradient_entry *entry; /* copies, grouped by tile; owned */
-    uint32_t *start; /* [tile_count + 1] owned */
+    uint32_t *start;              /* [tile_count + 1] owned */
 };
 
 struct gradient_scratch {
@@ -43,7 +43,7 @@ struct gradient_scratch {
     size_t *place;             /* [tile_count + 1] offset of a tile's output; owned */
     size_t *touched;           /* [tile_count] owned */
     int thread_count;
-    struct gradient_tile *tile;         /* [thread_count] owned */
+    struct gradient_tile *tile; /* [thread_count] owned */
 };
 
 static void tile_init(struct gradient_tile *tile, size_t texels) {
@@ -310,8 +310,7 @@ static void sum_segments(struct gradient *g, struct gradient_log *const *log, si
     }
 }
 
-void gradient_reduce(struct gradient *g, struct gradient_log *const *log, size_t log_count,
-                     struct parallel *pool) {
+void gradient_reduce(struct gradient *g, struct gradient_log *const *log, size_t log_count, struct parallel *pool) {
     struct reduce r = {g, log, log_count};
     grow_scratch(g->scratch, log_count, parallel_thread_count(pool));
     parallel_for(pool, log_count, sort_log, &r);

@@ -36,15 +36,15 @@ struct gradient_log {
 
 /* Sums of an iteration. */
 struct gradient {
-    uint32_t width, height;  /* of the texture, texels */
-    size_t texel_count;      /* distinct texels touched */
-    uint32_t *texel;         /* [texel_count] ascending within a tile, tiles in order; owned */
-    rgb *d_base_color;       /* [texel_count] */
-    float *weight;           /* [texel_count] sum of filter weights */
+    uint32_t width, height; /* of the texture, texels */
+    size_t texel_count;     /* distinct texels touched */
+    uint32_t *texel;        /* [texel_count] ascending within a tile, tiles in order; owned */
+    rgb *d_base_color;      /* [texel_count] */
+    float *weight;          /* [texel_count] sum of filter weights */
     size_t segment_count;
-    double *d_roughness;     /* [segment_count] */
-    double *d_specular;      /* [segment_count] */
-    double (*d_emission)[3]; /* [segment_count] */
+    double *d_roughness;              /* [segment_count] */
+    double *d_specular;               /* [segment_count] */
+    double (*d_emission)[3];          /* [segment_count] */
     struct gradient_scratch *scratch; /* owned */
 };
 

@@ -8,13 +8,13 @@
 #include "common/mem.h"
 #include "common/rng.h"
 
-#define CELLS_ACROSS 16      /* along the longest side */
+#define CELLS_ACROSS 16 /* along the longest side */
 #define SURFACE_POINTS 32768
 #define POINTS_A_ROW 8
 #define PATCHES_MAX 256
 #define ROWS_MAX UINT16_MAX
-#define POWER_SHARE 0.1f     /* of the samples */
-#define HIDDEN_SHARE 0.01f   /* of the squared unoccluded light is assumed to arrive, since a few rays miss gaps */
+#define POWER_SHARE 0.1f   /* of the samples */
+#define HIDDEN_SHARE 0.01f /* of the squared unoccluded light is assumed to arrive, since a few rays miss gaps */
 #define SEED UINT64_C(0x6775696465)
 
 struct guide_point {
@@ -26,7 +26,7 @@ struct guide_builder {
     const struct lights *lights;
     const struct accel *accel;
     struct guide_point *point; /* [row_capacity][POINTS_A_ROW] owned */
-    uint8_t *point_count;        /* [row_capacity] owned */
+    uint8_t *point_count;      /* [row_capacity] owned */
     size_t row_capacity;
 };
 
@@ -140,8 +140,8 @@ static void estimate_row(const struct guide_builder *l, size_t row) {
         float sum = 0.0f;
         for (size_t i = 0; i < l->point_count[row]; i++) {
             bool arrives;
-            float light = light_between(l, &l->point[row * POINTS_A_ROW + i], patch,
-                                        rng_key(SEED + row, patch, i), &arrives);
+            float light =
+                light_between(l, &l->point[row * POINTS_A_ROW + i], patch, rng_key(SEED + row, patch, i), &arrives);
             sum += light * light * (arrives ? 1.0f : HIDDEN_SHARE);
         }
         /* The density of least variance is proportional to the root mean square. */
@@ -177,8 +177,8 @@ struct guide *guide_new(const struct lights *lights, const struct mesh *mesh, co
         return NULL;
     }
     make_grid(&g->grid, mesh);
-    g->row = mem_calloc(6 * (size_t)g->grid.size[0] * (size_t)g->grid.size[1] * (size_t)g->grid.size[2],
-                        sizeof *g->row);
+    g->row =
+        mem_calloc(6 * (size_t)g->grid.size[0] * (size_t)g->grid.size[1] * (size_t)g->grid.size[2], sizeof *g->row);
     g->row_count = 1;
     struct guide_builder l = {.g = g, .lights = lights, .accel = accel, .row_capacity = 256};
     l.point = mem_array(l.row_capacity * POINTS_A_ROW, sizeof *l.point);

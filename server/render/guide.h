@@ -28,15 +28,15 @@ struct guide_grid {
 
 struct guide {
     struct guide_grid grid;
-    uint16_t *row;            /* [cells * 6] 0 where no surface was found; owned, as all below */
+    uint16_t *row; /* [cells * 6] 0 where no surface was found; owned, as all below */
     size_t row_count, patch_count;
-    uint32_t *first;          /* [patch_count + 1] index of the first light triangle */
-    uint16_t *patch_of;       /* [light triangles] */
-    float *transfer;             /* [row_count][patch_count] irradiance per unit radiance, root mean square over
+    uint32_t *first;              /* [patch_count + 1] index of the first light triangle */
+    uint16_t *patch_of;           /* [light triangles] */
+    float *transfer;              /* [row_count][patch_count] irradiance per unit radiance, root mean square over
                                   * points */
-    float *power;             /* [patch_count] share of the total power */
-    size_t stride;            /* patch_count rounded up to a power of two */
-    float *cumulative;        /* [row_count][stride] cumulative probability of the patches, padded with 1, then
+    float *power;                 /* [patch_count] share of the total power */
+    size_t stride;                /* patch_count rounded up to a power of two */
+    float *cumulative;            /* [row_count][stride] cumulative probability of the patches, padded with 1, then
                                * INFINITY; row 0 is by power */
     int32_t row_step, patch_step; /* first step of the binary searches in a row and in a patch (shade_pick) */
 };

@@ -56,11 +56,9 @@ static void take_pixels(struct lights *l, const struct image *environment) {
     l->environment = mem_array(stride * l->height, sizeof *l->environment);
     for (size_t y = 0; y < l->height; y++) {
         for (size_t x = 0; x < stride; x++) {
-            const float *pixel = environment->pixel +
-                                 (y * l->width + x % l->width) * environment->channel_count;
+            const float *pixel = environment->pixel + (y * l->width + x % l->width) * environment->channel_count;
             for (int c = 0; c < 3; c++)
-                l->environment[y * stride + x][c] =
-                    isfinite(pixel[c]) && pixel[c] > 0.0f ? pixel[c] : 0.0f;
+                l->environment[y * stride + x][c] = isfinite(pixel[c]) && pixel[c] > 0.0f ? pixel[c] : 0.0f;
         }
     }
 }
@@ -185,9 +183,7 @@ void lights_free(struct lights *l) {
     mem_free(l);
 }
 
-static float cross_area(vec3 edge1, vec3 edge2) {
-    return 0.5f * vec3_length(vec3_cross(edge1, edge2));
-}
+static float cross_area(vec3 edge1, vec3 edge2) { return 0.5f * vec3_length(vec3_cross(edge1, edge2)); }
 
 /* Writes the parts of a triangle in the order of lights_part; returns how many. */
 static size_t cut(const struct light_triangle *whole, struct light_triangle *part) {
@@ -215,8 +211,10 @@ static size_t cut(const struct light_triangle *whole, struct light_triangle *par
 static struct light_triangle whole_triangle(const struct mesh *mesh, size_t triangle) {
     const uint32_t *v = mesh->index[triangle];
     vec3 a = mesh->position[v[0]];
-    return (struct light_triangle){.corner = a, .edge1 = vec3_sub(mesh->position[v[1]], a),
-                                   .edge2 = vec3_sub(mesh->position[v[2]], a), .whole = (uint32_t)triangle};
+    return (struct light_triangle){.corner = a,
+                                   .edge1 = vec3_sub(mesh->position[v[1]], a),
+                                   .edge2 = vec3_sub(mesh->position[v[2]], a),
+                                   .whole = (uint32_t)triangle};
 }
 
 /* Lists the triangles of the emitting segments, large ones in parts. */
@@ -300,8 +298,7 @@ static float density_of(const struct lights *l, uint32_t block, float sine) {
     return l->environment_chance * probability / (cells * cell_angle * sine);
 }
 
-static void sample_environment(const struct lights *l, float pick, float u, float v,
-                               struct light_sample *s) {
+static void sample_environment(const struct lights *l, float pick, float u, float v, struct light_sample *s) {
     uint32_t block = light_table_pick(&l->blocks, pick);
     uint32_t left = block % l->block_columns * l->grain, top = block / l->block_columns * l->grain;
     float x = fminf((float)left + u * (float)block_width(l, block), (float)l->width * 0x1.fffffep-1f);
@@ -329,8 +326,7 @@ rgb lights_pattern(const struct lights *l, const struct light_triangle *t, float
     return materials_emission_pattern(l->materials, at.x, at.y);
 }
 
-void lights_sample(const struct lights *l, vec3 point, float pick, float u, float v,
-                   struct light_sample *s) {
+void lights_sample(const struct lights *l, vec3 point, float pick, float u, float v, struct light_sample *s) {
     float chance = l->environment_chance;
     s->pdf = 0.0f;
     if (pick < chance) {

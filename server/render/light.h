@@ -34,8 +34,8 @@ struct light_triangle {
     rgb radiance;  /* mean of the segment */
     float density; /* of sampling its points, by area */
     uint32_t segment;
-    uint32_t level;   /* one of 4^level parts of a triangle of the mesh */
-    uint32_t whole;   /* that triangle */
+    uint32_t level; /* one of 4^level parts of a triangle of the mesh */
+    uint32_t whole; /* that triangle */
 };
 
 /* Cumulative sums end in this many infinite entries, since searches read several entries at once. */
@@ -48,25 +48,25 @@ struct light_table {
     double total;
     float *cumulative; /* [count + 1 + LIGHT_TABLE_PAD] 0 to 1; owned */
     size_t guide_count;
-    uint32_t *guide;   /* [guide_count] the entry whose range contains i / guide_count; owned */
+    uint32_t *guide; /* [guide_count] the entry whose range contains i / guide_count; owned */
 };
 
 struct lights {
     size_t triangle_count;
     struct light_triangle *triangle; /* owned */
     struct light_table triangles;
-    const struct atlas *atlas;         /* borrowed, both; NULL before lights_update */
+    const struct atlas *atlas; /* borrowed, both; NULL before lights_update */
     const struct materials *materials;
-    uint32_t *first_of;      /* [triangles of the mesh] index of the first part, for those that emit; owned */
+    uint32_t *first_of; /* [triangles of the mesh] index of the first part, for those that emit; owned */
     size_t segment_count;
-    rgb *emission;           /* [segment_count] copy that the tables were made from; owned */
-    float *area_density;     /* [segment_count] density by area of sampling a point on the front side; 0 for
+    rgb *emission;            /* [segment_count] copy that the tables were made from; owned */
+    float *area_density;      /* [segment_count] density by area of sampling a point on the front side; 0 for
                               * non-emitters; owned */
     float environment_chance; /* probability of sampling the environment */
     double environment_power; /* power that arrives from it; negative where visibility was not measured */
-    uint32_t width, height;  /* of the environment; 0 when there is none */
-    float (*environment)[3]; /* [height][width + 1], last column = first; owned */
-    uint32_t grain;          /* cells along each side of a block; blocks at the border may be smaller */
+    uint32_t width, height;   /* of the environment; 0 when there is none */
+    float (*environment)[3];  /* [height][width + 1], last column = first; owned */
+    uint32_t grain;           /* cells along each side of a block; blocks at the border may be smaller */
     uint32_t block_columns;
     struct light_table blocks; /* of width x (height - 1) cells, which lie between pixel centres */
 };
@@ -152,13 +152,11 @@ static inline const struct light_triangle *lights_pick(const struct lights *ligh
 }
 
 /* Samples a direction towards light from `point`, for numbers in [0, 1). */
-void lights_sample(const struct lights *lights, vec3 point, float pick, float u, float v,
-                   struct light_sample *sample);
+void lights_sample(const struct lights *lights, vec3 point, float pick, float u, float v, struct light_sample *sample);
 
 /* Density by solid angle with which lights_sample samples a given emitter point, at this distance and |cosine| on its
  * front side. */
-static inline float lights_pdf_segment(const struct lights *lights, uint32_t segment,
-                                       float distance_m, float cosine) {
+static inline float lights_pdf_segment(const struct lights *lights, uint32_t segment, float distance_m, float cosine) {
     return lights->area_density[segment] * distance_m * distance_m / fmaxf(cosine, 1e-6f);
 }
 

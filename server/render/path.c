@@ -102,13 +102,11 @@ static struct vertex_block *block_at(const struct path_batch *b, int depth, size
     return b->keeps_vertices ? &b->vertex[depth][block] : b->vertex[0];
 }
 
-static void add(rgb *to, rgb amount) {
-    *to = rgb_add(*to, amount);
-}
+static void add(rgb *to, rgb amount) { *to = rgb_add(*to, amount); }
 
 /* Adds the environment's radiance along a ray that left the scene. */
-static void add_environment(struct path_batch *b, const struct world *world, int depth,
-                         const struct path_state *f, vec3 direction, rgb *radiance) {
+static void add_environment(struct path_batch *b, const struct world *world, int depth, const struct path_state *f,
+                            vec3 direction, rgb *radiance) {
     const struct lights *lights = world->lights;
     if (!(lights->environment_chance > 0.0f))
         return;
@@ -134,15 +132,15 @@ static float4 corner_normal(const struct world_triangle *t, int corner) {
 /* Multiplies a lane's segment emission by the emission pattern at its point. */
 static void apply_pattern(const struct materials *m, const struct shade_block *s, struct vertex_block *v, int lane) {
     rgb mean = lanes3_rgb(&v->emission, lane);
-    rgb pattern = rgb_is_black(mean) ? rgb_gray(1.0f)
-                                     : materials_emission_pattern(m, s->place_x[lane], s->place_y[lane]);
+    rgb pattern =
+        rgb_is_black(mean) ? rgb_gray(1.0f) : materials_emission_pattern(m, s->place_x[lane], s->place_y[lane]);
     lanes3_set_rgb(&v->pattern, lane, pattern);
     lanes3_set_rgb(&v->emission, lane, rgb_mul(mean, pattern));
 }
 
 /* Loads the hit of the path at `index` into a lane. */
-static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane,
-                      size_t index, const rgb *radiance) {
+static void load_lane(struct path_batch *b, const struct world *world, struct vertex_block *v, int lane, size_t index,
+                      const rgb *radiance) {
     const struct path_state *f = &b->state[index];
     const struct accel_ray *ray = &b->ray[index];
     const struct accel_hit *hit = &b->hit[index];
@@ -177,16 +175,15 @@ static void load_lane(struct path_batch *b, const struct world *world, struct ve
         apply_pattern(m, s, v, lane);
     s->area_density[lane] = world->lights->area_density[segment];
     if (s->area_density[lane] > 0.0f && world->guide)
-        s->area_density[lane] *= guide_density_factor(world->guide, f->row,
-                                                      lights_part(world->lights, hit->triangle, b1, b2));
+        s->area_density[lane] *=
+            guide_density_factor(world->guide, f->row, lights_part(world->lights, hit->triangle, b1, b2));
 }
 
 static void add_emission(const struct vertex_block *v, int count, rgb *radiance) {
     for (int i = 0; i < count; i++) {
         rgb emission = lanes3_rgb(&v->emission, i);
         if (!rgb_is_black(emission))
-            add(&radiance[v->path[i]],
-                rgb_mul(lanes3_rgb(&v->beta, i), rgb_scale(emission, v->emission_weight[i])));
+            add(&radiance[v->path[i]], rgb_mul(lanes3_rgb(&v->beta, i), rgb_scale(emission, v->emission_weight[i])));
     }
 }
 
@@ -238,8 +235,7 @@ static bool pick_lights(struct shade_block *s, struct vertex_block *v, const str
 }
 
 /* Light samples of the lanes that chose the environment, lane by lane, since they are few. */
-static void sample_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights,
-                               int count) {
+static void sample_environment(struct shade_block *s, struct vertex_block *v, const struct lights *lights, int count) {
     for (int i = 0; i < count; i++) {
         if (s->pick[i] >= lights->environment_chance)
             continue;
@@ -271,8 +267,7 @@ static void prefetch_texels(const struct shade_block *s, const struct texture *t
 
 /* Weighted sum over the four texels, r g b and weight in one vector: a texel's fourth value is 1 where it is valid
  * and 0 elsewhere. Same result as texture_taps and texture_gather. */
-static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture,
-                          int count) {
+static void gather_texels(struct vertex_block *v, struct shade_block *s, const struct texture *texture, int count) {
     for (int i = 0; i < count; i++) {
         size_t down = v->y[i] + 1u < texture->height ? texture->width : 0;
         size_t right = v->x[i] + 1u < texture->width ? 1 : 0;
@@ -308,9 +303,9 @@ static void spawn_rays(struct path_batch *b, const struct vertex_block *v, uint3
     for (int i = 0; i < count; i++) {
         b->ray[active] =
             (struct accel_ray){lanes3_get(&s->bounce_origin, i), 0.0f, lanes3_get(&s->bounce, i), INFINITY};
-        b->state[active] = (struct path_state){v->path[i], first + (uint32_t)i,
-                                             lanes3_rgb(&s->bounce_beta, i), lanes3_rgb(&s->bounce_rr_beta, i),
-                                             s->guide_row[i], s->bounce_pdf[i]};
+        b->state[active] = (struct path_state){
+            v->path[i],      first + (uint32_t)i, lanes3_rgb(&s->bounce_beta, i), lanes3_rgb(&s->bounce_rr_beta, i),
+            s->guide_row[i], s->bounce_pdf[i]};
         active += s->bounce_continues[i];
     }
     b->shadow_count = shadows;
@@ -323,7 +318,9 @@ static struct shade_roulette roulette_at(const struct path_settings *settings, i
     bool all = any && segment >= settings->roulette_depth;
     bool derivatives = settings->derivatives;
     return (struct shade_roulette){
-        .scale = !all ? EARLY_RR_SCALE : derivatives ? DERIVATIVE_RR_SCALE : 1.0f,
+        .scale = !all          ? EARLY_RR_SCALE
+                 : derivatives ? DERIVATIVE_RR_SCALE
+                               : 1.0f,
         .least = any ? MIN_CHANCE : 1.0f,
         .most = all && !derivatives ? MAX_CHANCE : 1.0f,
         .least_light = any ? MIN_LIGHT_CHANCE : 1.0f,
@@ -332,8 +329,8 @@ static struct shade_roulette roulette_at(const struct path_settings *settings, i
 }
 
 /* Shades the `count` vertices of a block of this depth. */
-static void shade(struct path_batch *b, const struct world *world, const struct path_settings *settings,
-                  int depth, size_t block, int count, rgb *radiance) {
+static void shade(struct path_batch *b, const struct world *world, const struct path_settings *settings, int depth,
+                  size_t block, int count, rgb *radiance) {
     struct vertex_block *v = block_at(b, depth, block);
     struct shade_block *s = b->shade;
     const struct texture *texture = &world->materials->base_color;
@@ -362,8 +359,8 @@ static void shade(struct path_batch *b, const struct world *world, const struct 
 }
 
 /* Shades all hits of this depth and spawns the rays of the next. New rays overwrite those of blocks already loaded. */
-static void shade_hits(struct path_batch *b, const struct world *world,
-                       const struct path_settings *settings, int depth, rgb *radiance) {
+static void shade_hits(struct path_batch *b, const struct world *world, const struct path_settings *settings, int depth,
+                       rgb *radiance) {
     size_t arrived = b->active_count, block = 0;
     int lane = 0;
     b->active_count = b->shadow_count = 0;
@@ -422,9 +419,8 @@ static void trace_shadow_rays(struct path_batch *b, const struct world *world, i
     }
 }
 
-void path_batch_trace(struct path_batch *b, const struct world *world,
-                      const struct path_settings *settings, size_t count, const struct ray *ray,
-                      const struct path_key *key, rgb *radiance) {
+void path_batch_trace(struct path_batch *b, const struct world *world, const struct path_settings *settings,
+                      size_t count, const struct ray *ray, const struct path_key *key, rgb *radiance) {
     assert(count <= b->capacity && settings->max_depth <= b->max_depth);
     for (size_t i = 0; i < count; i++) {
         b->key[i] = sampler_key(settings->seed, key[i].index, key[i].iteration);
@@ -463,8 +459,7 @@ void path_batch_counts(const struct path_batch *b, uint64_t *ray_count, uint64_t
 }
 
 void path_batch_set_tap(struct path_batch *b,
-                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray),
-                        void *user) {
+                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray), void *user) {
     b->tap = tap;
     b->tap_user = user;
 }

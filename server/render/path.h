@@ -27,14 +27,14 @@ struct path_settings {
     bool derivatives;   /* roulette ends fewer paths, since derivatives of far vertices scatter over many texels and
                          * their noise falls only with the number of paths */
     uint64_t seed;
-    float least_color;  /* base colours are clamped to this from below for roulette: derivatives by base colour are no
+    float least_color; /* base colours are clamped to this from below for roulette: derivatives by base colour are no
                          * smaller where it is dark. 0 when only pictures are wanted */
 };
 
 /* Names the random numbers of one path, a pure function of these and the seed. Samples of consecutive `sample`
  * numbers and equal other fields are stratified. */
 struct path_key {
-    uint32_t index;     /* texel, or pixel */
+    uint32_t index; /* texel, or pixel */
     uint32_t iteration;
     uint32_t sample;
 };
@@ -54,9 +54,8 @@ void path_batch_free(struct path_batch *batch);
 
 /* Sets radiance[count]; count <= capacity. The first surface hit is the first vertex. Non-finite estimates become 0
  * and are counted. Allocates nothing. */
-void path_batch_trace(struct path_batch *batch, const struct world *world,
-                      const struct path_settings *settings, size_t count, const struct ray *ray,
-                      const struct path_key *key, rgb *radiance);
+void path_batch_trace(struct path_batch *batch, const struct world *world, const struct path_settings *settings,
+                      size_t count, const struct ray *ray, const struct path_key *key, rgb *radiance);
 
 /* Appends to `log` the derivatives of the paths of the last path_batch_trace, given d_radiance[count], the derivative
  * of the loss by each ray's radiance. The materials must be unchanged. */
@@ -66,8 +65,7 @@ void path_batch_backward(struct path_batch *batch, const rgb *d_radiance, struct
  * true for occlusion queries. For benchmarks that trace the same rays by other means. */
 struct accel_ray;
 void path_batch_set_tap(struct path_batch *batch,
-                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray),
-                        void *user);
+                        void (*tap)(void *user, bool shadow, size_t count, const struct accel_ray *ray), void *user);
 
 /* Rays traced and non-finite samples dropped since the batch was made. */
 void path_batch_counts(const struct path_batch *batch, uint64_t *ray_count, uint64_t *dropped_count);

@@ -29,7 +29,7 @@ static void apply_patterns(const struct vertex_block *v, int count, struct shade
 
 /* Derivative at a vertex of the last depth, which only emits. */
 static rgb emission_backward(const struct vertex_block *v, int lane, bool has_pattern, rgb d_radiance,
-                        struct gradient_log *log) {
+                             struct gradient_log *log) {
     rgb adjoint = rgb_mul(d_radiance, lanes3_rgb(&v->beta, lane));
     if (has_pattern)
         adjoint = rgb_mul(adjoint, lanes3_rgb(&v->pattern, lane));
@@ -51,15 +51,15 @@ static void log_lane(const struct vertex_block *v, const struct shade_derivative
     rgb d_base_color = lanes3_rgb(&d->d_base_color, lane);
     if (rgb_is_black(d_base_color))
         return;
-    log->entry[log->entry_count++] = (struct gradient_entry){
-        v->x[lane],
-        v->y[lane],
-        {v->weight[0][lane], v->weight[1][lane], v->weight[2][lane], v->weight[3][lane]},
-        d_base_color};
+    log->entry[log->entry_count++] =
+        (struct gradient_entry){v->x[lane],
+                                v->y[lane],
+                                {v->weight[0][lane], v->weight[1][lane], v->weight[2][lane], v->weight[3][lane]},
+                                d_base_color};
 }
 
-static void backward_block(struct path_batch *b, int depth, size_t block, int count,
-                           const rgb *d_radiance, struct gradient_log *log) {
+static void backward_block(struct path_batch *b, int depth, size_t block, int count, const rgb *d_radiance,
+                           struct gradient_log *log) {
     struct vertex_block *v = &b->vertex[depth][block];
     struct shade_derivative *d = b->derivative;
     bool ends = b->ended && depth == b->depth_count - 1;
@@ -77,8 +77,7 @@ static void backward_block(struct path_batch *b, int depth, size_t block, int co
         if (!ends)
             log_lane(v, d, i, log);
         if (depth > 0)
-            lanes3_set_rgb(&b->vertex[depth - 1][v->parent[i] / LANES].next,
-                           (int)(v->parent[i] % LANES), out);
+            lanes3_set_rgb(&b->vertex[depth - 1][v->parent[i] / LANES].next, (int)(v->parent[i] % LANES), out);
     }
 }
 
@@ -88,7 +87,7 @@ void path_batch_backward(struct path_batch *b, const rgb *d_radiance, struct gra
         size_t count = b->vertex_count[depth];
         gradient_log_reserve(log, count);
         for (size_t first = 0; first < count; first += LANES)
-            backward_block(b, depth, first / LANES, (int)(count - first < LANES ? count - first : LANES),
-                           d_radiance, log);
+            backward_block(b, depth, first / LANES, (int)(count - first < LANES ? count - first : LANES), d_radiance,
+                           log);
     }
 }

@@ -23,9 +23,7 @@ enum { PAIR_CHOICES, PAIR_LIGHT, PAIR_DIRECTION, PAIR_ROULETTE, PAIRS_PER_VERTEX
 #define FOR_LANES _Pragma("GCC ivdep") for (int i = 0; i < LANES; i++)
 #endif
 
-static inline float power_heuristic(float a, float b) {
-    return a * a / (a * a + b * b);
-}
+static inline float power_heuristic(float a, float b) { return a * a / (a * a + b * b); }
 
 /* clampf without branches. */
 static inline float clamp_branchless(float a, float least, float most) {
@@ -63,8 +61,7 @@ KERNEL void shade_surface(struct vertex_block *restrict v, struct shade_block *r
         float length2 = vec3_dot(n, n);
         float over = 1.0f / sqrtf(bsdf_max(length2, 1e-12f));
         bool smooth = length2 > 1.0f;
-        n = (vec3){smooth ? n.x * over : normal.x, smooth ? n.y * over : normal.y,
-                   smooth ? n.z * over : normal.z};
+        n = (vec3){smooth ? n.x * over : normal.x, smooth ? n.y * over : normal.y, smooth ? n.z * over : normal.z};
         float side = vec3_dot(n, viewer) < 0.0f ? -1.0f : 1.0f;
         n = vec3_scale(n, side);
         lanes3_set(&s->frame_normal, i, n);
@@ -93,9 +90,7 @@ KERNEL void shade_place(struct vertex_block *restrict v, struct shade_block *res
 
 KERNEL void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid) {
     const struct guide_grid g = *grid;
-    FOR_LANES {
-        s->cell[i] = guide_cell(&g, lanes3_get(&s->point, i), lanes3_get(&s->frame_normal, i));
-    }
+    FOR_LANES { s->cell[i] = guide_cell(&g, lanes3_get(&s->point, i), lanes3_get(&s->frame_normal, i)); }
 }
 
 KERNEL void shade_numbers(struct shade_block *restrict s, int depth) {
@@ -131,9 +126,7 @@ KERNEL void shade_pick(struct shade_block *restrict s, const struct guide *restr
         patch[i] = 0;
     }
     for (int32_t step = guide->row_step; step > 0; step /= 2) {
-        FOR_LANES {
-            patch[i] += until[start[i] + patch[i] + step - 1] <= at[i] ? step : 0;
-        }
+        FOR_LANES { patch[i] += until[start[i] + patch[i] + step - 1] <= at[i] ? step : 0; }
     }
     FOR_LANES {
         int32_t before = patch[i] > 0 ? start[i] + patch[i] - 1 : start[i];
@@ -193,13 +186,10 @@ KERNEL void shade_light(struct shade_block *restrict s) {
     }
 }
 
-static inline float max_channel(rgb c) {
-    return bsdf_max(c.r, bsdf_max(c.g, c.b));
-}
+static inline float max_channel(rgb c) { return bsdf_max(c.r, bsdf_max(c.g, c.b)); }
 
 static inline rgb reflect(struct bsdf_value f, rgb base_color, rgb light) {
-    return (rgb){(base_color.r * f.diffuse + f.specular) * light.r,
-                 (base_color.g * f.diffuse + f.specular) * light.g,
+    return (rgb){(base_color.r * f.diffuse + f.specular) * light.r, (base_color.g * f.diffuse + f.specular) * light.g,
                  (base_color.b * f.diffuse + f.specular) * light.b};
 }
 
@@ -222,9 +212,9 @@ KERNEL void shade_scatter(struct vertex_block *restrict v, struct shade_block *r
         rgb contribution = rgb_mul(beta, reflect(f, base_color, unoccluded));
         /* Roulette for shadow rays whose contribution is small against what the path has gathered (Veach 1997,
          * section 10.4.1). */
-        rgb path_rr_beta = lanes3_rgb(&s->rr_beta, i), color = {bsdf_max(base_color.r, roulette.least_color),
-                                                           bsdf_max(base_color.g, roulette.least_color),
-                                                           bsdf_max(base_color.b, roulette.least_color)};
+        rgb path_rr_beta = lanes3_rgb(&s->rr_beta, i),
+            color = {bsdf_max(base_color.r, roulette.least_color), bsdf_max(base_color.g, roulette.least_color),
+                     bsdf_max(base_color.b, roulette.least_color)};
         float max_contribution = max_channel(rgb_mul(path_rr_beta, reflect(f, color, unoccluded)));
         float chance = max_contribution / bsdf_max(MIN_CONTRIBUTION_SHARE * s->path_radiance[i], 1e-30f);
         chance = clamp_branchless(chance, roulette.least_light, 1.0f);
@@ -281,17 +271,14 @@ KERNEL void shade_backward(const struct vertex_block *restrict v, struct shade_d
                        reflect(light_value, base_color, rgb_scale(adjoint, v->light_factor[i])));
 
         rgb light = rgb_mul(adjoint, from_light), bounce = rgb_mul(adjoint, from_bounce);
-        lanes3_set_rgb(&d->d_base_color, i,
-                       rgb_mad(rgb_scale(light, to_light.diffuse), to_bounce.diffuse, bounce));
+        lanes3_set_rgb(&d->d_base_color, i, rgb_mad(rgb_scale(light, to_light.diffuse), to_bounce.diffuse, bounce));
         float light_sum = light.r + light.g + light.b, bounce_sum = bounce.r + bounce.g + bounce.b;
         rgb tinted_light = rgb_mul(light, base_color), tinted_bounce = rgb_mul(bounce, base_color);
         float light_tinted = tinted_light.r + tinted_light.g + tinted_light.b;
         float bounce_tinted = tinted_bounce.r + tinted_bounce.g + tinted_bounce.b;
-        d->d_roughness[i] = light_tinted * to_light.diffuse_by_roughness +
-                            light_sum * to_light.specular_by_roughness +
+        d->d_roughness[i] = light_tinted * to_light.diffuse_by_roughness + light_sum * to_light.specular_by_roughness +
                             bounce_tinted * to_bounce.diffuse_by_roughness +
                             bounce_sum * to_bounce.specular_by_roughness;
-        d->d_specular[i] =
-            light_sum * to_light.specular_by_specular + bounce_sum * to_bounce.specular_by_specular;
+        d->d_specular[i] = light_sum * to_light.specular_by_specular + bounce_sum * to_bounce.specular_by_specular;
     }
 }

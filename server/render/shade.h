@@ -11,8 +11,7 @@
 void shade_surface(struct vertex_block *restrict v, struct shade_block *restrict s);
 
 /* The four texels of each texture lookup, for a texture of this size. */
-void shade_place(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width,
-                 uint32_t height);
+void shade_place(struct vertex_block *restrict v, struct shade_block *restrict s, uint32_t width, uint32_t height);
 
 /* Cells of the guide. */
 void shade_cells(struct shade_block *restrict s, const struct guide_grid *restrict grid);
@@ -38,8 +37,7 @@ struct shade_roulette {
 };
 
 /* Reflection towards the light sample and along the continued path. */
-void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s,
-                   struct shade_roulette roulette);
+void shade_scatter(struct vertex_block *restrict v, struct shade_block *restrict s, struct shade_roulette roulette);
 
 /* Derivatives by all parameters at a vertex, and the radiance that leaves it. */
 void shade_backward(const struct vertex_block *restrict v, struct shade_derivative *restrict d);

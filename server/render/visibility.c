@@ -71,7 +71,7 @@ static float blurred(const struct visibility_bins *m, int row, int column) {
 }
 
 void visibility_measure(struct visibility *visibility, const struct mesh *mesh, const struct accel *accel,
-                   struct parallel *pool) {
+                        struct parallel *pool) {
     struct visibility_bins *m = mem_calloc(1, sizeof *m);
     *m = (struct visibility_bins){.mesh = mesh, .accel = accel};
     m->area_until = mem_array(mesh->triangle_count, sizeof *m->area_until);

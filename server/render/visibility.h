@@ -18,12 +18,12 @@
 
 struct visibility {
     float share[VISIBILITY_ROWS][VISIBILITY_COLUMNS]; /* mean of cosine x visibility, in [0, 1] */
-    double area;                            /* of all surfaces, m^2 */
+    double area;                                      /* of all surfaces, m^2 */
 };
 
 /* Bins are uniform in azimuth and polar angle (struct latlong). The result does not depend on the number of threads. */
 void visibility_measure(struct visibility *visibility, const struct mesh *mesh, const struct accel *accel,
-                   struct parallel *pool);
+                        struct parallel *pool);
 
 /* The share of the bin that contains a direction; around = 1 wraps to 0. */
 static inline float visibility_at(const struct visibility *visibility, struct latlong at) {

@@ -6,16 +6,13 @@
 
 #include "common/mem.h"
 
-static int16_t to_snorm(float v) {
-    return (int16_t)lrintf(clampf(v, -1.0f, 1.0f) * 32767.0f);
-}
+static int16_t to_snorm(float v) { return (int16_t)lrintf(clampf(v, -1.0f, 1.0f) * 32767.0f); }
 
 static void bake_triangle(struct world_triangle *t, const struct world *w, size_t index) {
     const struct mesh *mesh = w->mesh;
     const uint32_t *v = mesh->index[index];
     vec3 a = mesh->position[v[0]];
-    t->normal = vec3_normalize(vec3_cross(vec3_sub(mesh->position[v[1]], a),
-                                          vec3_sub(mesh->position[v[2]], a)));
+    t->normal = vec3_normalize(vec3_cross(vec3_sub(mesh->position[v[1]], a), vec3_sub(mesh->position[v[2]], a)));
     t->plane = vec3_dot(t->normal, a);
     t->segment = w->segments->of_triangle[index];
     for (int k = 0; k < 3; k++) {
@@ -28,8 +25,8 @@ static void bake_triangle(struct world_triangle *t, const struct world *w, size_
 }
 
 enum status world_init(struct world *w, const struct mesh *mesh, const struct segments *segments,
-                       const struct atlas *atlas, const struct materials *materials,
-                       const struct image *environment, struct parallel *pool, struct error *err) {
+                       const struct atlas *atlas, const struct materials *materials, const struct image *environment,
+                       struct parallel *pool, struct error *err) {
     memset(w, 0, sizeof *w);
     enum status status = accel_new(&w->accel, mesh, pool, err);
     if (status != STATUS_OK)

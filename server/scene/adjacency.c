@@ -21,8 +21,7 @@ static int by_upper_then_number(const void *left, const void *right) {
     return a->number < b->number ? -1 : a->number > b->number;
 }
 
-static void ends(const struct mesh *mesh, const uint32_t *weld, size_t half_edge, uint32_t *lower,
-                 uint32_t *upper) {
+static void ends(const struct mesh *mesh, const uint32_t *weld, size_t half_edge, uint32_t *lower, uint32_t *upper) {
     const uint32_t *v = mesh->index[half_edge / 3];
     uint32_t a = weld[v[half_edge % 3]], b = weld[v[(half_edge + 1) % 3]];
     *lower = a < b ? a : b;

@@ -14,30 +14,29 @@
 #include "server/scene/atlas_pack.h"
 #include "server/scene/coverage.h"
 
-#define MAX_GRID 2048     /* cells a side */
-#define INSET 2           /* units between a chart and its box: more than coverage's margin */
-#define TEXEL_FILL 0.75   /* share of the texels that the mesh's area fills; sizes a texel before packing */
-#define FIRST_FILL 0.96   /* share of the cells that shapes and padding fill in the first try */
-#define GUESS_ROUNDS 4    /* rasterisations to find the density for FIRST_FILL */
-#define SEARCH_STEP 1.015 /* factor on density until one fits and one does not */
-#define SEARCH_END 1.003  /* ratio of those two at which the search stops */
-#define MIN_DENSITY 1e-3  /* of density_bound: below this packing has failed */
-#define SHRINK 0.8        /* of a density at which a chart is larger than the grid */
-#define SINGLE_TEXEL_FILL 0.9    /* share of the texels that charts of one texel each can fill */
+#define MAX_GRID 2048         /* cells a side */
+#define INSET 2               /* units between a chart and its box: more than coverage's margin */
+#define TEXEL_FILL 0.75       /* share of the texels that the mesh's area fills; sizes a texel before packing */
+#define FIRST_FILL 0.96       /* share of the cells that shapes and padding fill in the first try */
+#define GUESS_ROUNDS 4        /* rasterisations to find the density for FIRST_FILL */
+#define SEARCH_STEP 1.015     /* factor on density until one fits and one does not */
+#define SEARCH_END 1.003      /* ratio of those two at which the search stops */
+#define MIN_DENSITY 1e-3      /* of density_bound: below this packing has failed */
+#define SHRINK 0.8            /* of a density at which a chart is larger than the grid */
+#define SINGLE_TEXEL_FILL 0.9 /* share of the texels that charts of one texel each can fill */
 
 /* All charts rasterised at one density. */
 struct raster {
     struct pack_item *item; /* [chart_count] */
     uint64_t *bits;
-    size_t bit_capacity;    /* words */
+    size_t bit_capacity; /* words */
 };
 
 static int32_t units_of(float metres, double density) {
     return INSET + (int32_t)lrint((double)metres * density * COVERAGE_UNITS);
 }
 
-static struct coverage_triangle place_of(const struct charts *charts, uint32_t triangle,
-                                         double density) {
+static struct coverage_triangle place_of(const struct charts *charts, uint32_t triangle, double density) {
     struct coverage_triangle place;
     for (int c = 0; c < 3; c++) {
         place.x[c] = units_of(charts->corner[triangle][c].x, density);
@@ -47,8 +46,8 @@ static struct coverage_triangle place_of(const struct charts *charts, uint32_t t
 }
 
 /* Sets the boxes of all charts, in cells of `cell` units; false when one exceeds `grid` cells. */
-static bool measure(struct raster *raster, const struct charts *charts, double density,
-                    int32_t cell, uint32_t grid, size_t *words) {
+static bool measure(struct raster *raster, const struct charts *charts, double density, int32_t cell, uint32_t grid,
+                    size_t *words) {
     *words = 0;
     for (size_t c = 0; c < charts->count; c++) {
         double side = (double)fmaxf(charts->extent[c].x, charts->extent[c].y) * density;
@@ -65,8 +64,7 @@ static bool measure(struct raster *raster, const struct charts *charts, double d
 }
 
 /* Rasterises all charts at `density` texels per metre. */
-static bool rasterise(struct raster *raster, const struct charts *charts, double density, int32_t cell,
-                 uint32_t grid) {
+static bool rasterise(struct raster *raster, const struct charts *charts, double density, int32_t cell, uint32_t grid) {
     size_t words;
     if (!measure(raster, charts, density, cell, grid, &words))
         return false;
@@ -103,10 +101,10 @@ static void raster_release(struct raster *raster) {
 
 /* The geometry of packing at one size. */
 struct pack_grid {
-    uint32_t size;     /* texels */
-    uint32_t cell;     /* texels */
-    uint32_t cells;    /* a side */
-    uint32_t padding;  /* cells */
+    uint32_t size;    /* texels */
+    uint32_t cell;    /* texels */
+    uint32_t cells;   /* a side */
+    uint32_t padding; /* cells */
 };
 
 static struct pack_grid grid_of(uint32_t size) {
@@ -161,8 +159,8 @@ static double density_bound(const struct charts *charts, const struct pack_grid 
 }
 
 /* A density at which the shapes fill about FIRST_FILL of the grid. */
-static double guess_density(struct raster *raster, const struct charts *charts,
-                            const struct pack_grid *grid, double full) {
+static double guess_density(struct raster *raster, const struct charts *charts, const struct pack_grid *grid,
+                            double full) {
     double density = full;
     for (int round = 0; round < GUESS_ROUNDS; round++) {
         double fill = fill_at(raster, charts, density, grid);
@@ -172,8 +170,7 @@ static double guess_density(struct raster *raster, const struct charts *charts,
 }
 
 /* Searches the greatest density that fits and leaves its packing in `best`; 0 when none does. */
-static double search_density(struct raster *best, const struct charts *charts,
-                             const struct pack_grid *grid) {
+static double search_density(struct raster *best, const struct charts *charts, const struct pack_grid *grid) {
     struct raster trial = {.item = mem_calloc(charts->count, sizeof *trial.item)};
     double full = density_bound(charts, grid);
     double density = guess_density(&trial, charts, grid, full);
@@ -200,8 +197,8 @@ static double search_density(struct raster *best, const struct charts *charts,
 }
 
 /* Sets the atlas coordinates from the packing. */
-static void set_corners(struct atlas *atlas, const struct charts *charts,
-                        const struct raster *raster, const struct pack_grid *grid, double density) {
+static void set_corners(struct atlas *atlas, const struct charts *charts, const struct raster *raster,
+                        const struct pack_grid *grid, double density) {
     int32_t cell = (int32_t)grid->cell * COVERAGE_UNITS;
     for (size_t c = 0; c < charts->count; c++) {
         const struct pack_item *item = &raster->item[c];
@@ -230,14 +227,13 @@ static size_t covered_texels(struct raster *raster, const struct charts *charts,
     return count;
 }
 
-static void finish(struct atlas *atlas, struct charts *charts, struct raster *raster,
-                   const struct pack_grid *grid, double density, size_t triangle_count) {
-    *atlas = (struct atlas){.width = grid->size, .height = grid->size,
-                            .texels_per_metre = (float)density, .chart_count = charts->count};
+static void finish(struct atlas *atlas, struct charts *charts, struct raster *raster, const struct pack_grid *grid,
+                   double density, size_t triangle_count) {
+    *atlas = (struct atlas){
+        .width = grid->size, .height = grid->size, .texels_per_metre = (float)density, .chart_count = charts->count};
     atlas->corner = mem_array(triangle_count, sizeof *atlas->corner);
     set_corners(atlas, charts, raster, grid, density);
-    atlas->utilisation = (double)covered_texels(raster, charts, density) /
-                         ((double)grid->size * grid->size);
+    atlas->utilisation = (double)covered_texels(raster, charts, density) / ((double)grid->size * grid->size);
     atlas->chart_of_triangle = charts->of_triangle;
     charts->of_triangle = NULL;
 }
@@ -267,9 +263,8 @@ static void shrink_charts(struct charts *charts, const float *density) {
 }
 
 /* `density` may be NULL. */
-static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
-                                const struct segments *segments, uint32_t size, const float *density_of,
-                                struct error *err) {
+static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
+                                uint32_t size, const float *density_of, struct error *err) {
     struct charts charts;
     struct pack_grid grid = grid_of(size);
     float texel_m = (float)sqrt(mesh_area(mesh) / TEXEL_FILL) / (float)size;
@@ -283,8 +278,10 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
         finish(atlas, &charts, &raster, &grid, density, mesh->triangle_count);
     } else {
         double needed = fmax(size_for(charts.count), 2.0 * size);
-        status = error_set(err, STATUS_INPUT, "the mesh is in %zu pieces: a texture of %u x %u texels "
-                           "cannot hold them", charts.count, size, size);
+        status = error_set(err, STATUS_INPUT,
+                           "the mesh is in %zu pieces: a texture of %u x %u texels "
+                           "cannot hold them",
+                           charts.count, size, size);
         if (needed <= ATLAS_MAX_SIZE)
             error_hint(err, "a texture_size of %.0f would", needed);
         else
@@ -295,9 +292,8 @@ static enum status make_at_size(struct atlas *atlas, const struct mesh *mesh,
     return status;
 }
 
-static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
-                                   const struct segments *segments, float texels_per_metre,
-                                   struct error *err) {
+static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
+                                   float texels_per_metre, struct error *err) {
     struct charts charts;
     charts_make(&charts, mesh, segments, 1.0f / texels_per_metre);
     struct raster raster = {.item = mem_calloc(charts.count, sizeof *raster.item)};
@@ -306,9 +302,10 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
     enum status status = STATUS_OK;
     for (bool fits = false; !fits && status == STATUS_OK; size *= 2) {
         if (size > ATLAS_MAX_SIZE) {
-            status = error_set(err, STATUS_INPUT, "%g texels per metre need a texture of %.0f x %.0f "
-                               "texels or more; %d is the most", (double)texels_per_metre, ceil(least),
-                               ceil(least), ATLAS_MAX_SIZE);
+            status = error_set(err, STATUS_INPUT,
+                               "%g texels per metre need a texture of %.0f x %.0f "
+                               "texels or more; %d is the most",
+                               (double)texels_per_metre, ceil(least), ceil(least), ATLAS_MAX_SIZE);
             break;
         }
         struct pack_grid grid = grid_of(size);
@@ -322,8 +319,8 @@ static enum status make_at_density(struct atlas *atlas, const struct mesh *mesh,
     return status;
 }
 
-enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
-                       uint32_t size, float texels_per_metre, struct error *err) {
+enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments, uint32_t size,
+                       float texels_per_metre, struct error *err) {
     if (texels_per_metre != 0.0f) {
         if (!(texels_per_metre > 0.0f) || !isfinite(texels_per_metre))
             return error_set(err, STATUS_INPUT, "texels per metre: %g is not a positive number",
@@ -336,8 +333,7 @@ enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struc
 enum status atlas_make_uneven(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
                               uint32_t size, const float *density, struct error *err) {
     if (size == 0 || size > ATLAS_MAX_SIZE)
-        return error_set(err, STATUS_INPUT, "texture size: %u is not within 1 to %d", size,
-                         ATLAS_MAX_SIZE);
+        return error_set(err, STATUS_INPUT, "texture size: %u is not within 1 to %d", size, ATLAS_MAX_SIZE);
     return make_at_size(atlas, mesh, segments, size, density, err);
 }
 

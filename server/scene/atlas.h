@@ -21,8 +21,8 @@
 #define ATLAS_PADDING 2 /* minimum number of free texels between the covered texels of two charts */
 
 struct atlas {
-    uint32_t width, height;      /* texels */
-    float texels_per_metre;      /* density of the densest chart */
+    uint32_t width, height; /* texels */
+    float texels_per_metre; /* density of the densest chart */
     size_t chart_count;
     uint32_t *chart_of_triangle; /* [triangle_count]; owned */
     vec2 (*corner)[3];           /* [triangle_count] atlas coordinates of the corners, texels; owned */
@@ -31,8 +31,8 @@ struct atlas {
 
 /* Makes a size x size atlas at the greatest density that fits. If texels_per_metre is not 0, uses that density and
  * the smallest power-of-two size up to ATLAS_MAX_SIZE that holds it (STATUS_INPUT when none does). Deterministic. */
-enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
-                       uint32_t size, float texels_per_metre, struct error *err);
+enum status atlas_make(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments, uint32_t size,
+                       float texels_per_metre, struct error *err);
 /* As atlas_make with a size. The density of a chart is the maximum of density[triangle_count], each in (0, 1], over
  * its triangles, as a fraction of the greatest density. */
 enum status atlas_make_uneven(struct atlas *atlas, const struct mesh *mesh, const struct segments *segments,
@@ -43,8 +43,7 @@ void atlas_release(struct atlas *atlas);
 static inline vec2 atlas_point(const struct atlas *atlas, size_t triangle, float b1, float b2) {
     const vec2 *c = atlas->corner[triangle];
     float b0 = 1.0f - b1 - b2;
-    return (vec2){b0 * c[0].x + b1 * c[1].x + b2 * c[2].x,
-                  b0 * c[0].y + b1 * c[1].y + b2 * c[2].y};
+    return (vec2){b0 * c[0].x + b1 * c[1].x + b2 * c[2].x, b0 * c[0].y + b1 * c[1].y + b2 * c[2].y};
 }
 
 #endif

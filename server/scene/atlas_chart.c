@@ -22,33 +22,33 @@
 
 #define NONE UINT32_MAX
 #define LITTLE_LEAN_DEG 45.0
-#define SMALL_TEXELS 100.0    /* area in texels below which a region is dissolved */
-#define REFINE_ROUNDS 2       /* growths, each with the mean normal of the one before */
-#define SAME_COSINE 0.9999f   /* between mean normals of two growths that would give the same region: 0.8 degrees */
-#define LEAN_STEPS 16         /* quantisation of lean in the priority queue */
-#define OVERLAP_TEXELS 0.01   /* depth of overlap that rounding produces between touching triangles */
+#define SMALL_TEXELS 100.0  /* area in texels below which a region is dissolved */
+#define REFINE_ROUNDS 2     /* growths, each with the mean normal of the one before */
+#define SAME_COSINE 0.9999f /* between mean normals of two growths that would give the same region: 0.8 degrees */
+#define LEAN_STEPS 16       /* quantisation of lean in the priority queue */
+#define OVERLAP_TEXELS 0.01 /* depth of overlap that rounding produces between touching triangles */
 
 struct builder {
     const struct mesh *mesh;
     const struct segments *segments;
     struct adjacency adjacency;
-    vec3 *normal;         /* [triangle_count] unit */
-    vec3 *smooth;         /* [triangle_count] unit, smoothed within creases */
-    double *area;         /* [triangle_count] m^2 */
-    uint32_t *by_area;    /* [triangle_count] largest first */
-    uint32_t *chart_of;   /* [triangle_count] or NONE */
+    vec3 *normal;       /* [triangle_count] unit */
+    vec3 *smooth;       /* [triangle_count] unit, smoothed within creases */
+    double *area;       /* [triangle_count] m^2 */
+    uint32_t *by_area;  /* [triangle_count] largest first */
+    uint32_t *chart_of; /* [triangle_count] or NONE */
     size_t chart_count;
-    vec3 *chart_normal;   /* [chart_count] unit; room for triangle_count */
-    uint32_t *seen;       /* [triangle_count] number of the last flood that met it */
-    uint32_t flood;       /* number of the present flood */
-    uint64_t *heap;       /* priority queue: step of lean, order of discovery, triangle */
+    vec3 *chart_normal; /* [chart_count] unit; room for triangle_count */
+    uint32_t *seen;     /* [triangle_count] number of the last flood that met it */
+    uint32_t flood;     /* number of the present flood */
+    uint64_t *heap;     /* priority queue: step of lean, order of discovery, triangle */
     size_t heap_count, heap_capacity;
-    uint32_t *region;     /* [triangle_count] the present region, in order of growth */
+    uint32_t *region; /* [triangle_count] the present region, in order of growth */
     size_t region_count;
     struct flat_triangle *flat; /* [triangle_count] scratch, as is the next */
     bool *dropped;
     double overlap_m;
-    float max_lean_cos;   /* cosine of CHART_MAX_LEAN_DEG */
+    float max_lean_cos; /* cosine of CHART_MAX_LEAN_DEG */
 };
 
 static void heap_push(struct builder *b, uint64_t key) {
@@ -78,8 +78,7 @@ static uint64_t heap_pop(struct builder *b) {
 }
 
 /* Pushes the unassigned neighbours of a triangle in its segment whose lean is small enough; `order` counts them. */
-static void offer_neighbours(struct builder *b, uint32_t t, vec3 normal, float min_cos,
-                             uint64_t *order) {
+static void offer_neighbours(struct builder *b, uint32_t t, vec3 normal, float min_cos, uint64_t *order) {
     for (uint32_t e = 0; e < 3; e++) {
         uint32_t half = 3 * t + e;
         for (uint32_t h = b->adjacency.next[half]; h != half; h = b->adjacency.next[h]) {
@@ -184,8 +183,8 @@ static void grow_all(struct builder *b, float min_cos) {
             if (b->chart_of[seed] != NONE)
                 continue;
             found = true;
-            vec3 normal = vec3_dot(b->smooth[seed], b->normal[seed]) < b->max_lean_cos
-                              ? b->normal[seed] : b->smooth[seed];
+            vec3 normal =
+                vec3_dot(b->smooth[seed], b->normal[seed]) < b->max_lean_cos ? b->normal[seed] : b->smooth[seed];
             for (int round = 0; round <= REFINE_ROUNDS; round++) {
                 b->region[0] = seed;
                 b->region_count = 1;
@@ -274,13 +273,13 @@ static void flatten(struct builder *b, struct charts *charts, size_t c, vec2 *po
             low[0] = fmin(low[0], x), high[0] = fmax(high[0], x);
             low[1] = fmin(low[1], y), high[1] = fmax(high[1], y);
         }
-        charts->flat_area += 0.5 * fabs((f->x[1] - f->x[0]) * (f->y[2] - f->y[0]) -
-                                        (f->y[1] - f->y[0]) * (f->x[2] - f->x[0]));
+        charts->flat_area +=
+            0.5 * fabs((f->x[1] - f->x[0]) * (f->y[2] - f->y[0]) - (f->y[1] - f->y[0]) * (f->x[2] - f->x[0]));
     }
     for (size_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
-            charts->corner[triangle[i]][k] = (vec2){(float)(b->flat[i].x[k] - low[0]),
-                                                    (float)(b->flat[i].y[k] - low[1])};
+            charts->corner[triangle[i]][k] =
+                (vec2){(float)(b->flat[i].x[k] - low[0]), (float)(b->flat[i].y[k] - low[1])};
     charts->extent[c] = (vec2){(float)(high[0] - low[0]), (float)(high[1] - low[1])};
 }
 
@@ -296,12 +295,9 @@ static int largest_first(const void *left, const void *right) {
     return a->triangle < b->triangle ? -1 : 1;
 }
 
-static float cos_of_deg(double degrees) {
-    return (float)cos(degrees * (3.14159265358979323846 / 180.0));
-}
+static float cos_of_deg(double degrees) { return (float)cos(degrees * (3.14159265358979323846 / 180.0)); }
 
-static void builder_init(struct builder *b, const struct mesh *mesh,
-                         const struct segments *segments, double texel_m) {
+static void builder_init(struct builder *b, const struct mesh *mesh, const struct segments *segments, double texel_m) {
     size_t n = mesh->triangle_count;
     *b = (struct builder){.mesh = mesh, .segments = segments, .overlap_m = OVERLAP_TEXELS * texel_m};
     adjacency_make(&b->adjacency, mesh);
@@ -345,14 +341,12 @@ static void builder_release(struct builder *b) {
     mem_free(b->dropped);
 }
 
-void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments,
-                 float texel_m) {
+void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments, float texel_m) {
     size_t n = mesh->triangle_count;
     struct builder b;
     builder_init(&b, mesh, segments, (double)texel_m);
     grow_all(&b, cos_of_deg(LITTLE_LEAN_DEG));
-    dissolve_small(&b, SMALL_TEXELS * (double)texel_m * (double)texel_m,
-                   b.max_lean_cos);
+    dissolve_small(&b, SMALL_TEXELS * (double)texel_m * (double)texel_m, b.max_lean_cos);
     grow_all(&b, b.max_lean_cos);
 
     *charts = (struct charts){.count = b.chart_count};

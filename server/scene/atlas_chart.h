@@ -29,8 +29,7 @@ struct charts {
 
 /* texel_m is the approximate size of a texel: charts of a few texels may lean more, since a seam costs them more than
  * the distortion. Deterministic. */
-void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments,
-                 float texel_m);
+void charts_make(struct charts *charts, const struct mesh *mesh, const struct segments *segments, float texel_m);
 void charts_release(struct charts *charts);
 
 #endif

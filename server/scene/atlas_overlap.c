@@ -22,17 +22,12 @@ struct overlap_grid {
     size_t entry_count, entry_capacity;
 };
 
-static double min3(const double v[3]) {
-    return fmin(v[0], fmin(v[1], v[2]));
-}
+static double min3(const double v[3]) { return fmin(v[0], fmin(v[1], v[2])); }
 
-static double max3(const double v[3]) {
-    return fmax(v[0], fmax(v[1], v[2]));
-}
+static double max3(const double v[3]) { return fmax(v[0], fmax(v[1], v[2])); }
 
 /* True when an edge of a has all of b at its outer side, but for `depth`. */
-static bool edge_separates(const struct flat_triangle *a, const struct flat_triangle *b,
-                           double depth) {
+static bool edge_separates(const struct flat_triangle *a, const struct flat_triangle *b, double depth) {
     for (int i = 0; i < 3; i++) {
         int j = i == 2 ? 0 : i + 1;
         double ex = a->x[j] - a->x[i], ey = a->y[j] - a->y[i];
@@ -50,16 +45,15 @@ static size_t cell_at(double place, double origin, double per_metre) {
     return (size_t)fmax(0.0, (place - origin) * per_metre);
 }
 
-static void rows_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t *first,
-                    size_t *last) {
+static void rows_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t *first, size_t *last) {
     *first = cell_at(min3(t->y), g->y0, g->per_metre);
     *last = cell_at(max3(t->y), g->y0, g->per_metre);
 }
 
 /* Columns of the grid that the triangle meets in a row, which has some. The strip is taken a
  * little higher than the row: rounding must not lose a cell. */
-static void columns_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t row,
-                       size_t *first, size_t *last) {
+static void columns_of(const struct overlap_grid *g, const struct flat_triangle *t, size_t row, size_t *first,
+                       size_t *last) {
     double bottom = g->y0 + ((double)row - 0.01) / g->per_metre;
     double top = g->y0 + ((double)row + 1.01) / g->per_metre;
     double low = INFINITY, high = -INFINITY;
@@ -107,16 +101,14 @@ static void grid_release(struct overlap_grid *g) {
     mem_free(g->entry);
 }
 
-static bool lies_over_one(const struct overlap_grid *g, const struct flat_triangle *triangle, size_t i,
-                          double depth) {
+static bool lies_over_one(const struct overlap_grid *g, const struct flat_triangle *triangle, size_t i, double depth) {
     size_t y, bottom, left, right;
     for (rows_of(g, &triangle[i], &y, &bottom); y <= bottom; y++) {
         columns_of(g, &triangle[i], y, &left, &right);
         for (size_t x = left; x <= right; x++)
             for (uint32_t e = g->head[y * g->columns + x]; e != NONE; e = g->entry[e].next) {
                 const struct flat_triangle *other = &triangle[g->entry[e].triangle];
-                if (!edge_separates(&triangle[i], other, depth) &&
-                    !edge_separates(other, &triangle[i], depth))
+                if (!edge_separates(&triangle[i], other, depth) && !edge_separates(other, &triangle[i], depth))
                     return true;
             }
     }
@@ -141,8 +133,7 @@ static void enter(struct overlap_grid *g, const struct flat_triangle *triangle, 
     }
 }
 
-size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth,
-                    bool *dropped) {
+size_t overlap_drop(const struct flat_triangle *triangle, size_t count, double depth, bool *dropped) {
     struct overlap_grid g;
     size_t dropped_count = 0;
     grid_init(&g, triangle, count);

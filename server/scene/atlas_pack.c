@@ -16,8 +16,8 @@
 
 #include "common/mem.h"
 
-#define LEVELS 15   /* runs up to 2^14 cells and over */
-#define CLASSES 96  /* of box sides, see class_of */
+#define LEVELS 15  /* runs up to 2^14 cells and over */
+#define CLASSES 96 /* of box sides, see class_of */
 
 struct pack_run {
     uint32_t y, x, length;
@@ -31,11 +31,11 @@ struct shape {
 
 struct atlas_packer {
     uint32_t size, padding;
-    size_t words;             /* of a row */
-    uint64_t *level[LEVELS];  /* [size][words] */
+    size_t words;            /* of a row */
+    uint64_t *level[LEVELS]; /* [size][words] */
     int level_count;
-    uint64_t *hits;           /* [words] scratch */
-    struct shape shape[4];    /* of the present item, by orientation */
+    uint64_t *hits;                   /* [words] scratch */
+    struct shape shape[4];            /* of the present item, by orientation */
     uint32_t start[CLASSES][CLASSES]; /* row where the last box of these sides found a place */
 };
 
@@ -95,8 +95,8 @@ static int level_of(const struct atlas_packer *p, uint32_t length) {
 }
 
 /* hits |= row >> shift for the words [first, last]. */
-static void or_shifted(uint64_t *restrict hits, const uint64_t *restrict row, size_t words,
-                       size_t first, size_t last, uint32_t shift) {
+static void or_shifted(uint64_t *restrict hits, const uint64_t *restrict row, size_t words, size_t first, size_t last,
+                       uint32_t shift) {
     size_t q = shift / 64;
     unsigned r = shift % 64;
     if (first + q >= words)

@@ -18,13 +18,11 @@ struct pack_item {
     int quarter;
 };
 
-static inline size_t pack_words(uint32_t width) {
-    return ((size_t)width + 63) / 64;
-}
+static inline size_t pack_words(uint32_t width) { return ((size_t)width + 63) / 64; }
 
 /* Where the place (x, y) of a w x h box gets by turning the box by quarter * 90 degrees. */
-static inline void pack_turn(int quarter, int32_t w, int32_t h, int32_t x, int32_t y,
-                             int32_t *turned_x, int32_t *turned_y) {
+static inline void pack_turn(int quarter, int32_t w, int32_t h, int32_t x, int32_t y, int32_t *turned_x,
+                             int32_t *turned_y) {
     switch (quarter) {
     case 0: *turned_x = x, *turned_y = y; break;
     case 1: *turned_x = h - y, *turned_y = x; break;

@@ -3,8 +3,7 @@
 
 #include "common/mem.h"
 
-void by_segment_sort(struct texels_by_segment *t, const struct segments *segments,
-                     const struct inverse_uv *inverse) {
+void by_segment_sort(struct texels_by_segment *t, const struct segments *segments, const struct inverse_uv *inverse) {
     size_t valid = inverse->valid_count;
     uint32_t *count = mem_calloc(segments->count + 2, sizeof *count);
     t->texel = mem_array(valid + 1, sizeof *t->texel);

@@ -14,8 +14,7 @@ struct texels_by_segment {
     uint32_t *texel; /* [valid_count]; owned */
 };
 
-void by_segment_sort(struct texels_by_segment *t, const struct segments *segments,
-                     const struct inverse_uv *inverse);
+void by_segment_sort(struct texels_by_segment *t, const struct segments *segments, const struct inverse_uv *inverse);
 void by_segment_release(struct texels_by_segment *t);
 
 static inline size_t by_segment_count(const struct texels_by_segment *t, size_t segment) {

@@ -15,7 +15,7 @@
 #include <stddef.h>
 
 #define HALF_PI (0.5 * PI)
-#define FOLD_STEPS 4096    /* of the march towards the fold */
+#define FOLD_STEPS 4096 /* of the march towards the fold */
 #define NEWTON_STEPS 50
 #define NEWTON_PIXELS 1e-6 /* residual at which the inverse is taken as found */
 
@@ -143,9 +143,8 @@ bool camera_project(const struct camera *c, vec3 point, float *x, float *y, floa
     if (!(p.z > 0.0f))
         return false;
     float u, v;
-    bool inside = c->model == CAMERA_OPENCV_FISHEYE
-                      ? project_fisheye(c, p.x / p.z, p.y / p.z, &u, &v)
-                      : project_opencv(c, p.x / p.z, p.y / p.z, &u, &v);
+    bool inside = c->model == CAMERA_OPENCV_FISHEYE ? project_fisheye(c, p.x / p.z, p.y / p.z, &u, &v)
+                                                    : project_opencv(c, p.x / p.z, p.y / p.z, &u, &v);
     if (!inside)
         return false;
     u = c->fx * u + c->cx;

@@ -15,11 +15,11 @@ enum camera_model { CAMERA_OPENCV, CAMERA_OPENCV_FISHEYE }; /* pinhole: OPENCV, 
 
 struct camera {
     enum camera_model model;
-    uint32_t width, height;      /* pixels */
-    float fx, fy, cx, cy;        /* pixels */
-    float k[6];                  /* radial */
-    float p[2];                  /* tangential; OPENCV only */
-    float fold;                  /* set by camera_find_fold, see there; 0: no limit */
+    uint32_t width, height; /* pixels */
+    float fx, fy, cx, cy;   /* pixels */
+    float k[6];             /* radial */
+    float p[2];             /* tangential; OPENCV only */
+    float fold;             /* set by camera_find_fold, see there; 0: no limit */
     struct rigid camera_from_world, world_from_camera;
 };
 
@@ -37,8 +37,6 @@ bool camera_project(const struct camera *camera, vec3 point, float *x, float *y,
  * when it does not converge; such pixels are not used. */
 bool camera_direction(const struct camera *camera, float x, float y, vec3 *direction);
 
-static inline vec3 camera_origin(const struct camera *camera) {
-    return camera->world_from_camera.translation;
-}
+static inline vec3 camera_origin(const struct camera *camera) { return camera->world_from_camera.translation; }
 
 #endif

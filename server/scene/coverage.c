@@ -30,13 +30,12 @@ static void cells(double lower, double upper, int32_t cell, int32_t *first, int3
     *last = (int32_t)floor((upper + MARGIN) / cell);
 }
 
-void coverage_rows(const struct coverage_triangle *triangle, int32_t cell, int32_t *first,
-                   int32_t *last) {
+void coverage_rows(const struct coverage_triangle *triangle, int32_t cell, int32_t *first, int32_t *last) {
     cells(min3(triangle->y), max3(triangle->y), cell, first, last);
 }
 
-void coverage_columns(const struct coverage_triangle *triangle, int32_t cell, int32_t row,
-                      int32_t *first, int32_t *last) {
+void coverage_columns(const struct coverage_triangle *triangle, int32_t cell, int32_t row, int32_t *first,
+                      int32_t *last) {
     const int32_t *x = triangle->x, *y = triangle->y;
     int32_t bottom = row * cell - MARGIN, top = (row + 1) * cell + MARGIN;
     double lower = INFINITY, upper = -INFINITY;

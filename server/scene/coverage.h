@@ -21,11 +21,10 @@ struct coverage_triangle {
 
 /* The rows [*first, *last] of cells that the triangle covers; a cell is a square of `cell` units,
  * a power of two. */
-void coverage_rows(const struct coverage_triangle *triangle, int32_t cell, int32_t *first,
-                   int32_t *last);
+void coverage_rows(const struct coverage_triangle *triangle, int32_t cell, int32_t *first, int32_t *last);
 
 /* The columns [*first, *last] that it covers in a row that coverage_rows names. */
-void coverage_columns(const struct coverage_triangle *triangle, int32_t cell, int32_t row,
-                      int32_t *first, int32_t *last);
+void coverage_columns(const struct coverage_triangle *triangle, int32_t cell, int32_t row, int32_t *first,
+                      int32_t *last);
 
 #endif

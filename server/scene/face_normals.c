@@ -20,8 +20,8 @@
 struct filter {
     const struct mesh *mesh;
     const struct face_normals *faces;
-    const vec3 *from;  /* [triangle_count] */
-    vec3 *to;          /* [triangle_count] */
+    const vec3 *from; /* [triangle_count] */
+    vec3 *to;         /* [triangle_count] */
     float spread;
 };
 

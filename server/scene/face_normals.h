@@ -9,14 +9,14 @@
 #include "server/scene/mesh.h"
 
 struct face_normals {
-    vec3 *normal;        /* [triangle_count] unit, filtered */
-    float *area;         /* [triangle_count] twice the area, m^2 */
-    uint32_t *weld;      /* [vertex_count] from mesh_weld */
-    uint32_t *first;     /* [vertex_count + 1] the triangles of welded vertex v are */
-    uint32_t *triangle;  /* those at [first[v], first[v + 1]), ascending */
+    vec3 *normal;           /* [triangle_count] unit, filtered */
+    float *area;            /* [triangle_count] twice the area, m^2 */
+    uint32_t *weld;         /* [vertex_count] from mesh_weld */
+    uint32_t *first;        /* [vertex_count + 1] the triangles of welded vertex v are */
+    uint32_t *triangle;     /* those at [first[v], first[v + 1]), ascending */
     float least_difference; /* to the most similar adjacent normal, median over triangles, before filtering: 0 for
                              * modelled meshes, whose walls consist of pairs of coplanar triangles */
-    float roughness;     /* difference of adjacent normals (length) before filtering: median over triangles of the
+    float roughness;        /* difference of adjacent normals (length) before filtering: median over triangles of the
                           * lower quartile over neighbours */
 };
 

@@ -6,7 +6,8 @@
 
 #include "common/cholesky.h"
 
-void height_frame_init(struct height_frame *f, vec3 normal, const vec3 *position, const uint32_t *vertex, size_t count) {
+void height_frame_init(struct height_frame *f, vec3 normal, const vec3 *position, const uint32_t *vertex,
+                       size_t count) {
     vec3 first = position[vertex[0]];
     double sum[3] = {0.0, 0.0, 0.0}, n = (double)count;
     for (size_t i = 0; i < count; i++) {

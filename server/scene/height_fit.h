@@ -21,9 +21,9 @@ struct height_frame {
 
 struct height_fit {
     size_t terms;
-    double coefficient[HEIGHT_PARABOLOID];                        /* of heights in metres over coordinates in `unit` */
+    double coefficient[HEIGHT_PARABOLOID];               /* of heights in metres over coordinates in `unit` */
     double factor[HEIGHT_PARABOLOID][HEIGHT_PARABOLOID]; /* Cholesky factor of the normal equations */
-    double residual_squares;                                      /* sum of squared residuals, m^2 */
+    double residual_squares;                             /* sum of squared residuals, m^2 */
 };
 
 /* Frame centred at the mean of position[vertex[0..count)], count > 0; `normal` need not be unit. */

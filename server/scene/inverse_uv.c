@@ -32,8 +32,7 @@ static struct coverage_triangle units_of(const struct atlas *atlas, size_t t) {
 }
 
 /* Rows of the image that the triangle covers; false when there are none. */
-static bool rows_of(const struct coverage_triangle *u, uint32_t height, int32_t *first,
-                    int32_t *last) {
+static bool rows_of(const struct coverage_triangle *u, uint32_t height, int32_t *first, int32_t *last) {
     coverage_rows(u, COVERAGE_UNITS, first, last);
     if (*first < 0)
         *first = 0;
@@ -144,8 +143,7 @@ void inverse_uv_make(struct inverse_uv *inverse, const struct atlas *atlas, size
     int thread_count = parallel_thread_count(pool);
     inverse->width = atlas->width;
     inverse->height = atlas->height;
-    inverse->triangle =
-        mem_array((size_t)atlas->width * atlas->height, sizeof *inverse->triangle);
+    inverse->triangle = mem_array((size_t)atlas->width * atlas->height, sizeof *inverse->triangle);
     struct fill fill = {.inverse = inverse, .atlas = atlas};
     sort_by_band(&fill, band_count, triangle_count);
     fill.offset = mem_calloc(band_count + 1, sizeof *fill.offset);

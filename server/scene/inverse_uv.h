@@ -18,9 +18,9 @@
 
 struct inverse_uv {
     uint32_t width, height;
-    uint32_t *triangle;   /* [height][width], INVERSE_UV_NONE where not valid; owned */
+    uint32_t *triangle; /* [height][width], INVERSE_UV_NONE where not valid; owned */
     size_t valid_count;
-    uint32_t *valid;      /* [valid_count] texel numbers y * width + x, in tiles of 32 x 32 texels
+    uint32_t *valid; /* [valid_count] texel numbers y * width + x, in tiles of 32 x 32 texels
                            * (row by row of tiles, row by row within one): neighbours in this
                            * list are neighbours on the surface; owned */
 };

@@ -5,8 +5,8 @@
 
 #define MAX_POLISHED_ROUGHNESS 0.5f /* roughness, at most */
 
-void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count,
-                    rgb base_color, float roughness, float specular) {
+void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
+                    float roughness, float specular) {
     texture_init(&m->base_color, inverse, base_color);
     m->segment_count = segment_count;
     m->emission_pattern = NULL;
@@ -46,9 +46,7 @@ void materials_drop_emission_pattern(struct materials *m) {
 /* Lower bound of a pattern's channels, since 0 stands for unknown. */
 #define MIN_PATTERN 1e-3f
 
-static float pattern_of(float radiance, float mean) {
-    return mean > 0.0f ? fmaxf(radiance / mean, MIN_PATTERN) : 1.0f;
-}
+static float pattern_of(float radiance, float mean) { return mean > 0.0f ? fmaxf(radiance / mean, MIN_PATTERN) : 1.0f; }
 
 void materials_set_emission_pattern(struct materials *m, size_t texel, rgb radiance, rgb mean) {
     rgb pattern = {pattern_of(radiance.r, mean.r), pattern_of(radiance.g, mean.g), pattern_of(radiance.b, mean.b)};

@@ -12,18 +12,18 @@
 #include "server/scene/texture.h"
 
 struct materials {
-    struct texture base_color;  /* linear reflectance in [0, 1] */
+    struct texture base_color; /* linear reflectance in [0, 1] */
     size_t segment_count;
-    float *roughness;           /* [segment_count] in [0, 1]; alpha = roughness^2; owned */
-    float *specular;            /* [segment_count] in [0, 1]; owned */
-    rgb *emission;              /* [segment_count] radiance emitted from the front side, mean over the segment; 0: no
+    float *roughness; /* [segment_count] in [0, 1]; alpha = roughness^2; owned */
+    float *specular;  /* [segment_count] in [0, 1]; owned */
+    rgb *emission;    /* [segment_count] radiance emitted from the front side, mean over the segment; 0: no
                                  * emitter; owned */
     uint16_t (*emission_pattern)[3]; /* [height][width] half precision: emission of a texel over the mean of its
                                       * segment, positive; 0 where unknown, which reads as 1. NULL: none. Owned */
 };
 
-void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count,
-                    rgb base_color, float roughness, float specular); /* no emission */
+void materials_init(struct materials *m, const struct inverse_uv *inverse, size_t segment_count, rgb base_color,
+                    float roughness, float specular); /* no emission */
 void materials_release(struct materials *m);
 
 /* Whether a segment is close to a mirror. The specular lobe of rougher ones is so wide that photographs show it. */

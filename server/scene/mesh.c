@@ -85,25 +85,30 @@ static enum status check_input(const struct mesh *mesh, const char *name, struct
     if (mesh->triangle_count == 0)
         return error_set(err, STATUS_INPUT, "mesh %s: it has no faces", name);
     if (mesh->triangle_count > MESH_MAX_TRIANGLES || mesh->vertex_count >= UINT32_MAX)
-        return error_set(err, STATUS_INPUT, "mesh %s: %zu triangles and %zu vertices, at most %zu "
-                         "and %u can be used", name, mesh->triangle_count, mesh->vertex_count,
-                         MESH_MAX_TRIANGLES, UINT32_MAX - 1);
+        return error_set(err, STATUS_INPUT,
+                         "mesh %s: %zu triangles and %zu vertices, at most %zu "
+                         "and %u can be used",
+                         name, mesh->triangle_count, mesh->vertex_count, MESH_MAX_TRIANGLES, UINT32_MAX - 1);
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         vec3 p = mesh->position[v];
         if (!vec3_is_finite(p))
-            return error_set(err, STATUS_INPUT, "mesh %s: vertex %zu: a coordinate is not a finite "
-                             "number", name, v);
+            return error_set(err, STATUS_INPUT,
+                             "mesh %s: vertex %zu: a coordinate is not a finite "
+                             "number",
+                             name, v);
         if (fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))) > MESH_MAX_COORDINATE_M)
-            return error_set(err, STATUS_INPUT, "mesh %s: vertex %zu at (%g, %g, %g) is farther than "
-                             "%g m from the origin", name, v, (double)p.x, (double)p.y, (double)p.z,
-                             (double)MESH_MAX_COORDINATE_M);
+            return error_set(err, STATUS_INPUT,
+                             "mesh %s: vertex %zu at (%g, %g, %g) is farther than "
+                             "%g m from the origin",
+                             name, v, (double)p.x, (double)p.y, (double)p.z, (double)MESH_MAX_COORDINATE_M);
     }
     for (size_t t = 0; t < mesh->triangle_count; t++)
         for (int c = 0; c < 3; c++)
             if (mesh->index[t][c] >= mesh->vertex_count)
-                return error_set(err, STATUS_INPUT, "mesh %s: face %u: vertex index %u, but there "
-                                 "are %zu vertices", name, mesh->face[t], mesh->index[t][c],
-                                 mesh->vertex_count);
+                return error_set(err, STATUS_INPUT,
+                                 "mesh %s: face %u: vertex index %u, but there "
+                                 "are %zu vertices",
+                                 name, mesh->face[t], mesh->index[t][c], mesh->vertex_count);
     return STATUS_OK;
 }
 
@@ -116,8 +121,7 @@ static bool is_degenerate(const struct mesh *mesh, size_t triangle) {
         edge[c][0] = (double)b.x - (double)a.x;
         edge[c][1] = (double)b.y - (double)a.y;
         edge[c][2] = (double)b.z - (double)a.z;
-        longest = fmax(longest, edge[c][0] * edge[c][0] + edge[c][1] * edge[c][1] +
-                                    edge[c][2] * edge[c][2]);
+        longest = fmax(longest, edge[c][0] * edge[c][0] + edge[c][1] * edge[c][1] + edge[c][2] * edge[c][2]);
     }
     double x = edge[0][1] * edge[1][2] - edge[0][2] * edge[1][1];
     double y = edge[0][2] * edge[1][0] - edge[0][0] * edge[1][2];
@@ -128,8 +132,7 @@ static bool is_degenerate(const struct mesh *mesh, size_t triangle) {
 }
 
 /* The welded corners in ascending order: the same for every winding and start. */
-static void sorted_corners(const struct mesh *mesh, const uint32_t *weld, size_t triangle,
-                           uint32_t corner[3]) {
+static void sorted_corners(const struct mesh *mesh, const uint32_t *weld, size_t triangle, uint32_t corner[3]) {
     for (int c = 0; c < 3; c++) {
         uint32_t v = weld[mesh->index[triangle][c]];
         int place = c;
@@ -186,8 +189,7 @@ static void repair_normals(struct mesh *mesh) {
             bad++;
             continue;
         }
-        mesh->normal[v] =
-            vec3_normalize((vec3){n.x / largest, n.y / largest, n.z / largest});
+        mesh->normal[v] = vec3_normalize((vec3){n.x / largest, n.y / largest, n.z / largest});
     }
     if (bad == 0)
         return;
@@ -206,8 +208,7 @@ static void repair_normals(struct mesh *mesh) {
     mem_free(sum);
 }
 
-enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report,
-                       struct error *err) {
+enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err) {
     struct mesh_report found = {0};
     enum status status = check_input(mesh, name, err);
     if (status != STATUS_OK)
@@ -216,8 +217,7 @@ enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *
     if (report)
         *report = found;
     if (mesh->triangle_count == 0)
-        return error_set(err, STATUS_INPUT, "mesh %s: none of its %zu faces has an area", name,
-                         mesh->face_count);
+        return error_set(err, STATUS_INPUT, "mesh %s: none of its %zu faces has an area", name, mesh->face_count);
     if (mesh->normal)
         repair_normals(mesh);
     return STATUS_OK;

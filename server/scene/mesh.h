@@ -13,14 +13,14 @@
 
 struct mesh {
     size_t vertex_count;
-    vec3 *position;          /* [vertex_count] metres; owned */
-    vec3 *normal;            /* [vertex_count] unit shading normals, or NULL; owned */
+    vec3 *position; /* [vertex_count] metres; owned */
+    vec3 *normal;   /* [vertex_count] unit shading normals, or NULL; owned */
     size_t triangle_count;
-    uint32_t (*index)[3];    /* [triangle_count] vertices, counter-clockwise from the front; owned */
-    uint32_t *face;          /* [triangle_count] face of the input that the triangle was cut from,
+    uint32_t (*index)[3]; /* [triangle_count] vertices, counter-clockwise from the front; owned */
+    uint32_t *face;       /* [triangle_count] face of the input that the triangle was cut from,
                               * ascending; owned */
-    int64_t *object_id;      /* [triangle_count] the input's object_id, or NULL; owned */
-    size_t face_count;       /* faces of the input, the dropped ones included */
+    int64_t *object_id;   /* [triangle_count] the input's object_id, or NULL; owned */
+    size_t face_count;    /* faces of the input, the dropped ones included */
 };
 
 struct mesh_report {
@@ -34,8 +34,7 @@ void mesh_release(struct mesh *mesh);
  * degenerate and duplicate triangles in place, keeping the order. Of two coincident triangles a ray hits either, so
  * only the first can be measured. Normals are normalised; zero or non-finite ones are replaced by the mean of the
  * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
-enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report,
-                       struct error *err);
+enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err);
 
 /* Maps each vertex to the lowest-numbered one at the same position (files repeat vertices where
  * normals differ). The result, [vertex_count], is the caller's (mem_free). */
@@ -50,7 +49,7 @@ static inline vec3 mesh_point(const struct mesh *mesh, size_t triangle, float b1
     p = vec3_mad(p, b1, mesh->position[v[1]]);
     return vec3_mad(p, b2, mesh->position[v[2]]);
 }
-double mesh_area(const struct mesh *mesh); /* total, m^2 */
+double mesh_area(const struct mesh *mesh);                           /* total, m^2 */
 void mesh_bounds(const struct mesh *mesh, vec3 *lower, vec3 *upper); /* of the triangles */
 
 #endif

@@ -10,26 +10,26 @@
 #include "server/scene/mesh_planes.h"
 #include "server/scene/mesh_round.h"
 
-#define CHUNK 1024      /* vertices per work item */
-#define ROUNDS 3        /* of filtering normals and then fitting vertices to them */
-#define STEPS_PER_ROUND 10        /* fixed-point iterations of the vertex update */
-#define CURVED_PASSES 2  /* of smoothing curved surfaces; the first gives them better normals */
-#define AVERAGE_PASSES 2 /* of averaging over direct neighbours: reaches about 20 vertices */
-#define SHAPE_SIGMA 0.4f /* of noise: a mean displacement of a neighbourhood below this may be chance */
-#define EXCESS_FACTOR 2.5f /* times the noise variance: a mean square displacement below this may be chance */
-#define SAME_SURFACE_COSINE 0.8f      /* between normals of neighbours on one surface */
-#define MAD_PER_SIGMA 0.6745f /* of a normal distribution: median absolute deviation over standard deviation */
+#define CHUNK 1024               /* vertices per work item */
+#define ROUNDS 3                 /* of filtering normals and then fitting vertices to them */
+#define STEPS_PER_ROUND 10       /* fixed-point iterations of the vertex update */
+#define CURVED_PASSES 2          /* of smoothing curved surfaces; the first gives them better normals */
+#define AVERAGE_PASSES 2         /* of averaging over direct neighbours: reaches about 20 vertices */
+#define SHAPE_SIGMA 0.4f         /* of noise: a mean displacement of a neighbourhood below this may be chance */
+#define EXCESS_FACTOR 2.5f       /* times the noise variance: a mean square displacement below this may be chance */
+#define SAME_SURFACE_COSINE 0.8f /* between normals of neighbours on one surface */
+#define MAD_PER_SIGMA 0.6745f    /* of a normal distribution: median absolute deviation over standard deviation */
 
 struct denoising {
     const struct face_normals *faces;
     struct mesh *mesh;
-    const vec3 *start;  /* [vertex_count] positions before denoising */
-    vec3 *normal;       /* [vertex_count] unit vertex normals, from the filtered triangle normals */
-    vec3 *next;         /* [vertex_count] */
-    float *displacement;       /* [vertex_count] along the normal, metres */
-    float *value;       /* [vertex_count] input of average(), and its output */
-    float *average;     /* [vertex_count] scratch of average() */
-    float noise;        /* standard deviation, metres */
+    const vec3 *start;   /* [vertex_count] positions before denoising */
+    vec3 *normal;        /* [vertex_count] unit vertex normals, from the filtered triangle normals */
+    vec3 *next;          /* [vertex_count] */
+    float *displacement; /* [vertex_count] along the normal, metres */
+    float *value;        /* [vertex_count] input of average(), and its output */
+    float *average;      /* [vertex_count] scratch of average() */
+    float noise;         /* standard deviation, metres */
 };
 
 static size_t chunks_of(const struct mesh *mesh) { return (mesh->vertex_count + CHUNK - 1) / CHUNK; }

@@ -9,31 +9,33 @@
 #include "common/mem.h"
 
 #define UNASSIGNED (UINT32_MAX - 1) /* region of a triangle that no seed has tried yet */
-#define MIN_NORMAL_COSINE 0.9f           /* between the plane's normal and the filtered normal of a triangle in it */
-#define MAX_DISTANCE_SIGMA 1.5f          /* of noise: distance of a triangle's vertices from the plane */
-#define GROW_PASSES 3            /* each after the first starts from the plane that the one before fitted */
-#define MIN_VERTICES 8    /* in a region */
-#define CONTINUED_COSINE 0.6f  /* between the plane's normal and that of an adjacent triangle beyond which it is an
+#define MIN_NORMAL_COSINE 0.9f      /* between the plane's normal and the filtered normal of a triangle in it */
+#define MAX_DISTANCE_SIGMA 1.5f     /* of noise: distance of a triangle's vertices from the plane */
+#define GROW_PASSES 3               /* each after the first starts from the plane that the one before fitted */
+#define MIN_VERTICES 8              /* in a region */
+#define CONTINUED_COSINE                                                                                               \
+    0.6f                         /* between the plane's normal and that of an adjacent triangle beyond which it is an
                                 * edge */
 #define MAX_CONTINUED_SHARE 0.33 /* of a region's vertices with such an adjacent triangle outside */
-#define MAX_RESIDUAL_SIGMA 1.5      /* of noise: root mean square distance of a region's vertices from its plane */
-#define MAX_BOW_SIGMA 0.2        /* of noise: a paraboloid that fits better by less than this is ignored however
+#define MAX_RESIDUAL_SIGMA 1.5   /* of noise: root mean square distance of a region's vertices from its plane */
+#define MAX_BOW_SIGMA                                                                                                  \
+    0.2                    /* of noise: a paraboloid that fits better by less than this is ignored however
                                   * significant */
-#define FILTERED_SIGMA 0.5    /* of noise: standard deviation of a filtered vertex */
+#define FILTERED_SIGMA 0.5 /* of noise: standard deviation of a filtered vertex */
 #define MAX_PLANES 8       /* that constrain one vertex; further ones are ignored */
 
 struct plane_growth {
     const struct mesh *mesh;
-    const vec3 *measured;        /* [vertex_count] */
+    const vec3 *measured; /* [vertex_count] */
     const struct face_normals *faces;
     float noise;
-    uint32_t *region;              /* [triangle_count] plane of a triangle, MESH_PLANES_NONE or UNASSIGNED */
-    uint32_t visit;              /* number of the current pass */
-    uint32_t *triangle_visit;              /* [triangle_count] last pass that tested the triangle */
-    uint32_t *vertex_visit;           /* [vertex_count] last pass that added the welded vertex */
-    size_t triangles, vertices;  /* in the current region */
-    uint32_t *triangle;          /* [triangle_count] */
-    uint32_t *vertex;            /* [vertex_count] welded */
+    uint32_t *region;           /* [triangle_count] plane of a triangle, MESH_PLANES_NONE or UNASSIGNED */
+    uint32_t visit;             /* number of the current pass */
+    uint32_t *triangle_visit;   /* [triangle_count] last pass that tested the triangle */
+    uint32_t *vertex_visit;     /* [vertex_count] last pass that added the welded vertex */
+    size_t triangles, vertices; /* in the current region */
+    uint32_t *triangle;         /* [triangle_count] */
+    uint32_t *vertex;           /* [vertex_count] welded */
 };
 
 /* --- fits --------------------------------------------------------------------------------------- */
@@ -97,9 +99,7 @@ static bool accept_plane(const struct plane_growth *g, struct mesh_plane *p) {
 
 /* --- growth ------------------------------------------------------------------------------------- */
 
-static uint32_t corner(const struct plane_growth *g, size_t t, int c) {
-    return g->faces->weld[g->mesh->index[t][c]];
-}
+static uint32_t corner(const struct plane_growth *g, size_t t, int c) { return g->faces->weld[g->mesh->index[t][c]]; }
 
 static bool is_in_plane(const struct plane_growth *g, const struct mesh_plane *p, size_t t) {
     double limit = (double)(MAX_DISTANCE_SIGMA * g->noise);

@@ -21,7 +21,7 @@ struct mesh_plane {
 struct mesh_planes {
     size_t count;
     struct mesh_plane *plane; /* [count] owned */
-    uint32_t *region;           /* [triangle_count] index of the triangle's plane, or MESH_PLANES_NONE; owned */
+    uint32_t *region;         /* [triangle_count] index of the triangle's plane, or MESH_PLANES_NONE; owned */
 };
 
 /* Finds the planes of a mesh whose normals were filtered. measured[vertex_count] are the positions before filtering,

@@ -7,15 +7,16 @@
 
 #include "common/mem.h"
 
-#define CHUNK 1024     /* vertices per work item */
-#define EDGE_COSINE 0.5f      /* between the normals of a vertex and its triangles; below it there is an edge */
-#define MIN_NORMAL_COSINE 0.5f      /* between the normals of vertices in one fit */
-#define MIN_NEIGHBOURS 12  /* vertices in the first fit; each further fit has half as many more */
+#define CHUNK 1024             /* vertices per work item */
+#define EDGE_COSINE 0.5f       /* between the normals of a vertex and its triangles; below it there is an edge */
+#define MIN_NORMAL_COSINE 0.5f /* between the normals of vertices in one fit */
+#define MIN_NEIGHBOURS 12      /* vertices in the first fit; each further fit has half as many more */
 #define MAX_NEIGHBOURS 96
 #define VISITED_SLOTS 256 /* of the hash set; more than twice MAX_NEIGHBOURS */
-#define MAX_CHI2_SIGMA 5.0   /* residual of a fit, in standard deviations of chi squared, above which the surface is
+#define MAX_CHI2_SIGMA                                                                                                 \
+    5.0                    /* residual of a fit, in standard deviations of chi squared, above which the surface is
                               * no paraboloid */
-#define INTERVAL_SIGMA 0.7      /* half width of a fit's confidence interval, standard deviations */
+#define INTERVAL_SIGMA 0.7 /* half width of a fit's confidence interval, standard deviations */
 
 struct smoothing {
     struct mesh *mesh;

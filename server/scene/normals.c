@@ -4,8 +4,8 @@
 #include "common/mem.h"
 #include "server/scene/face_normals.h"
 
-#define EDGE_COSINE 0.8f /* between filtered normals; below it there is an edge */
-#define FLAT_DIFFERENCE 1e-6f       /* 1 - cosine to the triangle's own normal that counts as equal */
+#define EDGE_COSINE 0.8f      /* between filtered normals; below it there is an edge */
+#define FLAT_DIFFERENCE 1e-6f /* 1 - cosine to the triangle's own normal that counts as equal */
 
 /* The vertices being built. */
 struct vertices {

@@ -64,8 +64,7 @@ float photograph_falloff(const struct photograph *photo, float x, float y) {
     return expf(s * (v[0] + s * (v[1] + s * v[2])));
 }
 
-bool photograph_sample(const struct photograph *photo, float x, float y,
-                       struct photograph_sample *sample) {
+bool photograph_sample(const struct photograph *photo, float x, float y, struct photograph_sample *sample) {
     uint32_t width = photo->camera.width, height = photo->camera.height;
     assert(width > 0 && height > 0);
     size_t column[2], row[2];
@@ -90,8 +89,7 @@ bool photograph_sample(const struct photograph *photo, float x, float y,
     if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
         return false;
     float scale = photo->exposure * photograph_falloff(photo, x, y);
-    float r = 1.0f / (scale * photo->gain.r), g = 1.0f / (scale * photo->gain.g),
-          b = 1.0f / (scale * photo->gain.b);
+    float r = 1.0f / (scale * photo->gain.r), g = 1.0f / (scale * photo->gain.g), b = 1.0f / (scale * photo->gain.b);
     sample->radiance = rgb_make(value[0] * r, value[1] * g, value[2] * b);
     sample->clip_radiance = rgb_make(photo->clip * r, photo->clip * g, photo->clip * b);
     return true;
@@ -132,8 +130,8 @@ bool photograph_sample_cubic(const struct photograph *photo, float x, float y, r
     if (!isfinite(value[0]) || !isfinite(value[1]) || !isfinite(value[2]))
         return false;
     float scale = 1.0f / (photo->exposure * photograph_falloff(photo, x, y));
-    *radiance = rgb_make(value[0] * scale / photo->gain.r, value[1] * scale / photo->gain.g,
-                         value[2] * scale / photo->gain.b);
+    *radiance =
+        rgb_make(value[0] * scale / photo->gain.r, value[1] * scale / photo->gain.g, value[2] * scale / photo->gain.b);
     return true;
 }
 

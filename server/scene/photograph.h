@@ -18,33 +18,33 @@
 #include "server/scene/camera.h"
 
 struct photograph {
-    char *name;             /* as in transforms.json; owned */
+    char *name; /* as in transforms.json; owned */
     struct camera camera;
-    bool is_test;           /* held out: never used to reconstruct */
+    bool is_test; /* held out: never used to reconstruct */
     bool is_hdr;
     bool exposure_known;
-    float exposure;         /* pixel value per radiance; 1 until it is solved where not known */
-    rgb gain;               /* per channel, 1 by default */
-    float vignette[3];      /* v0 v1 v2 of the falloff; 0: none */
-    float blur_px;          /* motion blur in excess of the neighbouring frames', standard deviation; 0: none */
-    float black;            /* a stored 0 reads as minus this value; 0 until the noise is known, and for HDR */
-    float clip;             /* saturation value; INFINITY for HDR */
-    uint16_t (*pixel)[3];   /* [height][width] linear, half precision; owned */
-    uint8_t *saturated;         /* [height][width] bit c: channel c is saturated, judged with its neighbourhood
+    float exposure;       /* pixel value per radiance; 1 until it is solved where not known */
+    rgb gain;             /* per channel, 1 by default */
+    float vignette[3];    /* v0 v1 v2 of the falloff; 0: none */
+    float blur_px;        /* motion blur in excess of the neighbouring frames', standard deviation; 0: none */
+    float black;          /* a stored 0 reads as minus this value; 0 until the noise is known, and for HDR */
+    float clip;           /* saturation value; INFINITY for HDR */
+    uint16_t (*pixel)[3]; /* [height][width] linear, half precision; owned */
+    uint8_t *saturated;   /* [height][width] bit c: channel c is saturated, judged with its neighbourhood
                                  * (clip.h); NULL: where the value is at the clip; owned */
-    bool *firefly;            /* [height][width] isolated bright pixel of Monte Carlo or sensor noise; NULL: not
+    bool *firefly;        /* [height][width] isolated bright pixel of Monte Carlo or sensor noise; NULL: not
                                * detected; owned */
-    uint8_t *clipped;       /* [height][width] bit c: channel c had its largest value in the file; NULL: where the
+    uint8_t *clipped;     /* [height][width] bit c: channel c had its largest value in the file; NULL: where the
                              * value is at the clip. In a file of primaries wider than Rec. 709, unclipped values may
                              * exceed the clip; owned */
-    char *color_space;      /* name of the file's colour space if it was converted ("Display P3"), else NULL; owned */
-    uint8_t *mask;          /* [height][width] 0: the pixel is excluded; NULL: none is; owned */
+    char *color_space;    /* name of the file's colour space if it was converted ("Display P3"), else NULL; owned */
+    uint8_t *mask;        /* [height][width] 0: the pixel is excluded; NULL: none is; owned */
 };
 
 struct photograph_sample {
-    rgb radiance;           /* value / (exposure * gain * falloff); may be negative */
-    bool saturated[3];      /* per channel: the value is a lower bound */
-    rgb clip_radiance;      /* radiance at which this frame saturates; INFINITY for HDR */
+    rgb radiance;      /* value / (exposure * gain * falloff); may be negative */
+    bool saturated[3]; /* per channel: the value is a lower bound */
+    rgb clip_radiance; /* radiance at which this frame saturates; INFINITY for HDR */
 };
 
 /* Whether any channel is a lower bound. */
@@ -76,8 +76,7 @@ static inline float photograph_weight(const struct photograph *photo) {
 
 /* Bilinear lookup at pixel coordinates (x, y) inside the picture; a channel is saturated if a tap with weight is.
  * False when a tap is masked or not finite. */
-bool photograph_sample(const struct photograph *photo, float x, float y,
-                       struct photograph_sample *sample);
+bool photograph_sample(const struct photograph *photo, float x, float y, struct photograph_sample *sample);
 
 /* Whether a tap of the bilinear lookup is a firefly. */
 bool photograph_has_firefly(const struct photograph *photo, float x, float y);

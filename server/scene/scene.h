@@ -13,7 +13,7 @@ struct scene {
     size_t photograph_count;
     struct photograph *photograph; /* [photograph_count]; owned */
     size_t warning_count;
-    char **warning;                /* [warning_count] sentences for the user; owned */
+    char **warning; /* [warning_count] sentences for the user; owned */
 };
 
 void scene_release(struct scene *scene);

@@ -18,14 +18,17 @@
 #include "common/rng.h"
 #include "server/scene/adjacency.h"
 
-#define CONVEX_FACTOR 0.3f    /* of the weight of a convex fold: objects are convex, and borders between objects are
+#define CONVEX_FACTOR                                                                                                  \
+    0.3f            /* of the weight of a convex fold: objects are convex, and borders between objects are
                                * mostly concave */
-#define FLAT 0.002f           /* weight below which there is no fold: 3.6 degrees concave, 6.6 convex */
-#define SIZE_BONUS 0.5             /* added to the internal difference of a region of 1 / BONUS_PARTS of the mesh's
+#define FLAT 0.002f /* weight below which there is no fold: 3.6 degrees concave, 6.6 convex */
+#define SIZE_BONUS                                                                                                     \
+    0.5 /* added to the internal difference of a region of 1 / BONUS_PARTS of the mesh's
                                     * area */
 #define BONUS_PARTS 100000.0
-#define SMALL_PARTS 5000.0    /* a region of less than 1 / SMALL_PARTS of the mesh is small */
-#define SCAN_EVENNESS 16.0    /* mean square of triangle areas over their squared mean: 1 to 3 for fused depth maps,
+#define SMALL_PARTS 5000.0 /* a region of less than 1 / SMALL_PARTS of the mesh is small */
+#define SCAN_EVENNESS                                                                                                  \
+    16.0 /* mean square of triangle areas over their squared mean: 1 to 3 for fused depth maps,
                                * hundreds for modelled rooms */
 
 #define NONE UINT32_MAX
@@ -83,9 +86,7 @@ static void join(struct regions *r, uint32_t a, uint32_t b, float weight) {
     r->inside[a] = fmaxf(weight, fmaxf(r->inside[a], r->inside[b]));
 }
 
-static vec3 centre_of(const struct mesh *mesh, uint32_t t) {
-    return mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f);
-}
+static vec3 centre_of(const struct mesh *mesh, uint32_t t) { return mesh_point(mesh, t, 1.0f / 3.0f, 1.0f / 3.0f); }
 
 static int lightest_first(const void *left, const void *right) {
     const struct link *a = left, *b = right;
@@ -95,8 +96,7 @@ static int lightest_first(const void *left, const void *right) {
 }
 
 /* All pairs of triangles that share an edge, in order of increasing weight. */
-static struct link *make_links(const struct mesh *mesh, const struct adjacency *adjacency,
-                               size_t *count) {
+static struct link *make_links(const struct mesh *mesh, const struct adjacency *adjacency, size_t *count) {
     vec3 *normal = adjacency_smooth_normals(adjacency, mesh);
     struct link *link = mem_array(3 * mesh->triangle_count, sizeof *link);
     *count = 0;
@@ -146,8 +146,7 @@ static size_t slot_of(const struct cubes *cubes, const int64_t cube[3]) {
 
 /* The hashed triangle with its centre nearest to p, if nearer than *nearest_m (which is lowered) and within one cell;
  * else `otherwise`. */
-static uint32_t nearest_triangle(const struct cubes *cubes, vec3 p, float *nearest_m,
-                                 uint32_t otherwise) {
+static uint32_t nearest_triangle(const struct cubes *cubes, vec3 p, float *nearest_m, uint32_t otherwise) {
     int64_t middle[3];
     cube_of(cubes, p, middle);
     for (int i = 0; i < 27; i++) {
@@ -189,8 +188,7 @@ static void merge_debris(struct regions *r, const struct mesh *mesh, double smal
     for (uint32_t t = 0; t < n; t++) {
         uint32_t root = root_of(r, t);
         if (r->area[root] < small_area)
-            target[root] = nearest_triangle(&cubes, centre_of(mesh, t), &distance_m[root],
-                                            target[root]);
+            target[root] = nearest_triangle(&cubes, centre_of(mesh, t), &distance_m[root], target[root]);
     }
     uint32_t strays = NONE;
     for (uint32_t t = 0; t < n; t++) {
@@ -233,8 +231,7 @@ void segments_automatic(struct segments *s, const struct mesh *mesh) {
     struct adjacency adjacency;
     adjacency_make(&adjacency, mesh);
     struct link *link = make_links(mesh, &adjacency, &link_count);
-    struct regions r = {mem_array(n, sizeof *r.parent), mem_array(n, sizeof *r.area),
-                        mem_calloc(n, sizeof *r.inside)};
+    struct regions r = {mem_array(n, sizeof *r.parent), mem_array(n, sizeof *r.area), mem_calloc(n, sizeof *r.inside)};
     double total = mesh_area(mesh);
     for (uint32_t t = 0; t < n; t++) {
         r.parent[t] = t;

@@ -11,8 +11,8 @@ vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float
     return vec3_dot(n, normal) > 0.0f ? n : normal;
 }
 
-bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
-                float x, float y, struct surface_point *p) {
+bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse, float x, float y,
+                struct surface_point *p) {
     if (!inverse_uv_lookup(inverse, atlas, x, y, &p->triangle, &p->b1, &p->b2))
         return false;
     p->position = mesh_point(mesh, p->triangle, p->b1, p->b2);
@@ -21,8 +21,8 @@ bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct
     return true;
 }
 
-bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas,
-                      const struct inverse_uv *inverse, uint32_t texel, struct surface_point *p) {
+bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
+                      uint32_t texel, struct surface_point *p) {
     return surface_at(mesh, atlas, inverse, (float)(texel % inverse->width) + 0.5f,
                       (float)(texel / inverse->width) + 0.5f, p);
 }

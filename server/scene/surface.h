@@ -23,11 +23,11 @@ struct surface_point {
 vec3 surface_shading(const struct mesh *mesh, uint32_t triangle, float b1, float b2, vec3 normal);
 
 /* Surface point at the texel's centre; false when the texel is not valid. */
-bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas,
-                      const struct inverse_uv *inverse, uint32_t texel, struct surface_point *point);
+bool surface_at_texel(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
+                      uint32_t texel, struct surface_point *point);
 
 /* Surface point at (x, y), in texels, inside a valid texel. */
-bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse,
-                float x, float y, struct surface_point *point);
+bool surface_at(const struct mesh *mesh, const struct atlas *atlas, const struct inverse_uv *inverse, float x, float y,
+                struct surface_point *point);
 
 #endif

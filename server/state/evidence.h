@@ -12,17 +12,17 @@
 
 /* Radiances are by channel. */
 struct emitter_evidence {
-    rgb radiance;          /* estimated outgoing radiance; 0: not observed; set by evidence_set_radiance only */
-    rgb observed;          /* median of the photographs; a lower bound in saturated channels */
-    bool is_seen;          /* some photograph shows it, and not what is beside or behind it */
-    bool only_mixed;       /* observed only in pixels that mix surfaces */
-    bool is_hidden;        /* a lamp that no photograph shows: `radiance` is inferred from its light (lamp_find.h) */
-    bool saturated[3];     /* by channel: at least half of its pixels saturate */
-    bool is_unbounded;     /* a saturated lamp whose `radiance` is inferred from its light (saturated_light.h) */
-    rgb lambert;           /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
-    float emitted_share;   /* part of `radiance` beyond `lambert`, in [0, 1] */
-    float changing_share;  /* part of its surface whose light changed between photographs (changing_light.h) */
-    float sky_lambert;     /* mean radiance of a Lambertian surface of albedo 1 by unobserved sky (sky_doubt.h) */
+    rgb radiance;         /* estimated outgoing radiance; 0: not observed; set by evidence_set_radiance only */
+    rgb observed;         /* median of the photographs; a lower bound in saturated channels */
+    bool is_seen;         /* some photograph shows it, and not what is beside or behind it */
+    bool only_mixed;      /* observed only in pixels that mix surfaces */
+    bool is_hidden;       /* a lamp that no photograph shows: `radiance` is inferred from its light (lamp_find.h) */
+    bool saturated[3];    /* by channel: at least half of its pixels saturate */
+    bool is_unbounded;    /* a saturated lamp whose `radiance` is inferred from its light (saturated_light.h) */
+    rgb lambert;          /* mean radiance that a Lambertian surface of albedo 1 would reflect there */
+    float emitted_share;  /* part of `radiance` beyond `lambert`, in [0, 1] */
+    float changing_share; /* part of its surface whose light changed between photographs (changing_light.h) */
+    float sky_lambert;    /* mean radiance of a Lambertian surface of albedo 1 by unobserved sky (sky_doubt.h) */
 };
 
 static inline void evidence_set_radiance(struct emitter_evidence *e, rgb radiance) { e->radiance = radiance; }

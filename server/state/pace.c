@@ -15,15 +15,15 @@
 #define PREPARE_PIXEL_SEC 4.5e-6 /* a pixel of photographs */
 #define PREPARE_TEXEL_SEC 1.6e-6 /* a texel of the square, mapped or not */
 #define FUSE_SEC 2.0
-#define FUSE_TEXEL_SEC 9.0e-6    /* a mapped texel, as all below */
-#define GATHER_SEC 0.45e-6       /* a direction */
-#define FIT_SPECULAR_SEC 13.0    /* a specular fit */
+#define FUSE_TEXEL_SEC 9.0e-6 /* a mapped texel, as all below */
+#define GATHER_SEC 0.45e-6    /* a direction */
+#define FIT_SPECULAR_SEC 13.0 /* a specular fit */
 #define FIT_TEXEL_SEC 3.5e-6
 #define MEASURE_SEC 16.0e-6
-#define DETAIL_SEC 0.9e-6        /* a step */
-#define REFINE_PATH_SEC 1.7e-6   /* a path of refine; listing1 walks it backwards as well: */
+#define DETAIL_SEC 0.9e-6      /* a step */
+#define REFINE_PATH_SEC 1.7e-6 /* a path of refine; listing1 walks it backwards as well: */
 #define LISTING1_FACTOR 1.5
-#define REPORT_SEC 1.2e-6        /* a path of a held-out re-render */
+#define REPORT_SEC 1.2e-6 /* a path of a held-out re-render */
 #define EXPORT_TEXEL_SEC 3.0e-6
 /* Usual part of the square that charts cover, and probes per block of mapped texels. */
 #define USUAL_COVER 0.75
@@ -56,7 +56,9 @@ static void plan_refine(struct reconstruction *r, double wanted, double modest) 
     plan_set(&r->plan, PLAN_REFINE, wanted, MODEST_OBSERVATIONS * modest, 0.0, solves(r) ? sec : LISTING1_FACTOR * sec);
 }
 
-void pace_plan_observations(struct reconstruction *r, double observations) { plan_refine(r, observations, observations); }
+void pace_plan_observations(struct reconstruction *r, double observations) {
+    plan_refine(r, observations, observations);
+}
 
 static void plan_report(struct reconstruction *r, double pixels) {
     double samples = settings_number(r->settings, "report_samples");
@@ -192,10 +194,9 @@ static void report_left_out(struct reconstruction *r, cJSON *list) {
         json_add_number(entry, "done", w->now);
         cJSON_AddItemToArray(list, entry);
         if (used < size)
-            used += (size_t)snprintf(text + used, size - used, "%s%.0f %% %s",
-                                     used ? ", " : "left out to keep time_limit_sec: ",
-                                     share < 1.0 ? fmin(fmax(100.0 * share, 1.0), 99.0) : 100.0,
-                                     report_parts[i].of_all);
+            used += (size_t)snprintf(
+                text + used, size - used, "%s%.0f %% %s", used ? ", " : "left out to keep time_limit_sec: ",
+                share < 1.0 ? fmin(fmax(100.0 * share, 1.0), 99.0) : 100.0, report_parts[i].of_all);
     }
     if (!plan_is_kept(&r->plan) && used < size)
         snprintf(text + used, size - used, "%sthe job took %.0f s in place of time_limit_sec=%.0f", used ? "; " : "",

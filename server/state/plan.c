@@ -19,8 +19,9 @@ static const struct {
     enum target to;
     bool whole; /* cut entirely or not at all */
 } cuts[] = {
-    {PLAN_REFINE, MODEST, false}, {PLAN_REPORT, MODEST, false}, {PLAN_DETAIL, LEAST, true}, {PLAN_MEASURE, LEAST, true},
-    {PLAN_GATHER, LEAST, false},  {PLAN_REFINE, LEAST, false},  {PLAN_REPORT, LEAST, false},
+    {PLAN_REFINE, MODEST, false}, {PLAN_REPORT, MODEST, false}, {PLAN_DETAIL, LEAST, true},
+    {PLAN_MEASURE, LEAST, true},  {PLAN_GATHER, LEAST, false},  {PLAN_REFINE, LEAST, false},
+    {PLAN_REPORT, LEAST, false},
 };
 #define CUTS (sizeof cuts / sizeof *cuts)
 

@@ -45,9 +45,9 @@ struct plan_work {
 };
 
 struct plan {
-    double limit_sec;   /* INFINITY: none */
-    double used_sec;    /* working time of all attempts */
-    double last_sec;    /* working time of this attempt at the last update */
+    double limit_sec; /* INFINITY: none */
+    double used_sec;  /* working time of all attempts */
+    double last_sec;  /* working time of this attempt at the last update */
     struct plan_work part[PLAN_PARTS];
 };
 

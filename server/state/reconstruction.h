@@ -42,18 +42,17 @@ struct reconstruct_hooks {
     bool (*checkpoint_due)(void *user);
     bool (*preview_due)(void *user);
     /* Commits all arrays as the newest checkpoint, or fails and keeps the previous one. */
-    enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array,
-                                   size_t count, struct error *err);
+    enum status (*checkpoint_save)(void *user, long iteration, const struct state_array *array, size_t count,
+                                   struct error *err);
     /* Fills the arrays from the newest complete checkpoint; *found is false and the arrays are untouched when there is
      * none. STATUS_CORRUPT if a stored size differs. */
-    enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found,
-                                   struct error *err);
+    enum status (*checkpoint_load)(void *user, struct state_array *array, size_t count, bool *found, struct error *err);
     enum status (*preview)(void *user, const struct reconstruction *r, struct error *err);
 };
 
 /* A held-out photograph and its re-render. */
 struct held_out {
-    const char *name;                /* borrowed from the scene, both */
+    const char *name; /* borrowed from the scene, both */
     const struct camera *camera;
     struct image photograph, render; /* linear radiance, R G B, of one size; owned */
     double msre, psnr_db, ssim;
@@ -72,20 +71,20 @@ struct reconstruction {
     struct inverse_uv inverse;
     struct materials materials;
     struct world world;
-    struct environment environment;  /* distant light; map.pixel is NULL where no photograph shows any */
-    rgb sky_factor;                  /* by which solve brightened its saturated directions, or 1 */
-    struct sun sun;                  /* a sun that no photograph shows */
-    double unseen_share;             /* part of the rays from surfaces that meet nothing observed */
+    struct environment environment;     /* distant light; map.pixel is NULL where no photograph shows any */
+    rgb sky_factor;                     /* by which solve brightened its saturated directions, or 1 */
+    struct sun sun;                     /* a sun that no photograph shows */
+    double unseen_share;                /* part of the rays from surfaces that meet nothing observed */
     bool exposures_drift, colors_drift; /* given exposures, white balance (calibrate.h) */
-    bool sky_is_fitted;              /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
-    struct noise noise;              /* of the photographs' pixels */
+    bool sky_is_fitted;                 /* unobserved sky was fitted to surfaces (unseen_light.h), not filled in */
+    struct noise noise;                 /* of the photographs' pixels */
     uint16_t (*radiance_preview)[3]; /* [height][width] a first picture of that (radiance_preview.h), or NULL; owned */
     struct fused fused;              /* observed radiance of each texel */
     bool *is_emitter;                /* [segment_count]; owned */
     struct emitter_evidence *evidence; /* [segment_count] evidence for it; owned */
     size_t held_out_count;
-    struct held_out *held_out;       /* [held_out_count]; owned */
-    cJSON *report;                   /* object, filled by the stages; owned */
+    struct held_out *held_out; /* [held_out_count]; owned */
+    cJSON *report;             /* object, filled by the stages; owned */
 };
 
 /* The segment of a valid texel. */

@@ -29,9 +29,10 @@ static enum status read_jobs(struct contents *c, struct sql *sql, struct error *
     while (status == STATUS_OK && (status = sql_step(sql, stmt, &row, err)) == STATUS_OK && row) {
         enum job_state state = (enum job_state)sqlite3_column_int(stmt, 1);
         c->jobs = mem_realloc_array(c->jobs, c->job_count + 1, sizeof *c->jobs);
-        c->jobs[c->job_count++] = (struct contents_job){
-            .id = sqlite3_column_int64(stmt, 0), .attempt = sqlite3_column_int(stmt, 2),
-            .is_running = state == JOB_RUNNING, .is_terminal = job_is_terminal(state)};
+        c->jobs[c->job_count++] = (struct contents_job){.id = sqlite3_column_int64(stmt, 0),
+                                                        .attempt = sqlite3_column_int(stmt, 2),
+                                                        .is_running = state == JOB_RUNNING,
+                                                        .is_terminal = job_is_terminal(state)};
     }
     return status;
 }

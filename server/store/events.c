@@ -9,21 +9,17 @@
 
 #define PRUNE_EVERY 64 /* events; until then a job has so many too many */
 
-void store_keep_events(struct store *store, size_t per_job) {
-    store->events_per_job = per_job;
-}
+void store_keep_events(struct store *store, size_t per_job) { store->events_per_job = per_job; }
 
 /* Removes a job's events up to `last`, and remembers that. */
 static enum status prune_job(struct store *store, int64_t job_id, int64_t last, struct error *err) {
-    enum status status = sql_run(&store->sql, err, "DELETE FROM events WHERE job_id = ? AND id <= ?",
-                                 "ii", job_id, last);
+    enum status status =
+        sql_run(&store->sql, err, "DELETE FROM events WHERE job_id = ? AND id <= ?", "ii", job_id, last);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "UPDATE jobs SET pruned_id = max(pruned_id, ?) WHERE id = ?", "ii", last,
-                         job_id);
+        status =
+            sql_run(&store->sql, err, "UPDATE jobs SET pruned_id = max(pruned_id, ?) WHERE id = ?", "ii", last, job_id);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE pruned SET event_id = max(event_id, ?)", "i",
-                         last);
+        status = sql_run(&store->sql, err, "UPDATE pruned SET event_id = max(event_id, ?)", "i", last);
     return status;
 }
 
@@ -45,17 +41,16 @@ static enum status prune(struct store *store, int64_t before_ms, bool *more, str
         return status;
     status = sql_int(&store->sql, 0, &job_id, err,
                      "SELECT id FROM jobs WHERE events_gone = 0 AND finished_ms > 0"
-                     " AND finished_ms < ? ORDER BY finished_ms LIMIT 1", "i", before_ms);
+                     " AND finished_ms < ? ORDER BY finished_ms LIMIT 1",
+                     "i", before_ms);
     if (status == STATUS_OK && job_id > 0) {
         *more = true;
         status = sql_int(&store->sql, 0, &last, err,
-                         "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC LIMIT 1 OFFSET 1",
-                         "i", job_id);
+                         "SELECT id FROM events WHERE job_id = ? ORDER BY id DESC LIMIT 1 OFFSET 1", "i", job_id);
         if (status == STATUS_OK) /* before 0 there is none */
             status = prune_job(store, job_id, last, err);
         if (status == STATUS_OK)
-            status = sql_run(&store->sql, err, "UPDATE jobs SET events_gone = 1 WHERE id = ?", "i",
-                             job_id);
+            status = sql_run(&store->sql, err, "UPDATE jobs SET events_gone = 1 WHERE id = ?", "i", job_id);
     }
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
@@ -68,8 +63,8 @@ enum status store_event_prune(struct store *store, int64_t before_ms, bool *more
     return status;
 }
 
-enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,
-                               const char *data, struct error *err) {
+enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
+                               struct error *err) {
     enum status status = sql_run(&store->sql, err,
                                  "INSERT INTO events (job_id, at_ms, attempt, type, data)"
                                  " VALUES (?, ?, ?, ?, ?)",
@@ -80,23 +75,20 @@ enum status store_event_append(struct store *store, int64_t job_id, int attempt,
 
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err) {
     int64_t present;
-    enum status status =
-        sql_int(&store->sql, -1, &present, err,
-                "SELECT CASE state WHEN ?2 THEN attempt ELSE 0 END FROM jobs WHERE id = ?1", "in",
-                job_id, (int)JOB_RUNNING);
+    enum status status = sql_int(&store->sql, -1, &present, err,
+                                 "SELECT CASE state WHEN ?2 THEN attempt ELSE 0 END FROM jobs WHERE id = ?1", "in",
+                                 job_id, (int)JOB_RUNNING);
     if (status != STATUS_OK)
         return status;
     if (present < 0)
         return error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)job_id);
     if (present != attempt)
-        return error_set(err, STATUS_CONFLICT, "attempt %d of job %lld is over", attempt,
-                         (long long)job_id);
+        return error_set(err, STATUS_CONFLICT, "attempt %d of job %lld is over", attempt, (long long)job_id);
     return STATUS_OK;
 }
 
 /* Takes the present place of the job from a progress event into its row. */
-static enum status update_progress(struct store *store, int64_t job_id, const char *data,
-                                   struct error *err) {
+static enum status update_progress(struct store *store, int64_t job_id, const char *data, struct error *err) {
     cJSON *object;
     const char *stage;
     double done, total, eta_sec;
@@ -113,14 +105,13 @@ static enum status update_progress(struct store *store, int64_t job_id, const ch
         status = sql_run(&store->sql, err,
                          "UPDATE jobs SET revision = revision + 1, stage = ?, progress = ?,"
                          " eta_sec = ? WHERE id = ?",
-                         "tddi", stage, total > 0.0 ? fmin(fmax(done / total, 0.0), 1.0) : 0.0,
-                         eta_sec, job_id);
+                         "tddi", stage, total > 0.0 ? fmin(fmax(done / total, 0.0), 1.0) : 0.0, eta_sec, job_id);
     cJSON_Delete(object);
     return status;
 }
 
-enum status store_event_add(struct store *store, int64_t job_id, int attempt, const char *type,
-                            const char *data, struct error *err) {
+enum status store_event_add(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
+                            struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
@@ -128,9 +119,8 @@ enum status store_event_add(struct store *store, int64_t job_id, int attempt, co
     if (status == STATUS_OK && strcmp(type, EVENT_PROGRESS) == 0) {
         status = update_progress(store, job_id, data, err);
         if (status == STATUS_OK)
-            status = sql_run(&store->sql, err,
-                             "DELETE FROM events WHERE job_id = ? AND type = 'progress'", "i",
-                             job_id);
+            status =
+                sql_run(&store->sql, err, "DELETE FROM events WHERE job_id = ? AND type = 'progress'", "i", job_id);
     }
     if (status == STATUS_OK)
         status = store_event_append(store, job_id, attempt, type, data, err);
@@ -138,8 +128,8 @@ enum status store_event_add(struct store *store, int64_t job_id, int attempt, co
 }
 
 enum status store_event_list(struct store *store, int64_t job_id, int64_t after, size_t limit,
-                             void (*each)(void *user, int64_t id, int64_t at_ms, int attempt,
-                                          const char *type, const char *data),
+                             void (*each)(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
+                                          const char *data),
                              void *user, struct error *err) {
     sqlite3_stmt *stmt;
     store_lock(store);
@@ -151,22 +141,22 @@ enum status store_event_list(struct store *store, int64_t job_id, int64_t after,
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
         if (row)
-            each(user, sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1),
-                 sqlite3_column_int(stmt, 2), sql_text(stmt, 3), sql_text(stmt, 4));
+            each(user, sqlite3_column_int64(stmt, 0), sqlite3_column_int64(stmt, 1), sqlite3_column_int(stmt, 2),
+                 sql_text(stmt, 3), sql_text(stmt, 4));
     }
     store_unlock(store);
     return status;
 }
 
 /* What the page says of the job, where it is one that `who` may read. */
-static enum status page_of_job(struct store *store, const struct caller *who, int64_t job_id,
-                               struct event_page *page, struct error *err) {
+static enum status page_of_job(struct store *store, const struct caller *who, int64_t job_id, struct event_page *page,
+                               struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
-    enum status status =
-        sql_first(&store->sql, &stmt, &found, err,
-                  "SELECT state, pruned_id, revision, owner_id, shared FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
-                  "ini", job_id, who == NULL || who->role == ROLE_ADMIN, who ? who->user_id : 0);
+    enum status status = sql_first(
+        &store->sql, &stmt, &found, err,
+        "SELECT state, pruned_id, revision, owner_id, shared FROM jobs WHERE id = ? AND (? OR owner_id = ? OR shared)",
+        "ini", job_id, who == NULL || who->role == ROLE_ADMIN, who ? who->user_id : 0);
     if (found) {
         page->state = (enum job_state)sqlite3_column_int(stmt, 0);
         page->pruned_id = sqlite3_column_int64(stmt, 1);
@@ -175,17 +165,16 @@ static enum status page_of_job(struct store *store, const struct caller *who, in
         page->is_shared = sqlite3_column_int(stmt, 4) != 0;
         sqlite3_reset(stmt);
     }
-    return status == STATUS_OK && !found
-               ? error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)job_id)
-               : status;
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "there is no job %lld", (long long)job_id)
+                                         : status;
 }
 
 static enum status page_of_all(struct store *store, struct event_page *page, struct error *err) {
     return sql_int(&store->sql, 0, &page->pruned_id, err, "SELECT event_id FROM pruned", "");
 }
 
-static enum status page_query(struct store *store, const struct caller *who, int64_t job_id,
-                              int64_t after, size_t limit, sqlite3_stmt **stmt, struct error *err) {
+static enum status page_query(struct store *store, const struct caller *who, int64_t job_id, int64_t after,
+                              size_t limit, sqlite3_stmt **stmt, struct error *err) {
     if (job_id > 0)
         return sql_query(&store->sql, stmt, err,
                          "SELECT id, at_ms, attempt, type, data, job_id FROM events"
@@ -203,16 +192,14 @@ static enum status page_query(struct store *store, const struct caller *who, int
                      "iii", after, who->user_id, (int64_t)limit);
 }
 
-enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id,
-                             int64_t after, size_t limit, size_t byte_limit,
-                             void (*each)(void *user, const struct event_row *row), void *user,
+enum status store_event_page(struct store *store, const struct caller *who, int64_t job_id, int64_t after, size_t limit,
+                             size_t byte_limit, void (*each)(void *user, const struct event_row *row), void *user,
                              struct event_page *page, struct error *err) {
     sqlite3_stmt *stmt;
     size_t bytes = 0;
     *page = (struct event_page){.last_id = after};
     store_lock(store);
-    enum status status = job_id > 0 ? page_of_job(store, who, job_id, page, err)
-                                    : page_of_all(store, page, err);
+    enum status status = job_id > 0 ? page_of_job(store, who, job_id, page, err) : page_of_all(store, page, err);
     if (status == STATUS_OK)
         status = page_query(store, who, job_id, after, limit, &stmt, err);
     bool row = status == STATUS_OK;
@@ -220,10 +207,12 @@ enum status store_event_page(struct store *store, const struct caller *who, int6
         status = sql_step(&store->sql, stmt, &row, err);
         if (!row)
             break;
-        struct event_row event = {
-            .id = sqlite3_column_int64(stmt, 0), .job_id = sqlite3_column_int64(stmt, 5),
-            .at_ms = sqlite3_column_int64(stmt, 1), .attempt = sqlite3_column_int(stmt, 2),
-            .type = sql_text(stmt, 3), .data = sql_text(stmt, 4)};
+        struct event_row event = {.id = sqlite3_column_int64(stmt, 0),
+                                  .job_id = sqlite3_column_int64(stmt, 5),
+                                  .at_ms = sqlite3_column_int64(stmt, 1),
+                                  .attempt = sqlite3_column_int(stmt, 2),
+                                  .type = sql_text(stmt, 3),
+                                  .data = sql_text(stmt, 4)};
         bytes += strlen(event.data);
         page->last_id = event.id;
         page->count++;
@@ -236,26 +225,24 @@ enum status store_event_page(struct store *store, const struct caller *who, int6
     page->is_full = page->count == limit || bytes >= byte_limit;
     /* Others' events after the last of ours need not be looked at again. */
     if (status == STATUS_OK && !page->is_full && job_id == 0)
-        status = sql_int(&store->sql, after, &page->last_id, err,
-                         "SELECT max(?, ifnull(max(id), 0)) FROM events", "i", page->last_id);
+        status = sql_int(&store->sql, after, &page->last_id, err, "SELECT max(?, ifnull(max(id), 0)) FROM events", "i",
+                         page->last_id);
     store_unlock(store);
     return status;
 }
 
 enum status store_event_last(struct store *store, int64_t job_id, int64_t *id, struct error *err) {
     store_lock(store);
-    enum status status =
-        job_id > 0 ? sql_int(&store->sql, 0, id, err,
-                             "SELECT ifnull(max(id), 0) FROM events WHERE job_id = ?", "i", job_id)
-                   : sql_int(&store->sql, 0, id, err, "SELECT ifnull(max(id), 0) FROM events", "");
+    enum status status = job_id > 0 ? sql_int(&store->sql, 0, id, err,
+                                              "SELECT ifnull(max(id), 0) FROM events WHERE job_id = ?", "i", job_id)
+                                    : sql_int(&store->sql, 0, id, err, "SELECT ifnull(max(id), 0) FROM events", "");
     store_unlock(store);
     return status;
 }
 
 enum status store_event_newest(struct store *store, int64_t *id, struct error *err) {
     store_lock(store);
-    enum status status =
-        sql_int(&store->sql, 0, id, err, "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
+    enum status status = sql_int(&store->sql, 0, id, err, "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
     store_unlock(store);
     return status;
 }

@@ -15,10 +15,10 @@ struct reserve {
     bool is_tight;
     int page_bytes;
     int64_t cushion_bytes; /* that are kept */
-    int64_t wal_frames;  /* that the log holds */
-    int64_t wal_bytes;   /* that it has space for */
-    int64_t page_count;  /* that the database file has space for */
-    int64_t pages_used;  /* by the database, with the present transaction */
+    int64_t wal_frames;    /* that the log holds */
+    int64_t wal_bytes;     /* that it has space for */
+    int64_t page_count;    /* that the database file has space for */
+    int64_t pages_used;    /* by the database, with the present transaction */
 };
 
 struct store {
@@ -33,7 +33,7 @@ struct store {
     struct unpaid {        /* CPU time that could not be entered; see turns.c */
         int64_t owner_id;
         double weight;
-    } *unpaid;             /* [unpaid_count], one a user; owned */
+    } * unpaid; /* [unpaid_count], one a user; owned */
     size_t unpaid_count;
     atomic_bool has_users;
 };
@@ -55,29 +55,28 @@ enum status store_begin(struct store *store, struct error *err);
  * it is to be tried again after store_reserve_spend, while that is true. */
 enum status store_begin_freeing(struct store *store, struct error *err);
 bool store_reserve_spend(struct store *store); /* gives DATA/reserve up; false when it is gone already */
-enum status store_end(struct store *store, enum status status, int64_t changed_job,
-                      struct error *err);
+enum status store_end(struct store *store, enum status status, int64_t changed_job, struct error *err);
 
 int64_t store_now_ms(void); /* Unix time */
 
 /* When a row may go, as SQL over its table: Unix milliseconds, 0 for never; see retention.h. States
  * up to 2 are those of jobs that have not ended; a scene in state 1 is being checked. */
-#define JOB_EXPIRES                                                                            \
-    "(CASE WHEN pinned = 1 OR state <= 2 THEN 0 WHEN expires_ms > 0 THEN expires_ms"           \
+#define JOB_EXPIRES                                                                                                    \
+    "(CASE WHEN pinned = 1 OR state <= 2 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                                   \
     " ELSE (SELECT iif(job_ms > 0, finished_ms + job_ms, 0) FROM retention) END)"
-#define SCENE_EXPIRES                                                                          \
-    "(CASE WHEN pinned = 1 OR state = 1 OR EXISTS (SELECT 1 FROM jobs WHERE"                   \
-    " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"    \
-    " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms,"                        \
-    " ifnull((SELECT max(created_ms) FROM scene_owners WHERE scene_id = scenes.id), 0),"       \
+#define SCENE_EXPIRES                                                                                                  \
+    "(CASE WHEN pinned = 1 OR state = 1 OR EXISTS (SELECT 1 FROM jobs WHERE"                                           \
+    " scene_id = scenes.id AND jobs.state <= 2) THEN 0 WHEN expires_ms > 0 THEN expires_ms"                            \
+    " ELSE (SELECT iif(scene_ms > 0, scene_ms + max(scenes.created_ms,"                                                \
+    " ifnull((SELECT max(created_ms) FROM scene_owners WHERE scene_id = scenes.id), 0),"                               \
     " ifnull((SELECT max(finished_ms) FROM jobs WHERE scene_id = scenes.id), 0)), 0) FROM retention) END)"
-#define UPLOAD_EXPIRES                                                                         \
-    "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                         \
-    " ELSE updated_ms + (SELECT iif(received = 0 AND scene_id = '', min(empty_upload_ms, upload_ms), upload_ms)"            \
+#define UPLOAD_EXPIRES                                                                                                 \
+    "(CASE WHEN pinned = 1 THEN 0 WHEN expires_ms > 0 THEN expires_ms"                                                 \
+    " ELSE updated_ms + (SELECT iif(received = 0 AND scene_id = '', min(empty_upload_ms, upload_ms), upload_ms)"       \
     " FROM retention) END)"
 /* What a struct retention changes of a row, for an UPDATE: ?1 pin, ?2 sets_expiry, ?3 expires_ms. */
-#define RETENTION_SET                                                                            \
-    "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                            \
+#define RETENTION_SET                                                                                                  \
+    "pinned = CASE ?1 WHEN 0 THEN pinned WHEN 1 THEN 1 ELSE 0 END,"                                                    \
     " expires_ms = iif(?2, ?3, expires_ms)"
 
 /* users.c, while the store is opened: sets has_users. */
@@ -93,13 +92,13 @@ void reserve_keep(struct store *store);
 enum status reserve_check(struct store *store, struct error *err);
 
 /* Inside a transaction: appends one event. */
-enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type,
-                               const char *data, struct error *err);
+enum status store_event_append(struct store *store, int64_t job_id, int attempt, const char *type, const char *data,
+                               struct error *err);
 /* Inside a transaction: gives a job a webhook; tells the job's webhook, if it has one, of a state. */
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err);
-enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state,
-                               const char *reason, const char *hint, struct error *err);
+enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state, const char *reason,
+                               const char *hint, struct error *err);
 struct count_limits; /* store.h */
 /* Inside a transaction: STATUS_LIMIT unless one more job of this owner (0: nobody) may be queued. */
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,

@@ -7,16 +7,16 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define COLUMNS                                                                                \
-    "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"        \
-    " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"   \
-    " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn," \
-    " restart_from, memory_step, pinned, " JOB_EXPIRES ","                                  \
-    " (SELECT url FROM webhooks WHERE job_id = jobs.id), disk_bytes,"                          \
-    " (SELECT json_object('state', CASE WHEN w.waiting > 0 THEN 'pending' WHEN result = '' THEN 'idle'"     \
-    "  WHEN result = 'delivered' THEN result ELSE 'failed' END, 'pending', w.waiting, 'attempts', attempts," \
-    "  'last_status', nullif(status, 0), 'last_error', nullif(error, ''), 'next_ms', w.next_ms, 'at_ms', at_ms)"  \
-    "  FROM webhooks, (SELECT count(*) AS waiting, min(next_ms) AS next_ms FROM outbox WHERE job_id = jobs.id) AS w" \
+#define COLUMNS                                                                                                        \
+    "id, revision, scene_id, name, labels, settings, priority, state, wanted, attempt,"                                \
+    " attempts_left, created_ms, started_ms, finished_ms, stage, progress, eta_sec, reason,"                           \
+    " hint, owner_id, (SELECT users.name FROM users WHERE users.id = owner_id), shared, turn,"                         \
+    " restart_from, memory_step, pinned, " JOB_EXPIRES ","                                                             \
+    " (SELECT url FROM webhooks WHERE job_id = jobs.id), disk_bytes,"                                                  \
+    " (SELECT json_object('state', CASE WHEN w.waiting > 0 THEN 'pending' WHEN result = '' THEN 'idle'"                \
+    "  WHEN result = 'delivered' THEN result ELSE 'failed' END, 'pending', w.waiting, 'attempts', attempts,"           \
+    "  'last_status', nullif(status, 0), 'last_error', nullif(error, ''), 'next_ms', w.next_ms, 'at_ms', at_ms)"       \
+    "  FROM webhooks, (SELECT count(*) AS waiting, min(next_ms) AS next_ms FROM outbox WHERE job_id = jobs.id) AS w"   \
     "  WHERE webhooks.job_id = jobs.id)"
 
 static void fill(struct job *job, sqlite3_stmt *stmt) {
@@ -62,18 +62,16 @@ static enum status not_found(int64_t id, struct error *err) {
 static char *stored_key(const struct job_new *job) {
     return !job->idempotency_key ? NULL
            : job->owner_id == 0  ? mem_strdup(job->idempotency_key)
-                                 : mem_printf("%lld/%s", (long long)job->owner_id,
-                                              job->idempotency_key);
+                                 : mem_printf("%lld/%s", (long long)job->owner_id, job->idempotency_key);
 }
 
 /* The job that a known idempotency key made; *id stays 0 when the key is new. */
-static enum status find_replay(struct store *store, const struct job_new *job, const char *key,
-                               int64_t *id, struct error *err) {
+static enum status find_replay(struct store *store, const struct job_new *job, const char *key, int64_t *id,
+                               struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false, same = false;
     enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT id, request_sha256 FROM jobs WHERE idempotency_key = ?",
-                                   "t", key);
+                                   "SELECT id, request_sha256 FROM jobs WHERE idempotency_key = ?", "t", key);
     if (found) {
         *id = sqlite3_column_int64(stmt, 0);
         same = strcmp(sql_text(stmt, 1), job->request_sha256 ? job->request_sha256 : "") == 0;
@@ -81,8 +79,7 @@ static enum status find_replay(struct store *store, const struct job_new *job, c
     }
     if (status != STATUS_OK || !found || same)
         return status;
-    error_set(err, STATUS_CONFLICT, "the idempotency key made job %lld from another request",
-              (long long)*id);
+    error_set(err, STATUS_CONFLICT, "the idempotency key made job %lld from another request", (long long)*id);
     return error_hint(err, "Use a new key for a new request.");
 }
 
@@ -92,8 +89,8 @@ static enum status check_kept(struct store *store, const struct job_new *job, st
     int64_t kept = 0, oldest = 0;
     if (job->user_max_jobs == 0 || job->owner_id == 0)
         return STATUS_OK;
-    enum status status = sql_int(&store->sql, 0, &kept, err, "SELECT count(*) FROM jobs WHERE owner_id = ?", "i",
-                                 job->owner_id);
+    enum status status =
+        sql_int(&store->sql, 0, &kept, err, "SELECT count(*) FROM jobs WHERE owner_id = ?", "i", job->owner_id);
     if (status != STATUS_OK || (uint64_t)kept < job->user_max_jobs)
         return status;
     status = sql_int(&store->sql, 0, &oldest, err,
@@ -108,11 +105,10 @@ static enum status check_kept(struct store *store, const struct job_new *job, st
 }
 
 /* Whether one more job may join the queue for this scene. */
-static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit,
-                             struct error *err) {
+static enum status check_new(struct store *store, const struct job_new *job, size_t queue_limit, struct error *err) {
     int64_t state;
-    enum status status = sql_int(&store->sql, -1, &state, err,
-                                 "SELECT state FROM scenes WHERE id = ?", "t", job->scene_id);
+    enum status status =
+        sql_int(&store->sql, -1, &state, err, "SELECT state FROM scenes WHERE id = ?", "t", job->scene_id);
     if (status != STATUS_OK)
         return status;
     if (state < 0)
@@ -127,8 +123,8 @@ static enum status check_new(struct store *store, const struct job_new *job, siz
     return status == STATUS_OK ? store_queue_check(store, job->owner_id, &limits, err) : status;
 }
 
-enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit,
-                          int64_t *id, bool *replayed, struct error *err) {
+enum status store_job_add(struct store *store, const struct job_new *job, size_t queue_limit, int64_t *id,
+                          bool *replayed, struct error *err) {
     *id = 0;
     *replayed = false;
     enum status status = store_begin(store, err);
@@ -145,18 +141,17 @@ enum status store_job_add(struct store *store, const struct job_new *job, size_t
         return store_end(store, status, STORE_NOTHING_CHANGED, err);
     }
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
-                         " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
-                         " shared, disk_bytes, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0,"
-                         "                       (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
-                         "ttttnnittin", job->scene_id, job->name, job->labels, job->settings,
-                         job->priority, job->max_attempts, store_now_ms(), key,
-                         job->request_sha256, job->owner_id, (int)job->is_shared);
+        status =
+            sql_run(&store->sql, err,
+                    "INSERT INTO jobs (scene_id, name, labels, settings, priority,"
+                    " attempts_left, created_ms, idempotency_key, request_sha256, owner_id,"
+                    " shared, disk_bytes, turn) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 0,"
+                    "                       (SELECT ifnull(max(turn), 0) + 1 FROM jobs))",
+                    "ttttnnittin", job->scene_id, job->name, job->labels, job->settings, job->priority,
+                    job->max_attempts, store_now_ms(), key, job->request_sha256, job->owner_id, (int)job->is_shared);
     if (status == STATUS_OK) {
         *id = sqlite3_last_insert_rowid(store->sql.db);
-        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}",
-                                    err);
+        status = store_event_append(store, *id, 0, "state", "{\"state\":\"queued\"}", err);
         if (status == STATUS_OK && job->webhook_url)
             status = store_webhook_set(store, *id, job->webhook_url, job->webhook_secret, err);
     }
@@ -169,8 +164,8 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
     bool found = false;
     *job = (struct job){.eta_sec = -1.0};
     store_lock(store);
-    enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT " COLUMNS " FROM jobs WHERE id = ?", "i", id);
+    enum status status =
+        sql_first(&store->sql, &stmt, &found, err, "SELECT " COLUMNS " FROM jobs WHERE id = ?", "i", id);
     if (found) {
         fill(job, stmt);
         sqlite3_reset(stmt);
@@ -179,9 +174,8 @@ enum status store_job_get(struct store *store, int64_t id, struct job *job, stru
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-enum status store_job_list(struct store *store, const struct caller *who, int state_filter,
-                           int64_t before_id, size_t limit, struct job *jobs, size_t *count,
-                           struct error *err) {
+enum status store_job_list(struct store *store, const struct caller *who, int state_filter, int64_t before_id,
+                           size_t limit, struct job *jobs, size_t *count, struct error *err) {
     bool sees_all = !who || who->role == ROLE_ADMIN;
     sqlite3_stmt *stmt;
     *count = 0;
@@ -192,13 +186,11 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
             ? sql_query(&store->sql, &stmt, err,
                         "SELECT " COLUMNS " FROM jobs WHERE id < ?"
                         " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
-                        "inii", before, (int)sees_all, sees_all ? 0 : who->user_id,
-                        (int64_t)limit)
+                        "inii", before, (int)sees_all, sees_all ? 0 : who->user_id, (int64_t)limit)
             : sql_query(&store->sql, &stmt, err,
                         "SELECT " COLUMNS " FROM jobs WHERE id < ? AND state = ?"
                         " AND (? OR owner_id = ? OR shared) ORDER BY id DESC LIMIT ?",
-                        "innii", before, state_filter, (int)sees_all, sees_all ? 0 : who->user_id,
-                        (int64_t)limit);
+                        "innii", before, state_filter, (int)sees_all, sees_all ? 0 : who->user_id, (int64_t)limit);
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -214,58 +206,50 @@ enum status store_job_list(struct store *store, const struct caller *who, int st
 /* Gives job `id` its place before `next`, of the same owner; all after that move by one. */
 static enum status place_before(struct store *store, int64_t id, int64_t next, struct error *err) {
     int64_t turn, priority;
-    enum status status =
-        sql_int(&store->sql, INT64_MIN, &turn, err,
-                "SELECT turn FROM jobs WHERE id = ?1 AND id <> ?2 AND state IN (?3, ?4)"
-                " AND owner_id = (SELECT owner_id FROM jobs WHERE id = ?2)",
-                "iinn", next, id, (int)JOB_QUEUED, (int)JOB_PAUSED);
+    enum status status = sql_int(&store->sql, INT64_MIN, &turn, err,
+                                 "SELECT turn FROM jobs WHERE id = ?1 AND id <> ?2 AND state IN (?3, ?4)"
+                                 " AND owner_id = (SELECT owner_id FROM jobs WHERE id = ?2)",
+                                 "iinn", next, id, (int)JOB_QUEUED, (int)JOB_PAUSED);
     if (status == STATUS_OK && turn == INT64_MIN)
-        return error_set(err, STATUS_INPUT,
-                         "job %lld is no waiting job of the same owner: nothing goes before it",
+        return error_set(err, STATUS_INPUT, "job %lld is no waiting job of the same owner: nothing goes before it",
                          (long long)next);
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &priority, err, "SELECT priority FROM jobs WHERE id = ?",
-                         "i", next);
+        status = sql_int(&store->sql, 0, &priority, err, "SELECT priority FROM jobs WHERE id = ?", "i", next);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "UPDATE jobs SET turn = turn + 1 WHERE turn >= ? AND state IN (?, ?)",
-                         "inn", turn, (int)JOB_QUEUED, (int)JOB_PAUSED);
+        status = sql_run(&store->sql, err, "UPDATE jobs SET turn = turn + 1 WHERE turn >= ? AND state IN (?, ?)", "inn",
+                         turn, (int)JOB_QUEUED, (int)JOB_PAUSED);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET turn = ?, priority = ? WHERE id = ?",
-                         "iii", turn, priority, id);
+        status =
+            sql_run(&store->sql, err, "UPDATE jobs SET turn = ?, priority = ? WHERE id = ?", "iii", turn, priority, id);
     return status;
 }
 
-static enum status place(struct store *store, int64_t id, const struct job_patch *patch,
-                         struct error *err) {
+static enum status place(struct store *store, int64_t id, const struct job_patch *patch, struct error *err) {
     switch (patch->place) {
     case JOB_PLACE_KEEP: break;
     case JOB_PLACE_FIRST:
-        return sql_run(&store->sql, err,
-                       "UPDATE jobs SET turn = (SELECT min(turn) - 1 FROM jobs) WHERE id = ?", "i",
+        return sql_run(&store->sql, err, "UPDATE jobs SET turn = (SELECT min(turn) - 1 FROM jobs) WHERE id = ?", "i",
                        id);
     case JOB_PLACE_LAST:
-        return sql_run(&store->sql, err,
-                       "UPDATE jobs SET turn = (SELECT max(turn) + 1 FROM jobs) WHERE id = ?", "i",
+        return sql_run(&store->sql, err, "UPDATE jobs SET turn = (SELECT max(turn) + 1 FROM jobs) WHERE id = ?", "i",
                        id);
     case JOB_PLACE_BEFORE: return place_before(store, id, patch->before_id, err);
     }
     return STATUS_OK;
 }
 
-enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision,
-                            const struct job_patch *patch, struct error *err) {
+enum status store_job_patch(struct store *store, int64_t id, int64_t expected_revision, const struct job_patch *patch,
+                            struct error *err) {
     int64_t revision;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_int(&store->sql, 0, &revision, err, "SELECT revision FROM jobs WHERE id = ?", "i",
-                     id);
+    status = sql_int(&store->sql, 0, &revision, err, "SELECT revision FROM jobs WHERE id = ?", "i", id);
     if (status == STATUS_OK && revision == 0)
         status = not_found(id, err);
     else if (status == STATUS_OK && expected_revision >= 0 && revision != expected_revision)
-        status = error_set(err, STATUS_CONFLICT, "job %lld has revision %lld, not %lld",
-                           (long long)id, (long long)revision, (long long)expected_revision);
+        status = error_set(err, STATUS_CONFLICT, "job %lld has revision %lld, not %lld", (long long)id,
+                           (long long)revision, (long long)expected_revision);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "UPDATE jobs SET " RETENTION_SET ", revision = revision + 1,"
@@ -273,8 +257,8 @@ enum status store_job_patch(struct store *store, int64_t id, int64_t expected_re
                          " priority = CASE WHEN ?6 = ?7 THEN priority ELSE ?6 END,"
                          " shared = CASE WHEN ?8 < 0 THEN shared ELSE ?8 END WHERE id = ?9",
                          "nnittnnni", (int)patch->retention.pin, (int)patch->retention.sets_expiry,
-                         patch->retention.expires_ms, patch->name, patch->labels, patch->priority,
-                         INT_MIN, patch->shared, id);
+                         patch->retention.expires_ms, patch->name, patch->labels, patch->priority, INT_MIN,
+                         patch->shared, id);
     if (status == STATUS_OK)
         status = place(store, id, patch, err);
     return store_end(store, status, id, err);
@@ -305,8 +289,8 @@ enum status store_job_delete(struct store *store, int64_t id, struct error *err)
     return status;
 }
 
-enum status store_job_running(struct store *store, size_t limit, int64_t *ids,
-                              enum job_wanted *wanted, size_t *count, struct error *err) {
+enum status store_job_running(struct store *store, size_t limit, int64_t *ids, enum job_wanted *wanted, size_t *count,
+                              struct error *err) {
     sqlite3_stmt *stmt;
     *count = 0;
     store_lock(store);

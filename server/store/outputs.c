@@ -11,8 +11,8 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define COLUMNS                                                                                \
-    "name, bytes, sha256, content_type, updated_ms, attempt, digest, digest_inode, digest_bytes, digest_modified_ns," \
+#define COLUMNS                                                                                                        \
+    "name, bytes, sha256, content_type, updated_ms, attempt, digest, digest_inode, digest_bytes, digest_modified_ns,"  \
     " digest_changed_ns"
 
 static void fill(struct output_row *row, sqlite3_stmt *stmt) {
@@ -61,9 +61,8 @@ static enum status tell_wanted(const struct store *store, enum status status) {
     return status;
 }
 
-enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type,
-                             const char *name, uint64_t bytes, const char *sha256,
-                             const char *content_type, struct error *err) {
+enum status store_output_put(struct store *store, int64_t job_id, int attempt, const char *type, const char *name,
+                             uint64_t bytes, const char *sha256, const char *content_type, struct error *err) {
     if (!name_is_plain(name))
         return error_set(err, STATUS_INPUT, "\"%.100s\" is no name for an output", name);
     if (strlen(sha256) != 64 || strspn(sha256, "0123456789abcdef") != 64)
@@ -76,8 +75,7 @@ enum status store_output_put(struct store *store, int64_t job_id, int attempt, c
         status = sql_run(&store->sql, err,
                          "INSERT OR REPLACE INTO outputs (job_id, name, bytes, sha256,"
                          " content_type, updated_ms, attempt, digest_wanted) VALUES (?, ?, ?, ?, ?, ?, ?, 1)",
-                         "itittin", job_id, name, (int64_t)bytes, sha256, content_type,
-                         store_now_ms(), attempt);
+                         "itittin", job_id, name, (int64_t)bytes, sha256, content_type, store_now_ms(), attempt);
     if (status == STATUS_OK) {
         cJSON *data = cJSON_CreateObject();
         json_add_string(data, "name", name);
@@ -92,37 +90,33 @@ enum status store_output_put(struct store *store, int64_t job_id, int attempt, c
     return tell_wanted(store, store_end(store, status, job_id, err));
 }
 
-enum status store_output_get(struct store *store, int64_t job_id, const char *name,
-                             struct output_row *row, struct error *err) {
+enum status store_output_get(struct store *store, int64_t job_id, const char *name, struct output_row *row,
+                             struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
     *row = (struct output_row){0};
     store_lock(store);
-    enum status status =
-        sql_first(&store->sql, &stmt, &found, err,
-                  "SELECT " COLUMNS " FROM outputs WHERE job_id = ? AND name = ?", "it", job_id,
-                  name);
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
+                                   "SELECT " COLUMNS " FROM outputs WHERE job_id = ? AND name = ?", "it", job_id, name);
     if (found) {
         fill(row, stmt);
         sqlite3_reset(stmt);
     }
     store_unlock(store);
     return status == STATUS_OK && !found
-               ? error_set(err, STATUS_NOT_FOUND, "job %lld has no output %.200s",
-                           (long long)job_id, name)
+               ? error_set(err, STATUS_NOT_FOUND, "job %lld has no output %.200s", (long long)job_id, name)
                : status;
 }
 
-enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows,
-                              size_t *count, struct error *err) {
+enum status store_output_list(struct store *store, int64_t job_id, struct output_row **rows, size_t *count,
+                              struct error *err) {
     sqlite3_stmt *stmt;
     size_t capacity = 0;
     *rows = NULL;
     *count = 0;
     store_lock(store);
     enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT " COLUMNS " FROM outputs WHERE job_id = ? ORDER BY name",
-                                   "i", job_id);
+                                   "SELECT " COLUMNS " FROM outputs WHERE job_id = ? ORDER BY name", "i", job_id);
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -163,7 +157,8 @@ enum status store_output_next_digest(struct store *store, int64_t *job_id, struc
     store_lock(store);
     enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS ", job_id FROM outputs WHERE digest_wanted = 1"
-                                   " ORDER BY bytes LIMIT 1", "");
+                                   " ORDER BY bytes LIMIT 1",
+                                   "");
     if (found) {
         fill(row, stmt);
         *job_id = sqlite3_column_int64(stmt, 11);

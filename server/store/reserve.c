@@ -28,12 +28,12 @@
 /* A cancelled job is some 12 pages; of a job that is removed most pages are freed, and those are not written. */
 #define CUSHION_BYTES ((int64_t)4 << 20) /* on a disk that has 64 MiB free at the start; else a 16th of it */
 #define CUSHION_BYTES_MIN ((int64_t)128 << 10)
-#define STEP_SHARE 4                  /* of the cushion, by which the log grows, so that not every commit extends it */
-#define SPARE_SHARE 4                 /* of the cushion, for new pages of the database: what stops a job adds an event */
-#define CHUNK_BYTES (64 << 10)        /* by which the database's file grows */
-#define WAL_HEADER 32                 /* bytes: sqlite.org/fileformat2.html, 4.1 */
+#define STEP_SHARE 4           /* of the cushion, by which the log grows, so that not every commit extends it */
+#define SPARE_SHARE 4          /* of the cushion, for new pages of the database: what stops a job adds an event */
+#define CHUNK_BYTES (64 << 10) /* by which the database's file grows */
+#define WAL_HEADER 32          /* bytes: sqlite.org/fileformat2.html, 4.1 */
 #define FRAME_HEADER 24
-#define CHECKPOINT_FRAMES 1000        /* SQLite's own default */
+#define CHECKPOINT_FRAMES 1000 /* SQLite's own default */
 #define CHECKPOINT_TIGHT 16
 
 #define FILE_BYTES ((uint64_t)16 << 20) /* of DATA/reserve */
@@ -53,9 +53,7 @@ static int committed(void *user, sqlite3 *db, const char *name, int frames) {
     return SQLITE_OK;
 }
 
-static bool is_full(int number) {
-    return number == ENOSPC || number == EDQUOT || number == EFBIG;
-}
+static bool is_full(int number) { return number == ENOSPC || number == EDQUOT || number == EFBIG; }
 
 /* False where the disk has no room for it. */
 static bool extend_wal(struct store *store) {
@@ -92,7 +90,8 @@ static bool extend_database(struct store *store) {
     }
     /* SQLite does not hand the reason on. */
     uint64_t room = 0;
-    return !(is_full(errno) || (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)r->cushion_bytes));
+    return !(is_full(errno) ||
+             (file_free_bytes(r->dir, &room, NULL) == STATUS_OK && room < (uint64_t)r->cushion_bytes));
 }
 
 enum status reserve_look(struct store *store, struct error *err) {

@@ -8,14 +8,12 @@
 #include "common/mem.h"
 #include "server/store/internal.h"
 
-enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
-                       struct error *err) {
+enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms, struct error *err) {
     enum status status = store_begin_freeing(store, err); /* without it no daemon starts to free anything */
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err,
-                     "UPDATE retention SET scene_ms = ?, job_ms = ?, upload_ms = ?",
-                     "iii", scene_ms, job_ms, upload_ms);
+    status = sql_run(&store->sql, err, "UPDATE retention SET scene_ms = ?, job_ms = ?, upload_ms = ?", "iii", scene_ms,
+                     job_ms, upload_ms);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
@@ -27,20 +25,20 @@ enum status store_keep_empty(struct store *store, int64_t upload_ms, struct erro
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit,
-                               struct expired **list, size_t *count, struct error *err) {
+enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit, struct expired **list, size_t *count,
+                               struct error *err) {
     sqlite3_stmt *stmt;
     *list = mem_calloc(limit, sizeof **list);
     *count = 0;
     store_lock(store);
-    enum status status = sql_query(
-        &store->sql, &stmt, err,
-        "SELECT * FROM (SELECT 0 AS kind, id, name, " UPLOAD_EXPIRES " AS expires FROM uploads"
-        " UNION ALL SELECT 1, id, name, " JOB_EXPIRES " FROM jobs"
-        " UNION ALL SELECT 2, id, ifnull((SELECT name FROM scene_owners WHERE scene_id = scenes.id"
-        "  ORDER BY created_ms, user_id LIMIT 1), ''), " SCENE_EXPIRES " FROM scenes)"
-        " WHERE expires BETWEEN 1 AND ? ORDER BY kind, expires LIMIT ?",
-        "ii", now_ms, (int64_t)limit);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT * FROM (SELECT 0 AS kind, id, name, " UPLOAD_EXPIRES " AS expires FROM uploads"
+                  " UNION ALL SELECT 1, id, name, " JOB_EXPIRES " FROM jobs"
+                  " UNION ALL SELECT 2, id, ifnull((SELECT name FROM scene_owners WHERE scene_id = scenes.id"
+                  "  ORDER BY created_ms, user_id LIMIT 1), ''), " SCENE_EXPIRES " FROM scenes)"
+                  " WHERE expires BETWEEN 1 AND ? ORDER BY kind, expires LIMIT ?",
+                  "ii", now_ms, (int64_t)limit);
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -64,24 +62,20 @@ static enum status delete_expired(struct store *store, const struct expired *wha
     if (status != STATUS_OK)
         return status;
     if (what->kind == EXPIRED_UPLOAD)
-        status = sql_run(&store->sql, err,
-                         "DELETE FROM uploads WHERE id = ? AND " UPLOAD_EXPIRES " BETWEEN 1 AND ?", "ti",
-                         what->id, now_ms);
+        status = sql_run(&store->sql, err, "DELETE FROM uploads WHERE id = ? AND " UPLOAD_EXPIRES " BETWEEN 1 AND ?",
+                         "ti", what->id, now_ms);
     else if (what->kind == EXPIRED_JOB)
-        status = sql_run(&store->sql, err,
-                         "DELETE FROM jobs WHERE id = ? AND " JOB_EXPIRES " BETWEEN 1 AND ?", "ii",
+        status = sql_run(&store->sql, err, "DELETE FROM jobs WHERE id = ? AND " JOB_EXPIRES " BETWEEN 1 AND ?", "ii",
                          changed, now_ms);
     else
-        status = sql_run(&store->sql, err,
-                         "DELETE FROM scenes WHERE id = ? AND " SCENE_EXPIRES " BETWEEN 1 AND ?", "ti",
-                         what->id, now_ms);
+        status = sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ? AND " SCENE_EXPIRES " BETWEEN 1 AND ?",
+                         "ti", what->id, now_ms);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = error_set(err, STATUS_CONFLICT, "%s does not expire any more", what->id);
     return store_end(store, status, changed, err);
 }
 
-enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms,
-                                 struct error *err) {
+enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms, struct error *err) {
     enum status status;
     do
         status = delete_expired(store, what, now_ms, err);

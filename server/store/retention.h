@@ -21,8 +21,7 @@
 struct store;
 
 /* How long after rule 2; 0: for ever (not for uploads). Once, before anything is listed. */
-enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms,
-                       struct error *err);
+enum status store_keep(struct store *store, int64_t scene_ms, int64_t job_ms, int64_t upload_ms, struct error *err);
 
 /* The same for an upload of which no byte has arrived. */
 enum status store_keep_empty(struct store *store, int64_t upload_ms, struct error *err);
@@ -39,16 +38,15 @@ enum expired_kind { EXPIRED_UPLOAD, EXPIRED_JOB, EXPIRED_SCENE };
 
 struct expired {
     enum expired_kind kind;
-    char id[65];        /* a job's number in decimal */
+    char id[65]; /* a job's number in decimal */
     char *name;
     int64_t expires_ms;
 };
 /* What has expired by `now_ms`, uploads first, then jobs, then scenes, at most `limit`; the
  * caller's: mem_free each name, then the list. */
-enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit,
-                               struct expired **list, size_t *count, struct error *err);
+enum status store_expired_list(struct store *store, int64_t now_ms, size_t limit, struct expired **list, size_t *count,
+                               struct error *err);
 /* Removes its rows; STATUS_CONFLICT when it is no longer to go. The caller removes the files. */
-enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms,
-                                 struct error *err);
+enum status store_expired_delete(struct store *store, const struct expired *what, int64_t now_ms, struct error *err);
 
 #endif

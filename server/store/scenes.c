@@ -18,22 +18,22 @@
 
 /* The owner whose name for the scene user ?2 sees: that user himself, else the first who shares it with him or, where he
  * sees all (?1), the first who sent it. */
-#define SHOWN_OWNER                                                                                        \
-    "(SELECT user_id FROM scene_owners AS o WHERE scene_id = scenes.id AND (?1 OR user_id = ?2 OR EXISTS" \
-    " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1))"   \
+#define SHOWN_OWNER                                                                                                    \
+    "(SELECT user_id FROM scene_owners AS o WHERE scene_id = scenes.id AND (?1 OR user_id = ?2 OR EXISTS"              \
+    " (SELECT 1 FROM jobs WHERE jobs.scene_id = o.scene_id AND owner_id = o.user_id AND shared = 1))"                  \
     " ORDER BY user_id = ?2 DESC, created_ms, user_id LIMIT 1)"
-#define SCENES                                                                                             \
-    "scenes LEFT JOIN scene_owners AS shown ON shown.scene_id = scenes.id AND shown.user_id = " SHOWN_OWNER \
+#define SCENES                                                                                                         \
+    "scenes LEFT JOIN scene_owners AS shown ON shown.scene_id = scenes.id AND shown.user_id = " SHOWN_OWNER            \
     " LEFT JOIN users ON users.id = shown.user_id"
 /* When that owner sent it. */
 #define CREATED "ifnull(shown.created_ms, scenes.created_ms)"
 /* One who shared it and gave it up leaves it without a name for its readers. */
-#define COLUMNS                                                                                            \
-    "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, " CREATED ", problems,"        \
+#define COLUMNS                                                                                                        \
+    "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, " CREATED ", problems,"                    \
     " facts, users.name, pinned, " SCENE_EXPIRES ", disk_bytes"
 /* What user ?2 may read where not all (?1); see caller_access_job. */
-#define IS_READABLE                                                                            \
-    "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"   \
+#define IS_READABLE                                                                                                    \
+    "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"                           \
     " OR EXISTS (SELECT 1 FROM jobs WHERE scene_id = scenes.id AND shared = 1))"
 #define NOT_A_USER ((int64_t)-1)
 
@@ -66,20 +66,18 @@ static enum status not_found(const char *id, struct error *err) {
 }
 
 /* -1 when there is no such scene. */
-static enum status state_of(struct store *store, const char *id, int64_t *state,
-                            struct error *err) {
+static enum status state_of(struct store *store, const char *id, int64_t *state, struct error *err) {
     return sql_int(&store->sql, -1, state, err, "SELECT state FROM scenes WHERE id = ?", "t", id);
 }
 
 /* Whether its check is under way or about to be. */
 static enum status is_in_check(struct store *store, const char *id, int64_t *is_so, struct error *err) {
-    return sql_int(&store->sql, 0, is_so, err,
-                   "SELECT 1 FROM scenes WHERE id = ? AND state = ? AND problems = '[]'", "tn", id,
-                   (int)SCENE_CHECKING);
+    return sql_int(&store->sql, 0, is_so, err, "SELECT 1 FROM scenes WHERE id = ? AND state = ? AND problems = '[]'",
+                   "tn", id, (int)SCENE_CHECKING);
 }
 
-enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes,
-                            int64_t owner_id, bool *existed, struct error *err) {
+enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes, int64_t owner_id,
+                            bool *existed, struct error *err) {
     int64_t state = -1, is_mine = 0;
     *existed = false;
     enum status status = store_begin(store, err);
@@ -87,16 +85,15 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
         return status;
     status = state_of(store, id, &state, err);
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &is_mine, err,
-                         "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id, owner_id);
+        status = sql_int(&store->sql, 0, &is_mine, err, "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?",
+                         "ti", id, owner_id);
     if (status == STATUS_OK && state < 0)
         status = sql_run(&store->sql, err,
                          "INSERT INTO scenes (id, state, bytes, created_ms)"
                          " VALUES (?, ?, ?, ?)",
                          "tnii", id, (int)SCENE_CHECKING, (int64_t)bytes, store_now_ms());
     else if (status == STATUS_OK && (state == SCENE_REJECTED || state == SCENE_CHECKING))
-        status = sql_run(&store->sql, err,
-                         "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
+        status = sql_run(&store->sql, err, "UPDATE scenes SET state = ?, problems = '[]' WHERE id = ?", "nt",
                          (int)SCENE_CHECKING, id);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
@@ -109,8 +106,8 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
 }
 
 /* The end of a check. */
-static enum status conclude(struct store *store, const char *id, enum scene_state to,
-                            const char *problems, const char *facts, struct error *err) {
+static enum status conclude(struct store *store, const char *id, enum scene_state to, const char *problems,
+                            const char *facts, struct error *err) {
     int64_t state = -1;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
@@ -129,18 +126,15 @@ static enum status conclude(struct store *store, const char *id, enum scene_stat
     return store_end(store, status, 0, err);
 }
 
-enum status store_scene_ready(struct store *store, const char *id, const char *facts,
-                              struct error *err) {
+enum status store_scene_ready(struct store *store, const char *id, const char *facts, struct error *err) {
     return conclude(store, id, SCENE_READY, "[]", facts, err);
 }
 
-enum status store_scene_reject(struct store *store, const char *id, const char *problems,
-                               struct error *err) {
+enum status store_scene_reject(struct store *store, const char *id, const char *problems, struct error *err) {
     return conclude(store, id, SCENE_REJECTED, problems, "{}", err);
 }
 
-enum status store_scene_postpone(struct store *store, const char *id, const char *problems,
-                                 struct error *err) {
+enum status store_scene_postpone(struct store *store, const char *id, const char *problems, struct error *err) {
     return conclude(store, id, SCENE_CHECKING, problems, "{}", err);
 }
 
@@ -148,21 +142,18 @@ enum status store_scene_check_again(struct store *store, struct error *err) {
     enum status status = store_begin_freeing(store, err); /* a start on a full disk needs it */
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err,
-                     "UPDATE scenes SET problems = '[]' WHERE state = ? AND problems <> '[]'", "n",
+    status = sql_run(&store->sql, err, "UPDATE scenes SET problems = '[]' WHERE state = ? AND problems <> '[]'", "n",
                      (int)SCENE_CHECKING);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_scene_get(struct store *store, const char *id, struct scene_row *row,
-                            struct error *err) {
+enum status store_scene_get(struct store *store, const char *id, struct scene_row *row, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
     *row = (struct scene_row){0};
     store_lock(store);
     enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT " COLUMNS " FROM " SCENES " WHERE scenes.id = ?3", "nit", 1,
-                                   NOT_A_USER, id);
+                                   "SELECT " COLUMNS " FROM " SCENES " WHERE scenes.id = ?3", "nit", 1, NOT_A_USER, id);
     if (found) {
         fill(row, stmt);
         sqlite3_reset(stmt);
@@ -171,20 +162,15 @@ enum status store_scene_get(struct store *store, const char *id, struct scene_ro
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-static bool sees_all(const struct caller *who) {
-    return !who || who->role == ROLE_ADMIN;
-}
+static bool sees_all(const struct caller *who) { return !who || who->role == ROLE_ADMIN; }
 
-static int64_t user_of(const struct caller *who) {
-    return who ? who->user_id : NOT_A_USER;
-}
+static int64_t user_of(const struct caller *who) { return who ? who->user_id : NOT_A_USER; }
 
-enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix,
-                             struct scene_row *row, struct error *err) {
+enum status store_scene_find(struct store *store, const struct caller *who, const char *prefix, struct scene_row *row,
+                             struct error *err) {
     *row = (struct scene_row){0};
     size_t length = strlen(prefix);
-    if (length < 4 || length >= SCENE_ID_SIZE ||
-        strspn(prefix, "0123456789abcdef") != length)
+    if (length < 4 || length >= SCENE_ID_SIZE || strspn(prefix, "0123456789abcdef") != length)
         return not_found(prefix, err);
     sqlite3_stmt *stmt;
     bool found = false, another = false;
@@ -192,8 +178,7 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
     /* 'g' follows every hex digit. */
     enum status status = sql_first(&store->sql, &stmt, &found, err,
                                    "SELECT " COLUMNS " FROM " SCENES
-                                   " WHERE scenes.id >= ?3 AND scenes.id < ?3 || 'g' AND " IS_READABLE
-                                   " LIMIT 2",
+                                   " WHERE scenes.id >= ?3 AND scenes.id < ?3 || 'g' AND " IS_READABLE " LIMIT 2",
                                    "nit", (int)sees_all(who), user_of(who), prefix);
     if (found) {
         fill(row, stmt);
@@ -210,9 +195,8 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
     return status;
 }
 
-enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor,
-                             size_t limit, struct scene_row *rows, size_t *count,
-                             char next_cursor[128], struct error *err) {
+enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor, size_t limit,
+                             struct scene_row *rows, size_t *count, char next_cursor[128], struct error *err) {
     long long before_ms = INT64_MAX;
     char before_id[SCENE_ID_SIZE] = "";
     char rest;
@@ -222,12 +206,11 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
         return error_set(err, STATUS_INPUT, "\"%.64s\" is no cursor of a list of scenes", cursor);
     sqlite3_stmt *stmt;
     store_lock(store);
-    enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT " COLUMNS " FROM " SCENES
-                                   " WHERE (" CREATED ", scenes.id) < (?3, ?4) AND " IS_READABLE
-                                   " ORDER BY " CREATED " DESC, scenes.id DESC LIMIT ?5",
-                                   "niiti", (int)sees_all(who), user_of(who),
-                                   (int64_t)before_ms, before_id, (int64_t)limit + 1);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT " COLUMNS " FROM " SCENES " WHERE (" CREATED ", scenes.id) < (?3, ?4) AND " IS_READABLE
+                  " ORDER BY " CREATED " DESC, scenes.id DESC LIMIT ?5",
+                  "niiti", (int)sees_all(who), user_of(who), (int64_t)before_ms, before_id, (int64_t)limit + 1);
     bool row = status == STATUS_OK;
     while (row && *count <= limit) {
         status = sql_step(&store->sql, stmt, &row, err);
@@ -235,8 +218,7 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
             break;
         if (*count == limit) { /* one more than asked for: there is another page */
             if (limit > 0)
-                snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms,
-                         rows[limit - 1].id);
+                snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms, rows[limit - 1].id);
             sqlite3_reset(stmt);
             break;
         }
@@ -252,10 +234,10 @@ enum status store_scene_list(struct store *store, const struct caller *who, cons
 static enum status is_others_too(struct store *store, const char *id, int64_t owner_id, int64_t *is_so,
                                  struct error *err) {
     *is_so = 0;
-    return owner_id < 0 ? STATUS_OK
-                        : sql_int(&store->sql, 0, is_so, err,
-                                  "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1", "ti", id,
-                                  owner_id);
+    return owner_id < 0
+               ? STATUS_OK
+               : sql_int(&store->sql, 0, is_so, err,
+                         "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1", "ti", id, owner_id);
 }
 
 enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
@@ -271,8 +253,8 @@ enum status store_scene_patch(struct store *store, const struct caller *who, con
         status = error_hint(err, "It can be pinned; DELETE gives up your share of it alone.");
     }
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE scenes SET " RETENTION_SET " WHERE id = ?4", "nnit", (int)retention->pin,
-                         (int)retention->sets_expiry, retention->expires_ms, id);
+        status = sql_run(&store->sql, err, "UPDATE scenes SET " RETENTION_SET " WHERE id = ?4", "nnit",
+                         (int)retention->pin, (int)retention->sets_expiry, retention->expires_ms, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
     if (status == STATUS_OK && name)
@@ -309,16 +291,16 @@ static enum status delete_scene(struct store *store, const char *id, int64_t own
         status = error_hint(err, "Cancel the job or wait for its end.");
     }
     if (status == STATUS_OK && !dry_run)
-        status = others ? sql_run(&store->sql, err, "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", id,
-                                  owner_id)
+        status = others ? sql_run(&store->sql, err, "DELETE FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti",
+                                  id, owner_id)
                         : sql_run(&store->sql, err, "DELETE FROM scenes WHERE id = ?", "t", id);
     status = store_end(store, status, 0, err);
     *is_gone = status == STATUS_OK && !others;
     return status;
 }
 
-enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run,
-                               bool *is_gone, struct error *err) {
+enum status store_scene_delete(struct store *store, const char *id, int64_t owner_id, bool dry_run, bool *is_gone,
+                               struct error *err) {
     enum status status;
     do
         status = delete_scene(store, id, owner_id, dry_run, is_gone, err);
@@ -336,13 +318,14 @@ enum status store_scene_unchecked(struct store *store, const struct unchecked *s
     *count = 0;
     store_lock(store);
     /* The other columns are those of the row that has the minimum: sqlite.org/lang_select.html, 3.2 */
-    enum status status = sql_query(&store->sql, &stmt, err,
-                                   "SELECT id, owner, min(created_ms) AS oldest FROM (SELECT id, created_ms,"
-                                   " ifnull((SELECT user_id FROM scene_owners WHERE scene_id = scenes.id"
-                                   "  ORDER BY created_ms, user_id LIMIT 1), 0) AS owner FROM scenes"
-                                   "  WHERE state = ? AND problems = '[]' AND id NOT IN (SELECT value FROM json_each(?)))"
-                                   " GROUP BY owner ORDER BY oldest, id LIMIT ?",
-                                   "nti", (int)SCENE_CHECKING, skipped, (int64_t)limit);
+    enum status status =
+        sql_query(&store->sql, &stmt, err,
+                  "SELECT id, owner, min(created_ms) AS oldest FROM (SELECT id, created_ms,"
+                  " ifnull((SELECT user_id FROM scene_owners WHERE scene_id = scenes.id"
+                  "  ORDER BY created_ms, user_id LIMIT 1), 0) AS owner FROM scenes"
+                  "  WHERE state = ? AND problems = '[]' AND id NOT IN (SELECT value FROM json_each(?)))"
+                  " GROUP BY owner ORDER BY oldest, id LIMIT ?",
+                  "nti", (int)SCENE_CHECKING, skipped, (int64_t)limit);
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);

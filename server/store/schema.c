@@ -67,81 +67,76 @@ static const char step_1[] =
 
 /* Users. A scene is one for all who have uploaded its bytes: each of them owns it; user 0 is nobody,
  * from a time without tokens. */
-static const char step_2[] =
-    "CREATE TABLE users ("
-    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
-    "  name TEXT NOT NULL UNIQUE,"
-    "  created_ms INTEGER NOT NULL"
-    ") STRICT;"
-    "CREATE TABLE tokens ("
-    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
-    "  user_id INTEGER NOT NULL REFERENCES users (id),"
-    "  role INTEGER NOT NULL CHECK (role BETWEEN 0 AND 2),"
-    "  hash TEXT NOT NULL,"
-    "  created_ms INTEGER NOT NULL"
-    ") STRICT;"
-    "CREATE INDEX tokens_by_user ON tokens (user_id);"
-    "CREATE TABLE scene_owners ("
-    "  scene_id TEXT NOT NULL REFERENCES scenes (id) ON DELETE CASCADE,"
-    "  user_id INTEGER NOT NULL,"
-    "  created_ms INTEGER NOT NULL,"
-    "  PRIMARY KEY (scene_id, user_id)"
-    ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX scene_owners_by_user ON scene_owners (user_id);"
-    "INSERT INTO scene_owners SELECT id, 0, created_ms FROM scenes;"
-    "ALTER TABLE jobs ADD COLUMN owner_id INTEGER NOT NULL DEFAULT 0;"
-    "ALTER TABLE jobs ADD COLUMN shared INTEGER NOT NULL DEFAULT 0 CHECK (shared IN (0, 1));"
-    "CREATE INDEX jobs_by_owner ON jobs (owner_id, state);"
-    "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
+static const char step_2[] = "CREATE TABLE users ("
+                             "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+                             "  name TEXT NOT NULL UNIQUE,"
+                             "  created_ms INTEGER NOT NULL"
+                             ") STRICT;"
+                             "CREATE TABLE tokens ("
+                             "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+                             "  user_id INTEGER NOT NULL REFERENCES users (id),"
+                             "  role INTEGER NOT NULL CHECK (role BETWEEN 0 AND 2),"
+                             "  hash TEXT NOT NULL,"
+                             "  created_ms INTEGER NOT NULL"
+                             ") STRICT;"
+                             "CREATE INDEX tokens_by_user ON tokens (user_id);"
+                             "CREATE TABLE scene_owners ("
+                             "  scene_id TEXT NOT NULL REFERENCES scenes (id) ON DELETE CASCADE,"
+                             "  user_id INTEGER NOT NULL,"
+                             "  created_ms INTEGER NOT NULL,"
+                             "  PRIMARY KEY (scene_id, user_id)"
+                             ") STRICT, WITHOUT ROWID;"
+                             "CREATE INDEX scene_owners_by_user ON scene_owners (user_id);"
+                             "INSERT INTO scene_owners SELECT id, 0, created_ms FROM scenes;"
+                             "ALTER TABLE jobs ADD COLUMN owner_id INTEGER NOT NULL DEFAULT 0;"
+                             "ALTER TABLE jobs ADD COLUMN shared INTEGER NOT NULL DEFAULT 0 CHECK (shared IN (0, 1));"
+                             "CREATE INDEX jobs_by_owner ON jobs (owner_id, state);"
+                             "CREATE INDEX jobs_shared ON jobs (scene_id) WHERE shared = 1;";
 
 /* Uploads in parts. `received` bytes are on disk; `hash` is the state of their SHA-256; `boot` names
  * the run of the machine in which what lies in the file beyond them can be counted, if any. */
-static const char step_3[] =
-    "CREATE TABLE uploads ("
-    "  id TEXT PRIMARY KEY,"
-    "  owner_id INTEGER NOT NULL,"
-    "  name TEXT NOT NULL,"
-    "  metadata TEXT NOT NULL,"
-    "  sha256 TEXT NOT NULL,"
-    "  length INTEGER NOT NULL,"
-    "  received INTEGER NOT NULL DEFAULT 0 CHECK (received BETWEEN 0 AND length),"
-    "  hash BLOB NOT NULL,"
-    "  boot TEXT NOT NULL,"
-    "  scene_id TEXT NOT NULL DEFAULT '',"
-    "  created_ms INTEGER NOT NULL,"
-    "  updated_ms INTEGER NOT NULL"
-    ") STRICT;"
-    "CREATE INDEX uploads_by_age ON uploads (created_ms, id);";
+static const char step_3[] = "CREATE TABLE uploads ("
+                             "  id TEXT PRIMARY KEY,"
+                             "  owner_id INTEGER NOT NULL,"
+                             "  name TEXT NOT NULL,"
+                             "  metadata TEXT NOT NULL,"
+                             "  sha256 TEXT NOT NULL,"
+                             "  length INTEGER NOT NULL,"
+                             "  received INTEGER NOT NULL DEFAULT 0 CHECK (received BETWEEN 0 AND length),"
+                             "  hash BLOB NOT NULL,"
+                             "  boot TEXT NOT NULL,"
+                             "  scene_id TEXT NOT NULL DEFAULT '',"
+                             "  created_ms INTEGER NOT NULL,"
+                             "  updated_ms INTEGER NOT NULL"
+                             ") STRICT;"
+                             "CREATE INDEX uploads_by_age ON uploads (created_ms, id);";
 
 /* Places in the queue, what a retry does anew, how often a job ran out of memory. */
-static const char step_4[] =
-    "ALTER TABLE jobs ADD COLUMN turn INTEGER NOT NULL DEFAULT 0;"
-    "ALTER TABLE jobs ADD COLUMN restart_from TEXT NOT NULL DEFAULT '';"
-    "ALTER TABLE jobs ADD COLUMN memory_step INTEGER NOT NULL DEFAULT 0;"
-    "UPDATE jobs SET turn = id;"
-    "DROP INDEX jobs_by_turn;"
-    "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, turn);"
-    "CREATE INDEX jobs_turn ON jobs (turn);";
+static const char step_4[] = "ALTER TABLE jobs ADD COLUMN turn INTEGER NOT NULL DEFAULT 0;"
+                             "ALTER TABLE jobs ADD COLUMN restart_from TEXT NOT NULL DEFAULT '';"
+                             "ALTER TABLE jobs ADD COLUMN memory_step INTEGER NOT NULL DEFAULT 0;"
+                             "UPDATE jobs SET turn = id;"
+                             "DROP INDEX jobs_by_turn;"
+                             "CREATE INDEX jobs_by_turn ON jobs (state, priority DESC, turn);"
+                             "CREATE INDEX jobs_turn ON jobs (turn);";
 
 /* Fair turns. */
-static const char step_5[] =
-    "CREATE TABLE usage (owner_id INTEGER PRIMARY KEY, weight REAL NOT NULL) STRICT;"
-    "DROP INDEX jobs_by_turn;"
-    "CREATE INDEX jobs_by_turn ON jobs (state, owner_id, priority DESC, turn);";
+static const char step_5[] = "CREATE TABLE usage (owner_id INTEGER PRIMARY KEY, weight REAL NOT NULL) STRICT;"
+                             "DROP INDEX jobs_by_turn;"
+                             "CREATE INDEX jobs_by_turn ON jobs (state, owner_id, priority DESC, turn);";
 
 /* How long things are kept. */
-static const char step_6[] =
-    "ALTER TABLE scenes ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
-    "ALTER TABLE scenes ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;"
-    "ALTER TABLE jobs ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
-    "ALTER TABLE jobs ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;"
-    "CREATE TABLE retention ("
-    "  id INTEGER PRIMARY KEY CHECK (id = 1),"
-    "  scene_ms INTEGER NOT NULL,"
-    "  job_ms INTEGER NOT NULL,"
-    "  upload_ms INTEGER NOT NULL"
-    ") STRICT;"
-    "INSERT INTO retention VALUES (1, 0, 0, 86400000);";
+static const char step_6[] = "ALTER TABLE scenes ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
+                             "ALTER TABLE scenes ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;"
+                             "ALTER TABLE jobs ADD COLUMN pinned INTEGER NOT NULL DEFAULT 0 CHECK (pinned IN (0, 1));"
+                             "ALTER TABLE jobs ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;"
+                             "CREATE TABLE retention ("
+                             "  id INTEGER PRIMARY KEY CHECK (id = 1),"
+                             "  scene_ms INTEGER NOT NULL,"
+                             "  job_ms INTEGER NOT NULL,"
+                             "  upload_ms INTEGER NOT NULL"
+                             ") STRICT;"
+                             "INSERT INTO retention VALUES (1, 0, 0, 86400000);";
 
 /* Old events go: those of a job up to pruned_id have; events_gone when its end is long past and
  * only the last is left. `pruned` has the highest id that ever went so. */
@@ -153,22 +148,21 @@ static const char step_7[] =
     "INSERT INTO pruned VALUES (1, 0);";
 
 /* Webhooks of jobs, and what is still to be told. */
-static const char step_8[] =
-    "CREATE TABLE webhooks ("
-    "  job_id INTEGER PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,"
-    "  url TEXT NOT NULL,"
-    "  secret TEXT NOT NULL"
-    ") STRICT;"
-    "CREATE TABLE outbox ("
-    "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
-    "  job_id INTEGER NOT NULL,"
-    "  url TEXT NOT NULL,"
-    "  secret TEXT NOT NULL,"
-    "  body TEXT NOT NULL,"
-    "  tries INTEGER NOT NULL DEFAULT 0,"
-    "  next_ms INTEGER NOT NULL"
-    ") STRICT;"
-    "CREATE INDEX outbox_by_time ON outbox (next_ms);";
+static const char step_8[] = "CREATE TABLE webhooks ("
+                             "  job_id INTEGER PRIMARY KEY REFERENCES jobs (id) ON DELETE CASCADE,"
+                             "  url TEXT NOT NULL,"
+                             "  secret TEXT NOT NULL"
+                             ") STRICT;"
+                             "CREATE TABLE outbox ("
+                             "  id INTEGER PRIMARY KEY AUTOINCREMENT,"
+                             "  job_id INTEGER NOT NULL,"
+                             "  url TEXT NOT NULL,"
+                             "  secret TEXT NOT NULL,"
+                             "  body TEXT NOT NULL,"
+                             "  tries INTEGER NOT NULL DEFAULT 0,"
+                             "  next_ms INTEGER NOT NULL"
+                             ") STRICT;"
+                             "CREATE INDEX outbox_by_time ON outbox (next_ms);";
 
 /* How long an upload is kept, as for scenes and jobs. */
 static const char step_9[] =
@@ -176,21 +170,18 @@ static const char step_9[] =
     "ALTER TABLE uploads ADD COLUMN expires_ms INTEGER NOT NULL DEFAULT 0;";
 
 /* What the folders of scenes and jobs take of the disk; -1: not known. */
-static const char step_10[] =
-    "ALTER TABLE scenes ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
-    "ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
-    "DROP INDEX jobs_by_owner;"
-    "CREATE INDEX jobs_by_owner ON jobs (owner_id, state, disk_bytes);";
+static const char step_10[] = "ALTER TABLE scenes ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
+                              "ALTER TABLE jobs ADD COLUMN disk_bytes INTEGER NOT NULL DEFAULT -1;"
+                              "DROP INDEX jobs_by_owner;"
+                              "CREATE INDEX jobs_by_owner ON jobs (owner_id, state, disk_bytes);";
 
 /* A scene has a name for each of its owners. */
-static const char step_11[] =
-    "ALTER TABLE scene_owners ADD COLUMN name TEXT NOT NULL DEFAULT '';"
-    "UPDATE scene_owners SET name = (SELECT name FROM scenes WHERE id = scene_id);"
-    "ALTER TABLE scenes DROP COLUMN name;";
+static const char step_11[] = "ALTER TABLE scene_owners ADD COLUMN name TEXT NOT NULL DEFAULT '';"
+                              "UPDATE scene_owners SET name = (SELECT name FROM scenes WHERE id = scene_id);"
+                              "ALTER TABLE scenes DROP COLUMN name;";
 
 /* Lists of scenes go by when each owner sent them. */
-static const char step_12[] =
-    "DROP INDEX scenes_by_age;";
+static const char step_12[] = "DROP INDEX scenes_by_age;";
 
 /* The SHA-256 that this daemon computed of an output ("": none yet), and of which version of the file. Those that
  * are here already are hashed when they are first asked for. */
@@ -204,19 +195,17 @@ static const char step_13[] =
     "CREATE INDEX outputs_to_hash ON outputs (bytes) WHERE digest_wanted = 1;";
 
 /* An upload of which nothing has arrived holds its space for minutes, not for hours. */
-static const char step_14[] =
-    "ALTER TABLE retention ADD COLUMN empty_upload_ms INTEGER NOT NULL DEFAULT 600000;";
+static const char step_14[] = "ALTER TABLE retention ADD COLUMN empty_upload_ms INTEGER NOT NULL DEFAULT 600000;";
 
 /* What became of a job's webhook. */
 static const char step_15[] =
     "ALTER TABLE webhooks ADD COLUMN result TEXT NOT NULL DEFAULT '';" /* of the last call: delivered, failed or gave_up */
     "ALTER TABLE webhooks ADD COLUMN attempts INTEGER NOT NULL DEFAULT 0;" /* of its message */
-    "ALTER TABLE webhooks ADD COLUMN status INTEGER NOT NULL DEFAULT 0;" /* that was answered; 0: none */
+    "ALTER TABLE webhooks ADD COLUMN status INTEGER NOT NULL DEFAULT 0;"   /* that was answered; 0: none */
     "ALTER TABLE webhooks ADD COLUMN error TEXT NOT NULL DEFAULT '';"
     "ALTER TABLE webhooks ADD COLUMN at_ms INTEGER NOT NULL DEFAULT 0;"
     "CREATE INDEX outbox_by_job ON outbox (job_id);";
 
-const char *const schema_steps[] = {step_1, step_2, step_3, step_4, step_5,
-                                    step_6, step_7, step_8, step_9, step_10,
-                                    step_11, step_12, step_13, step_14, step_15};
+const char *const schema_steps[] = {step_1, step_2,  step_3,  step_4,  step_5,  step_6,  step_7, step_8,
+                                    step_9, step_10, step_11, step_12, step_13, step_14, step_15};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -11,12 +11,12 @@
 
 /* The sum of all that the user keeps whom the SQL expression `user` names, but for scene ?1 and job ?2. 1: the job
  * runs. */
-#define KEPT_BY(user)                                                                                          \
-    "((SELECT ifnull(sum(max(scenes.bytes, scenes.disk_bytes)), 0) FROM scenes"                                \
-    "    JOIN scene_owners ON scene_id = scenes.id WHERE scene_owners.user_id = " user " AND scenes.id <> ?1)" \
-    " + (SELECT ifnull(sum(iif(state <> 1 AND disk_bytes >= 0, disk_bytes, max(disk_bytes,"                    \
-    "     (SELECT ifnull(sum(outputs.bytes), 0) FROM outputs WHERE job_id = jobs.id)))), 0)"                   \
-    "    FROM jobs WHERE owner_id = " user " AND id <> ?2)"                                                    \
+#define KEPT_BY(user)                                                                                                  \
+    "((SELECT ifnull(sum(max(scenes.bytes, scenes.disk_bytes)), 0) FROM scenes"                                        \
+    "    JOIN scene_owners ON scene_id = scenes.id WHERE scene_owners.user_id = " user " AND scenes.id <> ?1)"         \
+    " + (SELECT ifnull(sum(iif(state <> 1 AND disk_bytes >= 0, disk_bytes, max(disk_bytes,"                            \
+    "     (SELECT ifnull(sum(outputs.bytes), 0) FROM outputs WHERE job_id = jobs.id)))), 0)"                           \
+    "    FROM jobs WHERE owner_id = " user " AND id <> ?2)"                                                            \
     " + (SELECT ifnull(sum(length), 0) FROM uploads WHERE owner_id = " user " AND scene_id = ''))"
 
 enum status store_user_bytes(struct store *store, int64_t user_id, const char *but_scene, int64_t but_job,
@@ -34,10 +34,11 @@ enum status store_user_pledged(struct store *store, int64_t user_id, int64_t sin
                                struct error *err) {
     int64_t sum = 0;
     store_lock(store);
-    enum status status = sql_int(&store->sql, 0, &sum, err,
-                                 "SELECT ifnull(sum(length - received), 0) FROM uploads WHERE owner_id = ? AND scene_id = ''"
-                                 " AND updated_ms >= ?",
-                                 "ii", user_id, since_ms);
+    enum status status =
+        sql_int(&store->sql, 0, &sum, err,
+                "SELECT ifnull(sum(length - received), 0) FROM uploads WHERE owner_id = ? AND scene_id = ''"
+                " AND updated_ms >= ?",
+                "ii", user_id, since_ms);
     store_unlock(store);
     *bytes = (uint64_t)sum;
     return status;
@@ -84,8 +85,9 @@ enum status store_share_check_scene(struct store *store, const char *id, uint64_
         return STATUS_OK;
     store_lock(store);
     enum status status = sql_int(&store->sql, 0, &least, err,
-                                 "SELECT ifnull(min(iif(o.user_id = 0, -1, " KEPT_BY("o.user_id") ")), -1)"
-                                 " FROM scene_owners AS o WHERE o.scene_id = ?1",
+                                 "SELECT ifnull(min(iif(o.user_id = 0, -1, " KEPT_BY(
+                                     "o.user_id") ")), -1)"
+                                                  " FROM scene_owners AS o WHERE o.scene_id = ?1",
                                  "ti", id, (int64_t)0);
     store_unlock(store);
     return status == STATUS_OK && least >= 0 ? compare((uint64_t)least, bytes, limit_bytes, err) : status;
@@ -97,12 +99,13 @@ static enum status enter_all(struct store *store, const struct disk_use *list, s
     if (status != STATUS_OK)
         return status;
     for (size_t i = 0; i < count && status == STATUS_OK; i++)
-        status = list[i].job_id
-                     ? sql_run(&store->sql, err,
-                               "UPDATE jobs SET disk_bytes = ?1, revision = revision + 1 WHERE id = ?2 AND disk_bytes <> ?1",
-                               "ii", list[i].bytes, list[i].job_id)
-                     : sql_run(&store->sql, err, "UPDATE scenes SET disk_bytes = ? WHERE id = ?", "it", list[i].bytes,
-                               list[i].scene_id);
+        status =
+            list[i].job_id
+                ? sql_run(&store->sql, err,
+                          "UPDATE jobs SET disk_bytes = ?1, revision = revision + 1 WHERE id = ?2 AND disk_bytes <> ?1",
+                          "ii", list[i].bytes, list[i].job_id)
+                : sql_run(&store->sql, err, "UPDATE scenes SET disk_bytes = ? WHERE id = ?", "it", list[i].bytes,
+                          list[i].scene_id);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 

@@ -49,8 +49,7 @@ static enum status fail(struct sql *sql, int code, const char *doing, struct err
     int os = errno;
     const char *why = sql->db ? sqlite3_errmsg(sql->db) : sqlite3_errstr(code);
     if (sql_is_full(code, os)) {
-        error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path,
-                  strerror(os == EDQUOT || os == EFBIG ? os : ENOSPC));
+        error_set(err, STATUS_NO_SPACE, "%s: %s", sql->path, strerror(os == EDQUOT || os == EFBIG ? os : ENOSPC));
         return error_hint(err, "Free some space on the disk that holds the file.");
     }
     switch (code & 0xff) {
@@ -58,17 +57,13 @@ static enum status fail(struct sql *sql, int code, const char *doing, struct err
         return error_set(err, STATUS_IO, "%s: cannot %s: %s (%s)", sql->path, doing, why,
                          os ? strerror(os) : "no errno");
     case SQLITE_BUSY:
-    case SQLITE_LOCKED:
-        return error_set(err, STATUS_UNAVAILABLE, "%s is in use by another process", sql->path);
+    case SQLITE_LOCKED: return error_set(err, STATUS_UNAVAILABLE, "%s is in use by another process", sql->path);
     case SQLITE_CORRUPT:
-    case SQLITE_NOTADB:
-        return error_set(err, STATUS_CORRUPT, "%s is damaged: %s", sql->path, why);
+    case SQLITE_NOTADB: return error_set(err, STATUS_CORRUPT, "%s is damaged: %s", sql->path, why);
     case SQLITE_CANTOPEN:
     case SQLITE_READONLY:
-    case SQLITE_PERM:
-        return error_set(err, STATUS_IO, "%s: cannot %s: %s", sql->path, doing, why);
-    default:
-        return error_set(err, STATUS_INTERNAL, "%s: cannot %s: %s", sql->path, doing, why);
+    case SQLITE_PERM: return error_set(err, STATUS_IO, "%s: cannot %s: %s", sql->path, doing, why);
+    default: return error_set(err, STATUS_INTERNAL, "%s: cannot %s: %s", sql->path, doing, why);
     }
 }
 
@@ -78,8 +73,7 @@ enum status sql_script(struct sql *sql, const char *text, struct error *err) {
     return code == SQLITE_OK ? STATUS_OK : fail(sql, code, text, err);
 }
 
-static enum status prepare(struct sql *sql, const char *text, sqlite3_stmt **stmt,
-                           struct error *err) {
+static enum status prepare(struct sql *sql, const char *text, sqlite3_stmt **stmt, struct error *err) {
     for (size_t i = 0; i < sql->statement_count; i++) {
         if (sql->statement[i].text == text) {
             *stmt = sql->statement[i].stmt;
@@ -108,9 +102,7 @@ static int bind_all(sqlite3_stmt *stmt, const char *types, va_list args) {
         case 'i': code = sqlite3_bind_int64(stmt, i, va_arg(args, int64_t)); break;
         case 'n': code = sqlite3_bind_int(stmt, i, va_arg(args, int)); break;
         case 'd': code = sqlite3_bind_double(stmt, i, va_arg(args, double)); break;
-        case 't':
-            code = sqlite3_bind_text(stmt, i, va_arg(args, const char *), -1, SQLITE_STATIC);
-            break;
+        case 't': code = sqlite3_bind_text(stmt, i, va_arg(args, const char *), -1, SQLITE_STATIC); break;
         case 'b': {
             const void *data = va_arg(args, const void *);
             code = sqlite3_bind_blob64(stmt, i, data, va_arg(args, size_t), SQLITE_STATIC);
@@ -122,8 +114,8 @@ static int bind_all(sqlite3_stmt *stmt, const char *types, va_list args) {
     return code;
 }
 
-static enum status query(struct sql *sql, sqlite3_stmt **stmt, const char *text, const char *types,
-                         va_list args, struct error *err) {
+static enum status query(struct sql *sql, sqlite3_stmt **stmt, const char *text, const char *types, va_list args,
+                         struct error *err) {
     enum status status = prepare(sql, text, stmt, err);
     if (status != STATUS_OK)
         return status;
@@ -131,8 +123,8 @@ static enum status query(struct sql *sql, sqlite3_stmt **stmt, const char *text,
     return code == SQLITE_OK ? STATUS_OK : fail(sql, code, text, err);
 }
 
-enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, const char *text,
-                      const char *types, ...) {
+enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, const char *text, const char *types,
+                      ...) {
     va_list args;
     va_start(args, types);
     enum status status = query(sql, stmt, text, types, args, err);
@@ -168,8 +160,8 @@ enum status sql_run(struct sql *sql, struct error *err, const char *text, const 
     return status;
 }
 
-enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err,
-                      const char *text, const char *types, ...) {
+enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err, const char *text,
+                      const char *types, ...) {
     va_list args;
     va_start(args, types);
     enum status status = query(sql, stmt, text, types, args, err);
@@ -178,8 +170,8 @@ enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct er
     return status == STATUS_OK ? sql_step(sql, *stmt, row, err) : status;
 }
 
-enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err,
-                    const char *text, const char *types, ...) {
+enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err, const char *text,
+                    const char *types, ...) {
     sqlite3_stmt *stmt;
     va_list args;
     va_start(args, types);
@@ -196,22 +188,16 @@ enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct er
     return status;
 }
 
-int64_t sql_changes(const struct sql *sql) {
-    return sqlite3_changes64(sql->db);
-}
+int64_t sql_changes(const struct sql *sql) { return sqlite3_changes64(sql->db); }
 
 const char *sql_text(sqlite3_stmt *stmt, int column) {
     const unsigned char *text = sqlite3_column_text(stmt, column);
     return text ? (const char *)text : "";
 }
 
-char *sql_dup(sqlite3_stmt *stmt, int column) {
-    return mem_strdup(sql_text(stmt, column));
-}
+char *sql_dup(sqlite3_stmt *stmt, int column) { return mem_strdup(sql_text(stmt, column)); }
 
-enum status sql_begin(struct sql *sql, struct error *err) {
-    return sql_run(sql, err, "BEGIN IMMEDIATE", "");
-}
+enum status sql_begin(struct sql *sql, struct error *err) { return sql_run(sql, err, "BEGIN IMMEDIATE", ""); }
 
 enum status sql_end(struct sql *sql, enum status status, struct error *err) {
     if (status == STATUS_OK)
@@ -224,8 +210,7 @@ enum status sql_end(struct sql *sql, enum status status, struct error *err) {
 }
 
 /* A pragma that SQLite does not know or cannot do answers with another value, not an error. */
-static enum status expect(struct sql *sql, const char *pragma, const char *wanted,
-                          struct error *err) {
+static enum status expect(struct sql *sql, const char *pragma, const char *wanted, struct error *err) {
     sqlite3_stmt *stmt = NULL;
     errno = 0;
     int code = sqlite3_prepare_v2(sql->db, pragma, -1, &stmt, NULL);
@@ -235,14 +220,13 @@ static enum status expect(struct sql *sql, const char *pragma, const char *wante
     if (code != SQLITE_ROW)
         status = fail(sql, code, pragma, err);
     else if (strcmp(sql_text(stmt, 0), wanted) != 0)
-        status = error_set(err, STATUS_INTERNAL, "%s: %s says \"%s\", expected \"%s\"", sql->path,
-                           pragma, sql_text(stmt, 0), wanted);
+        status = error_set(err, STATUS_INTERNAL, "%s: %s says \"%s\", expected \"%s\"", sql->path, pragma,
+                           sql_text(stmt, 0), wanted);
     sqlite3_finalize(stmt);
     return status;
 }
 
-static enum status configure(struct sql *sql, enum sql_journal journal, int page_size,
-                             struct error *err) {
+static enum status configure(struct sql *sql, enum sql_journal journal, int page_size, struct error *err) {
     char *size = mem_printf("PRAGMA page_size=%d", page_size);
     enum status status = page_size ? sql_script(sql, size, err) : STATUS_OK;
     mem_free(size);
@@ -276,18 +260,14 @@ enum status sql_check(struct sql *sql, const char *table, struct error *err) {
     return status;
 }
 
-enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size,
-                     struct error *err) {
+enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size, struct error *err) {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, set_allocator);
     *sql = (struct sql){.path = mem_strdup(path)};
     errno = 0;
-    int code = sqlite3_open_v2(path, &sql->db,
-                               SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX |
-                                   SQLITE_OPEN_EXRESCODE,
-                               NULL);
-    enum status status =
-        code == SQLITE_OK ? configure(sql, journal, page_size, err) : fail(sql, code, "open", err);
+    int code = sqlite3_open_v2(
+        path, &sql->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE, NULL);
+    enum status status = code == SQLITE_OK ? configure(sql, journal, page_size, err) : fail(sql, code, "open", err);
     if (status != STATUS_OK)
         sql_close(sql);
     return status;

@@ -36,8 +36,7 @@ enum sql_journal {
 
 /* page_size: for a new file; 0: SQLite's default. STATUS_UNAVAILABLE when somebody else has the
  * file, STATUS_CORRUPT when its head is damaged (sql_check looks at all of it). */
-enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size,
-                     struct error *err);
+enum status sql_open(struct sql *sql, const char *path, enum sql_journal journal, int page_size, struct error *err);
 void sql_close(struct sql *sql);
 
 /* SQLite's quick_check of the whole file, or of one table with its indices; reads all of that.
@@ -51,16 +50,16 @@ enum status sql_script(struct sql *sql, const char *text, struct error *err);
  * t const char * (NULL: null), b const void * and size_t (a blob, borrowed until the return). */
 enum status sql_run(struct sql *sql, struct error *err, const char *text, const char *types, ...);
 /* As sql_run, but leaves the statement before its first row: step it with sql_step. */
-enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, const char *text,
-                      const char *types, ...);
+enum status sql_query(struct sql *sql, sqlite3_stmt **stmt, struct error *err, const char *text, const char *types,
+                      ...);
 /* *row tells whether there is one more; after the last the statement is reset. */
 enum status sql_step(struct sql *sql, sqlite3_stmt *stmt, bool *row, struct error *err);
 /* As sql_query, and steps to the first row, if there is one: *row. sqlite3_reset is the caller's then. */
-enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err,
-                      const char *text, const char *types, ...);
+enum status sql_first(struct sql *sql, sqlite3_stmt **stmt, bool *row, struct error *err, const char *text,
+                      const char *types, ...);
 /* The first column of the first row as an integer, or `fallback` when there is no row. */
-enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err,
-                    const char *text, const char *types, ...);
+enum status sql_int(struct sql *sql, int64_t fallback, int64_t *value, struct error *err, const char *text,
+                    const char *types, ...);
 
 /* Whether SQLite's result and the errno of that moment tell of a full disk, which hides behind IOERR where a write,
  * sync or ftruncate fails and behind CANTOPEN where a file cannot be made. */

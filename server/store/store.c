@@ -18,8 +18,7 @@ static enum status migrate(struct store *store, struct error *err) {
     if (status != STATUS_OK)
         return status;
     if (version > schema_version) {
-        error_set(err, STATUS_CONFLICT,
-                  "%s has schema version %lld, this program knows versions up to %d",
+        error_set(err, STATUS_CONFLICT, "%s has schema version %lld, this program knows versions up to %d",
                   store->sql.path, (long long)version, schema_version);
         return error_hint(err, "Run the newer program that last used this data folder.");
     }
@@ -100,9 +99,7 @@ void store_close(struct store *store) {
     mem_free(store);
 }
 
-const char *store_library_version(void) {
-    return sqlite3_libversion();
-}
+const char *store_library_version(void) { return sqlite3_libversion(); }
 
 void store_on_change(struct store *store, void (*changed)(void *user, int64_t job_id), void *user) {
     store->changed = changed;
@@ -114,8 +111,7 @@ enum status store_probe(struct store *store, struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err, "INSERT OR REPLACE INTO probe (id, at_ms) VALUES (1, ?)",
-                     "i", now);
+    status = sql_run(&store->sql, err, "INSERT OR REPLACE INTO probe (id, at_ms) VALUES (1, ?)", "i", now);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &found, err, "SELECT at_ms FROM probe WHERE id = 1", "");
     if (status == STATUS_OK && found != now)
@@ -136,8 +132,8 @@ bool store_has_files(struct store *store, enum store_files kind, const char *id)
     return status != STATUS_OK || found != 0;
 }
 
-static enum status count_by_state(struct store *store, const char *text, int64_t *counts,
-                                  size_t limit, struct error *err) {
+static enum status count_by_state(struct store *store, const char *text, int64_t *counts, size_t limit,
+                                  struct error *err) {
     sqlite3_stmt *stmt;
     enum status status = sql_query(&store->sql, &stmt, err, text, "");
     bool row = status == STATUS_OK;
@@ -152,24 +148,23 @@ static enum status count_by_state(struct store *store, const char *text, int64_t
 enum status store_count(struct store *store, struct store_counts *counts, struct error *err) {
     *counts = (struct store_counts){0};
     store_lock(store);
-    enum status status = count_by_state(store, "SELECT state, count(*) FROM jobs GROUP BY state",
-                                        counts->jobs_by_state, JOB_STATE_COUNT, err);
+    enum status status = count_by_state(store, "SELECT state, count(*) FROM jobs GROUP BY state", counts->jobs_by_state,
+                                        JOB_STATE_COUNT, err);
     if (status == STATUS_OK)
-        status = count_by_state(store, "SELECT state, count(*) FROM scenes GROUP BY state",
-                                counts->scenes_by_state, SCENE_STATE_COUNT, err);
+        status = count_by_state(store, "SELECT state, count(*) FROM scenes GROUP BY state", counts->scenes_by_state,
+                                SCENE_STATE_COUNT, err);
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &counts->attempts, err,
-                         "SELECT ifnull(sum(attempt), 0) FROM jobs", "");
+        status = sql_int(&store->sql, 0, &counts->attempts, err, "SELECT ifnull(sum(attempt), 0) FROM jobs", "");
     if (status == STATUS_OK && counts->jobs_by_state[JOB_QUEUED] > 0)
         status = sql_int(&store->sql, 0, &counts->oldest_queued_ms, err,
-                         "SELECT created_ms FROM jobs WHERE id = (SELECT min(id) FROM jobs WHERE state = ?)",
-                         "n", (int)JOB_QUEUED);
+                         "SELECT created_ms FROM jobs WHERE id = (SELECT min(id) FROM jobs WHERE state = ?)", "n",
+                         (int)JOB_QUEUED);
     if (status == STATUS_OK)
         status = sql_int(&store->sql, 0, &counts->outbox, err, "SELECT count(*) FROM outbox", "");
     /* The highest id, not the rows that are left: it only grows, as a counter should. */
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &counts->events, err,
-                         "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
+        status =
+            sql_int(&store->sql, 0, &counts->events, err, "SELECT seq FROM sqlite_sequence WHERE name = 'events'", "");
     char *wal = mem_printf("%s-wal", store->sql.path);
     store_unlock(store);
     struct stat info;

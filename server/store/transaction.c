@@ -9,13 +9,9 @@ int64_t store_now_ms(void) {
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
-void store_lock(struct store *store) {
-    pthread_mutex_lock(&store->mutex);
-}
+void store_lock(struct store *store) { pthread_mutex_lock(&store->mutex); }
 
-void store_unlock(struct store *store) {
-    pthread_mutex_unlock(&store->mutex);
-}
+void store_unlock(struct store *store) { pthread_mutex_unlock(&store->mutex); }
 
 static enum status begin(struct store *store, bool is_freeing, struct error *err) {
     store_lock(store);
@@ -27,16 +23,11 @@ static enum status begin(struct store *store, bool is_freeing, struct error *err
     return status;
 }
 
-enum status store_begin(struct store *store, struct error *err) {
-    return begin(store, false, err);
-}
+enum status store_begin(struct store *store, struct error *err) { return begin(store, false, err); }
 
-enum status store_begin_freeing(struct store *store, struct error *err) {
-    return begin(store, true, err);
-}
+enum status store_begin_freeing(struct store *store, struct error *err) { return begin(store, true, err); }
 
-enum status store_end(struct store *store, enum status status, int64_t changed_job,
-                      struct error *err) {
+enum status store_end(struct store *store, enum status status, int64_t changed_job, struct error *err) {
     if (status == STATUS_OK)
         status = reserve_look(store, err);
     status = sql_end(&store->sql, status, err);

@@ -67,8 +67,7 @@ static enum status begun(struct store *store, enum status status, int64_t id, st
 }
 
 /* Locks, begins and reads the job. On an error everything is undone already. */
-static enum status job_begin(struct store *store, int64_t id, struct present *now,
-                             struct error *err) {
+static enum status job_begin(struct store *store, int64_t id, struct present *now, struct error *err) {
     return begun(store, store_begin(store, err), id, now, err);
 }
 
@@ -78,8 +77,7 @@ static enum status job_begin_stopping(struct store *store, int64_t id, struct pr
 }
 
 /* As job_begin, and the job must be running its attempt `attempt`. */
-static enum status attempt_begin(struct store *store, int64_t id, int attempt, struct present *now,
-                                 struct error *err) {
+static enum status attempt_begin(struct store *store, int64_t id, int attempt, struct present *now, struct error *err) {
     enum status status = job_begin_stopping(store, id, now, err);
     if (status != STATUS_OK || (now->state == JOB_RUNNING && now->attempt == attempt))
         return status;
@@ -96,8 +94,8 @@ static enum status forbidden(const struct present *now, const char *action, stru
                      job_state_name(now->state), action);
 }
 
-static enum status append_state(struct store *store, const struct present *now, const char *reason,
-                                const char *hint, struct error *err) {
+static enum status append_state(struct store *store, const struct present *now, const char *reason, const char *hint,
+                                struct error *err) {
     cJSON *data = cJSON_CreateObject();
     json_add_string(data, "state", job_state_name(now->state)); /* the event's row has the attempt */
     if (now->wanted != JOB_WANT_RUN)
@@ -114,8 +112,8 @@ static enum status append_state(struct store *store, const struct present *now, 
 }
 
 /* The only place that writes a state. *now becomes the new present. */
-static enum status move(struct store *store, struct present *now, enum job_state to,
-                        const char *reason, const char *hint, struct error *err) {
+static enum status move(struct store *store, struct present *now, enum job_state to, const char *reason,
+                        const char *hint, struct error *err) {
     if (now->state == JOB_RUNNING && now->wanted == JOB_WANT_CANCEL)
         to = JOB_CANCELLED, reason = hint = "";
     else if (now->state == JOB_RUNNING && now->wanted == JOB_WANT_PAUSE && to == JOB_QUEUED)
@@ -137,13 +135,10 @@ static enum status move(struct store *store, struct present *now, enum job_state
                                : status;
 }
 
-static enum status record_request(struct store *store, struct present *now, enum job_wanted wanted,
-                                  struct error *err) {
+static enum status record_request(struct store *store, struct present *now, enum job_wanted wanted, struct error *err) {
     now->wanted = wanted;
-    enum status status =
-        sql_run(&store->sql, err,
-                "UPDATE jobs SET revision = revision + 1, wanted = ? WHERE id = ?", "ni",
-                (int)wanted, now->id);
+    enum status status = sql_run(&store->sql, err, "UPDATE jobs SET revision = revision + 1, wanted = ? WHERE id = ?",
+                                 "ni", (int)wanted, now->id);
     return status == STATUS_OK ? append_state(store, now, "", "", err) : status;
 }
 
@@ -228,24 +223,22 @@ enum status store_job_resume(struct store *store, int64_t id, const struct count
 }
 
 /* A new life for a job that has ended; in the transaction that job_begin began. */
-static enum status revive(struct store *store, struct present *now, int max_attempts,
-                          const struct count_limits *limits, struct error *err) {
+static enum status revive(struct store *store, struct present *now, int max_attempts, const struct count_limits *limits,
+                          struct error *err) {
     int64_t scene = 0;
     enum status status =
-        sql_int(&store->sql, 0, &scene, err,
-                "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ?", "i",
-                now->id);
+        sql_int(&store->sql, 0, &scene, err, "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ?",
+                "i", now->id);
     if (status == STATUS_OK && !scene)
-        status = error_set(err, STATUS_CONFLICT, "the scene of job %lld was deleted",
-                           (long long)now->id);
+        status = error_set(err, STATUS_CONFLICT, "the scene of job %lld was deleted", (long long)now->id);
     if (status != STATUS_OK)
         return status;
     now->attempts_left = max_attempts;
     status = enqueue(store, now, limits, err);
     /* Where it ended is not where it will be. */
-    return status == STATUS_OK ? sql_run(&store->sql, err, "UPDATE jobs SET stage = '', progress = 0 WHERE id = ?", "i",
-                                         now->id)
-                               : status;
+    return status == STATUS_OK
+               ? sql_run(&store->sql, err, "UPDATE jobs SET stage = '', progress = 0 WHERE id = ?", "i", now->id)
+               : status;
 }
 
 enum status store_job_retry(struct store *store, int64_t id, int max_attempts, const char *from,
@@ -261,8 +254,7 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
     if (status == STATUS_OK)
         status = revive(store, &now, max_attempts, limits, err);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err,
-                         "UPDATE jobs SET restart_from = ?, memory_step = 0 WHERE id = ?", "ti",
+        status = sql_run(&store->sql, err, "UPDATE jobs SET restart_from = ?, memory_step = 0 WHERE id = ?", "ti",
                          from ? from : "", id);
     return store_end(store, status, id, err);
 }
@@ -278,8 +270,7 @@ enum status store_job_extend(struct store *store, int64_t id, int max_attempts, 
     if (status == STATUS_OK)
         status = revive(store, &now, max_attempts, limits, err);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET settings = ? WHERE id = ?", "ti",
-                         settings, id);
+        status = sql_run(&store->sql, err, "UPDATE jobs SET settings = ? WHERE id = ?", "ti", settings, id);
     return store_end(store, status, id, err);
 }
 
@@ -297,14 +288,13 @@ enum status store_job_start(struct store *store, int64_t id, int *attempt, struc
         status = move(store, &now, JOB_RUNNING, "", "", err);
     }
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET started_ms = ? WHERE id = ?", "ii",
-                         store_now_ms(), id);
+        status = sql_run(&store->sql, err, "UPDATE jobs SET started_ms = ? WHERE id = ?", "ii", store_now_ms(), id);
     *attempt = now.attempt;
     return store_end(store, status, id, err);
 }
 
-static enum status finish_once(struct store *store, int64_t id, int attempt, enum job_state to,
-                          const char *reason, const char *hint, struct error *err) {
+static enum status finish_once(struct store *store, int64_t id, int attempt, enum job_state to, const char *reason,
+                               const char *hint, struct error *err) {
     struct present now;
     enum status status = attempt_begin(store, id, attempt, &now, err);
     if (status != STATUS_OK)
@@ -314,8 +304,8 @@ static enum status finish_once(struct store *store, int64_t id, int attempt, enu
 }
 
 /* The end of an attempt in state `to`. */
-static enum status finish(struct store *store, int64_t id, int attempt, enum job_state to,
-                          const char *reason, const char *hint, struct error *err) {
+static enum status finish(struct store *store, int64_t id, int attempt, enum job_state to, const char *reason,
+                          const char *hint, struct error *err) {
     enum status status;
     do
         status = finish_once(store, id, attempt, to, reason, hint, err);
@@ -331,8 +321,8 @@ enum status store_job_succeed_but(struct store *store, int64_t id, int attempt, 
     return finish(store, id, attempt, JOB_SUCCEEDED, reason, "", err);
 }
 
-enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason,
-                           const char *hint, struct error *err) {
+enum status store_job_fail(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
+                           struct error *err) {
     return finish(store, id, attempt, JOB_FAILED, reason, hint, err);
 }
 
@@ -354,13 +344,12 @@ static enum status crash(struct store *store, int64_t id, int attempt, const cha
     now.attempts_left -= now.attempts_left > 0;
     status = move(store, &now, now.attempts_left > 0 ? JOB_QUEUED : JOB_FAILED, reason, hint, err);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE jobs SET memory_step = ? WHERE id = ?", "ni",
-                         memory_step, id);
+        status = sql_run(&store->sql, err, "UPDATE jobs SET memory_step = ? WHERE id = ?", "ni", memory_step, id);
     return store_end(store, status, id, err);
 }
 
-enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason,
-                            const char *hint, int memory_step, struct error *err) {
+enum status store_job_crash(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
+                            int memory_step, struct error *err) {
     enum status status;
     do
         status = crash(store, id, attempt, reason, hint, memory_step, err);
@@ -368,19 +357,18 @@ enum status store_job_crash(struct store *store, int64_t id, int attempt, const 
     return status;
 }
 
-enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason,
-                           struct error *err) {
+enum status store_job_stop(struct store *store, int64_t id, int attempt, const char *reason, struct error *err) {
     return finish(store, id, attempt, JOB_QUEUED, reason, "", err);
 }
 
-enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason,
-                            const char *hint, struct error *err) {
+enum status store_job_block(struct store *store, int64_t id, int attempt, const char *reason, const char *hint,
+                            struct error *err) {
     return finish(store, id, attempt, JOB_PAUSED, reason, hint, err);
 }
 
 /* Inside a transaction: gives one such job its reason. *id: which; 0: there was none. */
-static enum status explain_one(struct store *store, const char *reason, const char *prefix, const char *hint, int64_t *id,
-                               struct error *err) {
+static enum status explain_one(struct store *store, const char *reason, const char *prefix, const char *hint,
+                               int64_t *id, struct error *err) {
     struct present now;
     enum status status = sql_int(&store->sql, 0, id, err,
                                  "SELECT id FROM jobs WHERE state = ?1 AND reason <> ?2"
@@ -395,8 +383,8 @@ static enum status explain_one(struct store *store, const char *reason, const ch
     return status == STATUS_OK ? append_state(store, &now, reason, hint, err) : status;
 }
 
-enum status store_job_explain(struct store *store, const char *reason, const char *prefix,
-                              const char *hint, struct error *err) {
+enum status store_job_explain(struct store *store, const char *reason, const char *prefix, const char *hint,
+                              struct error *err) {
     for (;;) { /* a transaction each: others get their turns in between */
         int64_t id;
         enum status status = store_begin(store, err);
@@ -411,8 +399,8 @@ enum status store_job_explain(struct store *store, const char *reason, const cha
 
 static enum status requeue_one(struct store *store, int64_t *id, struct error *err) {
     struct present now;
-    enum status status = sql_int(&store->sql, 0, id, err, "SELECT id FROM jobs WHERE state = ? LIMIT 1", "n",
-                                 (int)JOB_RUNNING);
+    enum status status =
+        sql_int(&store->sql, 0, id, err, "SELECT id FROM jobs WHERE state = ? LIMIT 1", "n", (int)JOB_RUNNING);
     if (status != STATUS_OK || *id == 0)
         return status;
     status = look(store, *id, &now, err);

@@ -15,9 +15,7 @@
 #define HALF_LIFE_SEC 86400.0
 
 /* log2(2^a + 2^b) */
-static double add_weights(double a, double b) {
-    return fmax(a, b) + log2(1.0 + exp2(-fabs(a - b)));
-}
+static double add_weights(double a, double b) { return fmax(a, b) + log2(1.0 + exp2(-fabs(a - b))); }
 
 /* The store is locked. */
 static void owe(struct store *store, int64_t owner_id, double weight) {
@@ -35,16 +33,16 @@ static enum status pay(struct store *store, const struct unpaid *u, struct error
     sqlite3_stmt *stmt;
     bool found = false;
     double weight = u->weight;
-    enum status status = sql_first(&store->sql, &stmt, &found, err, "SELECT weight FROM usage WHERE owner_id = ?", "i",
-                                   u->owner_id);
+    enum status status =
+        sql_first(&store->sql, &stmt, &found, err, "SELECT weight FROM usage WHERE owner_id = ?", "i", u->owner_id);
     if (found) {
         weight = add_weights(weight, sqlite3_column_double(stmt, 0));
         sqlite3_reset(stmt);
     }
-    return status == STATUS_OK ? sql_run(&store->sql, err,
-                                         "INSERT OR REPLACE INTO usage (owner_id, weight) VALUES (?, ?)", "id",
-                                         u->owner_id, weight)
-                               : status;
+    return status == STATUS_OK
+               ? sql_run(&store->sql, err, "INSERT OR REPLACE INTO usage (owner_id, weight) VALUES (?, ?)", "id",
+                         u->owner_id, weight)
+               : status;
 }
 
 enum status store_usage_pay(struct store *store, struct error *err) {
@@ -78,32 +76,28 @@ enum status store_usage_add(struct store *store, int64_t owner_id, double cpu_se
     return store_usage_pay(store, err);
 }
 
-enum status store_job_next(struct store *store, int user_max_running, int64_t *id,
-                           struct error *err) {
+enum status store_job_next(struct store *store, int user_max_running, int64_t *id, struct error *err) {
     store_lock(store);
-    enum status status =
-        sql_int(&store->sql, 0, id, err,
-                "WITH busy (user_id, count) AS"
-                " (SELECT owner_id, count(*) FROM jobs WHERE state = ?1 GROUP BY owner_id)"
-                "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
-                " LEFT JOIN busy ON busy.user_id = jobs.owner_id"
-                " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
-                " WHERE jobs.state = ?2 AND scenes.state >= ?3"
-                "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
-                " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
-                "  priority DESC, turn LIMIT 1",
-                "nnnn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running);
+    enum status status = sql_int(&store->sql, 0, id, err,
+                                 "WITH busy (user_id, count) AS"
+                                 " (SELECT owner_id, count(*) FROM jobs WHERE state = ?1 GROUP BY owner_id)"
+                                 "SELECT jobs.id FROM jobs JOIN scenes ON scenes.id = scene_id"
+                                 " LEFT JOIN busy ON busy.user_id = jobs.owner_id"
+                                 " LEFT JOIN usage ON usage.owner_id = jobs.owner_id"
+                                 " WHERE jobs.state = ?2 AND scenes.state >= ?3"
+                                 "  AND (?4 = 0 OR jobs.owner_id = 0 OR ifnull(busy.count, 0) < ?4)"
+                                 " ORDER BY usage.weight IS NOT NULL, usage.weight, jobs.owner_id,"
+                                 "  priority DESC, turn LIMIT 1",
+                                 "nnnn", (int)JOB_RUNNING, (int)JOB_QUEUED, (int)SCENE_READY, user_max_running);
     store_unlock(store);
-    return status == STATUS_OK && *id == 0
-               ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run")
-               : status;
+    return status == STATUS_OK && *id == 0 ? error_set(err, STATUS_NOT_FOUND, "no job waits to be run") : status;
 }
 
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err) {
     int64_t queued;
-    enum status status = sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?", "n",
-                                 (int)JOB_QUEUED);
+    enum status status =
+        sql_int(&store->sql, 0, &queued, err, "SELECT count(*) FROM jobs WHERE state = ?", "n", (int)JOB_QUEUED);
     if (status == STATUS_OK && (uint64_t)queued >= limits->all)
         return error_set(err, STATUS_LIMIT, "%lld jobs are queued already, the limit is %zu", (long long)queued,
                          limits->all);

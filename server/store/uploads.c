@@ -7,8 +7,8 @@
 #include "server/store/internal.h"
 #include "server/store/store.h"
 
-#define COLUMNS                                                                                \
-    "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash," \
+#define COLUMNS                                                                                                        \
+    "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash,"                      \
     " owner_id, (SELECT name FROM users WHERE users.id = owner_id), pinned, " UPLOAD_EXPIRES
 
 static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
@@ -42,30 +42,28 @@ static enum status not_found(const char *id, struct error *err) {
 }
 
 /* Runs one statement in a transaction of its own; no row changed: not found. */
-static enum status end_change(struct store *store, enum status status, const char *id,
-                              struct error *err) {
+static enum status end_change(struct store *store, enum status status, const char *id, struct error *err) {
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash,
-                             size_t hash_size, const struct count_limits *limits, struct error *err) {
+enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash, size_t hash_size,
+                             const struct count_limits *limits, struct error *err) {
     int64_t count, mine = 0, now = store_now_ms();
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_int(&store->sql, 0, &count, err,
-                     "SELECT count(*) FROM uploads WHERE scene_id = ''", "");
+    status = sql_int(&store->sql, 0, &count, err, "SELECT count(*) FROM uploads WHERE scene_id = ''", "");
     if (status == STATUS_OK && (uint64_t)count >= limits->all)
-        status = error_set(err, STATUS_LIMIT, "%lld uploads are under way already, the limit is %zu",
-                           (long long)count, limits->all);
+        status = error_set(err, STATUS_LIMIT, "%lld uploads are under way already, the limit is %zu", (long long)count,
+                           limits->all);
     if (status == STATUS_OK && limits->one_user > 0 && row->owner_id > 0)
         status = sql_int(&store->sql, 0, &mine, err,
                          "SELECT count(*) FROM uploads WHERE scene_id = '' AND owner_id = ?", "i", row->owner_id);
     if (status == STATUS_OK && mine > 0 && (uint64_t)mine >= limits->one_user) {
-        error_set(err, STATUS_LIMIT, "%lld of your uploads are under way already, and one user may have %zu", (long long)mine,
-                  limits->one_user);
+        error_set(err, STATUS_LIMIT, "%lld of your uploads are under way already, and one user may have %zu",
+                  (long long)mine, limits->one_user);
         status = error_hint(err, "finish or remove some; an administrator can raise the option user_max_uploads");
     }
     if (status == STATUS_OK)
@@ -77,14 +75,14 @@ enum status store_upload_add(struct store *store, const struct upload_row *row, 
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 
-enum status store_upload_get(struct store *store, const char *id, struct upload_row *row, void *hash,
-                             size_t hash_size, struct error *err) {
+enum status store_upload_get(struct store *store, const char *id, struct upload_row *row, void *hash, size_t hash_size,
+                             struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
     *row = (struct upload_row){0};
     store_lock(store);
-    enum status status = sql_first(&store->sql, &stmt, &found, err,
-                                   "SELECT " COLUMNS " FROM uploads WHERE id = ?", "t", id);
+    enum status status =
+        sql_first(&store->sql, &stmt, &found, err, "SELECT " COLUMNS " FROM uploads WHERE id = ?", "t", id);
     if (found) {
         fill(row, stmt);
         if (hash && (size_t)sqlite3_column_bytes(stmt, 10) == hash_size)
@@ -99,9 +97,9 @@ enum status store_upload_get(struct store *store, const char *id, struct upload_
     return status == STATUS_OK && !found ? not_found(id, err) : status;
 }
 
-enum status store_upload_list(struct store *store, const struct caller *who, const char *sha256,
-                              const char *cursor, size_t limit, struct upload_row *rows, size_t *count,
-                              char next_cursor[128], struct error *err) {
+enum status store_upload_list(struct store *store, const struct caller *who, const char *sha256, const char *cursor,
+                              size_t limit, struct upload_row *rows, size_t *count, char next_cursor[128],
+                              struct error *err) {
     bool sees_all = !who || who->role == ROLE_ADMIN;
     long long before_ms = INT64_MAX;
     char before_id[UPLOAD_ID_SIZE] = "", rest;
@@ -122,8 +120,7 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
     while (row) {
         status = sql_step(&store->sql, stmt, &row, err);
         if (row && *count == limit) { /* one more than asked for: there is another page */
-            snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms,
-                     rows[limit - 1].id);
+            snprintf(next_cursor, 128, "%lld-%s", (long long)rows[limit - 1].created_ms, rows[limit - 1].id);
             sqlite3_reset(stmt);
             break;
         }
@@ -136,8 +133,7 @@ enum status store_upload_list(struct store *store, const struct caller *who, con
     return status;
 }
 
-enum status store_upload_begin(struct store *store, const char *id, const char *boot,
-                               struct error *err) {
+enum status store_upload_begin(struct store *store, const char *id, const char *boot, struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
@@ -145,8 +141,8 @@ enum status store_upload_begin(struct store *store, const char *id, const char *
     return end_change(store, status, id, err);
 }
 
-enum status store_upload_advance(struct store *store, const char *id, uint64_t received,
-                                 const void *hash, size_t hash_size, struct error *err) {
+enum status store_upload_advance(struct store *store, const char *id, uint64_t received, const void *hash,
+                                 size_t hash_size, struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
@@ -158,13 +154,11 @@ enum status store_upload_advance(struct store *store, const char *id, uint64_t r
     return end_change(store, status, id, err);
 }
 
-enum status store_upload_finish(struct store *store, const char *id, const char *scene_id,
-                                struct error *err) {
+enum status store_upload_finish(struct store *store, const char *id, const char *scene_id, struct error *err) {
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
-    status = sql_run(&store->sql, err, "UPDATE uploads SET scene_id = ? WHERE id = ?", "tt", scene_id,
-                     id);
+    status = sql_run(&store->sql, err, "UPDATE uploads SET scene_id = ? WHERE id = ?", "tt", scene_id, id);
     return end_change(store, status, id, err);
 }
 

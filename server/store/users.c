@@ -18,9 +18,7 @@
 
 static const char *const role_names[] = {"viewer", "user", "admin"};
 
-const char *role_name(enum role role) {
-    return role_names[role];
-}
+const char *role_name(enum role role) { return role_names[role]; }
 
 bool role_parse(const char *name, enum role *role) {
     for (int i = ROLE_VIEWER; i <= ROLE_ADMIN; i++) {
@@ -46,19 +44,17 @@ enum access caller_access_job(const struct caller *who, const struct job *job) {
     return access_of(who, job->owner_id == who->user_id, job->is_shared);
 }
 
-enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id,
-                               enum access *access, struct error *err) {
+enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id, enum access *access,
+                               struct error *err) {
     int64_t owns = 0, shared = 0;
     *access = ACCESS_NONE;
     store_lock(store);
     enum status status =
-        sql_int(&store->sql, 0, &owns, err,
-                "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti", scene_id,
-                who->user_id);
+        sql_int(&store->sql, 0, &owns, err, "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id = ?", "ti",
+                scene_id, who->user_id);
     if (status == STATUS_OK && !owns)
-        status = sql_int(&store->sql, 0, &shared, err,
-                         "SELECT 1 FROM jobs WHERE scene_id = ? AND shared = 1 LIMIT 1", "t",
-                         scene_id);
+        status = sql_int(&store->sql, 0, &shared, err, "SELECT 1 FROM jobs WHERE scene_id = ? AND shared = 1 LIMIT 1",
+                         "t", scene_id);
     store_unlock(store);
     if (status == STATUS_OK)
         *access = access_of(who, owns, shared);
@@ -67,14 +63,11 @@ enum status store_scene_access(struct store *store, const struct caller *who, co
 
 /* --- tokens -------------------------------------------------------------------------------- */
 
-bool store_has_users(struct store *store) {
-    return atomic_load(&store->has_users);
-}
+bool store_has_users(struct store *store) { return atomic_load(&store->has_users); }
 
 enum status store_look_for_users(struct store *store, struct error *err) {
     int64_t found;
-    enum status status =
-        sql_int(&store->sql, 0, &found, err, "SELECT 1 FROM users LIMIT 1", "");
+    enum status status = sql_int(&store->sql, 0, &found, err, "SELECT 1 FROM users LIMIT 1", "");
     atomic_store(&store->has_users, found != 0);
     return status;
 }
@@ -98,16 +91,15 @@ static enum status make_secret(char secret[SECRET_DIGITS + 1], struct error *err
     return STATUS_OK;
 }
 
-static enum status insert_token(struct store *store, const char *name, enum role role,
-                                const char *hash, int64_t *id, struct error *err) {
+static enum status insert_token(struct store *store, const char *name, enum role role, const char *hash, int64_t *id,
+                                struct error *err) {
     int64_t user;
     enum status status = sql_run(&store->sql, err,
                                  "INSERT INTO users (name, created_ms) VALUES (?, ?)"
                                  " ON CONFLICT (name) DO NOTHING",
                                  "ti", name, store_now_ms());
     if (status == STATUS_OK)
-        status = sql_int(&store->sql, 0, &user, err, "SELECT id FROM users WHERE name = ?", "t",
-                         name);
+        status = sql_int(&store->sql, 0, &user, err, "SELECT id FROM users WHERE name = ?", "t", name);
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT INTO tokens (user_id, role, hash, created_ms)"
@@ -118,13 +110,12 @@ static enum status insert_token(struct store *store, const char *name, enum role
     return status;
 }
 
-enum status store_token_add(struct store *store, const char *name, enum role role,
-                            char token[TOKEN_SIZE], int64_t *id, struct error *err) {
+enum status store_token_add(struct store *store, const char *name, enum role role, char token[TOKEN_SIZE], int64_t *id,
+                            struct error *err) {
     char secret[SECRET_DIGITS + 1], hash[SHA256_HEX_SIZE];
     if (!name_is_good(name)) {
         error_set(err, STATUS_INPUT, "\"%.80s\" is no name for a user", name);
-        return error_hint(err, "1 to %d letters, digits and . _ - @, a letter first",
-                          USER_NAME_SIZE - 1);
+        return error_hint(err, "1 to %d letters, digits and . _ - @, a letter first", USER_NAME_SIZE - 1);
     }
     enum status status = make_secret(secret, err);
     if (status != STATUS_OK)
@@ -156,8 +147,7 @@ static bool parse_token(const char *token, int64_t *id, const char **secret) {
     return strlen(*secret) == SECRET_DIGITS;
 }
 
-enum status store_token_find(struct store *store, const char *token, struct caller *caller,
-                             struct error *err) {
+enum status store_token_find(struct store *store, const char *token, struct caller *caller, struct error *err) {
     int64_t id;
     const char *secret;
     char hash[SHA256_HEX_SIZE], wanted[SHA256_HEX_SIZE] = "";
@@ -168,11 +158,10 @@ enum status store_token_find(struct store *store, const char *token, struct call
         return error_set(err, STATUS_NOT_FOUND, "that is no token of this daemon");
     sha256_of(secret, SECRET_DIGITS, hash);
     store_lock(store);
-    enum status status =
-        sql_first(&store->sql, &stmt, &found, err,
-                  "SELECT users.id, role, name, hash FROM tokens JOIN users ON users.id = user_id"
-                  " WHERE tokens.id = ?",
-                  "i", id);
+    enum status status = sql_first(&store->sql, &stmt, &found, err,
+                                   "SELECT users.id, role, name, hash FROM tokens JOIN users ON users.id = user_id"
+                                   " WHERE tokens.id = ?",
+                                   "i", id);
     if (found) {
         caller->user_id = sqlite3_column_int64(stmt, 0);
         caller->token_id = id;
@@ -206,8 +195,7 @@ static enum status revoke(struct store *store, const char *number_or_name, size_
                          "t", number_or_name);
     size_t gone = (size_t)sql_changes(&store->sql);
     if (status == STATUS_OK && gone == 0)
-        status = error_set(err, STATUS_NOT_FOUND,
-                           is_number ? "there is no token %.80s" : "%.80s has no token",
+        status = error_set(err, STATUS_NOT_FOUND, is_number ? "there is no token %.80s" : "%.80s has no token",
                            number_or_name);
     status = store_end(store, status, STORE_NOTHING_CHANGED, err);
     if (status == STATUS_OK)
@@ -215,8 +203,7 @@ static enum status revoke(struct store *store, const char *number_or_name, size_
     return status;
 }
 
-enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
-                               struct error *err) {
+enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err) {
     enum status status;
     do
         status = revoke(store, number_or_name, count, err);
@@ -227,14 +214,12 @@ enum status store_token_revoke(struct store *store, const char *number_or_name, 
 bool store_token_is_valid(struct store *store, int64_t id) {
     int64_t found = 0;
     store_lock(store);
-    enum status status =
-        sql_int(&store->sql, 0, &found, NULL, "SELECT 1 FROM tokens WHERE id = ?", "i", id);
+    enum status status = sql_int(&store->sql, 0, &found, NULL, "SELECT 1 FROM tokens WHERE id = ?", "i", id);
     store_unlock(store);
     return status == STATUS_OK && found != 0;
 }
 
-enum status store_token_list(struct store *store, struct token_row **rows, size_t *count,
-                             struct error *err) {
+enum status store_token_list(struct store *store, struct token_row **rows, size_t *count, struct error *err) {
     sqlite3_stmt *stmt;
     *rows = NULL;
     *count = 0;

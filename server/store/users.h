@@ -42,22 +42,20 @@ struct caller {
 enum access { ACCESS_NONE, ACCESS_READ, ACCESS_CHANGE };
 enum access caller_access_job(const struct caller *who, const struct job *job);
 /* STATUS_OK with ACCESS_NONE also where there is no such scene. */
-enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id,
-                               enum access *access, struct error *err);
+enum status store_scene_access(struct store *store, const struct caller *who, const char *scene_id, enum access *access,
+                               struct error *err);
 
 /* Whether there is or ever was a user: from then on, nobody comes in without a token. */
 bool store_has_users(struct store *store);
 
 /* Makes a token, and the user where the name is new: 1 to 64 letters, digits and . _ - @ */
-enum status store_token_add(struct store *store, const char *name, enum role role,
-                            char token[TOKEN_SIZE], int64_t *id, struct error *err);
+enum status store_token_add(struct store *store, const char *name, enum role role, char token[TOKEN_SIZE], int64_t *id,
+                            struct error *err);
 /* The caller that presents this token; STATUS_NOT_FOUND unless it is valid. What a wrong one has
  * in common with the right one does not show in the time that this takes. */
-enum status store_token_find(struct store *store, const char *token, struct caller *caller,
-                             struct error *err);
+enum status store_token_find(struct store *store, const char *token, struct caller *caller, struct error *err);
 /* Ends the token of that number, or all of the user of that name. */
-enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count,
-                               struct error *err);
+enum status store_token_revoke(struct store *store, const char *number_or_name, size_t *count, struct error *err);
 bool store_token_is_valid(struct store *store, int64_t id);
 
 struct token_row {
@@ -66,7 +64,6 @@ struct token_row {
     char name[USER_NAME_SIZE];
 };
 /* By number; *rows is the caller's (mem_free). */
-enum status store_token_list(struct store *store, struct token_row **rows, size_t *count,
-                             struct error *err);
+enum status store_token_list(struct store *store, struct token_row **rows, size_t *count, struct error *err);
 
 #endif

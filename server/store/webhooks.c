@@ -16,18 +16,17 @@
 
 enum status store_webhook_set(struct store *store, int64_t job_id, const char *url, const char *secret,
                               struct error *err) {
-    return sql_run(&store->sql, err, "INSERT INTO webhooks (job_id, url, secret) VALUES (?, ?, ?)", "itt",
-                   job_id, url, secret);
+    return sql_run(&store->sql, err, "INSERT INTO webhooks (job_id, url, secret) VALUES (?, ?, ?)", "itt", job_id, url,
+                   secret);
 }
 
-enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state,
-                               const char *reason, const char *hint, struct error *err) {
+enum status store_webhook_post(struct store *store, int64_t job_id, int attempt, const char *state, const char *reason,
+                               const char *hint, struct error *err) {
     sqlite3_stmt *stmt;
     bool found = false;
-    enum status status =
-        sql_first(&store->sql, &stmt, &found, err,
-                  "SELECT url, secret, name, labels FROM webhooks JOIN jobs ON jobs.id = job_id WHERE job_id = ?",
-                  "i", job_id);
+    enum status status = sql_first(
+        &store->sql, &stmt, &found, err,
+        "SELECT url, secret, name, labels FROM webhooks JOIN jobs ON jobs.id = job_id WHERE job_id = ?", "i", job_id);
     if (!found)
         return status;
     char *url = sql_dup(stmt, 0), *secret = sql_dup(stmt, 1);
@@ -44,9 +43,8 @@ enum status store_webhook_post(struct store *store, int64_t job_id, int attempt,
     sqlite3_reset(stmt);
     char *text = json_text(body);
     int64_t now = store_now_ms();
-    status = sql_run(&store->sql, err,
-                     "INSERT INTO outbox (job_id, url, secret, body, next_ms) VALUES (?, ?, ?, ?, ?)", "ittti",
-                     job_id, url, secret, text, now);
+    status = sql_run(&store->sql, err, "INSERT INTO outbox (job_id, url, secret, body, next_ms) VALUES (?, ?, ?, ?, ?)",
+                     "ittti", job_id, url, secret, text, now);
     mem_free(text);
     cJSON_Delete(body);
     mem_free(url);
@@ -82,15 +80,18 @@ enum status store_outbox_next(struct store *store, int64_t after, const int64_t 
                   " AND ifnull(owner_id, 0) NOT IN (SELECT value FROM json_each(?)) ORDER BY outbox.id LIMIT 1",
                   "iiit", now, never, after, buf_text(&skipped));
     if (found) {
-        *row = (struct outbox_row){.id = sqlite3_column_int64(stmt, 0), .job_id = sqlite3_column_int64(stmt, 1),
-                                   .url = sql_dup(stmt, 2), .secret = sql_dup(stmt, 3), .body = sql_dup(stmt, 4),
-                                   .tries = sqlite3_column_int(stmt, 5), .owner_id = sqlite3_column_int64(stmt, 6)};
+        *row = (struct outbox_row){.id = sqlite3_column_int64(stmt, 0),
+                                   .job_id = sqlite3_column_int64(stmt, 1),
+                                   .url = sql_dup(stmt, 2),
+                                   .secret = sql_dup(stmt, 3),
+                                   .body = sql_dup(stmt, 4),
+                                   .tries = sqlite3_column_int(stmt, 5),
+                                   .owner_id = sqlite3_column_int64(stmt, 6)};
         sqlite3_reset(stmt);
     }
     store_unlock(store);
     buf_release(&skipped);
-    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "the outbox has nothing to send")
-                                         : status;
+    return status == STATUS_OK && !found ? error_set(err, STATUS_NOT_FOUND, "the outbox has nothing to send") : status;
 }
 
 enum status store_outbox_wait(struct store *store, double *seconds, struct error *err) {
@@ -107,11 +108,15 @@ enum status store_outbox_wait(struct store *store, double *seconds, struct error
 /* For who looks at the job; gone with it. */
 static enum status note_outcome(struct store *store, int64_t id, const struct outbox_outcome *outcome, bool gave_up,
                                 struct error *err) {
-    return sql_run(&store->sql, err,
-                   "UPDATE webhooks SET result = ?, attempts = outbox.tries + 1, status = ?, error = ?, at_ms = ? FROM outbox"
-                   " WHERE outbox.id = ? AND webhooks.job_id = outbox.job_id",
-                   "tntii", outcome->delivered ? "delivered" : gave_up ? "gave_up" : "failed", outcome->status,
-                   outcome->reason ? outcome->reason : "", store_now_ms(), id);
+    return sql_run(
+        &store->sql, err,
+        "UPDATE webhooks SET result = ?, attempts = outbox.tries + 1, status = ?, error = ?, at_ms = ? FROM outbox"
+        " WHERE outbox.id = ? AND webhooks.job_id = outbox.job_id",
+        "tntii",
+        outcome->delivered ? "delivered"
+        : gave_up          ? "gave_up"
+                           : "failed",
+        outcome->status, outcome->reason ? outcome->reason : "", store_now_ms(), id);
 }
 
 static enum status settle(struct store *store, int64_t id, const struct outbox_outcome *outcome, bool *gave_up,
@@ -170,8 +175,8 @@ enum status store_webhook_again(struct store *store, int64_t job_id, struct erro
     if (status == STATUS_OK && !found)
         status = error_set(err, STATUS_CONFLICT, "job %lld has no webhook", (long long)job_id);
     if (status == STATUS_OK)
-        status = sql_run(&store->sql, err, "UPDATE outbox SET tries = 0, next_ms = ? WHERE job_id = ?", "ii", store_now_ms(),
-                         job_id);
+        status = sql_run(&store->sql, err, "UPDATE outbox SET tries = 0, next_ms = ? WHERE job_id = ?", "ii",
+                         store_now_ms(), job_id);
     waiting = sql_changes(&store->sql);
     if (status == STATUS_OK && waiting == 0)
         status = post_present(store, job_id, err);

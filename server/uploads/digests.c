@@ -30,9 +30,7 @@ struct digests {
 
 /* --- one file ---------------------------------------------------------------------------- */
 
-static int64_t nanoseconds(struct timespec t) {
-    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
-}
+static int64_t nanoseconds(struct timespec t) { return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec; }
 
 static enum status look(int fd, struct file_version *v, struct error *err) {
     struct stat info;
@@ -40,7 +38,8 @@ static enum status look(int fd, struct file_version *v, struct error *err) {
         return error_set_errno(err, errno, "cannot look at an output");
     if (!S_ISREG(info.st_mode))
         return error_set(err, STATUS_CORRUPT, "an output is not a plain file");
-    *v = (struct file_version){info.st_ino, (uint64_t)info.st_size, nanoseconds(info.st_mtim), nanoseconds(info.st_ctim)};
+    *v = (struct file_version){info.st_ino, (uint64_t)info.st_size, nanoseconds(info.st_mtim),
+                               nanoseconds(info.st_ctim)};
     return STATUS_OK;
 }
 
@@ -230,9 +229,7 @@ void digests_wake(void *digests) {
     pthread_mutex_unlock(&d->mutex);
 }
 
-uint64_t digests_hashed_bytes(const struct digests *d) {
-    return atomic_load(&d->hashed_bytes);
-}
+uint64_t digests_hashed_bytes(const struct digests *d) { return atomic_load(&d->hashed_bytes); }
 
 void digests_wait(struct digests *d) {
     pthread_mutex_lock(&d->mutex);

@@ -19,14 +19,13 @@
 #include "server/uploads/upload.h"
 #include "server/uploads/upload_session.h"
 
-#define UNFINISHED_MAX 10000 /* uploads, of all users */
-#define SPARE_BYTES (1 << 20)  /* of a file that need not be given back: file systems round up */
+#define UNFINISHED_MAX 10000  /* uploads, of all users */
+#define SPARE_BYTES (1 << 20) /* of a file that need not be given back: file systems round up */
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
 /* The file is, or was about to be, at its place among the scenes. */
-static enum status place(struct resumables *r, const struct upload_row *row, const char *scene_id,
-                         struct error *err) {
+static enum status place(struct resumables *r, const struct upload_row *row, const char *scene_id, struct error *err) {
     struct folder *folder = r->config.folder;
     char *path = upload_session_path(r, row->id);
     bool existed;
@@ -37,8 +36,7 @@ static enum status place(struct resumables *r, const struct upload_row *row, con
     else /* there, but is that on disk? */
         status = upload_sync_place(folder->dir, scene_id, err);
     if (status == STATUS_OK)
-        status = store_scene_add(r->config.store, scene_id, row->name, row->length, row->owner_id,
-                                 &existed, err);
+        status = store_scene_add(r->config.store, scene_id, row->name, row->length, row->owner_id, &existed, err);
     pthread_mutex_unlock(&folder->scene_mutex);
     mem_free(path);
     return status == STATUS_OK ? store_upload_finish(r->config.store, row->id, scene_id, err) : status;
@@ -92,8 +90,9 @@ struct resumables *resumables_new(const struct resumables_config *config) {
     pthread_mutex_init(&r->finishing, NULL);
     boot_id(r->boot);
     if (!*r->boot)
-        log_warning("the kernel's boot id cannot be read: what a daemon that is killed has received of an upload and not "
-                    "yet counted is sent again");
+        log_warning(
+            "the kernel's boot id cannot be read: what a daemon that is killed has received of an upload and not "
+            "yet counted is sent again");
     return r;
 }
 
@@ -173,8 +172,7 @@ enum status resumables_recover(struct resumables *r, struct error *err) {
         status = store_upload_list(r->config.store, NULL, "", cursor, 64, rows, &count, next, err);
         for (size_t i = 0; i < count; i++) {
             struct error why;
-            if (!*rows[i].scene_id && rows[i].received == rows[i].length &&
-                finish(r, rows[i].id, &why) != STATUS_OK)
+            if (!*rows[i].scene_id && rows[i].received == rows[i].length && finish(r, rows[i].id, &why) != STATUS_OK)
                 log_warning("upload %s: %s", rows[i].id, why.message);
             upload_row_release(&rows[i]);
         }
@@ -207,8 +205,8 @@ enum status resumable_create(struct resumables *r, struct upload_row *row, size_
     if (fd < 0)
         status = error_set_errno(err, errno, "cannot create %s", path);
     else if (fallocate(fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)row->length) != 0 && errno != EOPNOTSUPP)
-        status = error_set_errno(err, errno, "cannot reserve %llu bytes for the upload",
-                                 (unsigned long long)row->length);
+        status =
+            error_set_errno(err, errno, "cannot reserve %llu bytes for the upload", (unsigned long long)row->length);
     if (status == STATUS_OK && fsync(fd) != 0)
         status = error_set_errno(err, errno, "cannot sync %s", path);
     if (status == STATUS_OK)

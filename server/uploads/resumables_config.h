@@ -8,9 +8,9 @@ struct folder; /* data/folder.h */
 struct store;  /* store/store.h */
 
 struct resumables_config {
-    struct store *store;   /* borrowed, and so is: */
+    struct store *store; /* borrowed, and so is: */
     struct folder *folder;
-    int64_t idle_ms;       /* after which an upload that does not grow gives its space back */
+    int64_t idle_ms;                 /* after which an upload that does not grow gives its space back */
     void (*scene_added)(void *user); /* an upload has become a scene, which is to be checked */
     void *user;
 };

@@ -25,9 +25,7 @@ struct upload {
     bool is_reserved;    /* the space for all of it is ours already */
 };
 
-uint64_t upload_bytes(const struct upload *u) {
-    return u->bytes;
-}
+uint64_t upload_bytes(const struct upload *u) { return u->bytes; }
 
 void upload_free(struct upload *u) {
     if (!u)
@@ -55,7 +53,8 @@ enum status upload_new(struct upload **out, const char *data_dir, uint64_t lengt
     } else if (length > 0) {
         u->is_reserved = fallocate(u->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)length) == 0;
         if (!u->is_reserved && (errno == ENOSPC || errno == EDQUOT))
-            status = error_set_errno(err, errno, "cannot reserve %llu bytes for the upload", (unsigned long long)length);
+            status =
+                error_set_errno(err, errno, "cannot reserve %llu bytes for the upload", (unsigned long long)length);
     }
     if (status == STATUS_OK)
         return STATUS_OK;
@@ -74,16 +73,13 @@ enum status upload_write(struct upload *u, const void *data, size_t length, bool
     if (u->bytes - u->step_start < STEP_BYTES)
         return STATUS_OK;
     /* Only a hint to the kernel; the sync at the end is what counts. */
-    (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start),
-                          SYNC_FILE_RANGE_WRITE);
+    (void)sync_file_range(u->fd, (off_t)u->step_start, (off_t)(u->bytes - u->step_start), SYNC_FILE_RANGE_WRITE);
     u->step_start = u->bytes;
     *must_check_room = !u->is_reserved;
     return STATUS_OK;
 }
 
-void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]) {
-    sha256_hex(&u->hash, hex);
-}
+void upload_digest(struct upload *u, char hex[SHA256_HEX_SIZE]) { sha256_hex(&u->hash, hex); }
 
 enum status upload_sync(struct upload *u, struct error *err) {
     return fsync(u->fd) == 0 ? STATUS_OK : error_set_errno(err, errno, "cannot sync the upload");

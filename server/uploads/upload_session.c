@@ -62,8 +62,8 @@ static enum status cut_tail(struct upload_session *s, struct error *err) {
     if (ftruncate(s->fd, (off_t)s->received) != 0)
         return error_set_errno(err, errno, "cannot cut upload %s", s->id);
     if (fallocate(s->fd, FALLOC_FL_KEEP_SIZE, 0, (off_t)s->length) != 0 && errno != EOPNOTSUPP)
-        return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s",
-                               (unsigned long long)s->length, s->id);
+        return error_set_errno(err, errno, "cannot reserve %llu bytes for upload %s", (unsigned long long)s->length,
+                               s->id);
     return store_upload_begin(s->resumables->config.store, s->id, s->resumables->boot, err);
 }
 
@@ -218,7 +218,7 @@ static void forget_tail(struct upload_session *s) {
     s->is_loaded = false; /* the next to come reads row and hash again */
     s->writer = NULL;
     s->needs_truncation = ftruncate(s->fd, (off_t)s->counted) != 0 &&
-                    store_upload_begin(s->resumables->config.store, s->id, "", &err) != STATUS_OK;
+                          store_upload_begin(s->resumables->config.store, s->id, "", &err) != STATUS_OK;
     if (s->needs_truncation)
         log_warning("upload %s: %s", s->id, err.message);
     pthread_mutex_unlock(&s->mutex);

@@ -19,19 +19,19 @@ struct upload_writer; /* upload_writer.h */
 struct upload_session {
     char id[UPLOAD_ID_SIZE];
     struct resumables *resumables;
-    unsigned users;       /* under resumables->mutex, and so are: */
+    unsigned users;        /* under resumables->mutex, and so are: */
     unsigned long visited; /* the round of upload_session_next that last gave it */
     struct upload_session *next;
     pthread_mutex_t syncing; /* held by a commit */
     pthread_mutex_t mutex;   /* guards what follows */
     bool is_loaded, is_gone;
     bool needs_truncation; /* what the file has beyond `counted` must be cut off and could not be yet */
-    int fd;          /* -1 before it is loaded; then the same until the session is dropped */
+    int fd;                /* -1 before it is loaded; then the same until the session is dropped */
     uint64_t length;
-    uint64_t received, counted; /* in the file; in the store */
-    uint64_t hinted;            /* writing out has begun up to here */
-    struct sha256 hash;         /* of what was received */
-    bool tail_is_trusted;           /* see resumable.h, invariant 3 */
+    uint64_t received, counted;         /* in the file; in the store */
+    uint64_t hinted;                    /* writing out has begun up to here */
+    struct sha256 hash;                 /* of what was received */
+    bool tail_is_trusted;               /* see resumable.h, invariant 3 */
     const struct upload_writer *writer; /* NULL: nobody writes */
 };
 
@@ -50,7 +50,7 @@ char *upload_session_path(const struct resumables *r, const char *id); /* of the
 enum status upload_session_get(struct resumables *r, const char *id, struct upload_session **out, struct error *err);
 /* One that nobody uses and that was not given in this round yet, for one more user; NULL: there is none. */
 struct upload_session *upload_session_next(struct resumables *r, unsigned long round);
-void upload_session_put(struct upload_session *s); /* one user less */
+void upload_session_put(struct upload_session *s);  /* one user less */
 void upload_session_drop(struct upload_session *s); /* nobody uses it */
 /* The upload is removed: whoever still uses it finds it gone. */
 void upload_session_mark_gone(struct resumables *r, const char *id);

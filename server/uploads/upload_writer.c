@@ -31,8 +31,8 @@ static enum status check_offset(const struct upload_session *s, uint64_t offset,
     if (!s->is_loaded) /* s->hash is still that of what was forgotten */
         return lost(err);
     if (s->received != offset)
-        return error_set(err, STATUS_CONFLICT, "the upload's offset is %llu, not %llu",
-                         (unsigned long long)s->received, (unsigned long long)offset);
+        return error_set(err, STATUS_CONFLICT, "the upload's offset is %llu, not %llu", (unsigned long long)s->received,
+                         (unsigned long long)offset);
     return STATUS_OK;
 }
 

@@ -44,9 +44,7 @@ struct checkpoint {
     int64_t next_row;
 };
 
-static size_t tile_count_of(size_t bytes) {
-    return (bytes + CHECKPOINT_TILE_BYTES - 1) / CHECKPOINT_TILE_BYTES;
-}
+static size_t tile_count_of(size_t bytes) { return (bytes + CHECKPOINT_TILE_BYTES - 1) / CHECKPOINT_TILE_BYTES; }
 
 static size_t tile_bytes(size_t array_bytes, size_t tile) {
     size_t left = array_bytes - tile * CHECKPOINT_TILE_BYTES;
@@ -62,8 +60,7 @@ static void arrays_release(struct stored_array *array, size_t count) {
 }
 
 /* Binds every hash, in order, to the rest of what a load relies on. */
-static uint64_t digest_of(const struct stored_array *array, size_t count, long iteration,
-                          const char *fingerprint) {
+static uint64_t digest_of(const struct stored_array *array, size_t count, long iteration, const char *fingerprint) {
     uint64_t digest = hash64(fingerprint, strlen(fingerprint), (uint64_t)iteration);
     for (size_t i = 0; i < count; i++) {
         digest = hash64(array[i].name, strlen(array[i].name) + 1, digest);
@@ -108,8 +105,7 @@ static enum status damaged(struct checkpoint *c, const char *what, struct error 
 
 static enum status read_arrays(struct checkpoint *c, struct error *err) {
     sqlite3_stmt *stmt;
-    enum status status = sql_query(&c->sql, &stmt, err,
-                                   "SELECT number, name, bytes FROM arrays ORDER BY number", "");
+    enum status status = sql_query(&c->sql, &stmt, err, "SELECT number, name, bytes FROM arrays ORDER BY number", "");
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&c->sql, stmt, &row, err);
@@ -136,8 +132,7 @@ static enum status read_arrays(struct checkpoint *c, struct error *err) {
 /* Reads every tile and checks its place, size and hash. */
 static enum status read_tiles(struct checkpoint *c, struct error *err) {
     sqlite3_stmt *stmt;
-    enum status status = sql_query(&c->sql, &stmt, err,
-                                   "SELECT id, array, number, hash, data FROM tiles", "");
+    enum status status = sql_query(&c->sql, &stmt, err, "SELECT id, array, number, hash, data FROM tiles", "");
     bool row = status == STATUS_OK;
     while (row) {
         status = sql_step(&c->sql, stmt, &row, err);
@@ -146,13 +141,12 @@ static enum status read_tiles(struct checkpoint *c, struct error *err) {
         uint64_t a = (uint64_t)sqlite3_column_int64(stmt, 1);
         uint64_t t = (uint64_t)sqlite3_column_int64(stmt, 2);
         struct checkpoint_tile found = {.row = sqlite3_column_int64(stmt, 0),
-                             .hash = (uint64_t)sqlite3_column_int64(stmt, 3)};
+                                        .hash = (uint64_t)sqlite3_column_int64(stmt, 3)};
         bool fits = a < c->array_count && t < c->array[a].tile_count && c->array[a].tile[t].row == 0;
         if (fits) {
             size_t bytes = tile_bytes(c->array[a].bytes, t);
             const void *data = sqlite3_column_blob(stmt, 4);
-            fits = data && (size_t)sqlite3_column_bytes(stmt, 4) == bytes &&
-                   hash64(data, bytes, 0) == found.hash;
+            fits = data && (size_t)sqlite3_column_bytes(stmt, 4) == bytes && hash64(data, bytes, 0) == found.hash;
         }
         if (!fits) {
             sqlite3_reset(stmt);
@@ -203,8 +197,7 @@ static enum status read_commit(struct checkpoint *c, char note[512], struct erro
     status = read_arrays(c, err);
     if (status == STATUS_OK)
         status = read_tiles(c, err);
-    if (status == STATUS_OK &&
-        digest_of(c->array, c->array_count, c->iteration, c->fingerprint) != digest)
+    if (status == STATUS_OK && digest_of(c->array, c->array_count, c->iteration, c->fingerprint) != digest)
         status = damaged(c, "the digest of its tiles does not match", err);
     c->complete = status == STATUS_OK;
     return status;
@@ -250,8 +243,8 @@ static enum status open_file(struct checkpoint *c, const char *path, struct erro
     return status == STATUS_OK ? sql_open(&c->sql, path, SQL_ROLLBACK, PAGE_SIZE, err) : status;
 }
 
-enum status checkpoint_open(struct checkpoint **out, const char *path, const char *fingerprint,
-                            char note[512], struct error *err) {
+enum status checkpoint_open(struct checkpoint **out, const char *path, const char *fingerprint, char note[512],
+                            struct error *err) {
     *out = NULL;
     note[0] = '\0';
     struct checkpoint *c = mem_calloc(1, sizeof *c);
@@ -305,8 +298,8 @@ static bool same_arrays(const struct checkpoint *c, const struct state_array *ar
 
 /* The index that describes `array`, with the rows and hashes of the newest commit where it holds
  * the same arrays. */
-static struct stored_array *next_index(const struct checkpoint *c, const struct state_array *array,
-                                       size_t count, bool same) {
+static struct stored_array *next_index(const struct checkpoint *c, const struct state_array *array, size_t count,
+                                       bool same) {
     struct stored_array *next = mem_calloc(count ? count : 1, sizeof *next);
     for (size_t i = 0; i < count; i++) {
         size_t tiles = tile_count_of(array[i].bytes);
@@ -323,9 +316,9 @@ static struct stored_array *next_index(const struct checkpoint *c, const struct 
 }
 
 /* Inserts the tiles of one array that have changed; *row is the next free row number. */
-static enum status insert_tiles(struct checkpoint *c, const struct state_array *array,
-                                size_t number, struct stored_array *next, int64_t *row,
-                                struct checkpoint_cost *cost, struct error *err) {
+static enum status insert_tiles(struct checkpoint *c, const struct state_array *array, size_t number,
+                                struct stored_array *next, int64_t *row, struct checkpoint_cost *cost,
+                                struct error *err) {
     enum status status = STATUS_OK;
     for (size_t t = 0; t < next->tile_count && status == STATUS_OK; t++) {
         const char *data = (const char *)array->data + t * CHECKPOINT_TILE_BYTES;
@@ -337,10 +330,9 @@ static enum status insert_tiles(struct checkpoint *c, const struct state_array *
         next->tile[t] = (struct checkpoint_tile){.row = (*row)++, .hash = hash};
         cost->written_tile_count++;
         cost->written_bytes += bytes;
-        status = sql_run(&c->sql, err,
-                         "INSERT INTO tiles (id, array, number, hash, data) VALUES (?, ?, ?, ?, ?)",
-                         "iiiib", next->tile[t].row, (int64_t)number, (int64_t)t, (int64_t)hash,
-                         (const void *)data, bytes);
+        status =
+            sql_run(&c->sql, err, "INSERT INTO tiles (id, array, number, hash, data) VALUES (?, ?, ?, ?, ?)", "iiiib",
+                    next->tile[t].row, (int64_t)number, (int64_t)t, (int64_t)hash, (const void *)data, bytes);
     }
     return status;
 }
@@ -352,20 +344,18 @@ static enum status delete_replaced(struct checkpoint *c, const struct stored_arr
     for (size_t i = 0; i < c->array_count; i++)
         for (size_t t = 0; t < c->array[i].tile_count && status == STATUS_OK; t++)
             if (!same || next[i].tile[t].row != c->array[i].tile[t].row)
-                status = sql_run(&c->sql, err, "DELETE FROM tiles WHERE id = ?", "i",
-                                 c->array[i].tile[t].row);
+                status = sql_run(&c->sql, err, "DELETE FROM tiles WHERE id = ?", "i", c->array[i].tile[t].row);
     return status;
 }
 
-static enum status write_heads(struct checkpoint *c, long iteration,
-                               const struct stored_array *next, size_t count, bool same,
-                               struct error *err) {
+static enum status write_heads(struct checkpoint *c, long iteration, const struct stored_array *next, size_t count,
+                               bool same, struct error *err) {
     enum status status = STATUS_OK;
     if (!same)
         status = sql_run(&c->sql, err, "DELETE FROM arrays", "");
     for (size_t i = 0; !same && i < count && status == STATUS_OK; i++)
-        status = sql_run(&c->sql, err, "INSERT INTO arrays (number, name, bytes) VALUES (?, ?, ?)",
-                         "iti", (int64_t)i, next[i].name, (int64_t)next[i].bytes);
+        status = sql_run(&c->sql, err, "INSERT INTO arrays (number, name, bytes) VALUES (?, ?, ?)", "iti", (int64_t)i,
+                         next[i].name, (int64_t)next[i].bytes);
     if (status == STATUS_OK)
         status = sql_run(&c->sql, err,
                          "INSERT OR REPLACE INTO newest (id, fingerprint, program, iteration,"
@@ -375,8 +365,8 @@ static enum status write_heads(struct checkpoint *c, long iteration,
     return status == STATUS_OK ? write_format(c, err) : status;
 }
 
-enum status checkpoint_save(struct checkpoint *c, long iteration, const struct state_array *array,
-                            size_t count, struct checkpoint_cost *cost, struct error *err) {
+enum status checkpoint_save(struct checkpoint *c, long iteration, const struct state_array *array, size_t count,
+                            struct checkpoint_cost *cost, struct error *err) {
     struct checkpoint_cost spent = {0};
     double start = clock_sec();
     enum status status = sql_begin(&c->sql, err);
@@ -415,8 +405,7 @@ static enum status load_tile(struct checkpoint *c, const struct checkpoint_tile 
                              struct error *err) {
     sqlite3_stmt *stmt;
     bool row;
-    enum status status = sql_query(&c->sql, &stmt, err, "SELECT data FROM tiles WHERE id = ?", "i",
-                                   tile->row);
+    enum status status = sql_query(&c->sql, &stmt, err, "SELECT data FROM tiles WHERE id = ?", "i", tile->row);
     if (status == STATUS_OK)
         status = sql_step(&c->sql, stmt, &row, err);
     if (status != STATUS_OK)
@@ -431,9 +420,7 @@ static enum status load_tile(struct checkpoint *c, const struct checkpoint_tile 
     }
     sqlite3_reset(stmt);
     /* It was whole when the file was opened: the device is at fault, or its memory. */
-    return status == STATUS_OK ? status
-                               : error_set(err, STATUS_IO, "%s: a tile read twice differs",
-                                           c->sql.path);
+    return status == STATUS_OK ? status : error_set(err, STATUS_IO, "%s: a tile read twice differs", c->sql.path);
 }
 
 /* The stored array of that name; NULL: none. */
@@ -461,7 +448,8 @@ static enum status check_surface(struct checkpoint *c, const struct stored_array
 }
 
 /* Whether all that is wanted is there as it is wanted. */
-static enum status check_arrays(struct checkpoint *c, const struct state_array *array, size_t count, struct error *err) {
+static enum status check_arrays(struct checkpoint *c, const struct state_array *array, size_t count,
+                                struct error *err) {
     enum status status = STATUS_OK;
     for (size_t i = 0; i < count && status == STATUS_OK; i++) {
         const struct stored_array *from = stored_named(c, array[i].name);
@@ -485,16 +473,16 @@ static void note_dropped(struct checkpoint *c, const struct state_array *array, 
         while (i < count && strcmp(array[i].name, c->array[s].name) != 0)
             i++;
         if (i == count)
-            used += (size_t)snprintf(c->note + used, size - used, "%s%s", used ? ", " : "dropped of the checkpoint: ",
-                                     c->array[s].name);
+            used += (size_t)snprintf(c->note + used, size - used, "%s%s",
+                                     used ? ", " : "dropped of the checkpoint: ", c->array[s].name);
     }
     if (used < size && c->format < STATE_FORMAT)
-        snprintf(c->note + used, size - used, "%sthe checkpoint is of format %d, by unbaked %.40s; %s", used ? "; " : "",
-                 c->format, c->program, used ? "the rest of it is used" : "all of it is used");
+        snprintf(c->note + used, size - used, "%sthe checkpoint is of format %d, by unbaked %.40s; %s",
+                 used ? "; " : "", c->format, c->program, used ? "the rest of it is used" : "all of it is used");
 }
 
-enum status checkpoint_load(struct checkpoint *c, struct state_array *array, size_t count,
-                            bool *found, long *iteration, struct error *err) {
+enum status checkpoint_load(struct checkpoint *c, struct state_array *array, size_t count, bool *found, long *iteration,
+                            struct error *err) {
     *found = false;
     c->note[0] = '\0';
     if (!c->complete)

@@ -28,45 +28,125 @@
 /* With any arguments. */
 static const int plain[] = {
     /* memory */
-    SCMP_SYS(brk), SCMP_SYS(madvise), SCMP_SYS(mmap), SCMP_SYS(mprotect), SCMP_SYS(mremap), SCMP_SYS(msync),
+    SCMP_SYS(brk),
+    SCMP_SYS(madvise),
+    SCMP_SYS(mmap),
+    SCMP_SYS(mprotect),
+    SCMP_SYS(mremap),
+    SCMP_SYS(msync),
     SCMP_SYS(munmap),
     /* threads */
-    SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(futex), SCMP_SYS(getcpu), SCMP_SYS(gettid), SCMP_SYS(membarrier),
-    SCMP_SYS(rseq), SCMP_SYS(sched_getaffinity), SCMP_SYS(sched_yield), SCMP_SYS(set_robust_list),
+    SCMP_SYS(exit),
+    SCMP_SYS(exit_group),
+    SCMP_SYS(futex),
+    SCMP_SYS(getcpu),
+    SCMP_SYS(gettid),
+    SCMP_SYS(membarrier),
+    SCMP_SYS(rseq),
+    SCMP_SYS(sched_getaffinity),
+    SCMP_SYS(sched_yield),
+    SCMP_SYS(set_robust_list),
     SCMP_SYS(set_tid_address),
     /* time */
-    SCMP_SYS(clock_getres), SCMP_SYS(clock_gettime), SCMP_SYS(clock_nanosleep), SCMP_SYS(getrusage),
-    SCMP_SYS(gettimeofday), SCMP_SYS(nanosleep), SCMP_SYS(time), SCMP_SYS(times),
+    SCMP_SYS(clock_getres),
+    SCMP_SYS(clock_gettime),
+    SCMP_SYS(clock_nanosleep),
+    SCMP_SYS(getrusage),
+    SCMP_SYS(gettimeofday),
+    SCMP_SYS(nanosleep),
+    SCMP_SYS(time),
+    SCMP_SYS(times),
     /* signals that come */
-    SCMP_SYS(pause), SCMP_SYS(restart_syscall), SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigpending),
-    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(rt_sigsuspend), SCMP_SYS(rt_sigtimedwait),
+    SCMP_SYS(pause),
+    SCMP_SYS(restart_syscall),
+    SCMP_SYS(rt_sigaction),
+    SCMP_SYS(rt_sigpending),
+    SCMP_SYS(rt_sigprocmask),
+    SCMP_SYS(rt_sigreturn),
+    SCMP_SYS(rt_sigsuspend),
+    SCMP_SYS(rt_sigtimedwait),
     SCMP_SYS(sigaltstack),
     /* who and where it is */
-    SCMP_SYS(getcwd), SCMP_SYS(getegid), SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getpid), SCMP_SYS(getppid),
-    SCMP_SYS(getrandom), SCMP_SYS(getrlimit), SCMP_SYS(getuid), SCMP_SYS(sysinfo), SCMP_SYS(uname),
+    SCMP_SYS(getcwd),
+    SCMP_SYS(getegid),
+    SCMP_SYS(geteuid),
+    SCMP_SYS(getgid),
+    SCMP_SYS(getpid),
+    SCMP_SYS(getppid),
+    SCMP_SYS(getrandom),
+    SCMP_SYS(getrlimit),
+    SCMP_SYS(getuid),
+    SCMP_SYS(sysinfo),
+    SCMP_SYS(uname),
     /* descriptors */
-    SCMP_SYS(close), SCMP_SYS(dup), SCMP_SYS(dup2), SCMP_SYS(dup3), SCMP_SYS(fadvise64), SCMP_SYS(fallocate),
-    SCMP_SYS(fdatasync), SCMP_SYS(flock), SCMP_SYS(fstat), SCMP_SYS(fstatfs), SCMP_SYS(fsync), SCMP_SYS(ftruncate),
-    SCMP_SYS(getdents64), SCMP_SYS(lseek), SCMP_SYS(poll), SCMP_SYS(ppoll), SCMP_SYS(pread64), SCMP_SYS(preadv),
-    SCMP_SYS(pselect6), SCMP_SYS(pwrite64), SCMP_SYS(pwritev), SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(select),
-    SCMP_SYS(sync_file_range), SCMP_SYS(syncfs), SCMP_SYS(write), SCMP_SYS(writev),
+    SCMP_SYS(close),
+    SCMP_SYS(dup),
+    SCMP_SYS(dup2),
+    SCMP_SYS(dup3),
+    SCMP_SYS(fadvise64),
+    SCMP_SYS(fallocate),
+    SCMP_SYS(fdatasync),
+    SCMP_SYS(flock),
+    SCMP_SYS(fstat),
+    SCMP_SYS(fstatfs),
+    SCMP_SYS(fsync),
+    SCMP_SYS(ftruncate),
+    SCMP_SYS(getdents64),
+    SCMP_SYS(lseek),
+    SCMP_SYS(poll),
+    SCMP_SYS(ppoll),
+    SCMP_SYS(pread64),
+    SCMP_SYS(preadv),
+    SCMP_SYS(pselect6),
+    SCMP_SYS(pwrite64),
+    SCMP_SYS(pwritev),
+    SCMP_SYS(read),
+    SCMP_SYS(readv),
+    SCMP_SYS(select),
+    SCMP_SYS(sync_file_range),
+    SCMP_SYS(syncfs),
+    SCMP_SYS(write),
+    SCMP_SYS(writev),
     /* names: what may be opened, made, renamed and removed is Landlock's */
-    SCMP_SYS(access), SCMP_SYS(faccessat), SCMP_SYS(faccessat2), SCMP_SYS(lstat), SCMP_SYS(mkdir), SCMP_SYS(mkdirat),
-    SCMP_SYS(newfstatat), SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(rename), SCMP_SYS(renameat),
-    SCMP_SYS(renameat2), SCMP_SYS(rmdir), SCMP_SYS(stat), SCMP_SYS(statfs), SCMP_SYS(statx), SCMP_SYS(unlink),
+    SCMP_SYS(access),
+    SCMP_SYS(faccessat),
+    SCMP_SYS(faccessat2),
+    SCMP_SYS(lstat),
+    SCMP_SYS(mkdir),
+    SCMP_SYS(mkdirat),
+    SCMP_SYS(newfstatat),
+    SCMP_SYS(readlink),
+    SCMP_SYS(readlinkat),
+    SCMP_SYS(rename),
+    SCMP_SYS(renameat),
+    SCMP_SYS(renameat2),
+    SCMP_SYS(rmdir),
+    SCMP_SYS(stat),
+    SCMP_SYS(statfs),
+    SCMP_SYS(statx),
+    SCMP_SYS(unlink),
     SCMP_SYS(unlinkat),
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) /* make their calls in ways of their own */
-    SCMP_SYS(getdents), SCMP_SYS(mincore), SCMP_SYS(open), SCMP_SYS(pipe), SCMP_SYS(pipe2),
+    SCMP_SYS(getdents),
+    SCMP_SYS(mincore),
+    SCMP_SYS(open),
+    SCMP_SYS(pipe),
+    SCMP_SYS(pipe2),
 #endif
 #ifdef __SANITIZE_ADDRESS__ /* its check for leaks traces its own threads from a process that shares their memory */
-    SCMP_SYS(prctl), SCMP_SYS(ptrace), SCMP_SYS(wait4),
+    SCMP_SYS(prctl),
+    SCMP_SYS(ptrace),
+    SCMP_SYS(wait4),
 #endif
 };
 
-static const int plain_network[] = {
-    SCMP_SYS(getpeername), SCMP_SYS(getsockname), SCMP_SYS(getsockopt), SCMP_SYS(connect), SCMP_SYS(recvfrom),
-    SCMP_SYS(recvmmsg), SCMP_SYS(recvmsg), SCMP_SYS(shutdown),
-    SCMP_SYS(seccomp), /* for confine_to_connection: it can only take away */
+static const int
+    plain_network
+        [] =
+            {
+                SCMP_SYS(getpeername), SCMP_SYS(getsockname), SCMP_SYS(getsockopt), SCMP_SYS(connect),
+                SCMP_SYS(recvfrom),    SCMP_SYS(recvmmsg),    SCMP_SYS(recvmsg),    SCMP_SYS(shutdown),
+                SCMP_SYS(seccomp), /* for confine_to_connection: it can only take away */
 };
 
 /* Whether a call of libseccomp did it. A system without memory is not one that cannot. */
@@ -76,7 +156,7 @@ static bool done(int result) {
     return result == 0;
 }
 
-#define ALLOW(filter, call, count, ...)                                                                          \
+#define ALLOW(filter, call, count, ...)                                                                                \
     done(seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(call), count, __VA_ARGS__))
 
 /* A number below 0 is a call that this architecture does not have. */
@@ -137,8 +217,7 @@ static bool allow_sockets(scmp_filter_ctx filter) {
     for (size_t i = 0; i < 2; i++)
         for (size_t k = 0; ok && k < sizeof kinds / sizeof *kinds; k++)
             ok = ALLOW(filter, socket, 3, SCMP_A0(SCMP_CMP_EQ, families[i], 0),
-                       SCMP_A1(SCMP_CMP_MASKED_EQ, ~flags, kinds[k].type),
-                       SCMP_A2(SCMP_CMP_EQ, kinds[k].protocol, 0));
+                       SCMP_A1(SCMP_CMP_MASKED_EQ, ~flags, kinds[k].type), SCMP_A2(SCMP_CMP_EQ, kinds[k].protocol, 0));
     return ok;
 }
 
@@ -146,8 +225,8 @@ static bool allow_sockets(scmp_filter_ctx filter) {
 static bool allow_socket_options(scmp_filter_ctx filter) {
     static const struct {
         scmp_datum_t level, name;
-    } options[] = {{SOL_SOCKET, SO_SNDTIMEO}, {SOL_SOCKET, SO_RCVTIMEO}, {IPPROTO_IP, IP_RECVERR},
-                   {IPPROTO_IPV6, IPV6_RECVERR}};
+    } options[] = {
+        {SOL_SOCKET, SO_SNDTIMEO}, {SOL_SOCKET, SO_RCVTIMEO}, {IPPROTO_IP, IP_RECVERR}, {IPPROTO_IPV6, IPV6_RECVERR}};
     bool ok = true;
     for (size_t i = 0; ok && i < sizeof options / sizeof *options; i++)
         ok = ALLOW(filter, setsockopt, 2, SCMP_A1(SCMP_CMP_EQ, options[i].level, 0),

@@ -27,9 +27,9 @@
 #define RULE_NET_PORT 2
 
 #define READ_ACCESS (LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR)
-#define WRITE_ACCESS                                                                           \
-    (READ_ACCESS | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR |             \
-     LANDLOCK_ACCESS_FS_REMOVE_FILE | LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG)
+#define WRITE_ACCESS                                                                                                   \
+    (READ_ACCESS | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_REMOVE_DIR | LANDLOCK_ACCESS_FS_REMOVE_FILE |    \
+     LANDLOCK_ACCESS_FS_MAKE_DIR | LANDLOCK_ACCESS_FS_MAKE_REG)
 
 #define DNS_PORT 53 /* a long reply comes by TCP */
 
@@ -69,11 +69,10 @@ static bool allow_all(int ruleset, const char *const *paths, size_t count, uint6
 
 static bool allow_system(int ruleset) {
     /* What the loader, the threading library and the C library look at while they run. */
-    static const char *const folders[] = {"/usr", "/lib", "/lib64", "/proc/self", "/sys/devices", "/sys/fs/cgroup",
-                                          "/sys/kernel/mm"};
-    static const char *const files[] = {"/etc/ld.so.cache", "/etc/localtime", "/proc/cpuinfo",
-                                        "/proc/meminfo",    "/proc/stat",     "/dev/urandom",
-                                        "/dev/null"};
+    static const char *const folders[] = {"/usr",         "/lib",           "/lib64",        "/proc/self",
+                                          "/sys/devices", "/sys/fs/cgroup", "/sys/kernel/mm"};
+    static const char *const files[] = {"/etc/ld.so.cache", "/etc/localtime", "/proc/cpuinfo", "/proc/meminfo",
+                                        "/proc/stat",       "/dev/urandom",   "/dev/null"};
     return allow_all(ruleset, folders, COUNT(folders), READ_ACCESS) &&
            allow_all(ruleset, files, COUNT(files), LANDLOCK_ACCESS_FS_READ_FILE);
 }
@@ -93,8 +92,8 @@ bool confine_files(const struct sandbox *sandbox) {
     long version = syscall(SYS_landlock_create_ruleset, NULL, 0, LANDLOCK_CREATE_RULESET_VERSION);
     if (version < 1)
         return false;
-    uint64_t later = (version >= VERSION_REFER ? ACCESS_REFER : 0) |
-                     (version >= VERSION_TRUNCATE ? ACCESS_TRUNCATE : 0);
+    uint64_t later =
+        (version >= VERSION_REFER ? ACCESS_REFER : 0) | (version >= VERSION_TRUNCATE ? ACCESS_TRUNCATE : 0);
     struct ruleset_attributes attributes = {
         .files = ACCESS_1 | later | (version >= VERSION_IOCTL ? ACCESS_IOCTL : 0),
         .network = version >= VERSION_NETWORK ? BIND_TCP | CONNECT_TCP : 0,

@@ -70,8 +70,7 @@ static size_t key_of(const char *secret, unsigned char key[WEBHOOK_KEY_MOST], co
     return strlen(secret);
 }
 
-void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body,
-                  char signature[64]) {
+void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body, char signature[64]) {
     unsigned char mac[32];
     gnutls_datum_t raw = {.data = mac, .size = sizeof mac}, text = {0};
     unsigned char decoded[WEBHOOK_KEY_MOST];
@@ -210,7 +209,8 @@ enum status task_deliver(const struct order *order, struct progress *progress, s
     deliver_sign(order->secret, order->message_id, now, order->body, signature);
     bool is_v6 = strchr(url.host, ':') != NULL;
     buf_init(&request, 1 << 20);
-    buf_printf(&request, "POST %s%s HTTP/1.1\r\nHost: %s%s%s:%s\r\nUser-Agent: unbaked/" UNBAKE_VERSION "\r\n"
+    buf_printf(&request,
+               "POST %s%s HTTP/1.1\r\nHost: %s%s%s:%s\r\nUser-Agent: unbaked/" UNBAKE_VERSION "\r\n"
                "Connection: close\r\nContent-Type: " MIME_JSON "\r\nContent-Length: %zu\r\n"
                "webhook-id: %s\r\nwebhook-timestamp: %lld\r\nwebhook-signature: %s\r\n\r\n%s",
                *url.target == '/' ? "" : "/", url.target, is_v6 ? "[" : "", url.host, is_v6 ? "]" : "", url.port,

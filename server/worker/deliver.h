@@ -19,8 +19,7 @@
 bool deliver_is_public(const struct sockaddr *address);
 
 /* "v1,BASE64" for a secret as its owner gave it. */
-void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body,
-                  char signature[64]);
+void deliver_sign(const char *secret, const char *id, long long timestamp, const char *body, char signature[64]);
 
 /* The status, from 100 to 999, that is told by the first line of a reply of HTTP/1.0 or 1.1; 0 where it is none.
  * The line may go on, or end where it was cut off. */

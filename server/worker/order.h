@@ -25,10 +25,10 @@ struct order {
     uint64_t memory_bytes; /* 0: no limit */
     bool sandbox;
     /* kind "reconstruct" */
-    const char *scene;      /* folder of the unpacked bundle */
-    const char *name;       /* of the job, for the report's title; may be "" */
-    const char *reduced;    /* what was made smaller after it ran out of memory; may be "" */
-    const cJSON *settings;  /* object */
+    const char *scene;     /* folder of the unpacked bundle */
+    const char *name;      /* of the job, for the report's title; may be "" */
+    const char *reduced;   /* what was made smaller after it ran out of memory; may be "" */
+    const cJSON *settings; /* object */
     int64_t job_id;
     int attempt;
     double checkpoint_interval_sec;

@@ -64,8 +64,7 @@ void progress_stage(struct progress *p, const char *stage) {
     send_line(p, object);
 }
 
-void progress_step(struct progress *p, const char *stage, double done, double total,
-                   double eta_sec) {
+void progress_step(struct progress *p, const char *stage, double done, double total, double eta_sec) {
     cJSON *object = line("progress");
     json_add_string(object, "stage", stage);
     json_add_number(object, "done", done);
@@ -82,8 +81,8 @@ void progress_metric(struct progress *p, const char *series, long step, double v
     send_line(p, object);
 }
 
-void progress_file(struct progress *p, const char *type, const char *name, uint64_t bytes,
-                   const char *sha256, const char *content_type) {
+void progress_file(struct progress *p, const char *type, const char *name, uint64_t bytes, const char *sha256,
+                   const char *content_type) {
     cJSON *object = line(type);
     json_add_string(object, "name", name);
     json_add_int(object, "bytes", (int64_t)bytes);

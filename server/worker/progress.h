@@ -41,8 +41,8 @@ struct progress {
 void progress_stage(struct progress *p, const char *stage);
 void progress_step(struct progress *p, const char *stage, double done, double total, double eta_sec);
 void progress_metric(struct progress *p, const char *series, long step, double value);
-void progress_file(struct progress *p, const char *type, const char *name, uint64_t bytes,
-                   const char *sha256, const char *content_type);
+void progress_file(struct progress *p, const char *type, const char *name, uint64_t bytes, const char *sha256,
+                   const char *content_type);
 void progress_log(struct progress *p, const char *level, const char *message);
 void progress_checkpoint(struct progress *p, long iteration, uint64_t bytes, double seconds);
 /* hint may be NULL. */

@@ -29,18 +29,17 @@ static struct sums sums_of(const struct mesh *mesh) {
 }
 
 /* Within what single precision loses when a mesh is turned. */
-static bool near(double found, double wanted) {
-    return fabs(found - wanted) <= 1e-5 * fabs(wanted);
-}
+static bool near(double found, double wanted) { return fabs(found - wanted) <= 1e-5 * fabs(wanted); }
 
-static enum status compare(const char *name, const struct mesh *found_mesh, const struct mesh *mesh, struct error *err) {
+static enum status compare(const char *name, const struct mesh *found_mesh, const struct mesh *mesh,
+                           struct error *err) {
     struct sums found = sums_of(found_mesh), wanted = sums_of(mesh);
     if (found.triangle_count != wanted.triangle_count)
-        return error_set(err, STATUS_CORRUPT, "%s: read back, it has %zu triangles, not %zu", name, found.triangle_count,
-                         wanted.triangle_count);
+        return error_set(err, STATUS_CORRUPT, "%s: read back, it has %zu triangles, not %zu", name,
+                         found.triangle_count, wanted.triangle_count);
     if (!near(found.area, wanted.area) || !near(found.squares, wanted.squares))
-        return error_set(err, STATUS_CORRUPT, "%s: read back, its %zu triangles lie elsewhere: %g m2 in place of %g", name,
-                         found.triangle_count, found.area, wanted.area);
+        return error_set(err, STATUS_CORRUPT, "%s: read back, its %zu triangles lie elsewhere: %g m2 in place of %g",
+                         name, found.triangle_count, found.area, wanted.area);
     return STATUS_OK;
 }
 

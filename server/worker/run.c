@@ -49,7 +49,7 @@ struct worker_run {
     struct checkpoint *checkpoint;
     char *out_dir;
     bool stop;
-    bool preview_asked; /* by SIGUSR1 */
+    bool preview_asked;      /* by SIGUSR1 */
     const struct mesh *mesh; /* that outputs are of */
     struct working_time worked;
     double next_checkpoint, next_preview, next_progress, next_hang_up_test; /* monotonic, s */
@@ -57,9 +57,9 @@ struct worker_run {
     size_t series_count;
     struct {
         char name[32];
-        double next;    /* when the next value may be told */
-        bool is_held;   /* the newest value has not been told: it is when the stage ends, so that */
-        long step;      /* a curve always has its last point */
+        double next;  /* when the next value may be told */
+        bool is_held; /* the newest value has not been told: it is when the stage ends, so that */
+        long step;    /* a curve always has its last point */
         double value;
     } series[SERIES_MAX];
 };
@@ -114,8 +114,7 @@ static bool preview_due(void *user) {
 static void tell_held_metrics(struct worker_run *run) {
     for (size_t i = 0; i < run->series_count; i++) {
         if (run->series[i].is_held)
-            progress_metric(run->progress, run->series[i].name, run->series[i].step,
-                            run->series[i].value);
+            progress_metric(run->progress, run->series[i].name, run->series[i].step, run->series[i].value);
         run->series[i].is_held = false;
     }
 }
@@ -127,8 +126,7 @@ static void tell_stage(void *user, const char *stage) {
     run->next_progress = 0.0; /* the stage's own time left, at once */
 }
 
-static void tell_progress(void *user, const char *stage, double done, double total,
-                          double eta_sec) {
+static void tell_progress(void *user, const char *stage, double done, double total, double eta_sec) {
     struct worker_run *run = user;
     double now = clock_sec();
     if (now < run->next_progress && done < total)
@@ -175,16 +173,15 @@ static double worked_sec(void *user) {
 
 /* --- checkpoints ----------------------------------------------------------------------------- */
 
-static enum status save_checkpoint(void *user, long iteration, const struct state_array *array,
-                                   size_t count, struct error *err) {
+static enum status save_checkpoint(void *user, long iteration, const struct state_array *array, size_t count,
+                                   struct error *err) {
     struct worker_run *run = user;
     struct checkpoint_cost cost;
     enum status status = checkpoint_save(run->checkpoint, iteration, array, count, &cost, err);
     if (status != STATUS_OK)
         return status;
     double interval = run->order->checkpoint_interval_sec;
-    double wait = fmin(fmax(cost.seconds / CHECKPOINT_SHARE, interval),
-                       interval * CHECKPOINT_STRETCH);
+    double wait = fmin(fmax(cost.seconds / CHECKPOINT_SHARE, interval), interval * CHECKPOINT_STRETCH);
     run->next_checkpoint = clock_sec() + wait;
     progress_checkpoint(run->progress, iteration, cost.written_bytes, cost.seconds);
     return STATUS_OK;
@@ -192,8 +189,8 @@ static enum status save_checkpoint(void *user, long iteration, const struct stat
 
 /* A checkpoint that does not fit (what its format or the surface says) is as good as none: its work is lost, the job is
  * not. */
-static enum status load_checkpoint(void *user, struct state_array *array, size_t count,
-                                   bool *found, struct error *err) {
+static enum status load_checkpoint(void *user, struct state_array *array, size_t count, bool *found,
+                                   struct error *err) {
     struct worker_run *run = user;
     long iteration;
     char note[512];
@@ -213,7 +210,8 @@ static enum status load_checkpoint(void *user, struct state_array *array, size_t
  * takes on (which is less after running out of memory). */
 static char *fingerprint_of(const struct order *order) {
     char hex[SHA256_HEX_SIZE];
-    static const char *const apart[] = {"iterations", "time_limit_sec", "refine_looks", "texels_per_iteration", "listing1_looks"};
+    static const char *const apart[] = {"iterations", "time_limit_sec", "refine_looks", "texels_per_iteration",
+                                        "listing1_looks"};
     cJSON *kept = cJSON_Duplicate(order->settings, true);
     for (size_t i = 0; i < sizeof apart / sizeof *apart; i++)
         cJSON_DeleteItemFromObjectCaseSensitive(kept, apart[i]);
@@ -226,8 +224,8 @@ static char *fingerprint_of(const struct order *order) {
 
 /* --- files ------------------------------------------------------------------------------------ */
 
-static enum status announce(void *user, const char *type, const char *name,
-                            const char *content_type, struct error *err) {
+static enum status announce(void *user, const char *type, const char *name, const char *content_type,
+                            struct error *err) {
     struct worker_run *run = user;
     char *path = file_join(run->out_dir, name);
     char hex[SHA256_HEX_SIZE];
@@ -243,9 +241,7 @@ static enum status announce(void *user, const char *type, const char *name,
     return status;
 }
 
-static const char *title_of(const struct worker_run *run) {
-    return *run->order->name ? run->order->name : "unbake";
-}
+static const char *title_of(const struct worker_run *run) { return *run->order->name ? run->order->name : "unbake"; }
 
 static enum status write_preview(void *user, const struct reconstruction *r, struct error *err) {
     struct worker_run *run = user;
@@ -261,8 +257,7 @@ static enum status write_preview(void *user, const struct reconstruction *r, str
     return status;
 }
 
-static enum status write_outputs(struct worker_run *run, const struct reconstruction *r,
-                                 struct error *err) {
+static enum status write_outputs(struct worker_run *run, const struct reconstruction *r, struct error *err) {
     struct export_input input;
     results_make(&input, r, title_of(run));
     run->mesh = input.mesh;
@@ -275,13 +270,13 @@ static enum status write_outputs(struct worker_run *run, const struct reconstruc
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
-static enum status load_scene(struct worker_run *run, const struct settings *settings,
-                              struct parallel *pool, struct scene *scene, struct error *err) {
+static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
+                              struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
     cJSON *problems = cJSON_CreateArray();
     tell_stage(run, "load");
-    enum status status = bundle_load(run->order->scene, settings_text(settings, "transforms"),
-                                     &limits, pool, scene, problems, err);
+    enum status status =
+        bundle_load(run->order->scene, settings_text(settings, "transforms"), &limits, pool, scene, problems, err);
     /* Only with another transforms file than the one that the scene's check has read. */
     const cJSON *problem;
     cJSON_ArrayForEach(problem, problems) {
@@ -314,8 +309,8 @@ static enum status open_checkpoint(struct worker_run *run, struct error *err) {
     return status;
 }
 
-static enum status reconstruct(struct worker_run *run, const struct settings *settings,
-                               struct parallel *pool, struct error *err) {
+static enum status reconstruct(struct worker_run *run, const struct settings *settings, struct parallel *pool,
+                               struct error *err) {
     struct scene scene;
     struct reconstruction r = {0};
     const struct reconstruct_hooks hooks = {
@@ -354,8 +349,7 @@ static enum status reconstruct(struct worker_run *run, const struct settings *se
     return status;
 }
 
-enum status task_reconstruct(const struct order *order, struct progress *progress,
-                             struct error *err) {
+enum status task_reconstruct(const struct order *order, struct progress *progress, struct error *err) {
     struct worker_run run = {.order = order, .progress = progress};
     struct settings settings;
     sigset_t set;

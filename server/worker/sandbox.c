@@ -41,6 +41,4 @@ void sandbox_enter(const struct sandbox *sandbox, struct sandbox_result *result)
     describe(sandbox, result);
 }
 
-bool sandbox_keep_connection(void) {
-    return confine_to_connection();
-}
+bool sandbox_keep_connection(void) { return confine_to_connection(); }

@@ -11,8 +11,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
 
 /* Reconstructs, from the newest checkpoint on; leaves the outputs in DIR/out. STATUS_CANCELLED
  * when asked to stop (a checkpoint was saved). */
-enum status task_reconstruct(const struct order *order, struct progress *progress,
-                             struct error *err);
+enum status task_reconstruct(const struct order *order, struct progress *progress, struct error *err);
 
 /* Calls a webhook; see deliver.h. */
 enum status task_deliver(const struct order *order, struct progress *progress, struct error *err);

@@ -55,9 +55,7 @@ static void confine(const struct order *order, struct progress *progress) {
         return;
     }
     sandbox_enter(&sandbox, &result);
-    progress_log(progress,
-                 result.files && result.system_calls && result.memory ? "info" : "warning",
-                 result.text);
+    progress_log(progress, result.files && result.system_calls && result.memory ? "info" : "warning", result.text);
 }
 
 static enum status work(const struct order *order, struct progress *progress, struct error *err) {

@@ -68,13 +68,14 @@ static void unit_check_names(const struct unit *u) {
         /* put into effect below, or by confine.c */
         "UMask", "Environment", "ProtectSystem", "ProtectHome", "PrivateTmp", "PrivateDevices", "PrivateUsers",
         "ProtectProc", "ProcSubset", "ProtectKernelTunables", "ProtectControlGroups", "NoNewPrivileges",
-        "CapabilityBoundingSet", "RestrictAddressFamilies", "RestrictNamespaces", "RestrictSUIDSGID", "RestrictRealtime",
-        "LockPersonality", "MemoryDenyWriteExecute", "SystemCallErrorNumber", "SystemCallFilter", "WatchdogSec",
+        "CapabilityBoundingSet", "RestrictAddressFamilies", "RestrictNamespaces", "RestrictSUIDSGID",
+        "RestrictRealtime", "LockPersonality", "MemoryDenyWriteExecute", "SystemCallErrorNumber", "SystemCallFilter",
+        "WatchdogSec",
         /* of how it is started and stopped, or of what the lists above refuse anyway */
-        "Type", "NotifyAccess", "User", "ExecStart", "ExecReload", "Restart", "RestartSec", "KillMode", "TimeoutStopSec",
-        "LimitNOFILE", "OOMPolicy", "StateDirectory", "StateDirectoryMode", "PrivateMounts", "RemoveIPC", "KeyringMode",
-        "AmbientCapabilities", "ProtectKernelModules", "ProtectKernelLogs", "ProtectClock", "ProtectHostname",
-        "SystemCallArchitectures"};
+        "Type", "NotifyAccess", "User", "ExecStart", "ExecReload", "Restart", "RestartSec", "KillMode",
+        "TimeoutStopSec", "LimitNOFILE", "OOMPolicy", "StateDirectory", "StateDirectoryMode", "PrivateMounts",
+        "RemoveIPC", "KeyringMode", "AmbientCapabilities", "ProtectKernelModules", "ProtectKernelLogs", "ProtectClock",
+        "ProtectHostname", "SystemCallArchitectures"};
     for (size_t i = 0; i < u->count; i++) {
         bool found = false;
         for (size_t k = 0; k < sizeof known / sizeof *known; k++)
@@ -159,11 +160,13 @@ static void unit_hide(const struct unit *u, const char *writable, const char *pr
     make_dirs(at);
     put_tree(tools, at);
     if (unit_is(u, "ProtectSystem", "strict")) {
-        static const char *const roots[] = {"/bin", "/boot", "/etc", "/lib", "/opt", "/run", "/sbin", "/srv", "/usr", "/var"};
+        static const char *const roots[] = {"/bin", "/boot", "/etc", "/lib", "/opt",
+                                            "/run", "/sbin", "/srv", "/usr", "/var"};
         struct mount_attr root = {.attr_set = MOUNT_ATTR_RDONLY};
         for (size_t i = 0; i < sizeof roots / sizeof *roots; i++) {
             struct stat info; /* a mount of its own, or a part of the root's */
-            if (stat(roots[i], &info) == 0 && syscall(SYS_mount_setattr, AT_FDCWD, roots[i], AT_RECURSIVE, &root, sizeof root) != 0)
+            if (stat(roots[i], &info) == 0 &&
+                syscall(SYS_mount_setattr, AT_FDCWD, roots[i], AT_RECURSIVE, &root, sizeof root) != 0)
                 must(errno == EINVAL, roots[i]);
         }
         must(syscall(SYS_mount_setattr, AT_FDCWD, "/", 0, &root, sizeof root) == 0, "/");
@@ -173,7 +176,10 @@ static void unit_hide(const struct unit *u, const char *writable, const char *pr
         set_read_only("/sys", true);
     bool subset = unit_is(u, "ProcSubset", "pid"), invisible = unit_is(u, "ProtectProc", "invisible");
     if (subset || invisible)
-        mount_over("proc", "proc", "/proc", subset && invisible ? "hidepid=invisible,subset=pid" : subset ? "subset=pid" : "hidepid=invisible");
+        mount_over("proc", "proc", "/proc",
+                   subset && invisible ? "hidepid=invisible,subset=pid"
+                   : subset            ? "subset=pid"
+                                       : "hidepid=invisible");
 }
 
 /* PrivateUsers= leaves its own user; CapabilityBoundingSet= nothing that root may do. */
@@ -218,7 +224,7 @@ static void unit_set_environment(const struct unit *u) {
 
 /* --- the filter of system calls ----------------------------------------------------------------------------- */
 
-#define LET(filter, number, count, ...) \
+#define LET(filter, number, count, ...)                                                                                \
     must(seccomp_rule_add(filter, SCMP_ACT_ALLOW, number, count, __VA_ARGS__) == 0, #__VA_ARGS__)
 
 static void let_sockets(scmp_filter_ctx filter, const struct unit *u, int number) {
@@ -238,7 +244,8 @@ static void let_sockets(scmp_filter_ctx filter, const struct unit *u, int number
 /* What lines other than SystemCallFilter= refuse of a call that it lets through; false: nothing. */
 static bool let_part(scmp_filter_ctx filter, const struct unit *u, const char *name, int number) {
     static const scmp_datum_t spaces = CLONE_NEWNS | CLONE_NEWUSER | CLONE_NEWPID | CLONE_NEWNET | CLONE_NEWUTS |
-                                       CLONE_NEWIPC | CLONE_NEWCGROUP, suid = S_ISUID | S_ISGID;
+                                       CLONE_NEWIPC | CLONE_NEWCGROUP,
+                              suid = S_ISUID | S_ISGID;
     bool no_wx = unit_is(u, "MemoryDenyWriteExecute", "yes"), no_spaces = unit_is(u, "RestrictNamespaces", "yes"),
          no_suid = unit_is(u, "RestrictSUIDSGID", "yes");
     if (no_wx && strcmp(name, "mmap") == 0) {

@@ -47,7 +47,8 @@ int main(int argc, char **argv) {
         field(text, "Webhook-Signature", given);
         deliver_sign(argv[1], id, strtoll(stamp, NULL, 10), gap ? gap + 4 : "", wanted);
         printf("{\"path\":\"%s\",\"id\":\"%s\",\"timestamp\":%s,\"signature\":\"%s\",\"good\":%s,\"body\":%s}\n", path,
-               id, stamp[0] ? stamp : "0", given, strcmp(given, wanted) == 0 ? "true" : "false", gap ? gap + 4 : "null");
+               id, stamp[0] ? stamp : "0", given, strcmp(given, wanted) == 0 ? "true" : "false",
+               gap ? gap + 4 : "null");
         fflush(stdout);
         char reply[128];
         snprintf(reply, sizeof reply, "HTTP/1.1 %s Here\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: 0\r\n\r\n",

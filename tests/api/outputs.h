@@ -16,12 +16,13 @@ static inline void write_output(struct rig *rig, int64_t job, const char *name, 
     mem_free(path);
 }
 
-static inline void announce(struct rig *rig, int64_t job, int attempt, const char *name, const void *data, size_t length) {
+static inline void announce(struct rig *rig, int64_t job, int attempt, const char *name, const void *data,
+                            size_t length) {
     struct error err;
     char hex[SHA256_HEX_SIZE];
     sha256_of(data, length, hex);
-    rig_must(store_output_put(rig->store, job, attempt, EVENT_OUTPUT, name, length, hex, "image/x-exr", &err),
-             &err, "store_output_put");
+    rig_must(store_output_put(rig->store, job, attempt, EVENT_OUTPUT, name, length, hex, "image/x-exr", &err), &err,
+             "store_output_put");
 }
 
 static inline void field_of(const struct buf *reply, const char *name, char value[256]) {
@@ -40,7 +41,8 @@ static inline void check_field(const struct buf *reply, const char *name, const 
 }
 
 /* GETs a path of the job; the status must be that one. */
-static inline void ask(struct rig *rig, int64_t job, const char *path, const char *fields, int status, struct buf *reply) {
+static inline void ask(struct rig *rig, int64_t job, const char *path, const char *fields, int status,
+                       struct buf *reply) {
     char *full = mem_printf("/v1/jobs/%lld/%s", (long long)job, path);
     int found = rig_get(rig, full, fields, reply);
     CHECK_THAT(found == status, "%s (%s): %d, not %d", path, fields, found, status);

@@ -41,14 +41,23 @@ static inline void rig_open(struct rig *rig, const struct guard_limits *limits, 
     struct error err;
     log_set_level(LOG_WARNING);
     rig_must(store_open(&rig->store, rig->dir, &err), &err, "store_open");
-    struct scheduler_config work = {.data_dir = rig->dir, .worker_binary = "/bin/false", .max_running = 1,
-        .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
+    struct scheduler_config work = {.data_dir = rig->dir,
+                                    .worker_binary = "/bin/false",
+                                    .max_running = 1,
+                                    .checkpoint_interval_sec = 60,
+                                    .stop_grace_sec = 1};
     rig_must(scheduler_new(&rig->scheduler, &work, rig->store, &err), &err, "scheduler_new");
     struct proxies *proxies = &rig->proxies; /* the test stands for many callers */
     rig_must(proxies_parse(proxies, "127.0.0.1", "X-Forwarded-For", &err), &err, "proxies_parse");
-    struct api_config config = {.proxies = proxies, .data_dir = rig->dir, .max_attempts = 2, .queue_limit = 50,
-        .max_upload_bytes = 8 << 20, .max_streams = stream_max, .keepalive_sec = keepalive_sec, .upload_keep_ms = 3600000,
-        .server_names = "lab.example.org"};
+    struct api_config config = {.proxies = proxies,
+                                .data_dir = rig->dir,
+                                .max_attempts = 2,
+                                .queue_limit = 50,
+                                .max_upload_bytes = 8 << 20,
+                                .max_streams = stream_max,
+                                .keepalive_sec = keepalive_sec,
+                                .upload_keep_ms = 3600000,
+                                .server_names = "lab.example.org"};
     rig_must(service_new(&rig->api, &config, rig->store, rig->scheduler, &err), &err, "service_new");
     struct listener_config network = {.address = "127.0.0.1", .connection_max = connection_max, .limits = *limits};
     rig_must(listener_start(&rig->listener, &network, rig->api, &err), &err, "listener_start");
@@ -92,8 +101,8 @@ static inline bool rig_connected(int fd) {
 }
 
 static inline struct sockaddr_in rig_address(const struct listener *listener) {
-    return (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons(listener_port(listener)),
-                                .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    return (struct sockaddr_in){
+        .sin_family = AF_INET, .sin_port = htons(listener_port(listener)), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
 }
 
 static inline int rig_connect(const struct rig *rig) {

@@ -40,8 +40,13 @@ static int64_t make_job(enum thing thing, int64_t owner) {
     if (row.state == SCENE_CHECKING) /* `existed` tells only of the owner's own */
         rig_must(store_scene_ready(rig.store, scenes[thing], "{}", &err), &err, "scene");
     scene_row_release(&row);
-    struct job_new job = {.scene_id = scenes[thing], .name = "job", .labels = "{}", .settings = "{}",
-                          .owner_id = owner, .is_shared = thing == SHARED, .max_attempts = 2};
+    struct job_new job = {.scene_id = scenes[thing],
+                          .name = "job",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .owner_id = owner,
+                          .is_shared = thing == SHARED,
+                          .max_attempts = 2};
     bool replayed;
     rig_must(store_job_add(rig.store, &job, 1000, &id, &replayed, &err), &err, "store_job_add");
     return id;
@@ -53,8 +58,8 @@ static int ask(enum who who, const char *method, const char *path, const char *f
     static unsigned count;
     struct buf text;
     buf_init(&text, 65536);
-    buf_printf(&text, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nX-Forwarded-For: 10.%u.%u.1\r\n%s", method,
-               path, count / 256 % 256, count % 256, fields);
+    buf_printf(&text, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nX-Forwarded-For: 10.%u.%u.1\r\n%s",
+               method, path, count / 256 % 256, count % 256, fields);
     count++;
     if (who != NOBODY)
         buf_printf(&text, "Authorization: Bearer %s\r\n", tokens[who]);
@@ -69,8 +74,11 @@ static int ask(enum who who, const char *method, const char *path, const char *f
 static int status_of(enum who who, const char *method, const char *path, const char *body) {
     struct buf reply;
     bool is_part = strncmp(path, "/v1/uploads/", 12) == 0 && strcmp(method, "PATCH") == 0;
-    int status = ask(who, method, path, is_part ? "Tus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\nContent-Length: 0\r\n"
-                     "Content-Type: application/offset+octet-stream\r\n" : "If-Match: *\r\n", body, &reply);
+    int status = ask(who, method, path,
+                     is_part ? "Tus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\nContent-Length: 0\r\n"
+                               "Content-Type: application/offset+octet-stream\r\n"
+                             : "If-Match: *\r\n",
+                     body, &reply);
     buf_release(&reply);
     return status;
 }
@@ -139,8 +147,8 @@ static void test_matrix(void) {
                 /* Fresh things each time: the allowed requests change them. */
                 int64_t me = user_of(who == VIEWER ? VIEWER : USER), she = user_of(ADMIN);
                 int64_t job = thing == NONE ? 999999 : make_job((enum thing)thing, thing == OWN ? me : she);
-                char *path = is_upload ? make_upload((enum thing)thing)
-                                       : concrete(table[i].pattern, job, scenes[thing]);
+                char *path =
+                    is_upload ? make_upload((enum thing)thing) : concrete(table[i].pattern, job, scenes[thing]);
                 /* A stream without an end would have to be cut. */
                 if (strstr(path, "/events") && !strchr(path, '?')) {
                     char *finite = mem_printf("%s?follow=0", path);
@@ -154,8 +162,8 @@ static void test_matrix(void) {
                 bool good = wanted ? found == wanted : found != 401 && found != 403 && (is_file || found != 404);
                 if (strcmp(table[i].pattern, "/v1/session") == 0 && table[i].method == METHOD_POST)
                     good = found == 400; /* {} has no token */
-                CHECK_THAT(good, "%s %s of %s by %s: %d, wanted %d", methods[table[i].method], path,
-                           thing_names[thing], who_names[who], found, wanted);
+                CHECK_THAT(good, "%s %s of %s by %s: %d, wanted %d", methods[table[i].method], path, thing_names[thing],
+                           who_names[who], found, wanted);
                 mem_free(path);
             }
         }
@@ -192,8 +200,12 @@ static void test_same_words(void) {
 
 static void test_bad_tokens(void) {
     static const char *const fields[] = {
-        "Authorization: Bearer\r\n", "Authorization: Bearer \r\n", "Authorization: Basic YTpi\r\n",
-        "Authorization: Bearer unbake_1_\r\n", "Cookie: unbake_token=\r\n", "Cookie: unbake_token\r\n",
+        "Authorization: Bearer\r\n",
+        "Authorization: Bearer \r\n",
+        "Authorization: Basic YTpi\r\n",
+        "Authorization: Bearer unbake_1_\r\n",
+        "Cookie: unbake_token=\r\n",
+        "Cookie: unbake_token\r\n",
         "Cookie: a=b; xunbake_token=1; unbake_tokens=2\r\n",
     };
     struct buf reply;
@@ -242,7 +254,8 @@ static void test_session(void) {
 static int open_stream(enum who who, int64_t job, struct buf *out) {
     int fd = rig_connect(&rig);
     char *text = mem_printf("GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-                            "Authorization: Bearer %s\r\n\r\n", (long long)job, tokens[who]);
+                            "Authorization: Bearer %s\r\n\r\n",
+                            (long long)job, tokens[who]);
     buf_init(out, 1 << 20);
     rig_send(fd, text, strlen(text));
     rig_receive(fd, out, "snapshot");

@@ -35,8 +35,8 @@ ssize_t pread(int fd, void *data, size_t length, off_t at) {
 }
 
 static int head(struct rig *rig, int64_t job, struct buf *reply) {
-    char *text = mem_printf("HEAD /v1/jobs/%lld/outputs/big.exr HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n",
-                            (long long)job);
+    char *text = mem_printf(
+        "HEAD /v1/jobs/%lld/outputs/big.exr HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", (long long)job);
     int status = rig_ask(rig, text, strlen(text), reply);
     mem_free(text);
     return status;

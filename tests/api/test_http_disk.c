@@ -23,8 +23,8 @@ static int ask(const char *method, const char *path, const char *fields, struct 
 static void check_answer(const char *method, const char *path, const char *fields, int wanted, const char *word) {
     struct buf reply;
     int status = ask(method, path, fields, &reply);
-    CHECK_THAT(status == wanted && strstr(buf_text(&reply), word), "%s %s: %d, not %d with \"%s\": %s", method, path, status,
-               wanted, word, buf_text(&reply));
+    CHECK_THAT(status == wanted && strstr(buf_text(&reply), word), "%s %s: %d, not %d with \"%s\": %s", method, path,
+               status, wanted, word, buf_text(&reply));
     buf_release(&reply);
 }
 
@@ -101,7 +101,8 @@ static void check_collector(void) {
 static int send_all(const char *id, struct buf *reply) {
     char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" TUS
                             "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
-                            "Content-Length: %zu\r\n\r\n", id, LARGE);
+                            "Content-Length: %zu\r\n\r\n",
+                            id, LARGE);
     static const char zeros[1 << 20];
     int fd = rig_connect(&rig);
     buf_init(reply, 1 << 20);

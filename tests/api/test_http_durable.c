@@ -50,7 +50,9 @@ static void mark_fd(int fd, bool now) {
         mark(info.st_ino, now);
 }
 
-#define REAL(name) __typeof__(name) *call; *(void **)&call = dlsym(RTLD_NEXT, #name)
+#define REAL(name)                                                                                                     \
+    __typeof__(name) *call;                                                                                            \
+    *(void **)&call = dlsym(RTLD_NEXT, #name)
 
 ssize_t write(int fd, const void *data, size_t length) {
     REAL(write);
@@ -124,12 +126,12 @@ int sqlite3_step(sqlite3_stmt *stmt) {
 
 /* --- requests ------------------------------------------------------------------------------------ */
 
-static void send_bytes(const char *method, const char *path, const char *fields, const void *body, size_t length, int wanted,
-                       struct buf *reply) {
+static void send_bytes(const char *method, const char *path, const char *fields, const void *body, size_t length,
+                       int wanted, struct buf *reply) {
     struct buf request;
     buf_init(&request, 1 << 20);
-    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%sContent-Length: %zu\r\n\r\n", method, path,
-               fields, length);
+    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%sContent-Length: %zu\r\n\r\n",
+               method, path, fields, length);
     buf_append(&request, body, length);
     int status = rig_ask(&rig, request.data, request.length, reply);
     CHECK_THAT(status == wanted, "%s %s: %d, not %d: %s", method, path, status, wanted, buf_text(reply));
@@ -173,7 +175,8 @@ static void in_parts(char *bytes) {
     buf_release(&reply);
     snprintf(upload_path, sizeof upload_path, "%s/uploads/%s", rig.dir, location + strlen("/v1/uploads/"));
     for (size_t at = 0; at < UPLOADED; at += UPLOADED / 2) {
-        snprintf(fields, sizeof fields, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: %zu\r\n", at);
+        snprintf(fields, sizeof fields, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: %zu\r\n",
+                 at);
         send_bytes("PATCH", location, fields, bytes + at, UPLOADED / 2, 204, &reply);
         buf_release(&reply);
     }

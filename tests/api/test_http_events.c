@@ -7,8 +7,8 @@
 
 static int open_stream(const struct rig *rig, int64_t job, const char *query, const char *fields) {
     int fd = rig_connect(rig);
-    char *text = mem_printf("GET /v1/jobs/%lld/events%s HTTP/1.1\r\nHost: localhost\r\n%s\r\n", (long long)job,
-                            query, fields);
+    char *text =
+        mem_printf("GET /v1/jobs/%lld/events%s HTTP/1.1\r\nHost: localhost\r\n%s\r\n", (long long)job, query, fields);
     rig_send(fd, text, strlen(text));
     mem_free(text);
     return fd;
@@ -111,8 +111,11 @@ static void check_ndjson(struct rig *rig) {
     for (int i = 0; i < 200; i++)
         add_metric(rig, job, attempt, i);
     /* As an attempt of an earlier release may have left it: only the row says which job and attempt it is of. */
-    rig_must(store_event_add(rig->store, job, attempt, EVENT_LOG, "{\"message\":\"forged\",\"job\":99999,\"attempt\":77,"
-                             "\"at\":\"1970-01-01T00:00:00.000Z\"}", &err), &err, "store_event_add");
+    rig_must(store_event_add(rig->store, job, attempt, EVENT_LOG,
+                             "{\"message\":\"forged\",\"job\":99999,\"attempt\":77,"
+                             "\"at\":\"1970-01-01T00:00:00.000Z\"}",
+                             &err),
+             &err, "store_event_add");
     rig_must(store_job_fail(rig->store, job, attempt, "no", "why", &err), &err, "store_job_fail");
     char path[64];
     snprintf(path, sizeof path, "/v1/jobs/%lld/events?after=0", (long long)job);
@@ -130,7 +133,8 @@ static void check_ndjson(struct rig *rig) {
         const char *at = cJSON_GetStringValue(cJSON_GetObjectItem(data, "at"));
         CHECK_THAT(at && strncmp(at, "1970", 4) != 0 &&
                        cJSON_GetNumberValue(cJSON_GetObjectItem(data, "job")) == (double)job &&
-                       cJSON_GetNumberValue(cJSON_GetObjectItem(data, "attempt")) <= attempt, "%s", line);
+                       cJSON_GetNumberValue(cJSON_GetObjectItem(data, "attempt")) <= attempt,
+                   "%s", line);
         metrics += strcmp(cJSON_GetStringValue(cJSON_GetObjectItem(event, "event")), EVENT_METRIC) == 0;
         previous = id;
         count++;
@@ -243,8 +247,8 @@ static int source_connect(struct rig *rig, struct event_source *source, size_t m
     mem_free(text);
     buf_init(&reply, 1 << 24);
     rig_receive(fd, &reply, "\r\n\r\n");
-    for (ssize_t got = 1; rig_status(&reply) == 200 && got > 0 && reply.length < most &&
-                          !strstr(buf_text(&reply), "\r\n0\r\n\r\n");) {
+    for (ssize_t got = 1;
+         rig_status(&reply) == 200 && got > 0 && reply.length < most && !strstr(buf_text(&reply), "\r\n0\r\n\r\n");) {
         got = recv(fd, chunk, sizeof chunk, 0);
         buf_append(&reply, chunk, got > 0 ? (size_t)got : 0);
     }

@@ -22,7 +22,10 @@ static char *fill_in(const char *path) {
     snprintf(number, sizeof number, "%lld", (long long)job);
     if (!mark)
         return mem_strdup(path);
-    return mem_printf("%.*s%s%s", (int)(mark - path), path, mark[1] == 'j' ? number : mark[1] == 'u' ? upload : scene,
+    return mem_printf("%.*s%s%s", (int)(mark - path), path,
+                      mark[1] == 'j'   ? number
+                      : mark[1] == 'u' ? upload
+                                       : scene,
                       mark + 3);
 }
 
@@ -31,7 +34,8 @@ static int ask(const char *method, const char *path, const char *fields, const v
     struct buf request;
     char *full = fill_in(path);
     buf_init(&request, 1 << 20);
-    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s%s", method, full, token_field, fields);
+    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s%s", method, full, token_field,
+               fields);
     if (strcmp(method, "GET") != 0)
         buf_printf(&request, "Content-Length: %zu\r\n", length);
     buf_puts(&request, "\r\n");
@@ -44,9 +48,7 @@ static int ask(const char *method, const char *path, const char *fields, const v
 
 /* --- what there must be before ------------------------------------------------------------------- */
 
-static void queued_job(void) {
-    job = rig_job(&rig);
-}
+static void queued_job(void) { job = rig_job(&rig); }
 
 static void ended_job(void) {
     job = rig_job(&rig);
@@ -69,8 +71,9 @@ static void job_with_output(void) {
     rig_must(file_make_dirs(dir, &err), &err, "a folder");
     rig_must(file_replace(path, "abc", 3, &err), &err, "an output");
     for (int i = 0; i < 2; i++)
-        rig_must(store_output_put(rig.store, job, attempt, EVENT_OUTPUT, i ? "b.png" : "a.png", 3, RIG_SCENE, "image/png",
-                                  &err), &err, "store_output_put");
+        rig_must(store_output_put(rig.store, job, attempt, EVENT_OUTPUT, i ? "b.png" : "a.png", 3, RIG_SCENE,
+                                  "image/png", &err),
+                 &err, "store_output_put");
     mem_free(path);
     mem_free(dir);
 }
@@ -90,9 +93,7 @@ static void unused_scene(void) {
     rig_must(store_scene_ready(rig.store, scene, "{}", &err), &err, "store_scene_ready");
 }
 
-static void rig_scene_again(void) {
-    strcpy(scene, RIG_SCENE);
-}
+static void rig_scene_again(void) { strcpy(scene, RIG_SCENE); }
 
 #define TUS "Tus-Resumable: 1.0.0\r\n"
 
@@ -122,8 +123,8 @@ static void expired_things(void) {
 
 static const struct step {
     const char *method, *path, *fields, *body; /* NULL: UPLOADED bytes */
-    void (*before)(void); /* each time; NULL: nothing */
-    bool is_tolerant;     /* it may do without: an empty stream, say */
+    void (*before)(void);                      /* each time; NULL: nothing */
+    bool is_tolerant;                          /* it may do without: an empty stream, say */
 } steps[] = {
     {"GET", "/readyz", "", "", NULL, false},
     {"GET", "/metrics", "", "", NULL, false},
@@ -141,12 +142,15 @@ static const struct step {
     {"GET", "/v1/uploads/{u}", "", "", NULL, false},
     {"PATCH", "/v1/uploads/{u}", JSON, "{\"pinned\":true}", NULL, false},
     {"PATCH", "/v1/uploads/{u}", PART, NULL, new_upload, false},
-    {"PATCH", "/v1/uploads/{u}", PART_CHECKED "ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n", "abc", new_upload, false},
+    {"PATCH", "/v1/uploads/{u}", PART_CHECKED "ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n", "abc", new_upload,
+     false},
     {"DELETE", "/v1/uploads/{u}?dry_run=1", TUS, "", new_upload, false},
     {"DELETE", "/v1/uploads/{u}", TUS, "", new_upload, false},
     {"POST", "/v1/jobs", JSON, "{\"scene\":\"" RIG_SCENE "\"}", queued_job, false},
-    {"POST", "/v1/jobs", JSON "Idempotency-Key: k\r\n", "{\"scene\":\"00112233\",\"webhook\":"
-     "{\"url\":\"http://x/\",\"secret\":\"0123456789abcdef\"}}", NULL, false},
+    {"POST", "/v1/jobs", JSON "Idempotency-Key: k\r\n",
+     "{\"scene\":\"00112233\",\"webhook\":"
+     "{\"url\":\"http://x/\",\"secret\":\"0123456789abcdef\"}}",
+     NULL, false},
     {"POST", "/v1/jobs?dry_run=1", JSON, "{\"scene\":\"" RIG_SCENE "\"}", NULL, false},
     {"GET", "/v1/jobs", "", "", NULL, false},
     {"GET", "/v1/jobs?state=queued&limit=1", "", "", NULL, false},
@@ -243,8 +247,8 @@ static void check_refusals(void) {
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         struct buf reply;
         int status = ask(bad[i].method, bad[i].path, bad[i].fields, bad[i].body, strlen(bad[i].body), &reply);
-        CHECK_THAT(status == bad[i].status && strstr(buf_text(&reply), "\"detail\":\""), "%s %s (%s): %d, not %d", bad[i].method,
-                   bad[i].path, bad[i].body, status, bad[i].status);
+        CHECK_THAT(status == bad[i].status && strstr(buf_text(&reply), "\"detail\":\""), "%s %s (%s): %d, not %d",
+                   bad[i].method, bad[i].path, bad[i].body, status, bad[i].status);
         buf_release(&reply);
     }
 }
@@ -269,7 +273,8 @@ static void check_garbled(void) {
     static const char *const settings[] = {"{", "[]", "{\"no_such\":1}"};
     bool replayed;
     for (size_t i = 0; i < sizeof settings / sizeof *settings; i++) {
-        struct job_new new = {.scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = settings[i], .max_attempts = 2};
+        struct job_new new = {
+            .scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = settings[i], .max_attempts = 2};
         rig_must(store_job_add(rig.store, &new, 1000, &job, &replayed, &err), &err, "store_job_add");
         check_answer("POST", "/v1/jobs/{j}/extend", JSON, "{\"looks\":60}", 500, "log has details");
     }
@@ -277,8 +282,13 @@ static void check_garbled(void) {
 
 /* The HTTP side starts, or says why not. */
 static bool start_once(bool is_sql, long n) {
-    struct api_config config = {.data_dir = rig.dir, .max_attempts = 2, .queue_limit = 50, .max_upload_bytes = 8 << 20,
-                                .max_streams = 9, .keepalive_sec = 60, .upload_keep_ms = 3600000};
+    struct api_config config = {.data_dir = rig.dir,
+                                .max_attempts = 2,
+                                .queue_limit = 50,
+                                .max_upload_bytes = 8 << 20,
+                                .max_streams = 9,
+                                .keepalive_sec = 60,
+                                .upload_keep_ms = 3600000};
     struct listener_config network = {.address = "127.0.0.1", .connection_max = 9, .limits = rig_patient};
     struct api *api;
     struct listener *listener;
@@ -293,7 +303,8 @@ static bool start_once(bool is_sql, long n) {
         status = listener_start(&listener, &network, api, &err);
     bool struck = is_sql ? sql_faults_lift() : system_faults_lift(), has_begun = status == STATUS_OK;
     faults_are_off = true;
-    CHECK_THAT(has_begun ? true : struck && err.status == status && *err.message, "a start, call %ld: %s", n, err.message);
+    CHECK_THAT(has_begun ? true : struck && err.status == status && *err.message, "a start, call %ld: %s", n,
+               err.message);
     if (has_begun) {
         listener_quiesce(listener);
         listener_stop(listener);

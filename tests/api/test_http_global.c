@@ -16,8 +16,8 @@ static int get_as(const char *token, const char *path, struct buf *reply) {
 }
 
 static int64_t job_of(int64_t owner) {
-    struct job_new job = {.scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = "{}",
-                          .max_attempts = 2, .owner_id = owner};
+    struct job_new job = {
+        .scene_id = RIG_SCENE, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 2, .owner_id = owner};
     bool replayed;
     int64_t id;
     rig_must(store_job_add(rig.store, &job, 1000, &id, &replayed, &err), &err, "store_job_add");
@@ -27,7 +27,8 @@ static int64_t job_of(int64_t owner) {
 static void add_metrics(int64_t job, int attempt, int count) {
     for (int i = 0; i < count; i++)
         rig_must(store_event_add(rig.store, job, attempt, EVENT_METRIC, "{\"series\":\"loss\",\"step\":1,\"value\":1}",
-                                 &err), &err, "store_event_add");
+                                 &err),
+                 &err, "store_event_add");
 }
 
 static int count_of(const struct buf *reply, const char *part) {
@@ -133,8 +134,9 @@ static void check_waiting_in_vain(void) {
     int64_t job = rig_job(&rig);
     rig_must(store_job_cancel(rig.store, job, &err), &err, "store_job_cancel");
     rig_must(store_job_get(rig.store, job, &now, &err), &err, "store_job_get");
-    char *request = mem_printf("GET /v1/jobs/%lld?wait=60 HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: \"rev-%lld\"\r\n\r\n",
-                               (long long)job, (long long)now.revision);
+    char *request =
+        mem_printf("GET /v1/jobs/%lld?wait=60 HTTP/1.1\r\nHost: localhost\r\nIf-None-Match: \"rev-%lld\"\r\n\r\n",
+                   (long long)job, (long long)now.revision);
     job_release(&now);
     int fd = rig_connect(&rig);
     buf_init(&reply, 1 << 16);

@@ -141,7 +141,8 @@ static int send_all_but(const char *id, char byte, size_t left) {
     int fd = rig_connect(&rig);
     char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nTus-Resumable: 1.0.0\r\n"
                             "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
-                            "Content-Length: %d\r\n\r\n", id, BYTES);
+                            "Content-Length: %d\r\n\r\n",
+                            id, BYTES);
     memset(bytes, byte, sizeof bytes);
     rig_send(fd, head, strlen(head));
     rig_send(fd, bytes, BYTES - left);
@@ -172,7 +173,8 @@ static void check_stop(void) {
     struct resumables *p = rig.api->resumables;
     struct buf reply;
     pthread_t thread;
-    snprintf(path, sizeof path, "GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\n\r\n", (long long)rig_job(&rig));
+    snprintf(path, sizeof path, "GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\n\r\n",
+             (long long)rig_job(&rig));
     int stream = rig_connect(&rig);
     buf_init(&reply, 1 << 20);
     rig_send(stream, path, strlen(path));

@@ -49,7 +49,8 @@ static void check_slow(const struct rig *rig) {
         /* bodies of 20 bytes a second */
         {.head = "POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\n", .drip = "x"},
         {.head = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
-                 "Content-Length: 100000\r\n\r\n", .drip = " "},
+                 "Content-Length: 100000\r\n\r\n",
+         .drip = " "},
         {.head = NULL, .drip = "G"}, /* a second request */
     };
     const size_t count = sizeof slow / sizeof *slow;
@@ -69,7 +70,8 @@ static void check_slow(const struct rig *rig) {
     buf_release(&reply);
     drip_all(slow, count);
     for (size_t k = 0; k < count; k++) {
-        CHECK_THAT(slow[k].is_closed, "the one with \"%s\" is not cut off", slow[k].head ? slow[k].head : "a second request");
+        CHECK_THAT(slow[k].is_closed, "the one with \"%s\" is not cut off",
+                   slow[k].head ? slow[k].head : "a second request");
         close(slow[k].fd);
     }
     for (int i = 0; i < CROWD; i++) {

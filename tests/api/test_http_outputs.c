@@ -41,8 +41,9 @@ static void check_head(struct rig *rig, int64_t job, const char *etag) {
     static const char *const ranges[] = {"", "Range: bytes=2-4\r\n", "Range: bytes=99-\r\n"};
     for (size_t i = 0; i < sizeof ranges / sizeof *ranges; i++) {
         struct buf reply;
-        char *text = mem_printf("HEAD /v1/jobs/%lld/outputs/a.exr HTTP/1.1\r\nHost: localhost\r\n%sConnection: close\r\n\r\n",
-                                (long long)job, ranges[i]);
+        char *text =
+            mem_printf("HEAD /v1/jobs/%lld/outputs/a.exr HTTP/1.1\r\nHost: localhost\r\n%sConnection: close\r\n\r\n",
+                       (long long)job, ranges[i]);
         CHECK(rig_ask(rig, text, strlen(text), &reply) == 200);
         check_field(&reply, "Content-Length", "10");
         check_field(&reply, "Content-Range", "");

@@ -15,8 +15,10 @@ static int64_t anna_id;
 
 /* POST /v1/uploads of so many bytes; its id goes to `id` where it is made. */
 static int create(const char *token, uint64_t bytes, char id[33], struct buf *reply) {
-    char *text = mem_printf("POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
-                            "Tus-Resumable: 1.0.0\r\nUpload-Length: %llu\r\n\r\n", token, (unsigned long long)bytes);
+    char *text =
+        mem_printf("POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
+                   "Tus-Resumable: 1.0.0\r\nUpload-Length: %llu\r\n\r\n",
+                   token, (unsigned long long)bytes);
     int status = rig_ask(&rig, text, strlen(text), reply);
     const char *location = strstr(buf_text(reply), "\r\nLocation: /v1/uploads/");
     CHECK((status == 201) == (location && sscanf(location + 24, "%32[0-9a-f]", id) == 1));
@@ -125,9 +127,11 @@ static void test_idle(void) {
     CHECK(create(anna, length, id, &reply) == 201);
     buf_release(&reply);
     for (int part = 0; part < 2; part++) {
-        char *text = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
-                                "Tus-Resumable: 1.0.0\r\nUpload-Offset: %d\r\nContent-Type: application/offset+octet-stream\r\n"
-                                "Content-Length: 1000\r\n\r\n%.1000s", id, anna, part * 1000, body);
+        char *text = mem_printf(
+            "PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
+            "Tus-Resumable: 1.0.0\r\nUpload-Offset: %d\r\nContent-Type: application/offset+octet-stream\r\n"
+            "Content-Length: 1000\r\n\r\n%.1000s",
+            id, anna, part * 1000, body);
         int status = rig_ask(&rig, text, strlen(text), &reply);
         CHECK_THAT(status == 204, "part %d: %d: %s", part, status, buf_text(&reply));
         buf_release(&reply);

@@ -25,9 +25,7 @@ static bool is_upload(int fd) {
     return strstr(path, "/uploads/") != NULL;
 }
 
-static void nap(void) {
-    nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
-}
+static void nap(void) { nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL); }
 
 /* The first of an upload fails, after a second one, if it comes meanwhile, has ended well: the kernel
  * tells a lost page once, and the file has lost its last byte. */
@@ -77,8 +75,8 @@ static void check_received(struct rig *rig, const char *id, uint64_t wanted) {
     struct upload_row row = {0};
     struct error err;
     rig_must(store_upload_get(rig->store, id, &row, NULL, 0, &err), &err, "store_upload_get");
-    CHECK_THAT(row.received == wanted && !*row.scene_id, "%llu bytes, scene \"%s\"",
-               (unsigned long long)row.received, row.scene_id);
+    CHECK_THAT(row.received == wanted && !*row.scene_id, "%llu bytes, scene \"%s\"", (unsigned long long)row.received,
+               row.scene_id);
     upload_row_release(&row);
 }
 
@@ -141,10 +139,12 @@ static void test_overtaken(struct rig *rig) {
     struct error err;
     struct buf reply;
     rig_must(resumable_create(p, &row, 0, &err), &err, "resumable_create");
-    char *head = mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nTus-Resumable: 1.0.0\r\n"
-                            "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
-                            "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n"
-                            "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n", row.id);
+    char *head =
+        mem_printf("PATCH /v1/uploads/%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nTus-Resumable: 1.0.0\r\n"
+                   "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 0\r\n"
+                   "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\r\n"
+                   "Transfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n",
+                   row.id);
     int fd = rig_connect(rig);
     rig_send(fd, head, strlen(head));
     while (atomic_load(&rig->api->uploaded_bytes) < before + 3)
@@ -157,7 +157,8 @@ static void test_overtaken(struct rig *rig) {
     buf_init(&reply, 1 << 16);
     rig_send(fd, "0\r\n\r\n", 5);
     rig_receive(fd, &reply, NULL);
-    CHECK_THAT(rig_status(&reply) == 409 && strstr(buf_text(&reply), "another request continues"), "%s", buf_text(&reply));
+    CHECK_THAT(rig_status(&reply) == 409 && strstr(buf_text(&reply), "another request continues"), "%s",
+               buf_text(&reply));
     check_received(rig, row.id, 5);
     buf_release(&reply);
     close(fd);

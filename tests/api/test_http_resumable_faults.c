@@ -18,11 +18,11 @@ static char bytes[BYTES], sha256[SHA256_HEX_SIZE];
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 /* Refused so, by a sentence with `word`. */
-#define IS(call, wanted, word)                                                                                      \
-    do {                                                                                                            \
-        enum status check_status = (call);                                                                          \
-        CHECK_THAT(check_status == (wanted) && err.status == check_status && strstr(err.message, word), "%s: %s",   \
-                   status_name(check_status), err.message);                                                         \
+#define IS(call, wanted, word)                                                                                         \
+    do {                                                                                                               \
+        enum status check_status = (call);                                                                             \
+        CHECK_THAT(check_status == (wanted) && err.status == check_status && strstr(err.message, word), "%s: %s",      \
+                   status_name(check_status), err.message);                                                            \
     } while (0)
 
 /* --- an upload ------------------------------------------------------------------------------------- */
@@ -140,7 +140,8 @@ static void check_spoiled(void) {
     IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_IO, "cannot cut");
     CHECK(writer == NULL);
     system_break(" fallocate ", ENOSPC);
-    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_NO_SPACE, "cannot reserve 1000 bytes");
+    IS(upload_writer_take(rig.api->resumables, id, HALF, false, &writer, &err), STATUS_NO_SPACE,
+       "cannot reserve 1000 bytes");
     system_break(" fallocate ", EOPNOTSUPP); /* some disks cannot reserve */
     send_part(HALF, BYTES);
     system_mend();

@@ -1,10 +1,10 @@
 /* test_http_share.c -- a user's share: what passes it is refused, to this user only. */
 #include "tests/api/rig.h"
 
-static int send_as(const struct rig *rig, const char *token, const char *request, size_t length,
-                   struct buf *reply) {
+static int send_as(const struct rig *rig, const char *token, const char *request, size_t length, struct buf *reply) {
     char *text = mem_printf("%s\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
-                            "Content-Length: %zu\r\n\r\n", request, token, length);
+                            "Content-Length: %zu\r\n\r\n",
+                            request, token, length);
     size_t head = strlen(text);
     text = mem_realloc_array(text, head + length + 1, 1);
     memset(text + head, ' ', length);
@@ -17,7 +17,8 @@ static int send_as(const struct rig *rig, const char *token, const char *request
 /* In chunks, so that nobody knows how many bytes come: those of send_as. */
 static int send_chunked(const struct rig *rig, const char *token, size_t length, char filling, struct buf *reply) {
     char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-                            "Authorization: Bearer %s\r\nTransfer-Encoding: chunked\r\n\r\n%zx\r\n", token, length);
+                            "Authorization: Bearer %s\r\nTransfer-Encoding: chunked\r\n\r\n%zx\r\n",
+                            token, length);
     size_t head = strlen(text);
     text = mem_realloc_array(text, head + length + 7, 1);
     memset(text + head, filling, length);
@@ -33,7 +34,8 @@ static void test_two_at_once(const struct rig *rig, const char *token) {
     int fd[2];
     struct buf reply;
     char *text = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
-                            "Authorization: Bearer %s\r\nContent-Length: 600000\r\nExpect: 100-continue\r\n\r\n", token);
+                            "Authorization: Bearer %s\r\nContent-Length: 600000\r\nExpect: 100-continue\r\n\r\n",
+                            token);
     char *body = mem_calloc(1, 600000);
     for (int i = 0; i < 2; i++) {
         fd[i] = rig_connect(rig);
@@ -90,7 +92,8 @@ static void test_streams(struct rig *rig, const char *one, const char *other) {
     int fd[3];
     rig->api->config.user_max_streams = 1;
     for (int i = 0; i < 3; i++) {
-        char *text = mem_printf("GET /v1/events HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n\r\n", token[i]);
+        char *text =
+            mem_printf("GET /v1/events HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer %s\r\n\r\n", token[i]);
         fd[i] = rig_connect(rig);
         rig_send(fd[i], text, strlen(text));
         buf_init(&reply, 1 << 20);
@@ -135,8 +138,8 @@ static void check_known(struct rig *rig, const char *one, const char *other) {
     for (size_t i = 0; i < 4; i++) {
         struct buf reply;
         int status = send_as(rig, sent_by[i], "POST /v1/scenes HTTP/1.1", 1000, &reply);
-        CHECK_THAT(status == (i < 2 ? 201 : 200) && strstr(buf_text(&reply), "\"state\":\"checking\""), "sent %zu: %d: %s", i,
-                   status, buf_text(&reply));
+        CHECK_THAT(status == (i < 2 ? 201 : 200) && strstr(buf_text(&reply), "\"state\":\"checking\""),
+                   "sent %zu: %d: %s", i, status, buf_text(&reply));
         buf_release(&reply);
     }
 }

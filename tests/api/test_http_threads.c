@@ -113,7 +113,8 @@ static int ask_as(const char *method, const char *path, const char *fields, cons
                   struct buf *reply) {
     struct buf request;
     buf_init(&request, 4 << 20);
-    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s%s", method, path, token_field, fields);
+    buf_printf(&request, "%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s%s", method, path, token_field,
+               fields);
     if (!strstr(fields, "chunked"))
         buf_printf(&request, "Content-Length: %zu\r\n", length);
     buf_puts(&request, "\r\n");
@@ -123,7 +124,8 @@ static int ask_as(const char *method, const char *path, const char *fields, cons
     return status;
 }
 
-static void must(int wanted, const char *method, const char *path, const char *fields, const void *body, size_t length) {
+static void must(int wanted, const char *method, const char *path, const char *fields, const void *body,
+                 size_t length) {
     struct buf reply;
     int status = ask_as(method, path, fields, body, length, &reply);
     CHECK_THAT(status == wanted, "%s %s: %d, not %d: %s", method, path, status, wanted, buf_text(&reply));
@@ -161,21 +163,24 @@ static void upload(int number) {
     }
     buf_puts(&chunks, "0\r\n\r\n");
     snprintf(half, sizeof half, "Upload-Offset: %zu\r\n", part);
-    char *fields = mem_printf(TUS "Content-Type: application/offset+octet-stream\r\nTransfer-Encoding: chunked\r\n%s", half);
+    char *fields =
+        mem_printf(TUS "Content-Type: application/offset+octet-stream\r\nTransfer-Encoding: chunked\r\n%s", half);
     must(204, "PATCH", path, fields, buf_text(&chunks), chunks.length);
     must(200, "HEAD", path, TUS, "", 0);
     mem_free(fields);
     buf_release(&chunks);
     create(path);
-    char *cut = mem_printf("PATCH %s HTTP/1.1\r\nHost: localhost\r\n%s" TUS "Content-Type: application/offset+octet-stream\r\n"
-                           "Upload-Offset: 0\r\nContent-Length: %zu\r\n\r\nabc", path, token_field, UPLOADED);
+    char *cut =
+        mem_printf("PATCH %s HTTP/1.1\r\nHost: localhost\r\n%s" TUS "Content-Type: application/offset+octet-stream\r\n"
+                   "Upload-Offset: 0\r\nContent-Length: %zu\r\n\r\nabc",
+                   path, token_field, UPLOADED);
     int fd = rig_connect(&rig);
     rig_send(fd, cut, strlen(cut));
     close(fd);
     mem_free(cut);
     must(204, "DELETE", path, TUS, "", 0);
-    cut = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\n%sContent-Length: %zu\r\n\r\nabc%d", token_field, UPLOADED,
-                     number);
+    cut = mem_printf("POST /v1/scenes HTTP/1.1\r\nHost: localhost\r\n%sContent-Length: %zu\r\n\r\nabc%d", token_field,
+                     UPLOADED, number);
     fd = rig_connect(&rig);
     rig_send(fd, cut, strlen(cut));
     close(fd);
@@ -188,7 +193,8 @@ static void jobs(const char *scene, int number) {
     int64_t job = 0;
     snprintf(body, sizeof body, "{\"scene\":\"%s\",\"name\":\"j%d\"}", scene, number);
     CHECK(ask_as("POST", "/v1/jobs", JSON, body, strlen(body), &reply) == 201);
-    CHECK(sscanf(strstr(buf_text(&reply), "{\"id\":") ? strstr(buf_text(&reply), "{\"id\":") + 6 : "", "%ld", &job) == 1);
+    CHECK(sscanf(strstr(buf_text(&reply), "{\"id\":") ? strstr(buf_text(&reply), "{\"id\":") + 6 : "", "%ld", &job) ==
+          1);
     buf_release(&reply);
     snprintf(path, sizeof path, "/v1/jobs/%lld", (long long)job);
     must(200, "GET", path, "", "", 0);
@@ -226,8 +232,9 @@ static void *client(void *user) {
     must(200, "GET", big_path, "", "", 0);
     must(206, "GET", big_path, "Range: bytes=5-900000\r\n", "", 0);
     must(200, "HEAD", big_path, "", "", 0);
-    static const char *const others[] = {"/", "/healthz", "/readyz", "/metrics", "/openapi.json", "/v1/version", "/v1/session",
-                                         "/v1/settings", "/v1/scenes", "/v1/uploads", "/v1/jobs", "/v1/events?follow=0"};
+    static const char *const others[] = {
+        "/",           "/healthz",     "/readyz",    "/metrics",    "/openapi.json", "/v1/version",
+        "/v1/session", "/v1/settings", "/v1/scenes", "/v1/uploads", "/v1/jobs",      "/v1/events?follow=0"};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         must(200, "GET", others[i], "", "", 0);
     must(404, "GET", "/v1/jobs/999", "", "", 0);
@@ -273,7 +280,8 @@ static void check_hung(void) {
     int fd[WAITING];
     struct buf reply;
     char *request = mem_printf("POST /v1/uploads HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%s" TUS
-                               "Upload-Length: 600\r\n\r\n", token_field);
+                               "Upload-Length: 600\r\n\r\n",
+                               token_field);
     alarm(120); /* who waits for the disk waits for ever */
     hang(true);
     for (int i = 0; i < WAITING; i++) {

@@ -6,13 +6,15 @@ static struct error err;
 
 static int ask(const char *token, const char *line, const char *body, struct buf *reply) {
     char *text = mem_printf("%s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nAuthorization: Bearer %s\r\n"
-                            "Content-Type: application/json\r\nContent-Length: %zu\r\n\r\n%s", line, token, strlen(body), body);
+                            "Content-Type: application/json\r\nContent-Length: %zu\r\n\r\n%s",
+                            line, token, strlen(body), body);
     int status = rig_ask(&rig, text, strlen(text), reply);
     mem_free(text);
     return status;
 }
 
-static void expect(const char *token, const char *line, const char *body, int wanted, const char *there, const char *not_there) {
+static void expect(const char *token, const char *line, const char *body, int wanted, const char *there,
+                   const char *not_there) {
     struct buf reply;
     int status = ask(token, line, body, &reply);
     CHECK_THAT(status == wanted && strstr(buf_text(&reply), there) && !strstr(buf_text(&reply), not_there),
@@ -38,8 +40,10 @@ int main(void) {
     rig_must(store_scene_add(rig.store, RIG_SCENE, "room", 10, who.user_id, &existed, &err), &err, "store_scene_add");
     rig_must(store_scene_ready(rig.store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
 
-    expect(anna, "POST /v1/jobs", JOB(HOOK("whsec_c2hvcnQgYnV0IGxvbmc=")), 422, "base64 of 24 to 64 bytes", "token=abc");
-    expect(anna, "POST /v1/jobs", JOB(HOOK("whsec_not base64 at all, is it")), 422, "base64 of 24 to 64 bytes", "token=abc");
+    expect(anna, "POST /v1/jobs", JOB(HOOK("whsec_c2hvcnQgYnV0IGxvbmc=")), 422, "base64 of 24 to 64 bytes",
+           "token=abc");
+    expect(anna, "POST /v1/jobs", JOB(HOOK("whsec_not base64 at all, is it")), 422, "base64 of 24 to 64 bytes",
+           "token=abc");
     expect(anna, "POST /v1/jobs", JOB(",\"shared\":true" HOOK(SECRET)), 201, "token=abc", SECRET);
     expect(anna, "POST /v1/jobs", JOB(HOOK("a secret of another form")), 201, "token=abc", "another form");
     expect(anna, "POST /v1/jobs", JOB(""), 201, "\"has_webhook\":false", "token=abc");

@@ -58,8 +58,8 @@ static void fixture_release(struct fixture *f) {
 /* A look-up at the corner that four texels share, of which (x, y) is the first. */
 static void add_entry(struct gradient_log *log, uint32_t x, uint32_t y) {
     struct gradient_entry *e = gradient_log_reserve(log, 1);
-    *e = (struct gradient_entry){.x = (uint16_t)x, .y = (uint16_t)y,
-                                 .weight = {0.25f, 0.25f, 0.25f, 0.25f}, .d = rgb_gray(1e-3f)};
+    *e = (struct gradient_entry){
+        .x = (uint16_t)x, .y = (uint16_t)y, .weight = {0.25f, 0.25f, 0.25f, 0.25f}, .d = rgb_gray(1e-3f)};
     log->entry_count++;
 }
 
@@ -106,7 +106,8 @@ int main(void) {
         few = fmin(few, few_sec(&f, i));
         all = fmin(all, all_sec(&f));
     }
-    fprintf(stderr, "Adam step of 8192 x 8192: touching 1 %% of the texels %.4f s of processor time, all %.3f s\n", few, all);
+    fprintf(stderr, "Adam step of 8192 x 8192: touching 1 %% of the texels %.4f s of processor time, all %.3f s\n", few,
+            all);
     printf("Adam step of 8192 x 8192, touching 1 %% over touching all\t%.4f\t0.03\tlower\n", few / all);
     fixture_release(&f);
     return 0;

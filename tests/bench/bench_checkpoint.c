@@ -53,11 +53,15 @@ int main(int argc, char **argv) {
     uint64_t hash = hash64(array[0].data, array[0].bytes, 0);
     printf("hash64: %.2f GB/s (%llx)\n", (double)array[0].bytes / (clock_sec() - start) * 1e-9,
            (unsigned long long)hash);
-    printf("one stream and fsync: %.2f s for %.0f MB\n", raw_write(dir, array, 3),
-           (double)total * 1e-6);
-    static const struct { const char *what; size_t every; } round[] = {
-        {"first", 1}, {"all changed", 1}, {"all changed", 1}, {"nothing changed", 0},
-        {"a tenth of the tiles changed", 10 * CHECKPOINT_TILE_BYTES / 4}};
+    printf("one stream and fsync: %.2f s for %.0f MB\n", raw_write(dir, array, 3), (double)total * 1e-6);
+    static const struct {
+        const char *what;
+        size_t every;
+    } round[] = {{"first", 1},
+                 {"all changed", 1},
+                 {"all changed", 1},
+                 {"nothing changed", 0},
+                 {"a tenth of the tiles changed", 10 * CHECKPOINT_TILE_BYTES / 4}};
     char *path = file_join(dir, "checkpoint.db"), note[512];
     struct checkpoint *c;
     struct error err;
@@ -71,9 +75,9 @@ int main(int argc, char **argv) {
         if (checkpoint_save(c, (long)i, array, 3, &cost, &err) != STATUS_OK)
             return fprintf(stderr, "%s\n", err.message), 1;
         stat(path, &info);
-        printf("save, %s: %.2f s, %zu of %zu tiles, %.0f MB; the file has %.0f MB\n", round[i].what,
-               cost.seconds, cost.written_tile_count, cost.tile_count,
-               (double)cost.written_bytes * 1e-6, (double)info.st_size * 1e-6);
+        printf("save, %s: %.2f s, %zu of %zu tiles, %.0f MB; the file has %.0f MB\n", round[i].what, cost.seconds,
+               cost.written_tile_count, cost.tile_count, (double)cost.written_bytes * 1e-6,
+               (double)info.st_size * 1e-6);
     }
     checkpoint_close(c);
     start = clock_sec();

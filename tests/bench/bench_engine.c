@@ -65,9 +65,10 @@ static void bench_room(const char *name) {
     }
     double b = median(bare, REPEATS), p = median(primal, REPEATS), g = median(gradient, REPEATS);
     double paths = (double)one.path_count;
-    fprintf(stderr, "%s: %zu paths, %.2f rays each; one core: bare %.2f Mrays/s, primal %.3f, gradient %.3f "
-            "Mpaths/s\n", name, one.path_count, (double)rays / paths,
-            (double)rays / b * 1e-6, paths / p * 1e-6, paths / g * 1e-6);
+    fprintf(stderr,
+            "%s: %zu paths, %.2f rays each; one core: bare %.2f Mrays/s, primal %.3f, gradient %.3f "
+            "Mpaths/s\n",
+            name, one.path_count, (double)rays / paths, (double)rays / b * 1e-6, paths / p * 1e-6, paths / g * 1e-6);
     printf("ray rate over bare Embree (%s)\t%.4f\t0.75\thigher\n", name, b / p);
     printf("gradient over primal cost (%s)\t%.4f\t1.3\tlower\n", name, g / p);
     mem_free(record.ray[0]);

@@ -70,17 +70,20 @@ static void write_room(const struct room *room, const struct camera *c, const ch
     CHECK(file != NULL);
     const struct rigid *m = &c->world_from_camera;
     const vec3 t = m->translation;
-    fprintf(file, "{\"camera\": {\"width\": %u, \"height\": %u, \"fx\": %.9g, \"world_from_camera\": [",
-            c->width, c->height, (double)c->fx);
+    fprintf(file, "{\"camera\": {\"width\": %u, \"height\": %u, \"fx\": %.9g, \"world_from_camera\": [", c->width,
+            c->height, (double)c->fx);
     for (int i = 0; i < 3; i++)
         fprintf(file, "[%.9g, %.9g, %.9g, %.9g], ", (double)m->rotation[i][0], (double)m->rotation[i][1],
-                (double)m->rotation[i][2], (double)(i == 0 ? t.x : i == 1 ? t.y : t.z));
+                (double)m->rotation[i][2],
+                (double)(i == 0   ? t.x
+                         : i == 1 ? t.y
+                                  : t.z));
     fprintf(file, "[0, 0, 0, 1]]},\n\"segments\": [");
     for (size_t s = 0; s < room->segments.count; s++) {
         rgb e = room->materials.emission[s];
-        fprintf(file, "%s\n{\"roughness\": %.9g, \"specular\": %.9g, \"emission\": [%.9g, %.9g, %.9g]}",
-                s ? "," : "", (double)room->materials.roughness[s], (double)room->materials.specular[s],
-                (double)e.r, (double)e.g, (double)e.b);
+        fprintf(file, "%s\n{\"roughness\": %.9g, \"specular\": %.9g, \"emission\": [%.9g, %.9g, %.9g]}", s ? "," : "",
+                (double)room->materials.roughness[s], (double)room->materials.specular[s], (double)e.r, (double)e.g,
+                (double)e.b);
     }
     fprintf(file, "]}\n");
     fclose(file);
@@ -125,7 +128,8 @@ static void bench_room(const char *python, const char *name) {
     run(&work, false);
     double mean = 0.0;
     for (size_t i = 0; i < work.path_count; i++)
-        mean += (double)(work.radiance[i].r + work.radiance[i].g + work.radiance[i].b) / (3.0 * (double)work.path_count);
+        mean +=
+            (double)(work.radiance[i].r + work.radiance[i].g + work.radiance[i].b) / (3.0 * (double)work.path_count);
     fprintf(stderr, "%s: our mean %.5g, theirs %s", name, mean, line + 6);
     double ours[2][REPEATS], theirs[2][REPEATS];
     for (int i = 0; i < REPEATS; i++) {
@@ -142,8 +146,8 @@ static void bench_room(const char *python, const char *name) {
         double a = median(ours[gradient], REPEATS), b = median(theirs[gradient], REPEATS);
         fprintf(stderr, "%s: %s: ours %.3f, Mitsuba's %.3f million paths per second\n", name,
                 gradient ? "gradient" : "primal", paths / a, paths / b);
-        printf("%s paths over Mitsuba 3 (%s)\t%.4f\t%s\thigher\n", gradient ? "gradient" : "primal", name,
-               b / a, gradient ? "4" : "1.2");
+        printf("%s paths over Mitsuba 3 (%s)\t%.4f\t%s\thigher\n", gradient ? "gradient" : "primal", name, b / a,
+               gradient ? "4" : "1.2");
     }
     work_release(&work);
 }

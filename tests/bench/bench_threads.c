@@ -46,10 +46,10 @@ static void bench_room(const char *name) {
         double best[2], share = best_sec(&one, &all, backward, best);
         double paths = (double)PARTS * PART_CHUNKS * BATCH * 1e-6;
         const char *what = backward ? "gradient" : "primal";
-        fprintf(stderr, "%s: %s: one core %.3f, all cores %.3f million paths per second\n", name, what,
-                paths / best[0], paths / best[1]);
-        printf("all %d cores over one core times %d, %s (%s)\t%.4f\t0.95\thigher\n",
-               parallel_thread_count(all.pool), parallel_thread_count(all.pool), what, name, share);
+        fprintf(stderr, "%s: %s: one core %.3f, all cores %.3f million paths per second\n", name, what, paths / best[0],
+                paths / best[1]);
+        printf("all %d cores over one core times %d, %s (%s)\t%.4f\t0.95\thigher\n", parallel_thread_count(all.pool),
+               parallel_thread_count(all.pool), what, name, share);
     }
     work_release(&one);
     work_release(&all);

@@ -16,8 +16,8 @@ struct moments {
 enum how { DEFAULT, SAMPLER_ONLY, PLAIN, HOW_COUNT };
 
 /* Texels that the camera sees, `count` of them. */
-static uint32_t *find_texels(const struct room *room, const struct inverse_uv *inverse,
-                             const struct camera *camera, size_t count) {
+static uint32_t *find_texels(const struct room *room, const struct inverse_uv *inverse, const struct camera *camera,
+                             size_t count) {
     uint32_t *texel = mem_array(count, sizeof *texel);
     size_t found = 0;
     vec3 origin = camera_origin(camera);
@@ -29,8 +29,8 @@ static uint32_t *find_texels(const struct room *room, const struct inverse_uv *i
             continue;
         vec3 point = mesh_point(&room->mesh, triangle, b1, b2), to = vec3_sub(point, origin);
         float distance = vec3_length(to);
-        if (camera_project(camera, point, &x, &y, &depth_m) && x >= 0.0f && y >= 0.0f &&
-            x < (float)camera->width && y < (float)camera->height &&
+        if (camera_project(camera, point, &x, &y, &depth_m) && x >= 0.0f && y >= 0.0f && x < (float)camera->width &&
+            y < (float)camera->height &&
             !accel_occluded(room->world.accel, origin, vec3_scale(to, 1.0f / distance), 0.0f, 0.999f * distance))
             texel[found++] = t;
     }
@@ -50,16 +50,15 @@ static void set_paths(struct work *w, const struct inverse_uv *inverse, const ui
         float b1, b2;
         if (inverse_uv_lookup(inverse, &room->atlas, (float)(t % room->atlas.width) + place.x,
                               (float)(t / room->atlas.width) + place.y, &triangle, &b1, &b2))
-            w->ray[i].direction =
-                vec3_normalize(vec3_sub(mesh_point(&room->mesh, triangle, b1, b2), w->ray[i].origin));
+            w->ray[i].direction = vec3_normalize(vec3_sub(mesh_point(&room->mesh, triangle, b1, b2), w->ray[i].origin));
     }
 }
 
 static void backward_chunk(void *user, size_t index, int thread) {
     struct work *w = user;
     size_t first = index * BATCH, count = w->path_count - first < BATCH ? w->path_count - first : BATCH;
-    path_batch_trace(w->batch[thread], &w->room->world, &w->settings, count, w->ray + first,
-                     w->key + first, w->radiance + first);
+    path_batch_trace(w->batch[thread], &w->room->world, &w->settings, count, w->ray + first, w->key + first,
+                     w->radiance + first);
     for (size_t i = first; i < first + count; i++)
         w->radiance[i] = rgb_gray(rng_to_float(rng_mix32((uint32_t)(i / SPP))) / SPP);
     gradient_log_clear(w->log[index]);

@@ -46,7 +46,7 @@ struct work {
     rgb *radiance;
     struct parallel *pool;
     struct path_batch **batch, **forward; /* [threads] */
-    struct gradient_log **log; /* [chunk_count] */
+    struct gradient_log **log;            /* [chunk_count] */
     struct gradient *gradient;
     bool backward;
     size_t first; /* chunk of this iteration */
@@ -80,8 +80,10 @@ static inline double run(struct work *w, bool backward) {
 static inline void work_init(struct work *w, const struct room *room, const struct camera *camera, int threads) {
     memset(w, 0, sizeof *w);
     w->room = room;
-    w->settings = (struct path_settings){.max_depth = DEPTH, .roulette_depth = ROULETTE_DEPTH,
-                                         .derivatives = true, .seed = 1,
+    w->settings = (struct path_settings){.max_depth = DEPTH,
+                                         .roulette_depth = ROULETTE_DEPTH,
+                                         .derivatives = true,
+                                         .seed = 1,
                                          .least_color = PATH_LEAST_COLOR};
     w->path_count = (size_t)camera->width * camera->height * SPP;
     w->chunk_count = (w->path_count + BATCH - 1) / BATCH;
@@ -164,8 +166,9 @@ static inline void load(struct room *room, const char *name) {
     }
     mem_free(color);
     inverse_uv_release(&inverse);
-    room_must(world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials, NULL,
-                         room->pool, &err), &err);
+    room_must(
+        world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials, NULL, room->pool, &err),
+        &err);
 }
 
 /* The same, and the camera of its frame 014, which sees most of either room. */

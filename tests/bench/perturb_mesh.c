@@ -212,8 +212,9 @@ static void decimate(struct mesh *mesh, float keep) {
             if (mesh->object_id[t] == object[i])
                 memcpy(from[of_object++], mesh->index[t], sizeof *from);
         size_t wanted = (size_t)(keep * (float)of_object);
-        size_t left = meshopt_simplify(&to[0][0], &from[0][0], 3 * of_object, &mesh->position[0].x,
-                                       mesh->vertex_count, sizeof *mesh->position, 3 * wanted, 1.0f, 0, NULL) / 3;
+        size_t left = meshopt_simplify(&to[0][0], &from[0][0], 3 * of_object, &mesh->position[0].x, mesh->vertex_count,
+                                       sizeof *mesh->position, 3 * wanted, 1.0f, 0, NULL) /
+                      3;
         memcpy(out[kept], to, left * sizeof *to);
         for (size_t t = 0; t < left; t++)
             out_object[kept++] = object[i];
@@ -228,17 +229,16 @@ static void decimate(struct mesh *mesh, float keep) {
     mem_free(object);
 }
 #else
-static void decimate(struct mesh *mesh, float keep) {
-    (void)mesh, (void)keep;
-}
+static void decimate(struct mesh *mesh, float keep) { (void)mesh, (void)keep; }
 #endif
 
 static bool write_ply(const char *path, const struct mesh *mesh) {
     FILE *file = fopen(path, "w");
     if (!file)
         return false;
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\n"
-                  "element face %zu\nproperty list uchar int vertex_indices\nproperty int object_id\nend_header\n",
+    fprintf(file,
+            "ply\nformat ascii 1.0\nelement vertex %zu\nproperty float x\nproperty float y\nproperty float z\n"
+            "element face %zu\nproperty list uchar int vertex_indices\nproperty int object_id\nend_header\n",
             mesh->vertex_count, mesh->triangle_count);
     for (size_t v = 0; v < mesh->vertex_count; v++)
         fprintf(file, "%.9g %.9g %.9g\n", (double)mesh->position[v].x, (double)mesh->position[v].y,

@@ -55,8 +55,8 @@ static void print_log(void *user, const char *message) {
     printf("%s\n", message);
 }
 
-static enum status keep_nothing(void *user, long iteration, const struct state_array *array,
-                                size_t count, struct error *err) {
+static enum status keep_nothing(void *user, long iteration, const struct state_array *array, size_t count,
+                                struct error *err) {
     (void)user;
     (void)iteration;
     (void)array;
@@ -65,8 +65,7 @@ static enum status keep_nothing(void *user, long iteration, const struct state_a
     return STATUS_OK;
 }
 
-static enum status find_nothing(void *user, struct state_array *array, size_t count, bool *found,
-                                struct error *err) {
+static enum status find_nothing(void *user, struct state_array *array, size_t count, bool *found, struct error *err) {
     (void)user;
     (void)array;
     (void)count;
@@ -124,8 +123,7 @@ static enum status run(int argc, char **argv, struct error *err) {
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
     if (status == STATUS_OK)
-        status = bundle_load(argv[1], settings_text(&settings, "transforms"), &limits, pool, &scene,
-                             NULL, err);
+        status = bundle_load(argv[1], settings_text(&settings, "transforms"), &limits, pool, &scene, NULL, err);
     printf("loaded in %.1f s\n", clock_sec() - begin);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);
@@ -135,8 +133,7 @@ static enum status run(int argc, char **argv, struct error *err) {
         char *text = json_page(cJSON_GetObjectItem(r.report, "metrics"));
         struct rusage usage;
         getrusage(RUSAGE_SELF, &usage);
-        printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0,
-               clock_sec() - begin);
+        printf("%s\npeak memory %.0f MiB, total %.1f s\n", text, (double)usage.ru_maxrss / 1024.0, clock_sec() - begin);
         mem_free(text);
     }
     reconstruct_release(&r);

@@ -113,8 +113,8 @@ static inline int cut_by_inode(const struct cut *c, uint64_t inode) {
 static inline void cut_read_step(struct cut *c, const char *root, const struct faults_record *r, const char *text) {
     struct cut_step *s = &c->step[c->step_count++];
     char *path = mem_strndup(text, r->length), *to = NULL; /* where there are two, the NUL ends the first */
-    *s = (struct cut_step){.op = r->op, .node = -1, .folder = -1, .to_folder = -1, .a = r->a, .text = text,
-                           .length = r->length};
+    *s = (struct cut_step){
+        .op = r->op, .node = -1, .folder = -1, .to_folder = -1, .a = r->a, .text = text, .length = r->length};
     switch (s->op) {
     case OP_CREATE:
         s->folder = cut_walk(c, root, path, &s->name);
@@ -139,11 +139,8 @@ static inline void cut_read_step(struct cut *c, const char *root, const struct f
         s->node = cut_by_inode(c, r->inode);
         cut_set(&c->node[s->folder], s->name, -1);
         break;
-    case OP_MARK:
-        s->node = r->inode ? cut_by_inode(c, r->inode) : -1;
-        break;
-    case OP_SYNC_ALL:
-        break;
+    case OP_MARK: s->node = r->inode ? cut_by_inode(c, r->inode) : -1; break;
+    case OP_SYNC_ALL: break;
     case OP_WRITE:
     case OP_SIZE:
     case OP_GROW:

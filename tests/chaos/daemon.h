@@ -65,8 +65,8 @@ static inline void preload_find(const char *build, const char *name, char path[P
 }
 
 static inline int http_connect(int port) {
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_in to = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), one = 1;
     struct timeval patience = {.tv_sec = 60};
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
@@ -90,8 +90,8 @@ static inline bool http_send(int fd, const void *data, size_t length) {
 
 /* One request on a connection of its own. The status, 0 where no whole reply came; its head and body go
  * to *head and *body (initialised here). `fields` are whole lines. */
-static inline int http_exchange(int port, const char *method, const char *path, const char *fields,
-                                const void *data, size_t length, struct buf *head, struct buf *body) {
+static inline int http_exchange(int port, const char *method, const char *path, const char *fields, const void *data,
+                                size_t length, struct buf *head, struct buf *body) {
     struct buf reply;
     char chunk[16384];
     ssize_t got = -1;
@@ -100,15 +100,17 @@ static inline int http_exchange(int port, const char *method, const char *path, 
     buf_init(body, (size_t)64 << 20);
     if (fd < 0)
         return 0;
-    char *request = mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: %zu\r\n%s\r\n",
-                               method, path, length, fields);
+    char *request =
+        mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Length: %zu\r\n%s\r\n", method,
+                   path, length, fields);
     buf_init(&reply, (size_t)64 << 20);
     if (http_send(fd, request, strlen(request)) && http_send(fd, data, length))
         while ((got = recv(fd, chunk, sizeof chunk, 0)) > 0)
             buf_append(&reply, chunk, (size_t)got);
     close(fd);
     mem_free(request);
-    const char *gap = strstr(buf_text(&reply), "\r\n\r\n"), *announced = strcasestr(buf_text(&reply), "\r\nContent-Length:");
+    const char *gap = strstr(buf_text(&reply), "\r\n\r\n"),
+               *announced = strcasestr(buf_text(&reply), "\r\nContent-Length:");
     if (gap && sscanf(buf_text(&reply), "HTTP/1.1 %d", &status) == 1) {
         size_t rest = reply.length - (size_t)(gap + 4 - buf_text(&reply));
         if (announced && announced < gap && strtoull(announced + 17, NULL, 10) != rest)
@@ -120,8 +122,8 @@ static inline int http_exchange(int port, const char *method, const char *path, 
     return status;
 }
 
-static inline int http_ask(int port, const char *method, const char *path, const char *fields,
-                           const void *data, size_t length, struct buf *body) {
+static inline int http_ask(int port, const char *method, const char *path, const char *fields, const void *data,
+                           size_t length, struct buf *body) {
     struct buf head;
     int status = http_exchange(port, method, path, fields, data, length, &head, body);
     buf_release(&head);

@@ -192,8 +192,7 @@ static void check_integrity(void) {
     char *path = file_join(daemon_.data, "state.db");
     bool whole = sqlite3_open(path, &db) == SQLITE_OK &&
                  sqlite3_prepare_v2(db, "PRAGMA integrity_check", -1, &stmt, NULL) == SQLITE_OK &&
-                 sqlite3_step(stmt) == SQLITE_ROW &&
-                 strcmp((const char *)sqlite3_column_text(stmt, 0), "ok") == 0;
+                 sqlite3_step(stmt) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(stmt, 0), "ok") == 0;
     broken += !whole;
     sqlite3_finalize(stmt);
     sqlite3_close(db);
@@ -297,7 +296,8 @@ int main(int argc, char **argv) {
     acknowledged = count_acknowledged();
     double median = percentile(ready, (size_t)kills, 0.5);
     printf("%ld kills, %ld acknowledged changes, events up to %lld; ready again after %.3f s (median), %.3f s (99 %%), "
-           "%.3f s (worst)\n", kills, acknowledged, last_event, median, percentile(ready, (size_t)kills, 0.99),
+           "%.3f s (worst)\n",
+           kills, acknowledged, last_event, median, percentile(ready, (size_t)kills, 0.99),
            percentile(ready, (size_t)kills, 1.0));
     figure("kills of the daemon under load", (double)kills, 2000, "higher");
     figure("kills of the daemon: acknowledged changes lost", (double)lost, 0, "lower");

@@ -32,9 +32,7 @@ static char kept_upload[80]; /* the path of the last */
 static long strikes, requests, ends;
 static bool is_memory; /* not the disk */
 
-static bool has_struck(void) {
-    return atomic_load(&faults->roles) && atomic_load(&faults->failed) > 0;
-}
+static bool has_struck(void) { return atomic_load(&faults->roles) && atomic_load(&faults->failed) > 0; }
 
 static struct thing *note(const char *path, const char *state) {
     size_t i = 0;
@@ -56,12 +54,12 @@ static bool is_right(int wanted, int status, const char *method, const char *pat
     if (status == wanted)
         return true;
     if (is_memory) {
-        CHECK_THAT(has_struck() && (status == 0 || status == 500), "%s: %s %s gets %d, not %d: %s", round_, method, path,
-                   status, wanted, buf_text(body));
+        CHECK_THAT(has_struck() && (status == 0 || status == 500), "%s: %s %s gets %d, not %d: %s", round_, method,
+                   path, status, wanted, buf_text(body));
         return false;
     }
-    CHECK_THAT(has_struck() && status == (is_full ? 507 : 500), "%s: %s %s gets %d, not %d: %s", round_, method, path, status,
-               wanted, buf_text(body));
+    CHECK_THAT(has_struck() && status == (is_full ? 507 : 500), "%s: %s %s gets %d, not %d: %s", round_, method, path,
+               status, wanted, buf_text(body));
     CHECK_THAT(!is_full || strcmp(method, "DELETE") != 0, "%s: %s cannot be removed from a full disk", round_, path);
     return false;
 }
@@ -77,7 +75,8 @@ static bool ask_json(int wanted, const char *method, const char *path, const cha
 }
 
 /* A change of what is at the path. */
-static bool change(const char *method, const char *path, const char *action, const char *json, int wanted, const char *state) {
+static bool change(const char *method, const char *path, const char *action, const char *json, int wanted,
+                   const char *state) {
     struct buf body;
     char *full = mem_printf("%s%s", path, action);
     struct thing *it = note(path, state);
@@ -95,7 +94,8 @@ static bool submit(const char *name, int iterations, char path[40]) {
     struct buf body;
     char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
                             "\"texels_per_iteration\":64,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
-                            "\"report_samples\":1}}", scene, name, iterations);
+                            "\"report_samples\":1}}",
+                            scene, name, iterations);
     bool made = ask_json(201, "POST", "/v1/jobs", json, &body);
     if (made)
         snprintf(path, 40, "/v1/jobs/%lld", strtoll(buf_text(&body) + 6, NULL, 10));
@@ -151,8 +151,8 @@ static void upload(long number, bool is_removed) {
                         bytes, 400, &body);
     buf_release(&body);
     if (has_part && !is_removed) {
-        ask(204, "PATCH", path, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 400\r\n", bytes + 400,
-            200, &body);
+        ask(204, "PATCH", path, TUS "Content-Type: application/offset+octet-stream\r\nUpload-Offset: 400\r\n",
+            bytes + 400, 200, &body);
         buf_release(&body);
     }
     if (is_removed)
@@ -197,8 +197,8 @@ static void check_things(void) {
         int status = http_get(daemon_.port, it->path, &body);
         snprintf(part, sizeof part, "\"state\":\"%s\"", it->state);
         CHECK_THAT(it->is_unsure || status == (it->is_gone ? 404 : 200), "%s: %s gets %d", round_, it->path, status);
-        CHECK_THAT(it->is_unsure || it->is_gone || !*it->state || strstr(buf_text(&body), part), "%s: %s is not %s: %s", round_,
-                   it->path, it->state, buf_text(&body));
+        CHECK_THAT(it->is_unsure || it->is_gone || !*it->state || strstr(buf_text(&body), part), "%s: %s is not %s: %s",
+                   round_, it->path, it->state, buf_text(&body));
         buf_release(&body);
     }
 }
@@ -219,8 +219,8 @@ static void check_upload(long number) {
     char *path = *hex ? mem_printf("%s/scenes/%s/archive", daemon_.data, hex)
                       : mem_printf("%s%s", daemon_.data, kept_upload + strlen("/v1"));
     buf_init(&bytes, 1 << 20);
-    CHECK_THAT(status != 200 || (file_read(path, &bytes, NULL) == STATUS_OK && bytes.length >= length && length <= 600 &&
-                                 memcmp(bytes.data ? bytes.data : "", sent, length) == 0),
+    CHECK_THAT(status != 200 || (file_read(path, &bytes, NULL) == STATUS_OK && bytes.length >= length &&
+                                 length <= 600 && memcmp(bytes.data ? bytes.data : "", sent, length) == 0),
                "%s: of %zu bytes of an upload not all are as they were sent", round_, length);
     buf_release(&bytes);
     buf_release(&body);
@@ -256,7 +256,8 @@ static void clear(const char *folder) {
             else
                 snprintf(path, sizeof path, "/v1/%s/%.0f", folder, id ? id->valuedouble : 0.0);
             int status = http_ask(daemon_.port, "DELETE", path, TUS, "", 0, &reply);
-            CHECK_THAT(status == 204 || status == 409, "%s: DELETE %s gets %d: %s", round_, path, status, buf_text(&reply));
+            CHECK_THAT(status == 204 || status == 409, "%s: DELETE %s gets %d: %s", round_, path, status,
+                       buf_text(&reply));
             buf_release(&reply);
             left++;
         }
@@ -436,8 +437,12 @@ static void begin(const char *build, bool jobs_wait, const char *archive) {
     static char library[PATH_MAX];
     char page[128];
     daemon_init(&daemon_, build);
-    const char *settings[] = {"min_free_mib=0", "max_running=1", "threads=1", "log_level=error",
-                              "checkpoint_interval_sec=0.1", jobs_wait ? "low_disk_mib=16000000" : "low_disk_mib=0"};
+    const char *settings[] = {"min_free_mib=0",
+                              "max_running=1",
+                              "threads=1",
+                              "log_level=error",
+                              "checkpoint_interval_sec=0.1",
+                              jobs_wait ? "low_disk_mib=16000000" : "low_disk_mib=0"};
     memcpy(daemon_.settings, settings, sizeof settings);
     preload_find(build, is_memory ? "memory" : "files", library);
     snprintf(page, sizeof page, "%s/faults", daemon_.dir);
@@ -464,8 +469,8 @@ static long go_on(bool (*round)(long n, long way), long step, bool all) {
         }
     for (int i = 0; i < 6000 && count_descriptors() > before + 3; i++)
         usleep(10000); /* the last connections are being closed */
-    CHECK_THAT(rounds < 5 || count_descriptors() <= before + 3, "%ld descriptors are open, there were %ld", count_descriptors(),
-               before);
+    CHECK_THAT(rounds < 5 || count_descriptors() <= before + 3, "%ld descriptors are open, there were %ld",
+               count_descriptors(), before);
     renew(1);
     return n - step;
 }

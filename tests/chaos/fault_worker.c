@@ -13,8 +13,8 @@
 #include "tests/chaos/faults.h"
 #include "tests/chaos/worker.h"
 
-#define SETTINGS                                                                                                \
-    "\"texture_size\":64,\"iterations\":6,\"texels_per_iteration\":64,"                                         \
+#define SETTINGS                                                                                                       \
+    "\"texture_size\":64,\"iterations\":6,\"texels_per_iteration\":64,"                                                \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
 /* What is to fail, and how. */
@@ -27,7 +27,7 @@ struct turn {
 
 static char binary[512], library[PATH_MAX], log_path[128];
 static const char *room, *archive;
-static char *root; /* the faults are below it */
+static char *root;                                  /* the faults are below it */
 static char peace[WORKER_OUTPUTS][SHA256_HEX_SIZE]; /* the outputs when nothing failed */
 static struct faults *faults;
 static bool is_memory; /* not the disk */
@@ -78,11 +78,12 @@ static void strike(const struct turn *t) {
     vague += is_vague; /* OpenEXR does not tell that its zlib had no memory; the next attempt is as large */
     CHECK_THAT(WEXITSTATUS(status) == wanted || is_vague || (WEXITSTATUS(status) == 0 && (!for_good || failed <= 1)),
                "operation %ld fails %s with %s: exit status %d", n, how, word, WEXITSTATUS(status));
-    CHECK_THAT(error != ENOSPC || count_scraps(dir) == 0, "operation %ld fails %s with %s: scraps are left", n, how, word);
+    CHECK_THAT(error != ENOSPC || count_scraps(dir) == 0, "operation %ld fails %s with %s: scraps are left", n, how,
+               word);
     if (WEXITSTATUS(status) != 0) {
         status = attempt(dir, 2);
-        CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == 0, "after operation %ld failed %s with %s: %x", n, how, word,
-                   (unsigned)status);
+        CHECK_THAT(WIFEXITED(status) && WEXITSTATUS(status) == 0, "after operation %ld failed %s with %s: %x", n, how,
+                   word, (unsigned)status);
     }
     if (check_failed_count == 0)
         worker_hash(dir, sums);
@@ -116,7 +117,8 @@ static void strike_check(const struct turn *t) {
     int wanted = is_memory ? PROGRESS_EXIT_MEMORY : error == ENOSPC ? PROGRESS_EXIT_NO_SPACE : PROGRESS_EXIT_FAILED;
     file_make_dirs(dir, NULL);
     buf_init(&bytes, (size_t)64 << 20);
-    CHECK(file_read(archive, &bytes, NULL) == STATUS_OK && file_replace(copy, bytes.data, bytes.length, NULL) == STATUS_OK);
+    CHECK(file_read(archive, &bytes, NULL) == STATUS_OK &&
+          file_replace(copy, bytes.data, bytes.length, NULL) == STATUS_OK);
     buf_release(&bytes);
     worker_order_check(dir, !is_memory);
     faults_arm(faults, FAULTS_WORKER, n, error, for_good);
@@ -130,8 +132,8 @@ static void strike_check(const struct turn *t) {
     vague += is_vague;
     CHECK_THAT(WEXITSTATUS(status) == wanted || is_vague || (is_good && (!for_good || failed <= 1)),
                "check, operation %ld fails %s with %s: exit status %d", n, how, word, WEXITSTATUS(status));
-    CHECK_THAT(is_good || error != ENOSPC || access(files, F_OK) != 0, "check, operation %ld fails %s with %s: files are left",
-               n, how, word);
+    CHECK_THAT(is_good || error != ENOSPC || access(files, F_OK) != 0,
+               "check, operation %ld fails %s with %s: files are left", n, how, word);
     CHECK_THAT(check(dir) == 0, "after the check's operation %ld failed %s with %s", n, how, word);
     if (check_failed_count == 0)
         file_remove_tree(dir, NULL);

@@ -27,15 +27,15 @@ struct faults {
     char root[256]; /* what happens below this folder counts */
     /* The n-th thing that processes of these roles do fails: operations on files with preload/files.c,
      * allocations with preload/memory.c. */
-    atomic_int roles;    /* 0: nothing is counted, nothing fails */
-    atomic_long count;   /* so many were done */
-    atomic_long fail_at; /* n, from 1; 0: none */
+    atomic_int roles;     /* 0: nothing is counted, nothing fails */
+    atomic_long count;    /* so many were done */
+    atomic_long fail_at;  /* n, from 1; 0: none */
     atomic_bool for_good; /* all later ones fail, too */
-    atomic_int error;    /* errno of operations, or FAULTS_KILL, FAULTS_HOLD */
-    atomic_int armed;    /* so many times */
-    atomic_bool is_told; /* whoever is held up has been told to stop */
-    atomic_long failed;  /* so many have */
-    char what[16];       /* the call that did, with preload/calls.c */
+    atomic_int error;     /* errno of operations, or FAULTS_KILL, FAULTS_HOLD */
+    atomic_int armed;     /* so many times */
+    atomic_bool is_told;  /* whoever is held up has been told to stop */
+    atomic_long failed;   /* so many have */
+    char what[16];        /* the call that did, with preload/calls.c */
     /* Hashes of the calls that led to allocations: to the n-th, at n - 1, while none is to fail; else, at 0, to
      * the first that does. */
     uint64_t calls[FAULTS_CALLS_MAX];
@@ -80,9 +80,7 @@ static inline void faults_lock(struct faults *f) {
         pthread_mutex_consistent(&f->mutex);
 }
 
-static inline void faults_unlock(struct faults *f) {
-    pthread_mutex_unlock(&f->mutex);
-}
+static inline void faults_unlock(struct faults *f) { pthread_mutex_unlock(&f->mutex); }
 
 /* Appends a record; the lock is held. */
 static inline void faults_log(int log_fd, enum faults_op op, uint64_t inode, uint64_t a, const void *text,

@@ -12,7 +12,9 @@
 
 int main(int argc, char **argv) {
     const char *what = argc > 2 ? argv[2] : "", *word = argc > 3 ? argv[3] : "";
-    struct faults *f = strcmp(what, "new") == 0 ? faults_new(argv[1], word, NULL) : argc > 2 ? faults_map(argv[1]) : NULL;
+    struct faults *f = strcmp(what, "new") == 0 ? faults_new(argv[1], word, NULL)
+                       : argc > 2               ? faults_map(argv[1])
+                                                : NULL;
     if (!f)
         return 2;
     if (strcmp(what, "new") == 0)

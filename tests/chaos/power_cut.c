@@ -45,7 +45,8 @@ static void mark_job(const struct buf *body) {
     char state[16];
     const char *at = strstr(buf_text(body), "\"state\":\"");
     must(sscanf(buf_text(body), "{\"id\":%lld,\"revision\":%lld", &id, &revision) == 2 && at &&
-         sscanf(at + 9, "%15[a-z]", state) == 1, "a job", body);
+             sscanf(at + 9, "%15[a-z]", state) == 1,
+         "a job", body);
     mark("job %lld %lld %s", id, revision, state);
 }
 
@@ -53,7 +54,8 @@ static long long submit(const char *name, int iterations) {
     struct buf body;
     char *json = mem_printf("{\"scene\":\"%s\",\"name\":\"%s\",\"settings\":{\"texture_size\":64,\"iterations\":%d,"
                             "\"texels_per_iteration\":128,\"cameras_per_texel\":1,\"samples_per_camera\":2,"
-                            "\"report_samples\":1}}", scene, name, iterations);
+                            "\"report_samples\":1}}",
+                            scene, name, iterations);
     must(http_json(daemon_.port, "POST", "/v1/jobs", "", json, &body) == 201, "a submission", &body);
     mark_job(&body);
     long long id = strtoll(buf_text(&body) + 6, NULL, 10);
@@ -137,14 +139,16 @@ static void parts_send(struct parts *u, size_t length, bool is_checked, bool is_
         bytes[0] ^= 1;
     }
     snprintf(path, sizeof path, "/v1/uploads/%s", u->id);
-    snprintf(fields, sizeof fields, "Tus-Resumable: 1.0.0\r\nContent-Type: application/offset+octet-stream\r\n"
-             "Upload-Offset: %zu\r\n%s", u->sent, checksum);
+    snprintf(fields, sizeof fields,
+             "Tus-Resumable: 1.0.0\r\nContent-Type: application/offset+octet-stream\r\n"
+             "Upload-Offset: %zu\r\n%s",
+             u->sent, checksum);
     mark("will upload %s", u->id);
     if (is_cut_off) {
         char head[400];
         int fd = http_connect(daemon_.port);
-        int used = snprintf(head, sizeof head, "PATCH %s HTTP/1.1\r\nHost: localhost\r\nContent-Length: %zu\r\n%s\r\n", path,
-                            length, fields);
+        int used = snprintf(head, sizeof head, "PATCH %s HTTP/1.1\r\nHost: localhost\r\nContent-Length: %zu\r\n%s\r\n",
+                            path, length, fields);
         http_send(fd, head, (size_t)used);
         http_send(fd, bytes, length / 2);
         await_bytes(u->id, u->sent + length / 2);
@@ -248,8 +252,8 @@ static void record(const char *build, const char *archive) {
     struct error err;
     daemon_init(&daemon_, build);
     static const char before[] = "00000000-0000-4000-8000-000000000001\n"; /* another boot than the machine's */
-    const char *settings[] = {"min_free_mib=0", "low_disk_mib=0", "max_running=1", "threads=1", "log_level=warning",
-                              "checkpoint_interval_sec=0.1"};
+    const char *settings[] = {"min_free_mib=0", "low_disk_mib=0",    "max_running=1",
+                              "threads=1",      "log_level=warning", "checkpoint_interval_sec=0.1"};
     memcpy(daemon_.settings, settings, sizeof settings);
     preload_find(build, "files", library);
     snprintf(page, sizeof page, "%s/faults", daemon_.dir);

@@ -255,8 +255,14 @@ static inline void promises_check(const struct promises *p, const char *data, co
     struct scheduler *scheduler = NULL;
     struct api *api = NULL;
     struct scheduler_config work = {.data_dir = data, .worker_binary = "/bin/false", .max_running = 1};
-    struct api_config config = {.data_dir = data, .max_attempts = 2, .queue_limit = 1000, .max_upload_bytes = 8 << 20,
-                                .max_streams = 1, .keepalive_sec = 60, .upload_keep_ms = 86400000, .server_names = ""};
+    struct api_config config = {.data_dir = data,
+                                .max_attempts = 2,
+                                .queue_limit = 1000,
+                                .max_upload_bytes = 8 << 20,
+                                .max_streams = 1,
+                                .keepalive_sec = 60,
+                                .upload_keep_ms = 86400000,
+                                .server_names = ""};
     enum status status = store_open(&store, data, &err);
     if (status == STATUS_OK)
         status = scheduler_new(&scheduler, &work, store, &err);

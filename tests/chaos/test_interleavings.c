@@ -101,19 +101,33 @@ static void stop(int number) {
 enum condition { QUEUED, RUNNING, TO_PAUSE, TO_CANCEL, PAUSED, SUCCEEDED, FAILED, CANCELLED, CONDITIONS };
 static const char letters[] = "QRUNPSFC";
 
-enum action { CANCEL, PAUSE, RESUME, RETRY, AGAIN, EXTEND, EDIT, USERS, /* over HTTP */
-              START = USERS, SUCCEED, FAIL, CRASH, STOP, BLOCK, ACTIONS };
+enum action {
+    CANCEL,
+    PAUSE,
+    RESUME,
+    RETRY,
+    AGAIN,
+    EXTEND,
+    EDIT,
+    USERS, /* over HTTP */
+    START = USERS,
+    SUCCEED,
+    FAIL,
+    CRASH,
+    STOP,
+    BLOCK,
+    ACTIONS
+};
 static const char *const words[ACTIONS] = {
-    [CANCEL] = "cancel", [PAUSE] = "pause", [RESUME] = "resume", [RETRY] = "retry", [AGAIN] = "retry?from=report",
-    [EXTEND] = "extend", [EDIT] = "", [START] = "start", [SUCCEED] = "succeed", [FAIL] = "fail",
-    [CRASH] = "crash", [STOP] = "stop", [BLOCK] = "block"};
+    [CANCEL] = "cancel", [PAUSE] = "pause", [RESUME] = "resume", [RETRY] = "retry",     [AGAIN] = "retry?from=report",
+    [EXTEND] = "extend", [EDIT] = "",       [START] = "start",   [SUCCEED] = "succeed", [FAIL] = "fail",
+    [CRASH] = "crash",   [STOP] = "stop",   [BLOCK] = "block"};
 /* What comes of it: the next condition, '=' nothing new, '-' refused. */
 static const char *const table[ACTIONS] = {
     /*           QRUNPSFC */
-    [CANCEL] =  "CNN=C--=", [PAUSE] =   "PU=-=---", [RESUME] =  "==R-Q---", [RETRY] =   "------QQ",
-    [AGAIN] =   "-----QQQ", [EXTEND] =  "-----QQQ", [EDIT] =    "========", [START] =   "R-------",
-    [SUCCEED] = "-SSC----", [FAIL] =    "-FFC----", [CRASH] =   "-QPC----", [STOP] =    "-QPC----",
-    [BLOCK] =   "-PPC----"};
+    [CANCEL] = "CNN=C--=", [PAUSE] = "PU=-=---", [RESUME] = "==R-Q---", [RETRY] = "------QQ",   [AGAIN] = "-----QQQ",
+    [EXTEND] = "-----QQQ", [EDIT] = "========",  [START] = "R-------",  [SUCCEED] = "-SSC----", [FAIL] = "-FFC----",
+    [CRASH] = "-QPC----",  [STOP] = "-QPC----",  [BLOCK] = "-PPC----"};
 
 struct model {
     long long id; /* 0: none */
@@ -160,13 +174,14 @@ static int ask(const char *method, const char *path, const char *fields, const c
     char chunk[16384];
     ssize_t got;
     int status = 0;
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_in at = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     buf_init(body, 1 << 24);
     if (connect(fd, (struct sockaddr *)&at, sizeof at) == 0) {
-        char *text = mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%sContent-Length: %zu\r\n\r\n%s",
-                                method, path, fields, strlen(data), data);
+        char *text =
+            mem_printf("%s %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n%sContent-Length: %zu\r\n\r\n%s",
+                       method, path, fields, strlen(data), data);
         rig_send(fd, text, strlen(text));
         mem_free(text);
         while ((got = recv(fd, chunk, sizeof chunk, 0)) > 0)
@@ -208,8 +223,8 @@ static enum status act(const struct model *m, enum action action, int attempt, b
 
 /* Whether the job is what the model says. */
 static bool is_so(const struct model *m) {
-    static const char *const states[] = {"queued", "running", "running", "running", "paused", "succeeded",
-                                         "failed", "cancelled"};
+    static const char *const states[] = {"queued", "running",   "running", "running",
+                                         "paused", "succeeded", "failed",  "cancelled"};
     static const char *const wanted[] = {"run", "run", "pause", "cancel", "run", "run", "run", "run"};
     char path[48], parts[4][48];
     struct buf reply;
@@ -239,7 +254,9 @@ static void check_history(const struct model *m) {
         enum job_state state = JOB_QUEUED;
         sscanf(at, "data: {\"state\":\"%15[a-z]", name);
         /* A wish is told in the state that it finds, and so is one that is taken back. */
-        bool legal = job_state_parse(name, &state) && (!begun ? state == JOB_QUEUED : job_may_become(last, state) || (state == last && state == JOB_RUNNING));
+        bool legal =
+            job_state_parse(name, &state) &&
+            (!begun ? state == JOB_QUEUED : job_may_become(last, state) || (state == last && state == JOB_RUNNING));
         if (!legal) {
             fprintf(stderr, "job %lld goes from %s to %s\n", m->id, job_state_name(last), name);
             illegal++;

@@ -75,8 +75,8 @@ static bool is_up(pid_t child, int *wait_status) {
 }
 
 static bool start_once(bool is_sql, long n) {
-    static const char *argv[] = {"unbaked", "--data", d.data, "--listen", "127.0.0.1:0", "--port-file", d.port_file,
-                                 "--set", "min_free_mib=0", "--set", "low_disk_mib=0", NULL};
+    static const char *argv[] = {"unbaked",   "--data", d.data,           "--listen", "127.0.0.1:0",    "--port-file",
+                                 d.port_file, "--set",  "min_free_mib=0", "--set",    "low_disk_mib=0", NULL};
     struct buf body;
     int wait_status = 0, code;
     char *socket_path = file_join(d.data, "admin.sock");
@@ -86,7 +86,8 @@ static bool start_once(bool is_sql, long n) {
     if (is_up(child, &wait_status)) {
         /* Once it has said where it listens it may still end by itself: its scheduler does not begin. */
         int status = http_get(d.port, "/readyz", &body);
-        CHECK_THAT(status == 200 || (status == 0 || status == 500 || status == 503), "call %ld: /readyz gets %d", n, status);
+        CHECK_THAT(status == 200 || (status == 0 || status == 500 || status == 503), "call %ld: /readyz gets %d", n,
+                   status);
         buf_release(&body);
         kill(child, SIGTERM);
         waitpid(child, &wait_status, 0);
@@ -125,7 +126,8 @@ static bool command_once(const char *const *argv, const char *wanted, bool is_sq
     CHECK_THAT(code != 0 || has(out, wanted), "%s, call %ld: it does not say what it did", argv[1], n);
     CHECK_THAT(code == 0 || has(d.log, "unbaked: ") || has(out, "FAIL "), "%s, call %ld: no sentence", argv[1], n);
     CHECK_THAT(access(part, F_OK) != 0, "call %ld: half a copy is left", n);
-    CHECK_THAT(strcmp(argv[1], "backup") != 0 || (code == 0) == (access(copy, F_OK) == 0) || struck, "call %ld: the copy", n);
+    CHECK_THAT(strcmp(argv[1], "backup") != 0 || (code == 0) == (access(copy, F_OK) == 0) || struck,
+               "call %ld: the copy", n);
     if (check_failed_count > 0)
         tell(is_sql, n);
     return struck;
@@ -133,8 +135,10 @@ static bool command_once(const char *const *argv, const char *wanted, bool is_sq
 
 /* Makes a certificate; without openssl there is none. */
 static void make_certificate(void) {
-    char *command = mem_printf("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 20 -subj /CN=x "
-                               "-keyout %s/key.pem -out %s/cert.pem 2>/dev/null", d.dir, d.dir);
+    char *command =
+        mem_printf("openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 20 -subj /CN=x "
+                   "-keyout %s/key.pem -out %s/cert.pem 2>/dev/null",
+                   d.dir, d.dir);
     bool made = system(command) == 0;
     snprintf(certificate, sizeof certificate, "tls_certificate=%s%s", made ? d.dir : "", made ? "/cert.pem" : "");
     snprintf(key, sizeof key, "tls_key=%s%s", made ? d.dir : "", made ? "/key.pem" : "");
@@ -144,8 +148,8 @@ static void make_certificate(void) {
 static void strike_commands(void) {
     const char *const backup[] = {"unbaked", "backup", copy, "--data", d.data, NULL};
     const char *const list[] = {"unbaked", "token", "list", "--data", d.data, NULL};
-    const char *const doctor[] = {"unbaked", "doctor", "--data", d.data, "--set", "min_free_mib=0",
-                                  "--set", certificate, "--set", key, NULL};
+    const char *const doctor[] = {"unbaked", "doctor",    "--data", d.data, "--set", "min_free_mib=0",
+                                  "--set",   certificate, "--set",  key,    NULL};
     make_certificate();
     for (int is_sql = 0; is_sql < 2; is_sql++) {
         for (long n = 1; command_once(backup, "bytes", is_sql, n) && check_failed_count == 0; n++)

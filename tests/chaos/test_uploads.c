@@ -18,8 +18,8 @@
 struct proxy {
     atomic_int daemon_port;
     int listener, port;
-    atomic_bool is_rough;   /* connections are reset, not ended */
-    double mean_budget;     /* bytes of a body that a connection carries before it is dropped */
+    atomic_bool is_rough;     /* connections are reset, not ended */
+    double mean_budget;       /* bytes of a body that a connection carries before it is dropped */
     atomic_ullong body_bytes; /* of PATCH requests, on the way to the daemon */
     atomic_uint drops, connections;
     atomic_uint open;
@@ -30,8 +30,8 @@ struct proxy {
 struct link {
     struct proxy *proxy;
     int client, server;
-    struct buf head;      /* of the request that is coming */
-    uint64_t body_left;   /* of it */
+    struct buf head;    /* of the request that is coming */
+    uint64_t body_left; /* of it */
     bool is_patch;
     uint64_t budget;
 };
@@ -298,7 +298,8 @@ int main(void) {
     CHECK_THAT(drops > 0, "no connection was dropped");
     CHECK_THAT(sent == whole, "%llu bytes were sent, of %llu", (unsigned long long)sent, (unsigned long long)whole);
     figure("uploads over dropped connections that differ from what was sent", wrong, 0, "lower");
-    figure("bytes sent twice over dropped connections, per cent", 100.0 * ((double)sent / (double)whole - 1.0), 0, "lower");
+    figure("bytes sent twice over dropped connections, per cent", 100.0 * ((double)sent / (double)whole - 1.0), 0,
+           "lower");
 
     atomic_store(&p.is_rough, true);
     make_rooms(&d, 2, others, bytes);
@@ -308,8 +309,8 @@ int main(void) {
         room_path(&d, 2, i, path);
         lost += !is_stored(&d, path);
     }
-    printf("%d more, %u connections reset, the daemon killed %d times, %.1f s\n", others,
-           atomic_load(&p.drops) - drops, kills, took);
+    printf("%d more, %u connections reset, the daemon killed %d times, %.1f s\n", others, atomic_load(&p.drops) - drops,
+           kills, took);
     figure("uploads over resets and kills of the daemon that differ from what was sent", lost, 0, "lower");
     CHECK_THAT(wrong == 0 && lost == 0, "%d and %d rooms differ", wrong, lost);
     daemon_remove(&d);

@@ -9,8 +9,8 @@
 #include "tests/chaos/daemon.h"
 
 /* What must be the same, byte for byte, whatever befell the job. */
-static const char *const worker_outputs[] = {"base_color.exr", "roughness.exr", "specular.exr", "emission.exr",
-                                             "confidence.exr", "scene.ply"};
+static const char *const worker_outputs[] = {"base_color.exr", "roughness.exr",  "specular.exr",
+                                             "emission.exr",   "confidence.exr", "scene.ply"};
 #define WORKER_OUTPUTS (sizeof worker_outputs / sizeof *worker_outputs)
 
 static inline void worker_write_order(const char *dir, char *text) {
@@ -25,7 +25,8 @@ static inline void worker_write_order(const char *dir, char *text) {
 /* The check of the scene that is in the folder as `archive`. */
 static inline void worker_order_check(const char *dir, bool sandbox) {
     worker_write_order(dir, mem_printf("{\"kind\":\"check\",\"scene_id\":\"x\",\"thread_count\":1,\"memory_bytes\":0,"
-                                       "\"sandbox\":%s}", sandbox ? "true" : "false"));
+                                       "\"sandbox\":%s}",
+                                       sandbox ? "true" : "false"));
 }
 
 /* Writes the order; `settings` are JSON members. */

@@ -4,8 +4,8 @@
 #include "tests/chaos/faults.h"
 #include "tests/chaos/worker.h"
 
-#define SETTINGS                                                                                                \
-    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                         \
+#define SETTINGS                                                                                                       \
+    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                                \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
 static char binary[512], library[PATH_MAX], log_path[128], dir[128];
@@ -44,7 +44,8 @@ static bool strike(const char *room, long n) {
                                         code == PROGRESS_EXIT_MEMORY)),
                "%s, call %ld: exit status %d", what, n, code);
     /* The first call asks whether anybody listens; without an end that is told the daemon counts it as a crash. */
-    CHECK_THAT(said || code == PROGRESS_EXIT_MEMORY || n == 1, "%s, call %ld: exit status %d, and no word", what, n, code);
+    CHECK_THAT(said || code == PROGRESS_EXIT_MEMORY || n == 1, "%s, call %ld: exit status %d, and no word", what, n,
+               code);
     code = run(NULL, "\"status\":\"ok\"", &said);
     CHECK_THAT(code == 0 && said, "%s, after call %ld: exit status %d", what, n, code);
     return struck;

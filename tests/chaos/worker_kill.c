@@ -11,8 +11,8 @@
 
 #define KILLS_PER_JOB 25
 #define LIVES_PER_JOB 20 /* such a part of a job's operations a life has at most */
-#define SETTINGS                                                                                                \
-    "\"texture_size\":128,\"iterations\":150,\"texels_per_iteration\":512,"                                     \
+#define SETTINGS                                                                                                       \
+    "\"texture_size\":128,\"iterations\":150,\"texels_per_iteration\":512,"                                            \
     "\"cameras_per_texel\":1,\"samples_per_camera\":4,\"report_samples\":1,\"preview_interval_sec\":60"
 
 static char binary[512], library[PATH_MAX];

@@ -74,9 +74,18 @@ static bool move_tail(struct mutant *m, size_t at, size_t removed, size_t insert
 
 /* Overwrites 1, 2, 4 or 8 bytes with a number that parsers trip over, in either byte order. */
 static void put_number(struct mutant *m, size_t at) {
-    static const uint64_t odd[] = {0, 1, 2, 7, 16, 32, 64, 100, 127, 128, 255, 256, 1024, 4096,
-                                   32767, 32768, 65535, 65536, 0x7fffffff, 0x80000000, 0xffffffff,
-                                   0x7fffffffffffffff, UINT64_MAX, UINT64_MAX - 1};
+    static const uint64_t odd[] = {0,          1,
+                                   2,          7,
+                                   16,         32,
+                                   64,         100,
+                                   127,        128,
+                                   255,        256,
+                                   1024,       4096,
+                                   32767,      32768,
+                                   65535,      65536,
+                                   0x7fffffff, 0x80000000,
+                                   0xffffffff, 0x7fffffffffffffff,
+                                   UINT64_MAX, UINT64_MAX - 1};
     size_t width = (size_t)1 << below(m, 4);
     uint64_t value = odd[below(m, sizeof odd / sizeof odd[0])];
     bool big = below(m, 2) == 0;

@@ -16,9 +16,7 @@ void seeds_add(struct seeds *s, const void *data, size_t size) {
     seed->size = size;
 }
 
-void seeds_text(struct seeds *s, const char *text) {
-    seeds_add(s, text, strlen(text));
-}
+void seeds_text(struct seeds *s, const char *text) { seeds_add(s, text, strlen(text)); }
 
 static void add_file(struct seeds *s, const char *path) {
     static uint8_t bytes[SEED_MAX_BYTES + 1];
@@ -30,9 +28,7 @@ static void add_file(struct seeds *s, const char *path) {
     seeds_add(s, bytes, size);
 }
 
-static int is_visible(const struct dirent *entry) {
-    return entry->d_name[0] != '.';
-}
+static int is_visible(const struct dirent *entry) { return entry->d_name[0] != '.'; }
 
 void seeds_path(struct seeds *s, const char *path, const char *suffix) {
     struct stat facts;
@@ -78,9 +74,7 @@ static int remove_one(const char *path, const struct stat *facts, int kind, stru
     return remove(path);
 }
 
-static void remove_folder(void) {
-    nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS);
-}
+static void remove_folder(void) { nftw(folder, remove_one, 16, FTW_DEPTH | FTW_PHYS); }
 
 const char *fuzz_folder(void) {
     static bool is_made;

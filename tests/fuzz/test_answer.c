@@ -16,10 +16,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    static const char *const texts[] = {
-        "HTTP/1.1 200 OK\r\n", "HTTP/1.0 404 Not Found\n", "HTTP/1.1 204\r\n", "HTTP/1.1 500", "HTTP/1.1 -20 OK\r\n",
-        "HTTP/1.1 2000 OK\r\n", "HTTP/1.1 20", "HTTP/1.2 200 OK\r\n", "HTTP/2 200\r\n", "HTTP/1.1  200 OK\r\n",
-        "HTTP/1.1 099 X\r\n", "ICY 200 OK\r\n", "HTTP/1.1 200OK\r\n", ""};
+    static const char *const texts[] = {"HTTP/1.1 200 OK\r\n", "HTTP/1.0 404 Not Found\n",
+                                        "HTTP/1.1 204\r\n",    "HTTP/1.1 500",
+                                        "HTTP/1.1 -20 OK\r\n", "HTTP/1.1 2000 OK\r\n",
+                                        "HTTP/1.1 20",         "HTTP/1.2 200 OK\r\n",
+                                        "HTTP/2 200\r\n",      "HTTP/1.1  200 OK\r\n",
+                                        "HTTP/1.1 099 X\r\n",  "ICY 200 OK\r\n",
+                                        "HTTP/1.1 200OK\r\n",  ""};
     s->mutants = 20000;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         seeds_text(s, texts[i]);

@@ -39,7 +39,8 @@ static void save_good(const char *path) {
 /* Loads what is there; it is what was saved, or nothing. */
 static void load(const char *path) {
     static uint8_t found_texture[sizeof texture], found_counter[sizeof counter];
-    struct state_array arrays[2] = {{"texture", found_texture, sizeof texture, 1}, {"counter", found_counter, sizeof counter, 1}};
+    struct state_array arrays[2] = {{"texture", found_texture, sizeof texture, 1},
+                                    {"counter", found_counter, sizeof counter, 1}};
     struct checkpoint *c;
     char note[512];
     struct error err = {.message = ""};
@@ -58,7 +59,8 @@ static void load(const char *path) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    char *path = file_join(fuzz_folder(), "checkpoint.db"), *journal = file_join(fuzz_folder(), "checkpoint.db-journal");
+    char *path = file_join(fuzz_folder(), "checkpoint.db"),
+         *journal = file_join(fuzz_folder(), "checkpoint.db-journal");
     if (good.length == 0)
         save_good(path);
     uint8_t *bytes = malloc(good.length);

@@ -5,8 +5,8 @@
 #include "common/mem.h"
 #include "tests/fuzz/fuzz.h"
 
-#define CAMERAS                                                                                    \
-    "# x\n1 PINHOLE 64 48 50 51 32 24\n2 FULL_OPENCV 64 48 50 50 32 24 -0.1 0.02 0.001 -0.002 0.1 0 0 0\n" \
+#define CAMERAS                                                                                                        \
+    "# x\n1 PINHOLE 64 48 50 51 32 24\n2 FULL_OPENCV 64 48 50 50 32 24 -0.1 0.02 0.001 -0.002 0.1 0 0 0\n"             \
     "3 SIMPLE_RADIAL_FISHEYE 64 48 50 32 24 0.01\r\n"
 #define IMAGES "# x\n\n1 1 0 0 0 0 0 0 1 a b.png\n1 2 -1 3 4 5\n2 0.5 -0.5 0.5 0.5 1 2 3 3 c/d.jpg\n\n"
 
@@ -17,13 +17,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     bool binary = size > 0 && (data[0] & 1), is_images = size > 0 && (data[0] & 2);
     const uint8_t *rest = size > 0 ? data + 1 : data;
     size_t length = size > 0 ? size - 1 : 0;
-    struct colmap_cameras *c =
-        is_images ? colmap_cameras_parse(CAMERAS, sizeof CAMERAS - 1, "cameras", false, &err)
-                  : colmap_cameras_parse(rest, length, "cameras", binary, &err);
+    struct colmap_cameras *c = is_images ? colmap_cameras_parse(CAMERAS, sizeof CAMERAS - 1, "cameras", false, &err)
+                                         : colmap_cameras_parse(rest, length, "cameras", binary, &err);
     if (c) {
-        enum status status =
-            is_images ? colmap_images_parse(rest, length, "images", binary, c, "images/", &t, &f, &err)
-                      : colmap_images_parse(IMAGES, sizeof IMAGES - 1, "images", false, c, "", &t, &f, &err);
+        enum status status = is_images
+                                 ? colmap_images_parse(rest, length, "images", binary, c, "images/", &t, &f, &err)
+                                 : colmap_images_parse(IMAGES, sizeof IMAGES - 1, "images", false, c, "", &t, &f, &err);
         MUST(status == STATUS_OK || (status == STATUS_INPUT && err.message[0] != '\0'));
         MUST(t.frame_count <= t.named_count);
         for (size_t i = 0; i < t.frame_count; i++) {

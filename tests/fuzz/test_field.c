@@ -53,11 +53,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    static const char *const texts[] = {
-        "bytes=0-99", "bytes=-5", "bytes=100-", "bytes=0-1,2-3", "\"a\", W/\"rev-1\" , *", "text/html;q=0.5, application/x-ndjson",
-        "application/json; charset=utf-8", "sha-256=:47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=:",
-        "bG9uZ2VyIHRoYW4gMTYgYnl0ZXM=", "YWI=", "999999999999999999", "-5", "[::1]:80", "lab.localhost:7117",
-        "127.0.0.1"};
+    static const char *const texts[] = {"bytes=0-99",
+                                        "bytes=-5",
+                                        "bytes=100-",
+                                        "bytes=0-1,2-3",
+                                        "\"a\", W/\"rev-1\" , *",
+                                        "text/html;q=0.5, application/x-ndjson",
+                                        "application/json; charset=utf-8",
+                                        "sha-256=:47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=:",
+                                        "bG9uZ2VyIHRoYW4gMTYgYnl0ZXM=",
+                                        "YWI=",
+                                        "999999999999999999",
+                                        "-5",
+                                        "[::1]:80",
+                                        "lab.localhost:7117",
+                                        "127.0.0.1"};
     s->mutants = 20000;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         seeds_text(s, texts[i]);

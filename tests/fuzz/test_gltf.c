@@ -15,13 +15,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     return 0;
 }
 
-#define TABLES                                                                                     \
-    "\"asset\":{\"version\":\"2.0\"},\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,"  \
-    "\"byteOffset\":36,\"byteLength\":8,\"target\":34963}],\"accessors\":[{\"bufferView\":0,\"byteOffset\":0," \
-    "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5123,\"count\":3," \
-    "\"type\":\"SCALAR\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":0}," \
-    "\"indices\":1,\"material\":0},{\"mode\":5,\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0," \
-    "\"children\":[1],\"scale\":[1,-2,1]},{\"mesh\":0,\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,3,0,1]}]," \
+#define TABLES                                                                                                         \
+    "\"asset\":{\"version\":\"2.0\"},\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,"                 \
+    "\"byteOffset\":36,\"byteLength\":8,\"target\":34963}],\"accessors\":[{\"bufferView\":0,\"byteOffset\":0,"         \
+    "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5123,\"count\":3,"      \
+    "\"type\":\"SCALAR\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":0},"                \
+    "\"indices\":1,\"material\":0},{\"mode\":5,\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0,"            \
+    "\"children\":[1],\"scale\":[1,-2,1]},{\"mesh\":0,\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,3,0,1]}],"                 \
     "\"scenes\":[{\"nodes\":[0]}],\"scene\":0"
 
 static void add_glb(struct seeds *s) {

@@ -54,7 +54,8 @@ void fuzz_seeds(struct seeds *s) {
     add(s, cmsCreateLinearizationDeviceLink(cmsSigRgbData, (cmsToneCurve *[3]){gamma, gamma, gamma}));
     cmsHPROFILE tables = cmsCreateRGBProfile(&white, &p3, (cmsToneCurve *[3]){gamma, gamma, gamma});
     cmsPipeline *pipeline = cmsPipelineAlloc(NULL, 3, 3);
-    cmsPipelineInsertStage(pipeline, cmsAT_BEGIN, cmsStageAllocToneCurves(NULL, 3, (cmsToneCurve *[3]){gamma, gamma, gamma}));
+    cmsPipelineInsertStage(pipeline, cmsAT_BEGIN,
+                           cmsStageAllocToneCurves(NULL, 3, (cmsToneCurve *[3]){gamma, gamma, gamma}));
     cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocCLut16bit(NULL, 3, 3, 3, NULL));
     cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(NULL, 3, NULL));
     MUST(cmsWriteTag(tables, cmsSigAToB0Tag, pipeline));

@@ -27,10 +27,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 
 void fuzz_seeds(struct seeds *s) {
     s->mutants = 3000;
-    seeds_text(s, "{\"kind\":\"reconstruct\",\"scene\":\"/x\",\"scene_id\":\"00\",\"settings\":{\"seed\":7},\"name\":\"n\","
-                  "\"job_id\":17,\"attempt\":2,\"thread_count\":4,\"memory_bytes\":1e9,\"sandbox\":true,"
-                  "\"checkpoint_interval_sec\":60,\"reduced\":\"texture_size\"}");
+    seeds_text(
+        s, "{\"kind\":\"reconstruct\",\"scene\":\"/x\",\"scene_id\":\"00\",\"settings\":{\"seed\":7},\"name\":\"n\","
+           "\"job_id\":17,\"attempt\":2,\"thread_count\":4,\"memory_bytes\":1e9,\"sandbox\":true,"
+           "\"checkpoint_interval_sec\":60,\"reduced\":\"texture_size\"}");
     seeds_text(s, "{\"kind\":\"check\",\"scene_id\":\"00\",\"thread_count\":4,\"memory_bytes\":0,\"sandbox\":false}");
-    seeds_text(s, "{\"kind\":\"deliver\",\"url\":\"https://a/\",\"secret\":\"s\",\"body\":\"{}\",\"message_id\":\"msg_7\","
-                  "\"allow_private\":false,\"sandbox\":true}");
+    seeds_text(s,
+               "{\"kind\":\"deliver\",\"url\":\"https://a/\",\"secret\":\"s\",\"body\":\"{}\",\"message_id\":\"msg_7\","
+               "\"allow_private\":false,\"sandbox\":true}");
 }

@@ -33,8 +33,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 }
 
 void fuzz_seeds(struct seeds *s) {
-    static const char *const texts[] = {"a/./b//c.png", "../x", "C:\\x", "/etc/passwd", "a\\..\\b", "__MACOSX/._a",
-                                        "preview/base_color.png", "\xC3\xA4/\xFF", "a/../../b", "a:b", "./C:/x", "a\u202Eb\u200E"};
+    static const char *const texts[] = {
+        "a/./b//c.png",           "../x",          "C:\\x",     "/etc/passwd", "a\\..\\b", "__MACOSX/._a",
+        "preview/base_color.png", "\xC3\xA4/\xFF", "a/../../b", "a:b",         "./C:/x",   "a\u202Eb\u200E"};
     s->mutants = 20000;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         seeds_text(s, texts[i]);

@@ -14,11 +14,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 /* A binary file of either byte order, with what the shared vectors lack. */
 static void add_binary(struct seeds *s, bool big) {
     uint8_t file[1024];
-    size_t used = (size_t)snprintf((char *)file, 512,
-        "ply\nformat binary_%s_endian 1.0\nelement vertex 5\nproperty float x\nproperty double y\n"
-        "property short z\nproperty list uchar int l\nelement face 3\nproperty ushort object_id\n"
-        "property list uchar uint vertex_indices\nelement other 1\nproperty int a\nend_header\n",
-        big ? "big" : "little");
+    size_t used =
+        (size_t)snprintf((char *)file, 512,
+                         "ply\nformat binary_%s_endian 1.0\nelement vertex 5\nproperty float x\nproperty double y\n"
+                         "property short z\nproperty list uchar int l\nelement face 3\nproperty ushort object_id\n"
+                         "property list uchar uint vertex_indices\nelement other 1\nproperty int a\nend_header\n",
+                         big ? "big" : "little");
     for (int i = 0; i < 5; i++) {
         memset(file + used, i, 14);
         file[used + 14] = (uint8_t)(i & 1); /* the list: none or one int */

@@ -6,8 +6,7 @@
 /* Makes the checksums right again: with wrong ones nothing behind them is reached. */
 static void repair(uint8_t *data, size_t size) {
     for (size_t at = 8; at + 12 <= size;) {
-        size_t length = (size_t)data[at] << 24 | (size_t)data[at + 1] << 16 |
-                        (size_t)data[at + 2] << 8 | data[at + 3];
+        size_t length = (size_t)data[at] << 24 | (size_t)data[at + 1] << 16 | (size_t)data[at + 2] << 8 | data[at + 3];
         if (length > size - at - 12)
             return;
         uint8_t *sum = data + at + 8 + length;

@@ -16,7 +16,7 @@
 
 #define SCENE "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff"
 #define CHECKED "ffeeddccbbaa99887766554433221100ffeeddccbbaa99887766554433221100"
-#define JOBS_MAX 50 /* then the store is made anew */
+#define JOBS_MAX 50        /* then the store is made anew */
 #define SIZE_MAX_HERE 4096 /* each line of it may be a transaction */
 
 static struct store *store;
@@ -104,8 +104,13 @@ static void check_scene(void) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct counters counters;
-    struct attempt a = {.phase = ATTEMPT_ALIVE, .iteration = -1.0, .dir = mem_strdup(fuzz_folder()),
-                        .worker = {.pid_fd = -1}, .scene_id = CHECKED, .settings = mem_strdup("{}"), .number = 1};
+    struct attempt a = {.phase = ATTEMPT_ALIVE,
+                        .iteration = -1.0,
+                        .dir = mem_strdup(fuzz_folder()),
+                        .worker = {.pid_fd = -1},
+                        .scene_id = CHECKED,
+                        .settings = mem_strdup("{}"),
+                        .number = 1};
     int64_t job_id = 0;
     if (size < 1 || size > SIZE_MAX_HERE) {
         mem_free(a.dir);
@@ -149,10 +154,12 @@ void fuzz_seeds(struct seeds *s) {
                   "{\"type\":\"metric\",\"series\":\"loss\",\"step\":140,\"value\":0.0113}\n"
                   "{\"type\":\"metric\",\"series\":\"rays\",\"step\":120,\"value\":1e9}\n"
                   "{\"type\":\"checkpoint\",\"iteration\":120,\"bytes\":1e6,\"seconds\":0.5}\n");
-    seeds_text(s, "3{\"type\":\"output\",\"name\":\"a.exr\",\"bytes\":10,\"sha256\":\"" SCENE "\","
-                  "\"content_type\":\"image/x-exr\"}\n{\"type\":\"preview\",\"name\":\"../a\",\"bytes\":10,\"sha256\":\"\"}\n"
-                  "{\"type\":\"log\",\"level\":\"info\",\"message\":\"hello\"}\n");
-    seeds_text(s, "1{\"type\":\"end\",\"status\":\"no-space\",\"message\":\"full\",\"hint\":\"free some\"}\n{}\n[]\n3\n");
+    seeds_text(
+        s, "3{\"type\":\"output\",\"name\":\"a.exr\",\"bytes\":10,\"sha256\":\"" SCENE "\","
+           "\"content_type\":\"image/x-exr\"}\n{\"type\":\"preview\",\"name\":\"../a\",\"bytes\":10,\"sha256\":\"\"}\n"
+           "{\"type\":\"log\",\"level\":\"info\",\"message\":\"hello\"}\n");
+    seeds_text(s,
+               "1{\"type\":\"end\",\"status\":\"no-space\",\"message\":\"full\",\"hint\":\"free some\"}\n{}\n[]\n3\n");
     seeds_text(s, "4{\"type\":\"problem\",\"file\":\"images/003.png\",\"reason\":\"damaged\",\"hint\":\"\"}\n");
     seeds_text(s, "2{\"type\":\"scene\",\"facts\":{\"triangle_count\":12}}\n");
     seeds_text(s, "2{\"type\":\"scene\",\"facts\":[]}\n{\"type\":\"scene\"}\n");

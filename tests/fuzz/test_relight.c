@@ -12,9 +12,10 @@
 #include "server/ingest/transforms.h"
 #include "tests/fuzz/fuzz.h"
 
-#define CAMERAS "{\"w\":3,\"h\":2,\"fl_x\":4,\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":"          \
-                "[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,3],[0,0,0,1]]}]}"
-#define TEXELS 8 /* a side */
+#define CAMERAS                                                                                                        \
+    "{\"w\":3,\"h\":2,\"fl_x\":4,\"frames\":[{\"file_path\":\"a\",\"transform_matrix\":"                               \
+    "[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,3],[0,0,0,1]]}]}"
+#define TEXELS 8       /* a side */
 #define PICTURE_MAX 64 /* pixels a side */
 
 static struct parallel *pool;
@@ -24,10 +25,10 @@ static size_t scene_size;
 
 /* Two triangles of two segments, as export/mesh_ply.c writes them. */
 static void make_scene(void) {
-    static const float vertex[4][5] = {
-        {0, 0, 0, 0, 0}, {1, 0, 0, 1, 0}, {1, 1, 0, 1, 1}, {0, 1, 0, 0, 1}};
+    static const float vertex[4][5] = {{0, 0, 0, 0, 0}, {1, 0, 0, 1, 0}, {1, 1, 0, 1, 1}, {0, 1, 0, 0, 1}};
     static const uint32_t face[2][5] = {{0, 1, 2, 0, 0}, {0, 2, 3, 1, 1}}; /* corners, segment, face */
-    scene_size = (size_t)snprintf((char *)scene_ply, sizeof scene_ply,
+    scene_size = (size_t)snprintf(
+        (char *)scene_ply, sizeof scene_ply,
         "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
         "property float s\nproperty float t\nelement face 2\nproperty list uchar int vertex_indices\n"
         "property int segment\nproperty int face\nend_header\n");

@@ -22,14 +22,35 @@
 #define SEPARATOR '\x1e'
 
 static char *const words[][6] = {
-    {"list"}, {"list", "--limit", "0"}, {"list", "--json"}, {"show", "1"}, {"show", "last"}, {"logs", "1"},
-    {"get", "1", "-o", "OUT"}, {"cancel", "1"}, {"pause", "1"}, {"retry", "1"}, {"rm", "1", "--dry-run"},
-    {"extend", "1", "--time", "60"}, {"edit", "1", "--name", "x"}, {"scenes"}, {"scenes", "show", "00112233"},
-    {"scenes", "rm", "00112233"}, {"scenes", "keep", "00112233", "--pin"}, {"uploads"}, {"uploads", "rm", "00"}, {"collect"},
-    {"settings"}, {"version"}, {"submit", "--scene", "00112233"}, {"cancel", "1", "--json"}, {"show", "1", "--json"},
+    {"list"},
+    {"list", "--limit", "0"},
+    {"list", "--json"},
+    {"show", "1"},
+    {"show", "last"},
+    {"logs", "1"},
+    {"get", "1", "-o", "OUT"},
+    {"cancel", "1"},
+    {"pause", "1"},
+    {"retry", "1"},
+    {"rm", "1", "--dry-run"},
+    {"extend", "1", "--time", "60"},
+    {"edit", "1", "--name", "x"},
+    {"scenes"},
+    {"scenes", "show", "00112233"},
+    {"scenes", "rm", "00112233"},
+    {"scenes", "keep", "00112233", "--pin"},
+    {"uploads"},
+    {"uploads", "rm", "00"},
+    {"collect"},
+    {"settings"},
+    {"version"},
+    {"submit", "--scene", "00112233"},
+    {"cancel", "1", "--json"},
+    {"show", "1", "--json"},
 };
 
-static const long codes[] = {200, 200, 200, 200, 201, 202, 204, 206, 301, 400, 401, 404, 409, 412, 413, 422, 429, 500, 507};
+static const long codes[] = {200, 200, 200, 200, 201, 202, 204, 206, 301, 400,
+                             401, 404, 409, 412, 413, 422, 429, 500, 507};
 
 /* --- the server ------------------------------------------------------------------------------ */
 
@@ -49,9 +70,10 @@ static char *next_reply(size_t *length) {
     size_t size = server.count >= REPLIES_MAX ? 0 : mark ? (size_t)(mark - server.at) : left;
     long code = server.count++ >= REPLIES_MAX ? 404 : server.code;
     bool has_body = code != 204;
-    char *head = mem_printf("HTTP/1.1 %ld X\r\nContent-Type: %s\r\nContent-Length: %zu\r\n\r\n", code,
-                            size > 0 && (server.at[0] == '{' || server.at[0] == '[') ? "application/json" : "text/plain",
-                            has_body ? size : 0);
+    char *head =
+        mem_printf("HTTP/1.1 %ld X\r\nContent-Type: %s\r\nContent-Length: %zu\r\n\r\n", code,
+                   size > 0 && (server.at[0] == '{' || server.at[0] == '[') ? "application/json" : "text/plain",
+                   has_body ? size : 0);
     *length = strlen(head) + (has_body ? size : 0);
     char *reply = mem_alloc(*length + 1);
     memcpy(reply, head, strlen(head));
@@ -74,7 +96,8 @@ static bool take_request(int fd) {
         ssize_t got = recv(fd, chunk, sizeof chunk, 0);
         if (got <= 0 || !buf_append(&text, chunk, (size_t)got))
             break;
-        const char *gap = strstr(buf_text(&text), "\r\n\r\n"), *length = strcasestr(buf_text(&text), "\r\nContent-Length: ");
+        const char *gap = strstr(buf_text(&text), "\r\n\r\n"),
+                   *length = strcasestr(buf_text(&text), "\r\nContent-Length: ");
         size_t body = gap && length && length < gap ? strtoul(length + 18, NULL, 10) : 0;
         is_whole = gap && text.length >= (size_t)(gap + 4 - text.data) + body;
     }
@@ -104,9 +127,7 @@ static void *serve(void *user) {
 
 /* archive_version_details, for `unbake version`, forgets what it returned when it is called again. */
 const char *__lsan_default_suppressions(void);
-const char *__lsan_default_suppressions(void) {
-    return "leak:libarchive.so";
-}
+const char *__lsan_default_suppressions(void) { return "leak:libarchive.so"; }
 
 static struct client client;
 static char *folder;
@@ -174,22 +195,32 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 
 /* --- seeds ----------------------------------------------------------------------------------- */
 
-#define JOB "{\"id\":1,\"revision\":3,\"scene\":\"00112233\",\"name\":\"x\",\"state\":\"running\",\"stage\":\"refine\","   \
-            "\"progress\":0.5,\"eta_sec\":12.5,\"attempt\":1,\"priority\":0,\"labels\":{\"a\":\"b\"},\"settings\":{\"seed\":7}," \
-            "\"created_at\":\"2024-05-06T07:08:09.123Z\",\"expires_at\":\"2030-01-01T00:00:00Z\",\"pinned\":false,"       \
-            "\"reason\":\"\",\"hint\":\"\"}"
-#define SCENE "{\"id\":\"00112233445566778899aabbccddeeff\",\"name\":\"room\",\"state\":\"rejected\",\"bytes\":1000,"    \
-              "\"problems\":[{\"file\":\"a.png\",\"reason\":\"is damaged\",\"hint\":\"\"}],\"facts\":{\"frame_count\":3},"      \
-              "\"created_at\":\"2024-05-06T07:08:09Z\"}"
-#define OUTPUTS "{\"items\":[{\"name\":\"preview/a.png\",\"bytes\":3,\"content_type\":\"image/png\",\"sha256\":"                    \
-                "\"ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad\"}]}"
-#define PROBLEM "{\"type\":\"urn:unbake:invalid\",\"title\":\"t\",\"status\":422,\"detail\":\"d\",\"hint\":\"h\","                   \
-                "\"invalid_params\":[{\"name\":\"seed\",\"reason\":\"is no number\",\"hint\":\"x\"}]}"
+#define JOB                                                                                                              \
+    "{\"id\":1,\"revision\":3,\"scene\":\"00112233\",\"name\":\"x\",\"state\":\"running\",\"stage\":\"refine\","         \
+    "\"progress\":0.5,\"eta_sec\":12.5,\"attempt\":1,\"priority\":0,\"labels\":{\"a\":\"b\"},\"settings\":{\"seed\":7}," \
+    "\"created_at\":\"2024-05-06T07:08:09.123Z\",\"expires_at\":\"2030-01-01T00:00:00Z\",\"pinned\":false,"              \
+    "\"reason\":\"\",\"hint\":\"\"}"
+#define SCENE                                                                                                          \
+    "{\"id\":\"00112233445566778899aabbccddeeff\",\"name\":\"room\",\"state\":\"rejected\",\"bytes\":1000,"            \
+    "\"problems\":[{\"file\":\"a.png\",\"reason\":\"is damaged\",\"hint\":\"\"}],\"facts\":{\"frame_count\":3},"       \
+    "\"created_at\":\"2024-05-06T07:08:09Z\"}"
+#define OUTPUTS                                                                                                        \
+    "{\"items\":[{\"name\":\"preview/a.png\",\"bytes\":3,\"content_type\":\"image/png\",\"sha256\":"                   \
+    "\"ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad\"}]}"
+#define PROBLEM                                                                                                        \
+    "{\"type\":\"urn:unbake:invalid\",\"title\":\"t\",\"status\":422,\"detail\":\"d\",\"hint\":\"h\","                 \
+    "\"invalid_params\":[{\"name\":\"seed\",\"reason\":\"is no number\",\"hint\":\"x\"}]}"
 
 void fuzz_seeds(struct seeds *s) {
     static const char *const bodies[] = {
-        "{\"items\":[" JOB "],\"next\":\"17\"}\x1e{\"items\":[" JOB "]}", JOB "\x1e" OUTPUTS, "{\"items\":[" JOB "]}\x1e" JOB "\x1e" OUTPUTS,
-        OUTPUTS "\x1e" "abc\x1e" JOB, "{\"items\":[" SCENE "]}", SCENE, PROBLEM,
+        "{\"items\":[" JOB "],\"next\":\"17\"}\x1e{\"items\":[" JOB "]}",
+        JOB "\x1e" OUTPUTS,
+        "{\"items\":[" JOB "]}\x1e" JOB "\x1e" OUTPUTS,
+        OUTPUTS "\x1e"
+                "abc\x1e" JOB,
+        "{\"items\":[" SCENE "]}",
+        SCENE,
+        PROBLEM,
         "{\"items\":[{\"id\":\"00\",\"name\":\"r\",\"length\":100,\"offset\":10,\"expires_at\":\"2030-01-01T00:00:00Z\"}]}",
         "{\"dry_run\":true,\"bytes\":1000,\"files\":3,\"items\":[{\"kind\":\"job\",\"id\":\"1\",\"bytes\":10}]}",
         "[{\"name\":\"seed\",\"type\":\"int\",\"unit\":\"\",\"minimum\":0,\"maximum\":9,\"default\":\"7\",\"help\":\"h\"}]",

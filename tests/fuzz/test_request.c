@@ -61,7 +61,8 @@ static void add_jobs(struct error *err) {
     int64_t id;
     bool replayed;
     int attempt;
-    struct job_new job = {.scene_id = SCENE, .name = "job", .labels = "{\"a\":\"b\"}", .settings = "{}", .max_attempts = 2};
+    struct job_new job = {
+        .scene_id = SCENE, .name = "job", .labels = "{\"a\":\"b\"}", .settings = "{}", .max_attempts = 2};
     for (int i = 0; i < 4; i++)
         must(store_job_add(lab.store, &job, 100, &id, &replayed, err), err);
     must(store_job_start(lab.store, 1, &attempt, err), err);
@@ -69,7 +70,8 @@ static void add_jobs(struct error *err) {
     put_file("jobs/1/out/preview/a.png", text);
     put_file("jobs/1/worker.log", "a line\nanother\n");
     put_file("jobs/1/checkpoint.db", "");
-    must(store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err), err);
+    must(store_output_put(lab.store, 1, attempt, EVENT_OUTPUT, "preview/a.png", strlen(text), digest, "image/png", err),
+         err);
     must(store_job_succeed(lab.store, 1, attempt, err), err);
     must(store_job_start(lab.store, 2, &attempt, err), err);
     must(store_job_pause(lab.store, 4, err), err);
@@ -100,12 +102,23 @@ static void start_daemon(void) {
     add_jobs(&err);
     add_upload(&err);
     must(store_token_add(lab.store, "ada", ROLE_USER, lab.token, &token_id, &err), &err);
-    struct scheduler_config work = {.data_dir = lab.dir, .worker_binary = "/bin/false", .max_running = 1,
-                                    .checkpoint_interval_sec = 60, .stop_grace_sec = 1};
+    struct scheduler_config work = {.data_dir = lab.dir,
+                                    .worker_binary = "/bin/false",
+                                    .max_running = 1,
+                                    .checkpoint_interval_sec = 60,
+                                    .stop_grace_sec = 1};
     must(scheduler_new(&lab.scheduler, &work, lab.store, &err), &err);
-    struct api_config config = {.data_dir = lab.dir, .max_attempts = 2, .queue_limit = 50, .max_upload_bytes = 1 << 20,
-                                .user_max_bytes = 1 << 21, .max_streams = 5, .keepalive_sec = 15, .upload_keep_ms = 3600000,
-                                .server_names = "lab.example.org", .libraries = libraries, .library_count = 1};
+    struct api_config config = {.data_dir = lab.dir,
+                                .max_attempts = 2,
+                                .queue_limit = 50,
+                                .max_upload_bytes = 1 << 20,
+                                .user_max_bytes = 1 << 21,
+                                .max_streams = 5,
+                                .keepalive_sec = 15,
+                                .upload_keep_ms = 3600000,
+                                .server_names = "lab.example.org",
+                                .libraries = libraries,
+                                .library_count = 1};
     must(service_new(&lab.api, &config, lab.store, lab.scheduler, &err), &err);
 }
 
@@ -133,8 +146,8 @@ static void add_field(struct request *r, const char *name, const char *value) {
     struct field *field = &r->fields[r->field_count++];
     const char *token = strstr(value, "$TOKEN");
     field->name = mem_strdup(name);
-    field->value = token ? mem_printf("%.*s%s%s", (int)(token - value), value, lab.token, token + 6)
-                         : mem_strdup(value);
+    field->value =
+        token ? mem_printf("%.*s%s%s", (int)(token - value), value, lab.token, token + 6) : mem_strdup(value);
 }
 
 /* Takes the head off *text, line by line; the body is what is left. */
@@ -195,9 +208,7 @@ static struct response *serve(struct request *r, char *text, const char *end) {
 
 /* --- the reply ------------------------------------------------------------------------------- */
 
-static void no_wake(void *waker) {
-    (void)waker;
-}
+static void no_wake(void *waker) { (void)waker; }
 
 static void check_fields(const struct response *reply) {
     for (size_t i = 0; i < reply->field_count; i++)
@@ -267,21 +278,28 @@ void fuzz_seeds(struct seeds *s) {
         "OGET /v1/jobs/3?wait=5\n" HOST "If-None-Match: \"rev-1\"\n",
         "OHEAD /v1/jobs/1/outputs/preview/a.png\n" HOST "Range: bytes=2-5\nIf-Range: \"sha256-x\"\n",
         "OGET /v1/jobs/1/outputs/preview%2Fa.png\n" HOST "Range: bytes=-3\n",
-        "OGET /v1/jobs/1/outputs\n" HOST, "OGET /v1/jobs/1/log?bytes=8\n" HOST,
+        "OGET /v1/jobs/1/outputs\n" HOST,
+        "OGET /v1/jobs/1/log?bytes=8\n" HOST,
         "OGET /v1/jobs/1/events?follow=0\n" HOST "Last-Event-ID: 2\nAccept: application/x-ndjson\n",
         "OGET /v1/events?after=0&wait=3\n" HOST "Accept: text/event-stream\n",
-        "OPOST /v1/jobs\n" HOST JSON "Idempotency-Key: k-1\n\n{\"scene\": \"00112233\", \"name\": \"x\", \"priority\": 5,"
+        "OPOST /v1/jobs\n" HOST JSON
+        "Idempotency-Key: k-1\n\n{\"scene\": \"00112233\", \"name\": \"x\", \"priority\": 5,"
         " \"labels\": {\"a\": \"b\"}, \"shared\": true, \"settings\": {\"texture_size\": 2048, \"method\": \"listing1\"},"
         " \"webhook\": {\"url\": \"https://lab.example.org/h\", \"secret\": \"0123456789abcdef\"}}",
         "OPOST /v1/jobs?dry_run=1\n" HOST JSON "\n{\"scene\": \"" SCENE "\", \"settings\": {\"seed\": 7}}",
         "OPATCH /v1/jobs/3\n" HOST "Content-Type: application/merge-patch+json\nIf-Match: \"rev-1\"\n\n"
         "{\"order\": \"first\", \"pinned\": true, \"expires_at\": \"2030-01-01T00:00:00Z\", \"priority\": -3}",
         "OPATCH /v1/jobs/3\n" HOST JSON "If-Match: *\n\n{\"order\": 4, \"expires_at\": null, \"name\": \"y\"}",
-        "OPOST /v1/jobs/2/cancel\n" HOST, "OPOST /v1/jobs/3/pause\n" HOST, "OPOST /v1/jobs/4/resume\n" HOST,
-        "OPOST /v1/jobs/1/retry?from=report\n" HOST, "ODELETE /v1/jobs/1?dry_run=1\n" HOST, "ODELETE /v1/jobs/1\n" HOST,
+        "OPOST /v1/jobs/2/cancel\n" HOST,
+        "OPOST /v1/jobs/3/pause\n" HOST,
+        "OPOST /v1/jobs/4/resume\n" HOST,
+        "OPOST /v1/jobs/1/retry?from=report\n" HOST,
+        "ODELETE /v1/jobs/1?dry_run=1\n" HOST,
+        "ODELETE /v1/jobs/1\n" HOST,
         "OPOST /v1/jobs/1/extend\n" HOST JSON "\n{\"iterations\": 500}",
         "OPOST /v1/jobs/1/extend\n" HOST JSON "\n{\"time_limit_sec\": 60.5}",
-        "OGET /v1/scenes?limit=1&cursor=1800000000000-00ff\n" HOST, "OGET /v1/scenes/00112233\n" HOST,
+        "OGET /v1/scenes?limit=1&cursor=1800000000000-00ff\n" HOST,
+        "OGET /v1/scenes/00112233\n" HOST,
         "OPATCH /v1/scenes/" SCENE "\n" HOST JSON "If-Match: *\n\n{\"name\": \"z\", \"pinned\": false}",
         "ODELETE /v1/scenes/" SCENE "\n" HOST,
         "OPOST /v1/scenes?name=kitchen\n" HOST "Content-Type: application/octet-stream\n"
@@ -290,18 +308,28 @@ void fuzz_seeds(struct seeds *s) {
         "X-Content-SHA256: ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad\n\nabc",
         "OPOST /v1/uploads\n" HOST TUS "Upload-Length: 100\nUpload-Metadata: name cm9vbQ==,filename YS56aXA=,is\n",
         "OGET /v1/uploads?sha256=" SCENE "&limit=3&cursor=1800000000000-00ff\n" HOST,
-        "OHEAD /v1/uploads/" UPLOAD "\n" HOST TUS, "ODELETE /v1/uploads/" UPLOAD "?dry_run=1\n" HOST TUS,
+        "OHEAD /v1/uploads/" UPLOAD "\n" HOST TUS,
+        "ODELETE /v1/uploads/" UPLOAD "?dry_run=1\n" HOST TUS,
         "OPATCH /v1/uploads/" UPLOAD "\n" HOST TUS "Upload-Offset: 0\nContent-Type: application/offset+octet-stream\n"
         "Upload-Checksum: sha1 qZk+NkcGgWq6PiVxeFDCbJzQ2J0=\n\nabc",
         "OPATCH /v1/uploads/" UPLOAD "\n" HOST TUS "Upload-Offset: 0\nContent-Type: application/offset+octet-stream\n"
         "Upload-Checksum: sha256 ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=\n\nabc",
         "OPOST /v1/uploads/" UPLOAD "\n" HOST TUS "X-HTTP-Method-Override: DELETE\n",
-        "OOPTIONS /v1/uploads\n" HOST, "OPOST /v1/collect?dry_run=1\n" HOST,
-        "TGET /v1/session\n" HOST "Authorization: Bearer $TOKEN\n", "TGET /v1/jobs\n" HOST "Cookie: a=b; unbake_token=$TOKEN\n",
-        "TPOST /v1/session\n" HOST JSON "X-Forwarded-Proto: https\n\n{\"token\": \"unbake_1_x\"}", "TDELETE /v1/session\n" HOST,
-        "TPOST /v1/jobs/3/cancel\n" HOST "Authorization: Bearer $TOKEN\nOrigin: http://localhost\nX-Request-Id: abc-1\n",
-        "OGET /metrics\n" HOST, "OGET /readyz\n" HOST, "OGET /v1/version\n" HOST, "OGET /v1/settings\n" HOST,
-        "OGET /openapi.json\n" HOST, "OGET /\n" HOST "Expect: 100-continue\n", "OBREW /v1/jobs\nHost: [::1]:80\n",
+        "OOPTIONS /v1/uploads\n" HOST,
+        "OPOST /v1/collect?dry_run=1\n" HOST,
+        "TGET /v1/session\n" HOST "Authorization: Bearer $TOKEN\n",
+        "TGET /v1/jobs\n" HOST "Cookie: a=b; unbake_token=$TOKEN\n",
+        "TPOST /v1/session\n" HOST JSON "X-Forwarded-Proto: https\n\n{\"token\": \"unbake_1_x\"}",
+        "TDELETE /v1/session\n" HOST,
+        "TPOST /v1/jobs/3/cancel\n" HOST
+        "Authorization: Bearer $TOKEN\nOrigin: http://localhost\nX-Request-Id: abc-1\n",
+        "OGET /metrics\n" HOST,
+        "OGET /readyz\n" HOST,
+        "OGET /v1/version\n" HOST,
+        "OGET /v1/settings\n" HOST,
+        "OGET /openapi.json\n" HOST,
+        "OGET /\n" HOST "Expect: 100-continue\n",
+        "OBREW /v1/jobs\nHost: [::1]:80\n",
     };
     s->mutants = 1500;
     for (size_t i = 0; i < sizeof requests / sizeof *requests; i++)

@@ -61,9 +61,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 
 void fuzz_seeds(struct seeds *s) {
     s->mutants = 10000;
-    seeds_text(s, "\3\xEF\xBB\xBF: hello\nretry: 5\n\nid: 12\nevent: progress\r\ndata: {\"stage\": \"refine\", \"done\": 3,"
-                  " \"total\": 10, \"eta_sec\": 33.5}\r\n\r\nevent: metric\ndata: {\"series\": \"loss\",\n"
-                  "data: \"value\": 0.0123, \"step\": 9}\n\n");
+    seeds_text(
+        s, "\3\xEF\xBB\xBF: hello\nretry: 5\n\nid: 12\nevent: progress\r\ndata: {\"stage\": \"refine\", \"done\": 3,"
+           " \"total\": 10, \"eta_sec\": 33.5}\r\n\r\nevent: metric\ndata: {\"series\": \"loss\",\n"
+           "data: \"value\": 0.0123, \"step\": 9}\n\n");
     seeds_text(s, "\7event: state\rid: 7\rdata: {\"state\": \"running\", \"attempt\": 2, \"wanted\": \"pause\"}\r\r"
                   "event: state\rdata: {\"state\": \"failed\", \"reason\": \"out of \\u001b[31m memory\"}\r\r");
     seeds_text(s, "\1event: metric\ndata: {\"series\": \"a\", \"value\": 1e-300}\n\n"

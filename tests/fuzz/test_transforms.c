@@ -17,9 +17,8 @@ static const char opencv[] =
     "\"transform_matrix\":[[0,-1,0,1e3],[1,0,0,-2],[0,0,1,0.5]]},"
     "{\"file_path\":\"sub\\\\c.png\",\"is_fisheye\":true,\"camera_angle_x\":2.5,\"k4\":0.3,"
     "\"transform_matrix\":[[0.6,0.8,0,0],[-0.8,0.6,0,0],[0,0,1,0],[0,0,0,1]]}]}";
-static const char fisheye[] =
-    "{\"camera_model\":\"OPENCV_FISHEYE\",\"camera_angle_x\":1.5,\"k1\":-0.4,\"frames\":["
-    "{\"file_path\":\"a\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
+static const char fisheye[] = "{\"camera_model\":\"OPENCV_FISHEYE\",\"camera_angle_x\":1.5,\"k1\":-0.4,\"frames\":["
+                              "{\"file_path\":\"a\",\"transform_matrix\":[[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}";
 
 static void check_frame(const struct transforms_frame *frame) {
     struct camera camera;
@@ -63,8 +62,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 
 /* Seeds with each of the odd values in the place of `node`'s every child, and below. */
 static void replace_all(struct seeds *s, cJSON *root, cJSON *node) {
-    static const char *const odd[] = {"null", "true", "\"\"", "\"..\"", "-1", "0", "1e999", "1e300",
-                                      "[]", "[[]]", "{}", "[1,2,3,4]"};
+    static const char *const odd[] = {"null",  "true",  "\"\"", "\"..\"", "-1", "0",
+                                      "1e999", "1e300", "[]",   "[[]]",   "{}", "[1,2,3,4]"};
     for (cJSON *child = node->child; child; child = child->next) {
         replace_all(s, root, child);
         for (size_t k = 0; k < sizeof odd / sizeof *odd; k++) {

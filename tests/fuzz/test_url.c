@@ -46,7 +46,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 void fuzz_seeds(struct seeds *s) {
     static const char *const texts[] = {
         "https://lab.example.org/hook?a=b", "http://127.0.0.1:8080", "http://[::ffff:10.0.0.1]:80/x", "https://a",
-        "http://user:pass@host/", "https://host/#f", "http://192.168.1.1:99999/"};
+        "http://user:pass@host/",           "https://host/#f",       "http://192.168.1.1:99999/"};
     s->mutants = 20000;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         seeds_text(s, texts[i]);

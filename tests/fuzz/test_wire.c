@@ -9,9 +9,7 @@
 
 static struct rig rig;
 
-static void stop(void) {
-    rig_stop(&rig);
-}
+static void stop(void) { rig_stop(&rig); }
 
 static void start(void) {
     snprintf(rig.dir, sizeof rig.dir, "%s", fuzz_folder());
@@ -59,15 +57,18 @@ void fuzz_seeds(struct seeds *s) {
     static const char *const requests[] = {
         "GET /healthz HTTP/1.1\r\n" HOST "\r\nGET /v1/jobs HTTP/1.1\r\n" HOST "\r\n",
         "HEAD /v1/jobs/1 HTTP/1.0\r\n\r\n",
-        "POST /v1/jobs?dry_run=1 HTTP/1.1\r\n" HOST "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+        "POST /v1/jobs?dry_run=1 HTTP/1.1\r\n" HOST
+        "Content-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
         "5;a=b\r\n{\"nam\r\n7\r\ne\":\"x\"}\r\n0\r\nX: y\r\n\r\n",
         "POST /v1/jobs/1/cancel HTTP/1.1\r\n" HOST "Expect: 100-continue\r\nContent-Length: 3\r\n\r\nabc",
         "POST /v1/scenes HTTP/1.1\r\n" HOST "Content-Length: 5\r\nConnection: close\r\n\r\nabcde",
-        "POST /v1/scenes HTTP/1.1\r\n" HOST "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 9\r\n\r\n--x\r\n\r\n--",
+        "POST /v1/scenes HTTP/1.1\r\n" HOST
+        "Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 9\r\n\r\n--x\r\n\r\n--",
         "GET /v1/jobs/1/events HTTP/1.1\r\n" HOST "Last-Event-ID: 0\r\n\r\n",
         "GET /metrics HTTP/1.1\nHost: localhost\nX-A: a\n b\n\n",
         "OPTIONS * HTTP/1.1\r\n" HOST "Content-Length: 3\r\nContent-Length: 3\r\n\r\nabc",
-        "PATCH /v1/uploads/00000000000000000000000000000000 HTTP/1.1\r\n" HOST "Tus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\n"
+        "PATCH /v1/uploads/00000000000000000000000000000000 HTTP/1.1\r\n" HOST
+        "Tus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\n"
         "Content-Type: application/offset+octet-stream\r\nContent-Length: 99999999\r\n\r\nabc",
     };
     s->mutants = 300;

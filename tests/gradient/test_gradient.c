@@ -40,7 +40,7 @@ static struct gradient_log *random_log(int number, uint32_t width, uint32_t heig
 
 static void check_sums(const struct gradient *g, struct gradient_log *const *log) {
     size_t texels = (size_t)g->width * g->height;
-    double (*sum)[4] = mem_calloc(texels, sizeof *sum);
+    double(*sum)[4] = mem_calloc(texels, sizeof *sum);
     double segments[SEGMENTS][2] = {{0}};
     for (int l = 0; l < LOGS; l++) {
         for (size_t i = 0; i < log[l]->entry_count; i++) {

@@ -28,20 +28,14 @@ static bool texel_of_segment(uint32_t texel, uint32_t segment) {
 static void nudge(struct box *b, const struct parameter *p, float amount) {
     struct materials *m = &b->materials;
     switch (p->kind) {
-    case TEXEL:
-        m->base_color.texel[p->which][1] += amount;
-        break;
+    case TEXEL: m->base_color.texel[p->which][1] += amount; break;
     case SEGMENT_COLOR:
         for (uint32_t i = 0; i < BOX_SIDE * BOX_SIDE; i++)
             for (int c = 0; c < 3 && texel_of_segment(i, p->which); c++)
                 m->base_color.texel[i][c] += amount;
         break;
-    case ROUGHNESS:
-        m->roughness[p->which] += amount;
-        break;
-    case SPECULAR:
-        m->specular[p->which] += amount;
-        break;
+    case ROUGHNESS: m->roughness[p->which] += amount; break;
+    case SPECULAR: m->specular[p->which] += amount; break;
     case EMISSION:
         m->emission[p->which].g += amount;
         world_update_lights(&b->world);
@@ -73,8 +67,8 @@ static double read_log(const struct gradient_log *log, const struct parameter *p
 }
 
 /* The sum of all channels of the batch's radiances. */
-static double trace(struct path_batch *batch, const struct box *b, const struct path_settings *settings,
-                    uint32_t group, rgb *radiance) {
+static double trace(struct path_batch *batch, const struct box *b, const struct path_settings *settings, uint32_t group,
+                    rgb *radiance) {
     struct ray ray[BATCH];
     struct path_key key[BATCH];
     for (uint32_t i = 0; i < BATCH; i++) {
@@ -119,8 +113,7 @@ static void check_parameter(struct box *b, const struct parameter *p) {
     double error = p->exact ? 2e-3 * size + 2e-3
                             : 3.5 * sqrt((square - (found - wanted) * (found - wanted)) / groups) + 1e-3 * size;
     printf("%-34s depth %d: %.6g, differences %.6g +- %.2g\n", p->name, p->depth, found, wanted, error);
-    CHECK_THAT(fabs(found - wanted) <= error, "%s: %g, differences say %g +- %g", p->name, found, wanted,
-               error);
+    CHECK_THAT(fabs(found - wanted) <= error, "%s: %g, differences say %g +- %g", p->name, found, wanted, error);
     CHECK_THAT(size > 0.0, "%s: no derivative at all", p->name);
     gradient_log_free(log);
     path_batch_free(batch);
@@ -252,7 +245,7 @@ struct loss_rig {
     struct box box;
     struct path_batch *batch[2]; /* of the two estimates */
     struct gradient_log *log;
-    double mean[PIXELS][3];      /* radiance */
+    double mean[PIXELS][3]; /* radiance */
 };
 
 /* A mean over the rounds, with what its standard error is made of. */
@@ -265,9 +258,7 @@ static void estimate_add(struct estimate *e, double value) {
     e->square += value * value / ROUNDS;
 }
 
-static double estimate_error(const struct estimate *e) {
-    return sqrt((e->square - e->mean * e->mean) / ROUNDS);
-}
+static double estimate_error(const struct estimate *e) { return sqrt((e->square - e->mean * e->mean) / ROUNDS); }
 
 static void trace_keys(struct loss_rig *rig, int batch, const struct ray *ray, const struct path_key *key,
                        rgb *radiance) {
@@ -347,8 +338,8 @@ static void check_loss(void) {
         for (int c = 0; c < 3; c++)
             truth += 2.0 * (rig.mean[i][c] - (double)target) * measure_slope(&rig, i, c);
     double two_error = estimate_error(&two), one_error = estimate_error(&one);
-    printf("squared loss: truth %.4f; two estimates %.4f +- %.4f; one %.4f +- %.4f\n", truth, two.mean,
-           two_error, one.mean, one_error);
+    printf("squared loss: truth %.4f; two estimates %.4f +- %.4f; one %.4f +- %.4f\n", truth, two.mean, two_error,
+           one.mean, one_error);
     double slack = 0.01 * fabs(truth); /* of the truth's own sampling */
     CHECK(fabs(two.mean - truth) < 3.5 * two_error + slack);
     CHECK(fabs(one.mean - truth) > 8.0 * one_error + slack);

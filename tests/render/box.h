@@ -23,8 +23,8 @@ struct box {
     struct world world;
 };
 
-static inline void box_quad(struct box *b, vec3 corner, vec3 u, vec3 v, uint32_t segment, float left,
-                            float top, float size) {
+static inline void box_quad(struct box *b, vec3 corner, vec3 u, vec3 v, uint32_t segment, float left, float top,
+                            float size) {
     struct mesh *m = &b->mesh;
     uint32_t first = (uint32_t)m->vertex_count;
     m->position[first] = corner;
@@ -53,12 +53,12 @@ static inline void box_init(struct box *b) {
     b->atlas.corner = mem_array(32, sizeof *b->atlas.corner);
     b->atlas.width = b->atlas.height = BOX_SIDE;
     vec3 x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1}, o = {0, 0, 0};
-    box_quad(b, o, z, x, 0, 1, 1, 14);                     /* floor, facing up */
-    box_quad(b, y, x, z, 0, 17, 1, 14);                    /* ceiling */
-    box_quad(b, o, x, y, 0, 33, 1, 14);                    /* back, facing +z */
-    box_quad(b, z, y, x, 0, 1, 17, 14);                    /* front */
-    box_quad(b, o, y, z, 0, 17, 17, 14);                   /* left */
-    box_quad(b, x, z, y, 0, 33, 17, 14);                   /* right */
+    box_quad(b, o, z, x, 0, 1, 1, 14);   /* floor, facing up */
+    box_quad(b, y, x, z, 0, 17, 1, 14);  /* ceiling */
+    box_quad(b, o, x, y, 0, 33, 1, 14);  /* back, facing +z */
+    box_quad(b, z, y, x, 0, 1, 17, 14);  /* front */
+    box_quad(b, o, y, z, 0, 17, 17, 14); /* left */
+    box_quad(b, x, z, y, 0, 33, 17, 14); /* right */
     box_quad(b, (vec3){0.2f, 0.35f, 0.2f}, (vec3){0, 0, 0.4f}, (vec3){0.5f, 0.1f, 0}, 1, 2, 40, 8);
     box_quad(b, (vec3){0.3f, 0.95f, 0.3f}, (vec3){0.3f, 0, 0}, (vec3){0, 0, 0.3f}, 2, 18, 40, 8);
     struct materials *m = &b->materials;
@@ -70,8 +70,7 @@ static inline void box_init(struct box *b) {
     m->base_color.texel = mem_calloc(BOX_SIDE * BOX_SIDE, sizeof *m->base_color.texel);
     for (uint32_t i = 0; i < BOX_SIDE * BOX_SIDE; i++)
         for (uint32_t c = 0; c < 4; c++)
-            m->base_color.texel[i][c] =
-                c == 3 ? 1.0f : 0.2f + 0.6f * rng_to_float((uint32_t)rng_key(8, i, c));
+            m->base_color.texel[i][c] = c == 3 ? 1.0f : 0.2f + 0.6f * rng_to_float((uint32_t)rng_key(8, i, c));
     for (int s = 0; s < 3; s++)
         m->roughness[s] = 0.5f;
     m->emission[2] = (rgb){9.0f, 8.0f, 6.0f};
@@ -91,8 +90,7 @@ static inline void box_open(struct box *b) {
 static inline void box_build(struct box *b) {
     struct parallel *pool = parallel_new(1);
     struct error err;
-    CHECK(world_init(&b->world, &b->mesh, &b->segments, &b->atlas, &b->materials, NULL, pool, &err) ==
-          STATUS_OK);
+    CHECK(world_init(&b->world, &b->mesh, &b->segments, &b->atlas, &b->materials, NULL, pool, &err) == STATUS_OK);
     parallel_free(pool);
 }
 

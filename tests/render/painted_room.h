@@ -43,8 +43,7 @@ static inline rgb painted_radiance(const struct painted *room, int64_t object, v
     float shade = 0.6f + 0.15f * p.x + 0.1f * p.y + 0.05f * p.z;
     float wave = sinf(5.0f * p.x + 3.0f * p.y + 1.0f) * sinf(4.0f * p.z - 2.0f * p.y + 6.0f * p.x);
     float fine = sinf(17.0f * p.x + 5.0f * p.z) * sinf(15.0f * p.y + 9.0f * p.z + 0.5f);
-    int tile = (int)floorf(2.3f * p.x + 0.37f) + (int)floorf(2.3f * p.y + 0.37f) +
-               (int)floorf(2.3f * p.z + 0.37f);
+    int tile = (int)floorf(2.3f * p.x + 0.37f) + (int)floorf(2.3f * p.y + 0.37f) + (int)floorf(2.3f * p.z + 0.37f);
     float paint = room->tiles ? (tile & 1 ? 1.3f : 0.7f) : 1.0f + 0.35f * wave + 0.35f * fine;
     return rgb_scale(wall_color[object], shade * paint);
 }
@@ -81,16 +80,19 @@ static inline void painted_make(struct painted *room, int threads, bool tiles) {
     *room = (struct painted){.pool = parallel_new(threads), .tiles = tiles};
     make_mesh(&room->scene.mesh);
     segments_from_object_id(&room->segments, &room->scene.mesh);
-    CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, &err) ==
-          STATUS_OK);
+    CHECK(atlas_make(&room->atlas, &room->scene.mesh, &room->segments, PAINTED_TEXTURE, 0.0f, &err) == STATUS_OK);
     inverse_uv_make(&room->inverse, &room->atlas, room->scene.mesh.triangle_count, room->pool);
     CHECK(accel_new(&room->accel, &room->scene.mesh, room->pool, &err) == STATUS_OK);
     room->scene.photograph = mem_calloc(PAINTED_FRAMES, sizeof *room->scene.photograph);
     room->scene.photograph_count = PAINTED_FRAMES;
     for (int f = 0; f < PAINTED_FRAMES; f++) {
         struct photograph *photo = &room->scene.photograph[f];
-        *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f,
-                                     .gain = {1, 1, 1}, .clip = INFINITY, .is_test = f % 8 == 7};
+        *photo = (struct photograph){.is_hdr = true,
+                                     .exposure_known = true,
+                                     .exposure = 1.0f,
+                                     .gain = {1, 1, 1},
+                                     .clip = INFINITY,
+                                     .is_test = f % 8 == 7};
         photo->name = mem_printf("frame %d", f);
         photo->camera = look(spread(f, 0.4f), spread(f * 7 + 3, 0.0f));
         photo->camera.width = PAINTED_WIDTH;

@@ -47,8 +47,7 @@ static inline void room_set_base_color(struct room *room, size_t segment, rgb va
     size_t x0 = segment % ROOM_BLOCKS_ACROSS * ROOM_BLOCK, y0 = segment / ROOM_BLOCKS_ACROSS * ROOM_BLOCK;
     for (size_t y = y0; y < y0 + ROOM_BLOCK; y++)
         for (size_t x = x0; x < x0 + ROOM_BLOCK; x++)
-            memcpy(t->texel[y * t->width + x], (float[4]){value.r, value.g, value.b, 1.0f},
-                   sizeof *t->texel);
+            memcpy(t->texel[y * t->width + x], (float[4]){value.r, value.g, value.b, 1.0f}, sizeof *t->texel);
 }
 
 static inline uint32_t room_segment_of_texel(uint32_t x, uint32_t y) {
@@ -78,8 +77,7 @@ static inline void room_make_tables(struct room *room) {
     m->specular = mem_calloc(m->segment_count, sizeof *m->specular);
     m->emission = mem_calloc(m->segment_count, sizeof *m->emission);
     m->base_color.width = m->base_color.height = room->atlas.width;
-    m->base_color.texel =
-        mem_calloc((size_t)room->atlas.width * room->atlas.height, sizeof *m->base_color.texel);
+    m->base_color.texel = mem_calloc((size_t)room->atlas.width * room->atlas.height, sizeof *m->base_color.texel);
 }
 
 /* Drops the triangles of an object from the mesh. */
@@ -120,9 +118,8 @@ static inline void room_read_image(const char *name, struct image *image) {
 }
 
 /* Reads a room; the objects in drop[0..drop_count) are left out. environment may be NULL. */
-static inline void room_load(struct room *room, const char *ply, const char *objects,
-                             const char *color_key, const int *drop, int drop_count,
-                             const struct image *environment, int thread_count) {
+static inline void room_load(struct room *room, const char *ply, const char *objects, const char *color_key,
+                             const int *drop, int drop_count, const struct image *environment, int thread_count) {
     struct error err;
     memset(room, 0, sizeof *room);
     room_must(ply_read(check_data(ply), ply, MESH_MAX_TRIANGLES, &room->mesh, NULL, &err), &err);
@@ -131,8 +128,9 @@ static inline void room_load(struct room *room, const char *ply, const char *obj
     room_make_tables(room);
     room_read_materials(room, objects, color_key);
     room->pool = parallel_new(thread_count);
-    room_must(world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials,
-                         environment, room->pool, &err), &err);
+    room_must(world_init(&room->world, &room->mesh, &room->segments, &room->atlas, &room->materials, environment,
+                         room->pool, &err),
+              &err);
 }
 
 static inline void room_release(struct room *room) {
@@ -182,14 +180,13 @@ static inline void room_camera(const char *transforms, const char *frame, struct
 /* Sums over independent estimates of a picture, whose spread gives our standard error. */
 struct room_picture {
     uint32_t width, height;
-    size_t count;          /* pixels */
-    double (*sum)[3];      /* [count] owned */
-    double (*square)[3];   /* [count] owned */
+    size_t count;        /* pixels */
+    double (*sum)[3];    /* [count] owned */
+    double (*square)[3]; /* [count] owned */
     int estimates;
 };
 
-static inline void room_picture_init(struct room_picture *p, uint32_t width, uint32_t height,
-                                     int estimates) {
+static inline void room_picture_init(struct room_picture *p, uint32_t width, uint32_t height, int estimates) {
     p->width = width;
     p->height = height;
     p->count = (size_t)width * height;
@@ -209,8 +206,8 @@ static inline void room_picture_add(struct room_picture *p, size_t pixel, int ch
 }
 
 /* Squared standard error of the difference of a pixel's means. */
-static inline double room_error2(const struct room_picture *p, const struct image *wanted, size_t pixel,
-                                 int channel, int error_channel) {
+static inline double room_error2(const struct room_picture *p, const struct image *wanted, size_t pixel, int channel,
+                                 int error_channel) {
     double mean = p->sum[pixel][channel] / p->estimates;
     double ours = fmax(0.0, p->square[pixel][channel] / p->estimates - mean * mean) / (p->estimates - 1);
     double theirs = (double)wanted->pixel[pixel * wanted->channel_count + (size_t)error_channel];
@@ -223,8 +220,7 @@ static inline double room_error2(const struct room_picture *p, const struct imag
  * The noise of light paths is skewed: a pixel whose rare bright paths were missed has too small a
  * mean and too small an error at once. So a pixel's error is taken as the greater of its own
  * and the root mean square over its 5 x 5 neighbours. */
-static inline void room_compare(const struct room_picture *p, const struct image *wanted,
-                                const char *name) {
+static inline void room_compare(const struct room_picture *p, const struct image *wanted, const char *name) {
     static const char *const value_name[] = {"R", "G", "B"};
     static const char *const error_name[] = {"err.R", "err.G", "err.B"};
     double beyond = 0.0, found_mean = 0.0, wanted_mean = 0.0, variance = 0.0, size = 0.0;
@@ -264,10 +260,10 @@ static inline void room_compare(const struct room_picture *p, const struct image
     beyond /= n;
     /* The channels of a pixel pass or fail together: three times the binomial's variance. */
     double limit = 0.0027 + 3.0 * sqrt(3.0 * 0.0027 / n);
-    printf("%-24s mean %.6g, wanted %.6g, z %+.2f; beyond 3 sigma %.4f (limit %.4f)\n", name, found_mean,
-           wanted_mean, (found_mean - wanted_mean) / error, beyond, limit);
-    CHECK_THAT(fabs(found_mean - wanted_mean) < 3.3 * error + 1e-3 * size / n,
-               "%s: mean %g, wanted %g +- %g", name, found_mean, wanted_mean, error);
+    printf("%-24s mean %.6g, wanted %.6g, z %+.2f; beyond 3 sigma %.4f (limit %.4f)\n", name, found_mean, wanted_mean,
+           (found_mean - wanted_mean) / error, beyond, limit);
+    CHECK_THAT(fabs(found_mean - wanted_mean) < 3.3 * error + 1e-3 * size / n, "%s: mean %g, wanted %g +- %g", name,
+               found_mean, wanted_mean, error);
     CHECK_THAT(beyond < limit, "%s: %g of the values beyond 3 sigma, %g allowed", name, beyond, limit);
 }
 

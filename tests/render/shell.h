@@ -32,8 +32,7 @@ static inline bool shell_stop_requested(void *user) {
     return s->polls_until_stop >= 0 && s->polls_until_stop-- == 0;
 }
 static inline void shell_ignore_stage(void *user, const char *stage) { (void)user, (void)stage; }
-static inline void shell_ignore_progress(void *user, const char *stage, double done, double total,
-                                         double eta) {
+static inline void shell_ignore_progress(void *user, const char *stage, double done, double total, double eta) {
     (void)user, (void)stage, (void)done, (void)total, (void)eta;
 }
 static inline void shell_ignore_metric(void *user, const char *series, long step, double value) {
@@ -41,7 +40,7 @@ static inline void shell_ignore_metric(void *user, const char *series, long step
 }
 static inline void shell_ignore_log(void *user, const char *message) { (void)user, (void)message; }
 static inline void shell_warn(void *user, const char *message) {
-    snprintf(((struct shell *)user)->warned, sizeof ((struct shell *)user)->warned, "%s", message);
+    snprintf(((struct shell *)user)->warned, sizeof((struct shell *)user)->warned, "%s", message);
 }
 static inline double shell_worked_sec(void *user) {
     struct shell *s = user;
@@ -51,8 +50,8 @@ static inline bool shell_never(void *user) {
     (void)user;
     return false;
 }
-static inline enum status shell_save(void *user, long iteration, const struct state_array *array,
-                                     size_t count, struct error *err) {
+static inline enum status shell_save(void *user, long iteration, const struct state_array *array, size_t count,
+                                     struct error *err) {
     struct shell *s = user;
     (void)iteration, (void)err;
     for (size_t i = 0; i < count; i++) {
@@ -64,8 +63,8 @@ static inline enum status shell_save(void *user, long iteration, const struct st
     s->has_checkpoint = true;
     return STATUS_OK;
 }
-static inline enum status shell_load(void *user, struct state_array *array, size_t count,
-                                     bool *found, struct error *err) {
+static inline enum status shell_load(void *user, struct state_array *array, size_t count, bool *found,
+                                     struct error *err) {
     struct shell *s = user;
     (void)err;
     *found = s->has_checkpoint;
@@ -74,8 +73,7 @@ static inline enum status shell_load(void *user, struct state_array *array, size
             memcpy(array[i].data, s->saved[i], array[i].bytes);
     return STATUS_OK;
 }
-static inline enum status shell_no_preview(void *user, const struct reconstruction *r,
-                                           struct error *err) {
+static inline enum status shell_no_preview(void *user, const struct reconstruction *r, struct error *err) {
     (void)user, (void)r, (void)err;
     return STATUS_OK;
 }
@@ -123,7 +121,7 @@ static inline struct settings shell_settings(const char *json) {
     return s;
 }
 
-#define SHELL_SMALL \
+#define SHELL_SMALL                                                                                                    \
     "{\"texture_size\":128,\"iterations\":2,\"report_samples\":1,\"gather_samples\":64,\"texels_per_iteration\":64}"
 
 /* A small run from beginning to end, in which hardly anything is refined. */

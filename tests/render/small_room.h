@@ -18,9 +18,8 @@
 #define HEIGHT 36
 
 /* A test may change these before walls are photographed. */
-static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f},
-                                  {0.2f, 0.6f, 0.3f}, {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f},
-                                  {0.4f, 0.4f, 0.4f}};
+static rgb wall_color[OBJECTS] = {{0.6f, 0.5f, 0.4f}, {0.8f, 0.8f, 0.8f}, {0.7f, 0.2f, 0.2f}, {0.2f, 0.6f, 0.3f},
+                                  {0.7f, 0.7f, 0.6f}, {0.5f, 0.6f, 0.8f}, {0.4f, 0.4f, 0.4f}};
 /* A test may make walls glossy before they are photographed. */
 static float wall_roughness[OBJECTS] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
 static float wall_specular[OBJECTS];
@@ -87,17 +86,16 @@ static inline void make_mesh_with_window(struct mesh *m) {
 }
 
 /* Each channel within a share of what it should be. */
-#define CHECK_RGB(found, wanted, share)                              \
-    do {                                                             \
-        CHECK_NEAR((found).r, (wanted).r, (share) * (wanted).r);     \
-        CHECK_NEAR((found).g, (wanted).g, (share) * (wanted).g);     \
-        CHECK_NEAR((found).b, (wanted).b, (share) * (wanted).b);     \
+#define CHECK_RGB(found, wanted, share)                                                                                \
+    do {                                                                                                               \
+        CHECK_NEAR((found).r, (wanted).r, (share) * (wanted).r);                                                       \
+        CHECK_NEAR((found).g, (wanted).g, (share) * (wanted).g);                                                       \
+        CHECK_NEAR((found).b, (wanted).b, (share) * (wanted).b);                                                       \
     } while (0)
 
 /* A camera at `from` that looks at `to`. */
 static inline struct camera look(vec3 from, vec3 to) {
-    struct camera c = {.width = WIDTH, .height = HEIGHT, .fx = 30, .fy = 30, .cx = WIDTH / 2.0f,
-                       .cy = HEIGHT / 2.0f};
+    struct camera c = {.width = WIDTH, .height = HEIGHT, .fx = 30, .fy = 30, .cx = WIDTH / 2.0f, .cy = HEIGHT / 2.0f};
     vec3 z = vec3_normalize(vec3_sub(to, from));
     vec3 x = vec3_normalize(vec3_cross(z, (vec3){0.01f, 1.0f, 0.02f}));
     vec3 y = vec3_cross(z, x);
@@ -110,13 +108,10 @@ static inline struct camera look(vec3 from, vec3 to) {
 static inline vec3 spread(int i, float margin) {
     float a = fmodf((float)i * 0.618f, 1.0f), b = fmodf((float)i * 0.755f, 1.0f);
     float c = fmodf((float)i * 0.570f, 1.0f);
-    return (vec3){margin + a * (4 - 2 * margin), margin + b * (2.6f - 2 * margin),
-                  margin + c * (3 - 2 * margin)};
+    return (vec3){margin + a * (4 - 2 * margin), margin + b * (2.6f - 2 * margin), margin + c * (3 - 2 * margin)};
 }
 
-static inline vec3 look_anywhere(int frame) {
-    return spread(frame * 7 + 3, 0.0f);
-}
+static inline vec3 look_anywhere(int frame) { return spread(frame * 7 + 3, 0.0f); }
 
 /* What a mesh needs beside itself to be rendered. */
 struct model {
@@ -141,8 +136,7 @@ static inline void model_light(struct model *m, const struct mesh *mesh, rgb lam
                                struct parallel *pool) {
     struct error err = {0};
     m->materials.emission[LAMP] = m->materials.emission[other_lamp] = lamp;
-    CHECK(world_init(&m->world, mesh, &m->segments, &m->atlas, &m->materials, environment, pool, &err) ==
-          STATUS_OK);
+    CHECK(world_init(&m->world, mesh, &m->segments, &m->atlas, &m->materials, environment, pool, &err) == STATUS_OK);
 }
 
 static inline void model_release(struct model *m) {
@@ -186,8 +180,12 @@ static inline void photograph_mesh(struct scene *scene, rgb lamp, const struct i
     scene->photograph_count = FRAMES;
     for (int f = 0; f < FRAMES; f++) {
         struct photograph *photo = &scene->photograph[f];
-        *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f,
-                                     .gain = {1, 1, 1}, .clip = INFINITY, .is_test = f % 5 == 4};
+        *photo = (struct photograph){.is_hdr = true,
+                                     .exposure_known = true,
+                                     .exposure = 1.0f,
+                                     .gain = {1, 1, 1},
+                                     .clip = INFINITY,
+                                     .is_test = f % 5 == 4};
         photo->name = mem_printf("frame %d", f);
         photo->camera = look(spread(f, 0.4f), target(f));
         struct image image;

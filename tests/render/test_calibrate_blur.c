@@ -37,8 +37,8 @@ static void test_smeared(struct painted *room) {
         right += is_blurred && f % 3 == 0;
         wrong += is_blurred && f % 3 != 0;
     }
-    printf("%zu of %zu smeared photographs found, %zu others, blur %.2f px, fused error %.4f -> %.4f\n", right,
-           smeared, wrong, found.blur_px, before, after);
+    printf("%zu of %zu smeared photographs found, %zu others, blur %.2f px, fused error %.4f -> %.4f\n", right, smeared,
+           wrong, found.blur_px, before, after);
     CHECK(right >= 3);
     CHECK(wrong == 0);
     CHECK(found.blur_px > 2.0 && found.blur_px < 10.0);

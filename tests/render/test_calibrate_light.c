@@ -18,8 +18,7 @@ static double worst_gain(const struct painted *room, const rgb *truth) {
         for (size_t t = 0; t < room->views.train_count; t++) {
             const struct photograph *photo = &room->scene.photograph[room->views.train[t]];
             const rgb *wanted = &truth[room->views.train[t]];
-            const float gain[3] = {photo->gain.r / wanted->r, photo->gain.g / wanted->g,
-                                   photo->gain.b / wanted->b};
+            const float gain[3] = {photo->gain.r / wanted->r, photo->gain.g / wanted->g, photo->gain.b / wanted->b};
             error[t] = log((double)(gain[c] * photo->exposure));
             mean += error[t] / (double)room->views.train_count;
         }
@@ -46,8 +45,8 @@ static void test_clean(struct painted *room) {
     CHECK(!found.drift && !found.white_balance && !found.vignette && found.exposures_solved == 0);
     for (int f = 0; f < PAINTED_FRAMES; f++) {
         const struct photograph *photo = &room->scene.photograph[f];
-        CHECK(photo->exposure == 1.0f && photo->gain.r == 1.0f && photo->gain.g == 1.0f &&
-              photo->gain.b == 1.0f && photo->vignette[0] == 0.0f);
+        CHECK(photo->exposure == 1.0f && photo->gain.r == 1.0f && photo->gain.g == 1.0f && photo->gain.b == 1.0f &&
+              photo->vignette[0] == 0.0f);
     }
 }
 

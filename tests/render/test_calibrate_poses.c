@@ -41,8 +41,8 @@ static void test_misplaced(struct painted *room, float turn, float move, size_t 
     for (uint32_t t = 0; t < room->views.train_count; t++)
         close += painted_frame_shift(room, room->views.train[t]) < 0.4;
     printf("every %zu misplaced: %zu moved, off by %.3f px -> %.3f px, %zu of %zu within 0.4 px, fused error "
-           "%.4f -> %.4f\n", every, found.moved_count, shift_before, shift_after, close,
-           room->views.train_count, before, after);
+           "%.4f -> %.4f\n",
+           every, found.moved_count, shift_before, shift_after, close, room->views.train_count, before, after);
     CHECK(shift_before > 1.5);
     CHECK(close + 2 >= room->views.train_count);
     CHECK(after < 0.5 * before);

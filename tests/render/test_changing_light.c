@@ -5,10 +5,10 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define SCREEN 2        /* the wall at x = 0 */
-#define NEAR_M 0.4f     /* the picture leaves so much of the wall free all around */
-#define PICTURE 0.3f    /* radiance; white paint there would show .32 */
-#define CLIP 0.0625f    /* exact as a half */
+#define SCREEN 2     /* the wall at x = 0 */
+#define NEAR_M 0.4f  /* the picture leaves so much of the wall free all around */
+#define PICTURE 0.3f /* radiance; white paint there would show .32 */
+#define CLIP 0.0625f /* exact as a half */
 
 enum paint { STILL, CHANGING, GLOSSY, CLIPPED };
 

@@ -14,8 +14,18 @@
 
 enum { LEFT = 4, FLOOR = 0, TALL = 6, LAMP = 8, SHADE = 9, SEGMENTS = 10 };
 
-enum picture { PRIMAL, BASE_LEFT, BASE_TALL, ROUGH_FLOOR, ROUGH_TALL, SPEC_FLOOR, SPEC_TALL,
-               EMIT_LAMP, EMIT_SHADE, PICTURES };
+enum picture {
+    PRIMAL,
+    BASE_LEFT,
+    BASE_TALL,
+    ROUGH_FLOOR,
+    ROUGH_TALL,
+    SPEC_FLOOR,
+    SPEC_TALL,
+    EMIT_LAMP,
+    EMIT_SHADE,
+    PICTURES
+};
 
 struct estimate {
     const struct room *room;
@@ -26,16 +36,14 @@ struct estimate {
 };
 
 /* One group's derivatives of a pixel's channel by every parameter, out of its log. */
-static void read_log(const struct gradient_log *log, int channel,
-                     double value[PICTURES][3]) {
+static void read_log(const struct gradient_log *log, int channel, double value[PICTURES][3]) {
     double base[SEGMENTS] = {0};
     for (size_t i = 0; i < log->entry_count; i++) {
         const struct gradient_entry *e = &log->entry[i];
         double d = (double)(channel == 0 ? e->d.r : channel == 1 ? e->d.g : e->d.b);
         for (uint32_t k = 0; k < 4; k++)
             if (e->weight[k] > 0.0f)
-                base[room_segment_of_texel(e->x + k % 2, e->y + k / 2)] +=
-                    (double)e->weight[k] * d;
+                base[room_segment_of_texel(e->x + k % 2, e->y + k / 2)] += (double)e->weight[k] * d;
     }
     value[BASE_LEFT][channel] = base[LEFT];
     value[BASE_TALL][channel] = base[TALL];
@@ -114,16 +122,14 @@ int main(void) {
     room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", NULL, 0, NULL, 0);
     room_camera("conformance/room_transforms.json", "primal_all.exr", &camera);
 
-    struct estimate direct = {.room = &room,
-                              .camera = &camera,
-                              .settings = {.max_depth = 2, .roulette_depth = 99, .seed = 11}};
+    struct estimate direct = {
+        .room = &room, .camera = &camera, .settings = {.max_depth = 2, .roulette_depth = 99, .seed = 11}};
     run(&direct);
     compare(&direct, PRIMAL, "primal_direct");
     finish(&direct);
 
-    struct estimate all = {.room = &room,
-                           .camera = &camera,
-                           .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 12}};
+    struct estimate all = {
+        .room = &room, .camera = &camera, .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 12}};
     run(&all);
     compare(&all, PRIMAL, "primal_all");
     finish(&all);
@@ -148,11 +154,9 @@ int main(void) {
 
     struct image sky;
     room_read_image("hdri/lythwood_room_1k.hdr", &sky);
-    room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", (int[]){1, 8}, 2,
-              &sky, 0);
-    struct estimate open = {.room = &room,
-                            .camera = &camera,
-                            .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 14}};
+    room_load(&room, "conformance/room.ply", "conformance/room.json", "base_color", (int[]){1, 8}, 2, &sky, 0);
+    struct estimate open = {
+        .room = &room, .camera = &camera, .settings = {.max_depth = 32, .roulette_depth = 6, .seed = 14}};
     run(&open);
     compare(&open, PRIMAL, "primal_env");
     finish(&open);

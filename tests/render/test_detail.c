@@ -30,8 +30,8 @@ static struct measured mean_of(const struct painted *room, const struct surface_
             !photograph_sample_cubic(&room->scene.photograph[room->views.train[t]], view.x, view.y, &shown))
             continue;
         shown = rgb_scale(shown, 1.0f / WHITE);
-        look[count++] = (struct robust_sample){.value = shown, .deviation = 0.01f, .weight = view.weight,
-                                               .source = t, .sharp = view.weight};
+        look[count++] = (struct robust_sample){
+            .value = shown, .deviation = 0.01f, .weight = view.weight, .source = t, .sharp = view.weight};
         sum = rgb_mad(sum, view.weight, shown);
         m.weight += view.weight;
     }
@@ -85,8 +85,11 @@ struct capture {
 /* Base colours are as measured but for `offset`. */
 static void capture_init(struct capture *s, bool tiles, int threads, float offset) {
     painted_make(&s->room, threads, tiles);
-    s->r = (struct reconstruction){.scene = &s->room.scene, .pool = s->room.pool, .segments = s->room.segments,
-                                   .atlas = s->room.atlas, .inverse = s->room.inverse};
+    s->r = (struct reconstruction){.scene = &s->room.scene,
+                                   .pool = s->room.pool,
+                                   .segments = s->room.segments,
+                                   .atlas = s->room.atlas,
+                                   .inverse = s->room.inverse};
     s->texels = (size_t)s->r.inverse.width * s->r.inverse.height;
     s->measured = mem_calloc(s->texels, sizeof *s->measured);
     s->white = mem_calloc(s->texels, sizeof *s->white);

@@ -15,14 +15,10 @@ static rgb waves(vec3 place) {
     return rgb_make(1.0f + 0.7f * wave, 1.0f + 0.5f * other, 1.0f - 0.6f * wave);
 }
 
-static rgb opposite(vec3 place) {
-    return rgb_sub(rgb_gray(2.0f), waves(place));
-}
+static rgb opposite(vec3 place) { return rgb_sub(rgb_gray(2.0f), waves(place)); }
 
 /* A bright half and a dark one. */
-static rgb halves(vec3 place) {
-    return rgb_gray(place.x < 2.0f ? 1.7f : 0.3f);
-}
+static rgb halves(vec3 place) { return rgb_gray(place.x < 2.0f ? 1.7f : 0.3f); }
 
 /* Linear, so that a bilinear look-up is exact but at the rim. */
 static rgb slope(vec3 place) {
@@ -157,8 +153,7 @@ static struct found find(const struct reconstruction *r) {
     for (size_t i = 0; i < r->inverse.valid_count; i++) {
         uint32_t texel = r->inverse.valid[i], s = reconstruction_segment(r, texel);
         struct surface_point at;
-        if (r->segments.id[s] != LAMP ||
-            !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) ||
+        if (r->segments.id[s] != LAMP || !surface_at_texel(&r->scene->mesh, &r->atlas, &r->inverse, texel, &at) ||
             fabsf(at.position.x - 2.0f) < 0.15f)
             continue;
         rgb shown = materials_emission_of_texel(&r->materials, s, texel);

@@ -82,8 +82,8 @@ static void test_recovers_sky(struct scene *scene) {
     double median, mean;
     compare_with_sky(&e, &median, &mean);
     printf("sky: %u x %u, %.1f %% of the sphere by %zu photographs, median error %.4f, mean %+.4f, "
-           "spread %.4f\n", e.map.width, e.map.height, 100.0 * e.seen_share, e.photograph_count, median,
-           mean, e.median_spread);
+           "spread %.4f\n",
+           e.map.width, e.map.height, 100.0 * e.seen_share, e.photograph_count, median, mean, e.median_spread);
     CHECK(e.map.width == 128 && e.map.height == 64); /* 2 pi 30 pixels around */
     CHECK(e.seen_share > 0.05 && e.seen_share < 0.5 && e.saturated_share == 0.0);
     CHECK_THAT(median < 0.01, "median error %g", median);
@@ -294,8 +294,8 @@ static void test_orient(void) {
         char up;
         float turn;
         vec3 wanted;
-    } cases[] = {{'y', 0, {0, 0, -1}}, {'y', 90, {-1, 0, 0}}, {'z', 0, {0, 1, 0}}, {'z', 90, {-1, 0, 0}},
-                 {'x', 0, {0, 0, -1}}, {'x', 90, {0, 1, 0}}};
+    } cases[] = {{'y', 0, {0, 0, -1}},  {'y', 90, {-1, 0, 0}}, {'z', 0, {0, 1, 0}},
+                 {'z', 90, {-1, 0, 0}}, {'x', 0, {0, 0, -1}},  {'x', 90, {0, 1, 0}}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         relight_orient(&picture, cases[i].up, cases[i].turn, 2.0f, &out);
         float cosine = vec3_dot(brightest(&out), cases[i].wanted);

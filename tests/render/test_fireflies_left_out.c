@@ -4,9 +4,9 @@
 #include "tests/render/shell.h"
 #include "tests/render/small_room.h"
 
-#define STEP 9        /* pixels from a firefly to the next, in a row and of rows */
-#define TIMES 30.0f   /* as bright as it should be */
-#define SPOT 0.25f    /* so far off a texel's colour is seen */
+#define STEP 9      /* pixels from a firefly to the next, in a row and of rows */
+#define TIMES 30.0f /* as bright as it should be */
+#define SPOT 0.25f  /* so far off a texel's colour is seen */
 
 static void add_fireflies(struct scene *scene) {
     for (size_t f = 0; f < scene->photograph_count; f++) {

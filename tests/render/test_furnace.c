@@ -6,7 +6,6 @@
 #include "server/render/film.h"
 #include "tests/render/box.h"
 
-
 /* Integral of f cos over the hemisphere by midpoints. */
 static double albedo(float base, float roughness, float specular, float cosine) {
     struct bsdf b = bsdf_make(rgb_gray(base), roughness, specular, cosine);
@@ -73,8 +72,8 @@ static void check_plate(float base, float roughness, float specular, float cosin
     double error, found = shoot(&b, ray, 2, 1 << 15, &error);
     double wanted = 2.0 * albedo(base, roughness, specular, cosine);
     CHECK_THAT(fabs(found - wanted) < 4.0 * error + 2e-3 * wanted,
-               "base %g roughness %g specular %g cosine %g: %g +- %g, wanted %g", (double)base,
-               (double)roughness, (double)specular, (double)cosine, found, error, wanted);
+               "base %g roughness %g specular %g cosine %g: %g +- %g, wanted %g", (double)base, (double)roughness,
+               (double)specular, (double)cosine, found, error, wanted);
     /* From below the plate is the same: materials are two-sided. */
     ray.origin.y = -ray.origin.y;
     ray.direction.y = -ray.direction.y;
@@ -106,8 +105,8 @@ static void check_roulette(const struct box *b, double found, double error, bool
         square += mean * mean / 200.0;
     }
     double roulette_error = sqrt((square - sum * sum) / 199.0);
-    CHECK_THAT(fabs(sum - found) < 4.0 * (error + roulette_error), "roulette: %g, without %g +- %g", sum,
-               found, error + roulette_error);
+    CHECK_THAT(fabs(sum - found) < 4.0 * (error + roulette_error), "roulette: %g, without %g +- %g", sum, found,
+               error + roulette_error);
     uint64_t rays_traced, dropped;
     path_batch_counts(batch, &rays_traced, &dropped);
     CHECK(rays_traced > 0 && dropped == 0);

@@ -35,8 +35,7 @@ static void fixture_init(struct fixture *f) {
     inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, f->pool);
     materials_init(&f->materials, &f->inverse, OBJECTS, rgb_gray(0.0f), 1.0f, 0.0f);
     f->materials.emission[LAMP] = lamp_radiance;
-    CHECK(world_init(&f->world, &f->mesh, &f->segments, &f->atlas, &f->materials, NULL, f->pool, &err) ==
-          STATUS_OK);
+    CHECK(world_init(&f->world, &f->mesh, &f->segments, &f->atlas, &f->materials, NULL, f->pool, &err) == STATUS_OK);
     f->radiance = mem_calloc((size_t)f->atlas.width * f->atlas.height, sizeof *f->radiance);
     for (size_t i = 0; i < f->inverse.valid_count; i++) {
         uint32_t texel = f->inverse.valid[i];
@@ -62,8 +61,8 @@ static void fixture_release(struct fixture *f) {
 
 /* Walls that emit send out what the field says of them: then one bounce is the whole of the light. */
 static void light_walls(struct fixture *f) {
-    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0}, {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
-                                               {0.1f, 0.1f, 2}, {0, 0, 0}, {9, 8, 6}};
+    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0},       {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
+                                               {0.1f, 0.1f, 2}, {0, 0, 0},          {9, 8, 6}};
     for (int o = 0; o < OBJECTS; o++)
         f->materials.emission[o] = wall_radiance[o];
     world_update_lights(&f->world);
@@ -91,9 +90,7 @@ static rgb trace_depth(struct fixture *f, vec3 wo, int max_depth) {
     return rgb_sub(sum, f->materials.emission[0]);
 }
 
-static rgb trace(struct fixture *f, vec3 wo) {
-    return trace_depth(f, wo, 2);
-}
+static rgb trace(struct fixture *f, vec3 wo) { return trace_depth(f, wo, 2); }
 
 static void check_close(rgb a, rgb b, float relative, const char *what, float parameter) {
     const float *p = &a.r, *q = &b.r;
@@ -231,7 +228,7 @@ static void test_back(void) {
     corner[0] = (vec3){0.5f, 0.6f, 0.5f}, corner[1] = (vec3){0.5f, 0.6f, 2.0f};
     corner[2] = (vec3){2.0f, 0.6f, 2.0f}, corner[3] = (vec3){2.0f, 0.6f, 0.5f};
     fixture_init(&g);
-    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0}, {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
+    static const rgb wall_radiance[OBJECTS] = {{0, 0, 0},       {0.5f, 0.4f, 0.3f}, {1, 0, 0}, {0, 1, 0.2f},
                                                {0.1f, 0.1f, 2}, {0.3f, 0.3f, 0.3f}, {0, 0, 0}};
     for (int o = 0; o < OBJECTS; o++)
         g.materials.emission[o] = wall_radiance[o];

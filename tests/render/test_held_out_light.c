@@ -6,8 +6,8 @@
 
 /* Multiplies each photograph by gains of its own, with a mean of about 1. */
 static void spoil(struct scene *scene) {
-    static const float gain[5][3] = {{1.2f, 1.0f, 0.85f}, {0.85f, 1.05f, 1.15f}, {1.0f, 0.9f, 1.1f},
-                                     {1.1f, 1.1f, 0.8f}, {0.8f, 1.0f, 1.25f}};
+    static const float gain[5][3] = {
+        {1.2f, 1.0f, 0.85f}, {0.85f, 1.05f, 1.15f}, {1.0f, 0.9f, 1.1f}, {1.1f, 1.1f, 0.8f}, {0.8f, 1.0f, 1.25f}};
     for (size_t i = 0; i < scene->photograph_count; i++) {
         struct photograph *photo = &scene->photograph[i];
         const float *g = gain[(i * 3 + i / 5) % 5];
@@ -19,7 +19,7 @@ static void spoil(struct scene *scene) {
 
 static double held_out_msre(struct scene *scene) {
     struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":1,\"report_samples\":32,"
-                                      "\"gather_samples\":64}");
+                                       "\"gather_samples\":64}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     double msre = 0.0;

@@ -39,9 +39,7 @@ static void test_hidden(struct parallel *pool) {
     scene_release(&scene);
 }
 
-static vec3 look_up(int frame) {
-    return (vec3){2.0f + 0.1f * (float)(frame % 5), 2.9f, 1.5f};
-}
+static vec3 look_up(int frame) { return (vec3){2.0f + 0.1f * (float)(frame % 5), 2.9f, 1.5f}; }
 
 /* Nothing of the floor is seen, but the lamp is. */
 static void test_none_hidden(struct parallel *pool) {

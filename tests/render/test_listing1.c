@@ -118,7 +118,7 @@ static void turn_inside_out(struct mesh *mesh, int64_t object) {
 static void test_recovers(struct scene *scene) {
     turn_inside_out(&scene->mesh, INSIDE_OUT);
     struct settings s = shell_settings("{\"texture_size\":64,\"iterations\":700,\"report_samples\":32,"
-                                      "\"texels_per_iteration\":512}");
+                                       "\"texels_per_iteration\":512}");
     struct shell shell = {.polls_until_stop = -1};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
@@ -132,17 +132,17 @@ static void test_recovers(struct scene *scene) {
         uint32_t segment = r.segments.of_triangle[r.inverse.triangle[texel]];
         const float *t = r.materials.base_color.texel[texel];
         const rgb *c = &wall_color[segment];
-        error[segment] += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) +
-                          pow((double)(t[2] - c->b), 2);
+        error[segment] += pow((double)(t[0] - c->r), 2) + pow((double)(t[1] - c->g), 2) + pow((double)(t[2] - c->b), 2);
         bias[segment] += (double)(t[0] - c->r + t[1] - c->g + t[2] - c->b);
         count[segment] += 3.0;
     }
     for (int o = 0; o < OBJECTS; o++) {
         double rms = sqrt(error[o] / count[o]);
         const rgb *e = &r.materials.emission[o];
-        printf("object %d: base colour off by %.4f, mean %+.4f, roughness %.3f, specular %.3f, emission %.4g %.4g %.4g\n",
-               o, rms, bias[o] / count[o], (double)r.materials.roughness[o], (double)r.materials.specular[o], (double)e->r,
-               (double)e->g, (double)e->b);
+        printf(
+            "object %d: base colour off by %.4f, mean %+.4f, roughness %.3f, specular %.3f, emission %.4g %.4g %.4g\n",
+            o, rms, bias[o] / count[o], (double)r.materials.roughness[o], (double)r.materials.specular[o], (double)e->r,
+            (double)e->g, (double)e->b);
         if (o == LAMP) {
             CHECK_NEAR(e->r, lamp_radiance.r, 0.05f * lamp_radiance.r);
             CHECK_NEAR(e->g, lamp_radiance.g, 0.05f * lamp_radiance.g);
@@ -168,10 +168,12 @@ int main(void) {
     struct parallel *pool = parallel_new(0);
     make_scene(&scene, pool);
     parallel_free(pool);
-    test_same_bytes(&scene, true, "{\"texture_size\":64,\"iterations\":18,\"report_samples\":2,"
-                                  "\"gather_samples\":64,\"texels_per_iteration\":256}");
-    test_same_bytes(&scene, false, "{\"texture_size\":64,\"iterations\":18,\"report_samples\":2,"
-                                   "\"method\":\"listing1\",\"texels_per_iteration\":256,\"coarse_levels\":3}");
+    test_same_bytes(&scene, true,
+                    "{\"texture_size\":64,\"iterations\":18,\"report_samples\":2,"
+                    "\"gather_samples\":64,\"texels_per_iteration\":256}");
+    test_same_bytes(&scene, false,
+                    "{\"texture_size\":64,\"iterations\":18,\"report_samples\":2,"
+                    "\"method\":\"listing1\",\"texels_per_iteration\":256,\"coarse_levels\":3}");
     test_stop_in_solve(&scene);
     test_ends_early(&scene);
     test_recovers(&scene);

@@ -29,13 +29,13 @@ static const char *find_python(void) {
 
 /* Off centre, so that the principal point counts. */
 static struct camera look(vec3 from, vec3 at) {
-    struct camera c = {.width = WIDTH, .height = HEIGHT, .fx = 45.0f, .fy = 45.0f,
-                       .cx = 0.42f * WIDTH, .cy = 0.56f * HEIGHT};
+    struct camera c = {
+        .width = WIDTH, .height = HEIGHT, .fx = 45.0f, .fy = 45.0f, .cx = 0.42f * WIDTH, .cy = 0.56f * HEIGHT};
     vec3 forward = vec3_normalize(vec3_sub(at, from));
     vec3 right = vec3_normalize(vec3_cross(forward, (vec3){0.0f, 1.0f, 0.0f}));
     vec3 down = vec3_cross(forward, right);
-    c.world_from_camera = (struct rigid){{{right.x, down.x, forward.x}, {right.y, down.y, forward.y},
-                                          {right.z, down.z, forward.z}}, from};
+    c.world_from_camera = (struct rigid){
+        {{right.x, down.x, forward.x}, {right.y, down.y, forward.y}, {right.z, down.z, forward.z}}, from};
     c.camera_from_world = rigid_inverse(&c.world_from_camera);
     return c;
 }
@@ -114,12 +114,20 @@ static void try(struct room *room, const struct image *sky, const struct image *
     float *zero = mem_calloc(texels, sizeof *zero);
     bool is_emitter[ROOM_OBJECT_COUNT] = {false};
     cJSON *report = cJSON_CreateObject();
-    struct export_input in = {
-        .title = "room", .mesh = &room->mesh, .segments = &room->segments, .atlas = &room->atlas,
-        .inverse = &room->inverse, .materials = &room->materials, .confidence_count = zero,
-        .confidence_spread = zero, .is_emitter = is_emitter, .environment = sky,
-        .environment_confidence = known, .comparison_count = VIEWS, .comparison = comparison,
-        .report = report};
+    struct export_input in = {.title = "room",
+                              .mesh = &room->mesh,
+                              .segments = &room->segments,
+                              .atlas = &room->atlas,
+                              .inverse = &room->inverse,
+                              .materials = &room->materials,
+                              .confidence_count = zero,
+                              .confidence_spread = zero,
+                              .is_emitter = is_emitter,
+                              .environment = sky,
+                              .environment_confidence = known,
+                              .comparison_count = VIEWS,
+                              .comparison = comparison,
+                              .report = report};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     for (int v = 0; v < VIEWS && status == STATUS_OK; v++)

@@ -14,8 +14,8 @@ static void check_values(void) {
     while (fgets(line, sizeof line, file)) {
         float r, g, b, roughness, specular, f[3];
         vec3 wi, wo; /* theirs: wi is the viewer's */
-        int n = sscanf(line, "%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f", &r, &g, &b, &roughness,
-                       &specular, &wi.x, &wi.y, &wi.z, &wo.x, &wo.y, &wo.z, &f[0], &f[1], &f[2]);
+        int n = sscanf(line, "%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f,%f", &r, &g, &b, &roughness, &specular, &wi.x,
+                       &wi.y, &wi.z, &wo.x, &wo.y, &wo.z, &f[0], &f[1], &f[2]);
         CHECK_THAT(n == 14, "row %d", rows);
         struct bsdf bsdf = bsdf_make((rgb){r, g, b}, roughness, specular, wi.z);
         struct bsdf_value v = bsdf_eval(&bsdf, wi, wo);
@@ -24,8 +24,8 @@ static void check_values(void) {
             double found = (double)(base[c] * v.diffuse + v.specular), wanted = (double)f[c];
             double excess = fabs(found - wanted) / (1e-4 * fabs(wanted) + 1e-6);
             worst = fmax(worst, excess);
-            CHECK_THAT(excess <= 1.0, "row %d channel %d: %.9g, wanted %.9g (roughness %g specular %g)",
-                       rows, c, found, wanted, (double)roughness, (double)specular);
+            CHECK_THAT(excess <= 1.0, "row %d channel %d: %.9g, wanted %.9g (roughness %g specular %g)", rows, c, found,
+                       wanted, (double)roughness, (double)specular);
         }
         rows++;
     }
@@ -47,8 +47,8 @@ static void check_albedo(void) {
         double sum = 0.0, square = 0.0;
         for (uint64_t i = 0; i < ALBEDO_SAMPLES; i++) {
             uint64_t a = rng_key(1, (uint64_t)row, 2 * i), b = rng_key(1, (uint64_t)row, 2 * i + 1);
-            vec3 wi = bsdf_sample(&bsdf, wo, rng_to_float((uint32_t)a),
-                                  rng_to_float((uint32_t)(a >> 32)), rng_to_float((uint32_t)b));
+            vec3 wi = bsdf_sample(&bsdf, wo, rng_to_float((uint32_t)a), rng_to_float((uint32_t)(a >> 32)),
+                                  rng_to_float((uint32_t)b));
             struct bsdf_value v = bsdf_eval(&bsdf, wo, wi);
             double value = v.pdf > 0.0f ? (double)((base * v.diffuse + v.specular) / v.pdf) : 0.0;
             sum += value;
@@ -60,8 +60,8 @@ static void check_albedo(void) {
          * nothing: their spread is about the mean itself. */
         error = sqrt(error * error + pow((double)albedo / 1024.0, 2.0));
         CHECK_THAT(fabs(mean - (double)albedo) <= 3.5 * error + 1e-6,
-                   "base %g roughness %g specular %g cosine %g: %g +- %g, wanted %g", (double)base,
-                   (double)roughness, (double)specular, (double)cosine, mean, error, (double)albedo);
+                   "base %g roughness %g specular %g cosine %g: %g +- %g, wanted %g", (double)base, (double)roughness,
+                   (double)specular, (double)cosine, mean, error, (double)albedo);
         row++;
     }
     fclose(file);

@@ -13,9 +13,7 @@
 #define CELLS (ROWS * COLUMNS)
 #define SAMPLES 200000
 
-static float number(uint64_t stream, uint64_t i, uint64_t k) {
-    return rng_to_float((uint32_t)rng_key(stream, i, k));
-}
+static float number(uint64_t stream, uint64_t i, uint64_t k) { return rng_to_float((uint32_t)rng_key(stream, i, k)); }
 
 /* Cells of equal solid angle over the sphere: rows in z, columns in angle. */
 static size_t cell_of(vec3 d) {
@@ -27,8 +25,7 @@ static size_t cell_of(vec3 d) {
 }
 
 /* Integrates a density over every cell by `side` x `side` midpoints. */
-static void integrate(double (*pdf)(const void *user, vec3 d), const void *user, int side,
-                      double *expected) {
+static void integrate(double (*pdf)(const void *user, vec3 d), const void *user, int side, double *expected) {
     for (int row = 0; row < ROWS; row++) {
         for (int column = 0; column < COLUMNS; column++) {
             double sum = 0.0;
@@ -86,9 +83,7 @@ static double light_density(const void *user, vec3 d) {
         return 0.0;
     const struct world_triangle *t = &b->world.triangle[hit.triangle];
     float facing = -vec3_dot(t->normal, d);
-    return facing > 0.0f
-               ? (double)lights_pdf_segment(b->world.lights, t->segment, hit.distance_m, facing)
-               : 0.0;
+    return facing > 0.0f ? (double)lights_pdf_segment(b->world.lights, t->segment, hit.distance_m, facing) : 0.0;
 }
 
 static void check_emitters(void) {
@@ -119,9 +114,7 @@ static void check_emitters(void) {
     box_release(&b);
 }
 
-static double environment_density(const void *user, vec3 d) {
-    return (double)lights_pdf_environment(user, d);
-}
+static double environment_density(const void *user, vec3 d) { return (double)lights_pdf_environment(user, d); }
 
 /* A map of patches, about 32 around; where there is a reach, half of the directions are closed. */
 static void check_environment(uint32_t width, uint32_t height, bool has_reach) {

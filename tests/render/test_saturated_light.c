@@ -80,9 +80,7 @@ static void test_polished_wood(struct parallel *pool) {
     scene_release(&scene);
 }
 
-static vec3 look_at_window(int frame) {
-    return (vec3){1.0f + 2.0f * fmodf((float)frame * 0.618f, 1.0f), 2.0f, 0.0f};
-}
+static vec3 look_at_window(int frame) { return (vec3){1.0f + 2.0f * fmodf((float)frame * 0.618f, 1.0f), 2.0f, 0.0f}; }
 
 /* Mean of the map where photographs look out. */
 static float seen_sky(const struct environment *e) {
@@ -143,7 +141,8 @@ static void test_pair(struct parallel *pool) {
     add_quad(&scene.mesh, 4, (vec3){0, 0, 0}, (vec3){4, 0, 0}, (vec3){0, 3, 0});
     add_quad(&scene.mesh, 4, (vec3){0, 0, 3}, (vec3){0, 3, 0}, (vec3){4, 0, 0});
     for (int i = 0; i < 2; i++)
-        add_quad(&scene.mesh, lamp[i], (vec3){1.5f + 0.5f * (float)i, 2.9f, 1.0f}, (vec3){0.45f, 0, 0}, (vec3){0, 0, 1});
+        add_quad(&scene.mesh, lamp[i], (vec3){1.5f + 0.5f * (float)i, 2.9f, 1.0f}, (vec3){0.45f, 0, 0},
+                 (vec3){0, 0, 1});
     other_lamp = 5;
     photograph_mesh(&scene, lamp_radiance, NULL, look_anywhere, pool);
     other_lamp = LAMP;
@@ -191,7 +190,8 @@ static void test_bar(struct parallel *pool) {
     wall_color[LAMP] = rgb_gray(0.8f);
     photograph_mesh(&scene, rgb_gray(0.0f), &sky, look_at_window, pool);
     struct scene dark = {.photograph = scene.photograph, .photograph_count = 2 * FRAMES / 3};
-    struct scene bright = {.photograph = scene.photograph + 2 * FRAMES / 3, .photograph_count = FRAMES - 2 * FRAMES / 3};
+    struct scene bright = {.photograph = scene.photograph + 2 * FRAMES / 3,
+                           .photograph_count = FRAMES - 2 * FRAMES / 3};
     saturate(&dark, CLIP);
     saturate(&bright, 0.0625f);
     struct reconstruction r;

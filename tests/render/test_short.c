@@ -50,7 +50,7 @@ static void test_busy_machine(struct scene *scene, const char *json) {
 
 static void test_limit(struct scene *scene) {
     struct settings s = shell_settings("{\"texture_size\":256,\"report_samples\":16,\"gather_samples\":128,"
-                                      "\"time_limit_sec\":1}");
+                                       "\"time_limit_sec\":1}");
     struct shell shell = {.polls_until_stop = -1, .sec_a_look = SLOW_SEC};
     struct reconstruction r;
     CHECK(shell_run(scene, &s, 0, &shell, &r) == STATUS_OK);
@@ -62,7 +62,8 @@ static void test_limit(struct scene *scene) {
     const cJSON *view = cJSON_GetArrayItem(cJSON_GetObjectItem(r.report, "views"), 0);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(view, "samples")) == 1.0);
     CHECK(cJSON_IsFalse(cJSON_GetObjectItem(limit, "kept")));
-    CHECK_THAT(strstr(r.left_out, "100 % of refine's observations") && strstr(r.left_out, "in place of time_limit_sec=1"),
+    CHECK_THAT(strstr(r.left_out, "100 % of refine's observations") &&
+                   strstr(r.left_out, "in place of time_limit_sec=1"),
                "%s", r.left_out);
     CHECK_STRING(shell.warned, r.left_out);
     for (int64_t wall = 0; wall < LAMP; wall++)

@@ -32,9 +32,23 @@ static void write_outputs(const char *dir, const struct reconstruction *r) {
     for (size_t i = 0; i < r->held_out_count; i++)
         comparison[i] = (struct export_comparison){r->held_out[i].name, &r->held_out[i].photograph,
                                                    &r->held_out[i].render, r->held_out[i].camera};
-    struct export_input in = {"room", &r->scene->mesh, &r->segments, &r->atlas, &r->inverse, &r->materials,
-                              r->fused.count, r->fused.spread, r->is_emitter, &r->environment.map,
-                              &r->environment.confidence, r->held_out_count, comparison, r->report, {0.0f, 1.0f, 0.0f}, true, NULL};
+    struct export_input in = {"room",
+                              &r->scene->mesh,
+                              &r->segments,
+                              &r->atlas,
+                              &r->inverse,
+                              &r->materials,
+                              r->fused.count,
+                              r->fused.spread,
+                              r->is_emitter,
+                              &r->environment.map,
+                              &r->environment.confidence,
+                              r->held_out_count,
+                              comparison,
+                              r->report,
+                              {0.0f, 1.0f, 0.0f},
+                              true,
+                              NULL};
     CHECK_THAT(export_outputs(dir, &in, NULL, NULL, &err) == STATUS_OK, "%s", err.message);
 }
 
@@ -70,7 +84,8 @@ static void test_relight(const struct reconstruction *r, struct parallel *pool) 
     static float pixel[16 * 8 * 3];
     for (int i = 0; i < 16 * 8; i++)
         pixel[3 * i] = 5.0f;
-    struct image sky = {.width = 16, .height = 8, .channel_count = 3, .channel = (char[3][64]){"R", "G", "B"}, .pixel = pixel};
+    struct image sky = {
+        .width = 16, .height = 8, .channel_count = 3, .channel = (char[3][64]){"R", "G", "B"}, .pixel = pixel};
     CHECK(image_write_exr(red, &sky, IMAGE_FLOAT, false, &err) == STATUS_OK);
     s.environment = red;
     s.lights = false;

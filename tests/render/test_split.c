@@ -33,17 +33,11 @@ static int64_t plain_floor(int column, int row) {
     return FLOOR;
 }
 
-static int64_t screen(int column, int row) {
-    return column >= 4 && column < 12 && row >= 3 && row < 9 ? LAMP : WALL;
-}
+static int64_t screen(int column, int row) { return column >= 4 && column < 12 && row >= 3 && row < 9 ? LAMP : WALL; }
 
-static int64_t tiles(int column, int row) {
-    return row == 0 ? WALL : (column / 3 + row / 3) % 2 ? WHITE : BLACK;
-}
+static int64_t tiles(int column, int row) { return row == 0 ? WALL : (column / 3 + row / 3) % 2 ? WHITE : BLACK; }
 
-static int64_t window(int column, int row) {
-    return column >= 6 && column < 10 && row >= 8 && row < 11 ? -1 : WALL;
-}
+static int64_t window(int column, int row) { return column >= 6 && column < 10 && row >= 8 && row < 11 ? -1 : WALL; }
 
 /* The room of small_room.h, its floor and the wall at z = 0 in cells, the lamp left out where that wall holds it. */
 static void make_room(struct mesh *m, paint_function *paint, bool has_lamp) {
@@ -77,7 +71,7 @@ static void join_wall(struct mesh *m) {
 
 static enum status reconstruct(struct scene *scene, int threads, struct reconstruction *r) {
     struct settings s = shell_settings("{\"texture_size\":96,\"iterations\":2,\"report_samples\":1,"
-                                      "\"gather_samples\":32,\"texels_per_iteration\":64}");
+                                       "\"gather_samples\":32,\"texels_per_iteration\":64}");
     struct shell shell = {.polls_until_stop = -1};
     enum status status = shell_run(scene, &s, threads, &shell, r);
     shell_release(&shell);

@@ -20,14 +20,10 @@ static void make_sky(struct image *sky, float sun) {
         sky->pixel[3 * SUN_ROW * SKY_WIDTH + c] = sun;
 }
 
-static float sun_theta(void) {
-    return (float)latlong_polar(SKY_HEIGHT, SUN_ROW);
-}
+static float sun_theta(void) { return (float)latlong_polar(SKY_HEIGHT, SUN_ROW); }
 
 /* Of a surface that faces it. */
-static float sun_irradiance(void) {
-    return SUN_RADIANCE * (float)latlong_pixel_angle(SKY_WIDTH, SKY_HEIGHT, SUN_ROW);
-}
+static float sun_irradiance(void) { return SUN_RADIANCE * (float)latlong_pixel_angle(SKY_WIDTH, SKY_HEIGHT, SUN_ROW); }
 
 /* Mean base colour of the floor's texels that the sun lights. */
 static rgb color_of_patch(const struct reconstruction *r) {

@@ -66,7 +66,7 @@ struct client {
     int fd;
     struct buf text;
     long long last_id;
-    long next_step; /* that is due */
+    long next_step;  /* that is due */
     long drop_after; /* bytes until its connection breaks off; negative: never */
 };
 
@@ -84,15 +84,15 @@ static unsigned draw(unsigned limit) {
 }
 
 static void open_client(struct client *c) {
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port),
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    struct sockaddr_in to = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     c->fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (connect(c->fd, (struct sockaddr *)&to, sizeof to) != 0) {
         perror("connect");
         exit(1);
     }
-    char *head = mem_printf("GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\nLast-Event-ID: %lld\r\n\r\n",
-                            job, c->last_id);
+    char *head = mem_printf("GET /v1/jobs/%lld/events HTTP/1.1\r\nHost: localhost\r\nLast-Event-ID: %lld\r\n\r\n", job,
+                            c->last_id);
     rig_send(c->fd, head, strlen(head));
     mem_free(head);
     struct epoll_event event = {.events = EPOLLIN, .data.ptr = c};
@@ -248,10 +248,11 @@ int main(void) {
     keep_pace(to, from, clients, paced, &median, &late);
     double took = storm(to, from, clients, paced, stormy);
     long busy_kib = command(to, from, "m");
-    printf("%d clients: %.1f MiB before, %.1f MiB idle, %.1f MiB after; events after %.1f ms (median), %.1f ms (99 %%); "
-           "storm: %ld events in %.0f s over %ld connections\n",
-           clients, (double)empty_kib / 1024, (double)idle_kib / 1024, (double)busy_kib / 1024, median * 1e3,
-           late * 1e3, delivered, took, connection_count);
+    printf(
+        "%d clients: %.1f MiB before, %.1f MiB idle, %.1f MiB after; events after %.1f ms (median), %.1f ms (99 %%); "
+        "storm: %ld events in %.0f s over %ld connections\n",
+        clients, (double)empty_kib / 1024, (double)idle_kib / 1024, (double)busy_kib / 1024, median * 1e3, late * 1e3,
+        delivered, took, connection_count);
     figure("event streams: clients", clients, 1000, "higher");
     figure("event streams: ms until a client has an event, 99 %", late * 1e3, 100, "lower");
     figure("event streams: MiB of the process, all idle", (double)idle_kib / 1024, 60, "lower");

@@ -64,7 +64,8 @@ static int64_t make_output(struct rig *rig) {
     memset(hex, '0', 64);
     hex[64] = '\0';
     rig_must(store_output_put(rig->store, job, attempt, EVENT_OUTPUT, "large", OUTPUT_BYTES, hex,
-                              "application/octet-stream", &err), &err, "store_output_put");
+                              "application/octet-stream", &err),
+             &err, "store_output_put");
     mem_free(path);
     mem_free(dir);
     return job;
@@ -91,12 +92,13 @@ static void attack(struct slow *s, const struct rig *rig, enum kind kind, int64_
         break;
     case PART:
         text = mem_printf("PATCH %s HTTP/1.1\r\nHost: localhost\r\nTus-Resumable: 1.0.0\r\nUpload-Offset: 0\r\n"
-                          "Content-Type: application/offset+octet-stream\r\nContent-Length: 100000\r\n\r\n", upload);
+                          "Content-Type: application/offset+octet-stream\r\nContent-Length: 100000\r\n\r\n",
+                          upload);
         break;
-    default:
-        text = mem_printf("GET /v1/jobs/%lld/outputs/large HTTP/1.1\r\nHost: localhost\r\n\r\n", (long long)job);
+    default: text = mem_printf("GET /v1/jobs/%lld/outputs/large HTTP/1.1\r\nHost: localhost\r\n\r\n", (long long)job);
     }
-    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(listener_port(rig->listener)),
+    struct sockaddr_in to = {.sin_family = AF_INET,
+                             .sin_port = htons(listener_port(rig->listener)),
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     *s = (struct slow){.fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0), .kind = kind};
     if (kind == READER)
@@ -201,7 +203,8 @@ int main(void) {
     CHECK_THAT(worst > 0 && worst < 1 << 20, "%ld bytes wait in the kernel for one reader", worst);
     figure("MiB that wait in the kernel for slow readers", (double)unsent / (1 << 20), 100, "lower");
     figure("slow clients still open after 60 s", open, 0, "lower");
-    figure("seconds until the last slow client is closed", fmax(fmax(last[0], last[1]), fmax(last[2], last[3])), 10, "lower");
+    figure("seconds until the last slow client is closed", fmax(fmax(last[0], last[1]), fmax(last[2], last[3])), 10,
+           "lower");
     figure("a good client's 99th percentile beside them, ms", 1e3 * good.latency[good.count * 99 / 100], 50, "lower");
     figure("the same, median, ms", 1e3 * good.latency[good.count / 2], 50, "lower");
     mem_free(good.latency);

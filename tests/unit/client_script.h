@@ -30,7 +30,7 @@ struct script {
     size_t count, done; /* done is read by the other thread after it waited for the client */
     int listener, port;
     pthread_t thread;
-    int hanging[2]; /* a pipe: a byte when the script hangs */
+    int hanging[2];                    /* a pipe: a byte when the script hangs */
     char body_sha256[SHA256_HEX_SIZE]; /* of the last request's body */
 };
 
@@ -44,12 +44,13 @@ static inline void add_step(struct script *s, const char *reply, const char *a, 
 }
 
 /* A reply with a body; more headers go before ("ETag: x\r\n" or ""). */
-static inline void add_reply(struct script *s, const char *code, const char *headers, const char *body,
-                      const char *a, const char *b, const char *c) {
-    const char *type = body[0] == '{' ? code[0] >= '4' ? "application/problem+json" : "application/json"
-                                      : "application/octet-stream";
+static inline void add_reply(struct script *s, const char *code, const char *headers, const char *body, const char *a,
+                             const char *b, const char *c) {
+    const char *type =
+        body[0] == '{' ? code[0] >= '4' ? "application/problem+json" : "application/json" : "application/octet-stream";
     char *reply = mem_printf("HTTP/1.1 %s\r\nContent-Type: %s\r\nContent-Length: %zu\r\n%s"
-                             "Connection: close\r\n\r\n%s", code, type, strlen(body), headers, body);
+                             "Connection: close\r\n\r\n%s",
+                             code, type, strlen(body), headers, body);
     add_step(s, reply, a, b, c);
     mem_free(reply);
 }
@@ -146,8 +147,8 @@ static inline void script_start(struct script *s) {
 
 /* Ends the server; every step must have been asked for, and nothing else. */
 static inline void script_end(struct script *s, const char *name) {
-    struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons((uint16_t)s->port),
-                                  .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    struct sockaddr_in address = {
+        .sin_family = AF_INET, .sin_port = htons((uint16_t)s->port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
     int fd = socket(AF_INET, SOCK_STREAM, 0);
     CHECK(connect(fd, (struct sockaddr *)&address, sizeof address) == 0);
     close(fd);
@@ -179,8 +180,8 @@ static inline int client(const struct script *s, const char *format, ...) {
     vsnprintf(words, sizeof words, format, args);
     va_end(args);
     const char *build = getenv("UNBAKE_BUILD");
-    char *command = mem_printf("%s/unbake %s --server http://127.0.0.1:%d/ >%s/out 2>%s/err",
-                               build ? build : "build", words, s->port, root, root);
+    char *command = mem_printf("%s/unbake %s --server http://127.0.0.1:%d/ >%s/out 2>%s/err", build ? build : "build",
+                               words, s->port, root, root);
     int status = system(command);
     mem_free(command);
     char *path = mem_printf("%s/out", root);
@@ -192,11 +193,10 @@ static inline int client(const struct script *s, const char *format, ...) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-#define CHECK_EXIT(found, wanted)                                                              \
-    do {                                                                                       \
-        int check_code = (found);                                                              \
-        CHECK_THAT(check_code == (wanted), "exit %d\nout: %s\nerr: %s", check_code, out_text,  \
-                   err_text);                                                                  \
+#define CHECK_EXIT(found, wanted)                                                                                      \
+    do {                                                                                                               \
+        int check_code = (found);                                                                                      \
+        CHECK_THAT(check_code == (wanted), "exit %d\nout: %s\nerr: %s", check_code, out_text, err_text);               \
     } while (0)
 #define CHECK_PART(text, part) CHECK_THAT(strstr(text, part) != NULL, "\"%s\" is not in: %s", part, text)
 

@@ -21,9 +21,14 @@ static struct error err;
 
 static char dir[64];
 static struct store *store;
-static const struct scheduler_config config = {.data_dir = dir, .worker_binary = "/proc/self/exe", .max_running = 1,
-                                               .thread_count = 1, .checkpoint_interval_sec = 60, .stop_grace_sec = 1,
-                                               .event_keep_sec = 3600, .checkpoint_keep_sec = 3600,
+static const struct scheduler_config config = {.data_dir = dir,
+                                               .worker_binary = "/proc/self/exe",
+                                               .max_running = 1,
+                                               .thread_count = 1,
+                                               .checkpoint_interval_sec = 60,
+                                               .stop_grace_sec = 1,
+                                               .event_keep_sec = 3600,
+                                               .checkpoint_keep_sec = 3600,
                                                .user_max_bytes = (uint64_t)1 << 40};
 
 /* --- faults --------------------------------------------------------------------------------------- */
@@ -77,7 +82,8 @@ static inline void log_catch(void) {
 
 static inline const char *log_read(void) {
     ssize_t got;
-    while (log_length < sizeof log_text - 1 && (got = read(log_fd, log_text + log_length, sizeof log_text - 1 - log_length)) > 0)
+    while (log_length < sizeof log_text - 1 &&
+           (got = read(log_fd, log_text + log_length, sizeof log_text - 1 - log_length)) > 0)
         log_length += (size_t)got;
     log_text[log_length] = '\0';
     return log_text;
@@ -113,8 +119,13 @@ static inline void rig_start(void) {
 }
 
 static inline int64_t add_job(const char *settings, const char *webhook) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = settings, .max_attempts = 3,
-                          .webhook_url = webhook, .webhook_secret = webhook ? "secret" : NULL};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "job",
+                          .labels = "{}",
+                          .settings = settings,
+                          .max_attempts = 3,
+                          .webhook_url = webhook,
+                          .webhook_secret = webhook ? "secret" : NULL};
     int64_t id = 0;
     bool replayed;
     OK(store_job_add(store, &new, 100000, &id, &replayed, &err));
@@ -148,8 +159,6 @@ static inline int count_descriptors(void) {
     return count;
 }
 
-static inline bool has_child(void) {
-    return waitpid(-1, NULL, WNOHANG) >= 0;
-}
+static inline bool has_child(void) { return waitpid(-1, NULL, WNOHANG) >= 0; }
 
 #endif

@@ -15,7 +15,7 @@
 #define PLANE_SIDE 32
 #define PLANE_TEXELS (PLANE_SIDE * PLANE_SIDE)
 #define PLANE_METRES 10.0f
-#define PLANE_PIXELS 16       /* of a photograph, along each side */
+#define PLANE_PIXELS 16                                             /* of a photograph, along each side */
 #define PLANE_MIDDLE (PLANE_SIDE / 2 * PLANE_SIDE + PLANE_SIDE / 2) /* the texel beyond the plane's middle */
 
 struct plane_rig {
@@ -23,7 +23,7 @@ struct plane_rig {
     struct reconstruction r;
     struct views views; /* of plane_rig_look on */
     struct parallel *pool;
-    size_t capacity;    /* photographs */
+    size_t capacity; /* photographs */
 };
 
 static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int threads) {
@@ -40,10 +40,15 @@ static inline void plane_rig_init(struct plane_rig *rig, size_t photographs, int
     rig->scene.mesh = (struct mesh){.vertex_count = 4, .position = position, .triangle_count = 2, .index = index};
     rig->scene.photograph = mem_calloc(photographs, sizeof *rig->scene.photograph);
     struct reconstruction *r = &rig->r;
-    *r = (struct reconstruction){.scene = &rig->scene, .pool = rig->pool, .is_emitter = is_emitter, .evidence = evidence};
+    *r = (struct reconstruction){
+        .scene = &rig->scene, .pool = rig->pool, .is_emitter = is_emitter, .evidence = evidence};
     r->segments = (struct segments){.count = 1, .of_triangle = of_triangle};
-    r->atlas = (struct atlas){.width = PLANE_SIDE, .height = PLANE_SIDE, .texels_per_metre = PLANE_SIDE / PLANE_METRES,
-                              .chart_count = 1, .chart_of_triangle = chart_of_triangle, .corner = corner};
+    r->atlas = (struct atlas){.width = PLANE_SIDE,
+                              .height = PLANE_SIDE,
+                              .texels_per_metre = PLANE_SIDE / PLANE_METRES,
+                              .chart_count = 1,
+                              .chart_of_triangle = chart_of_triangle,
+                              .corner = corner};
     inverse_uv_make(&r->inverse, &r->atlas, 2, rig->pool);
     materials_init(&r->materials, &r->inverse, 1, rgb_gray(0.5f), 0.5f, 0.0f);
     struct error err;
@@ -61,10 +66,14 @@ static inline struct photograph *plane_rig_add(struct plane_rig *rig, vec3 from,
     vec3 z = vec3_normalize(vec3_sub(to, from)), x = vec3_normalize(vec3_cross(z, (vec3){0.01f, 1.0f, 0.02f}));
     vec3 y = vec3_cross(z, x);
     struct rigid world_from_camera = {{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}, from};
-    *photo = (struct photograph){.is_hdr = true, .exposure_known = true, .exposure = 1.0f, .gain = {1, 1, 1},
-                                 .clip = INFINITY};
-    photo->camera = (struct camera){.width = PLANE_PIXELS, .height = PLANE_PIXELS, .fx = focal, .fy = focal,
-                                    .cx = PLANE_PIXELS / 2.0f, .cy = PLANE_PIXELS / 2.0f,
+    *photo = (struct photograph){
+        .is_hdr = true, .exposure_known = true, .exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY};
+    photo->camera = (struct camera){.width = PLANE_PIXELS,
+                                    .height = PLANE_PIXELS,
+                                    .fx = focal,
+                                    .fy = focal,
+                                    .cx = PLANE_PIXELS / 2.0f,
+                                    .cy = PLANE_PIXELS / 2.0f,
                                     .world_from_camera = world_from_camera,
                                     .camera_from_world = rigid_inverse(&world_from_camera)};
     photo->pixel = mem_array(PLANE_PIXELS * PLANE_PIXELS, sizeof *photo->pixel);

@@ -27,8 +27,7 @@ static inline bool room_load(const char *name, struct mesh *mesh) {
 }
 
 static inline struct mesh room_new(size_t vertex_count, size_t triangle_count) {
-    struct mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count,
-                        .face_count = triangle_count};
+    struct mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count, .face_count = triangle_count};
     mesh.position = mem_array(vertex_count, sizeof *mesh.position);
     mesh.index = mem_array(triangle_count, sizeof *mesh.index);
     mesh.face = mem_array(triangle_count, sizeof *mesh.face);
@@ -39,18 +38,16 @@ static inline struct mesh room_new(size_t vertex_count, size_t triangle_count) {
 
 /* A grid of columns x rows quads, each cut in two; place(user, u, v) gives the position for
  * u, v in [0, 1]. */
-static inline struct mesh room_grid(uint32_t columns, uint32_t rows,
-                                    vec3 (*place)(float u, float v, void *user), void *user) {
+static inline struct mesh room_grid(uint32_t columns, uint32_t rows, vec3 (*place)(float u, float v, void *user),
+                                    void *user) {
     struct mesh mesh = room_new((size_t)(columns + 1) * (rows + 1), (size_t)2 * columns * rows);
     for (uint32_t y = 0; y <= rows; y++)
         for (uint32_t x = 0; x <= columns; x++)
-            mesh.position[y * (columns + 1) + x] =
-                place((float)x / (float)columns, (float)y / (float)rows, user);
+            mesh.position[y * (columns + 1) + x] = place((float)x / (float)columns, (float)y / (float)rows, user);
     for (uint32_t y = 0; y < rows; y++)
         for (uint32_t x = 0; x < columns; x++) {
             uint32_t v = y * (columns + 1) + x, t = 2 * (y * columns + x);
-            const uint32_t two[2][3] = {{v, v + 1, v + columns + 2},
-                                        {v, v + columns + 2, v + columns + 1}};
+            const uint32_t two[2][3] = {{v, v + 1, v + columns + 2}, {v, v + columns + 2, v + columns + 1}};
             memcpy(mesh.index[t], two, sizeof two);
         }
     return mesh;

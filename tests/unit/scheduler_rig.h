@@ -122,9 +122,14 @@ static inline void *run_scheduler(void *argument) {
 }
 
 static inline void daemon_start(struct daemon *d, int max_running, const char *binary) {
-    struct scheduler_config config = {
-        .data_dir = d->dir, .worker_binary = binary, .max_running = max_running, .thread_count = 4,
-        .checkpoint_interval_sec = 60, .stop_grace_sec = 0.2, .attempt_events_max = RIG_EVENTS_MAX, .sandbox = false};
+    struct scheduler_config config = {.data_dir = d->dir,
+                                      .worker_binary = binary,
+                                      .max_running = max_running,
+                                      .thread_count = 4,
+                                      .checkpoint_interval_sec = 60,
+                                      .stop_grace_sec = 0.2,
+                                      .attempt_events_max = RIG_EVENTS_MAX,
+                                      .sandbox = false};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));
     CHECK(pthread_create(&d->thread, NULL, run_scheduler, d) == 0);
@@ -150,21 +155,17 @@ static inline void add_scene_of(struct daemon *d, const char *id, const char *ro
     mem_free(dir);
 }
 
-static inline void add_scene(struct daemon *d, const char *id, const char *role) {
-    add_scene_of(d, id, role, 0);
-}
+static inline void add_scene(struct daemon *d, const char *id, const char *role) { add_scene_of(d, id, role, 0); }
 
 /* 0 when the store refuses because the scene has been rejected by now. */
 static inline int64_t submit(struct daemon *d, const char *scene, const char *role) {
     char *settings = mem_printf("{\"role\":\"%s\"}", role);
-    struct job_new new = {.scene_id = scene, .name = role, .labels = "{}", .settings = settings,
-                          .max_attempts = 2};
+    struct job_new new = {.scene_id = scene, .name = role, .labels = "{}", .settings = settings, .max_attempts = 2};
     int64_t id = 0;
     bool replayed;
     enum status status = store_job_add(d->store, &new, 1000, &id, &replayed, &err);
-    CHECK_THAT(status == STATUS_OK ||
-                   (status == STATUS_CONFLICT && strstr(err.message, "was rejected") != NULL),
-               "%s", err.message);
+    CHECK_THAT(status == STATUS_OK || (status == STATUS_CONFLICT && strstr(err.message, "was rejected") != NULL), "%s",
+               err.message);
     scheduler_wake(d->scheduler);
     mem_free(settings);
     return id;
@@ -202,8 +203,7 @@ static inline bool wait_for_scene(struct daemon *d, const char *id, enum scene_s
 static inline void expect(struct daemon *d, int64_t id, enum job_state state, int attempt, const char *reason,
                           const char *hint) {
     struct job job;
-    CHECK_THAT(wait_for(d, id, state, NULL), "job %lld is not %s", (long long)id,
-               job_state_name(state));
+    CHECK_THAT(wait_for(d, id, state, NULL), "job %lld is not %s", (long long)id, job_state_name(state));
     OK(store_job_get(d->store, id, &job, &err));
     CHECK_THAT(job.attempt == attempt, "job \"%s\": attempt %d", job.name, job.attempt);
     CHECK_THAT(strstr(job.reason, reason) != NULL, "job \"%s\": \"%s\"", job.name, job.reason);

@@ -36,8 +36,8 @@ static inline void add_ready_scene(struct store *store, const char *id) {
 }
 
 static inline int64_t add_job(struct store *store, const char *scene, int priority) {
-    struct job_new new = {.scene_id = scene, .name = "n", .labels = "{}", .settings = "{}",
-                          .priority = priority, .max_attempts = 2};
+    struct job_new new = {
+        .scene_id = scene, .name = "n", .labels = "{}", .settings = "{}", .priority = priority, .max_attempts = 2};
     int64_t id = 0;
     bool replayed;
     OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
@@ -47,8 +47,7 @@ static inline int64_t add_job(struct store *store, const char *scene, int priori
 
 static int64_t event_count;
 static char last_event[256];
-static inline void count_event(void *user, int64_t id, int64_t at_ms, int attempt,
-                               const char *type, const char *data) {
+static inline void count_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
     (void)user, (void)id, (void)at_ms, (void)attempt, (void)type;
     event_count++;
     snprintf(last_event, sizeof last_event, "%s", data);
@@ -66,8 +65,7 @@ struct replay {
     size_t count, progress_count;
 };
 
-static inline void replay_one(void *user, int64_t id, int64_t at_ms, int attempt,
-                              const char *type, const char *data) {
+static inline void replay_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
     struct replay *replay = user;
     (void)data;
     CHECK(id > replay->last && at_ms > 0 && attempt >= 0);

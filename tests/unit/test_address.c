@@ -19,10 +19,22 @@ static void check_texts(void) {
     static const struct {
         const char *text, *shown; /* NULL: refused */
     } cases[] = {
-        {"10.1.2.3", "10.1.2.3"}, {"10.1.2.3:80", "10.1.2.3"}, {"::ffff:10.1.2.3", "10.1.2.3"},
-        {"2001:DB8::1", "2001:db8::1"}, {"[2001:db8::1]", "2001:db8::1"}, {"[2001:db8::1]:443", "2001:db8::1"},
-        {"", NULL}, {"unknown", NULL}, {"_hidden", NULL}, {"10.1.2", NULL}, {"10.1.2.300", NULL}, {"[::1", NULL},
-        {"[::1]x", NULL}, {"[]", NULL}, {"1.2.3.4 ", NULL}, {"[10.1.2.3]x:1", NULL},
+        {"10.1.2.3", "10.1.2.3"},
+        {"10.1.2.3:80", "10.1.2.3"},
+        {"::ffff:10.1.2.3", "10.1.2.3"},
+        {"2001:DB8::1", "2001:db8::1"},
+        {"[2001:db8::1]", "2001:db8::1"},
+        {"[2001:db8::1]:443", "2001:db8::1"},
+        {"", NULL},
+        {"unknown", NULL},
+        {"_hidden", NULL},
+        {"10.1.2", NULL},
+        {"10.1.2.300", NULL},
+        {"[::1", NULL},
+        {"[::1]x", NULL},
+        {"[]", NULL},
+        {"1.2.3.4 ", NULL},
+        {"[10.1.2.3]x:1", NULL},
         {"0000:0000:0000:0000:0000:0000:0000:0000:0000:0000:0000", NULL},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -43,12 +55,13 @@ static void check_texts(void) {
 }
 
 static void check_nets(void) {
-    static const char *const bad[] = {"10.0.0.0/33", "::1/129", "10.0.0.0/", "10.0.0.0/x", "10.0.0.0/-1", "/8", "lab",
-                                      "10.0.0.1:80", "1.2.3.4/0008"};
+    static const char *const bad[] = {"10.0.0.0/33", "::1/129", "10.0.0.0/",   "10.0.0.0/x",  "10.0.0.0/-1",
+                                      "/8",          "lab",     "10.0.0.1:80", "1.2.3.4/0008"};
     struct proxies p;
     struct error err;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-        CHECK_THAT(proxies_parse(&p, bad[i], "Forwarded", &err) == STATUS_INPUT && strstr(err.message, bad[i]), "%s", bad[i]);
+        CHECK_THAT(proxies_parse(&p, bad[i], "Forwarded", &err) == STATUS_INPUT && strstr(err.message, bad[i]), "%s",
+                   bad[i]);
     CHECK(proxies_parse(&p, "", "X-Real-IP", &err) == STATUS_INPUT && strstr(err.message, "X-Real-IP"));
     CHECK(proxies_parse(&p, " 10.0.0.0/9,::1\t192.168.7.4, 2001:db8::/33", "x-forwarded-for", &err) == STATUS_OK);
     CHECK(p.count == 4 && strcmp(p.field, "X-Forwarded-For") == 0);
@@ -56,9 +69,17 @@ static void check_nets(void) {
         const char *text;
         bool is_trusted;
     } cases[] = {
-        {"10.127.255.255", true}, {"10.128.0.0", false}, {"11.0.0.0", false}, {"::1", true}, {"::2", false},
-        {"192.168.7.4", true}, {"192.168.7.5", false}, {"2001:db8:7fff::1", true}, {"2001:db8:8000::1", false},
-        {"::10.0.0.1", false}, {"::ffff:10.0.0.1", true},
+        {"10.127.255.255", true},
+        {"10.128.0.0", false},
+        {"11.0.0.0", false},
+        {"::1", true},
+        {"::2", false},
+        {"192.168.7.4", true},
+        {"192.168.7.5", false},
+        {"2001:db8:7fff::1", true},
+        {"2001:db8:8000::1", false},
+        {"::10.0.0.1", false},
+        {"::ffff:10.0.0.1", true},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct address a = at(cases[i].text);
@@ -95,14 +116,14 @@ static void check_request(const char *field, const char *peer, const char *const
 
 static void check_requests(void) {
     const char *x = "X-Forwarded-For", *f = "Forwarded";
-    REQUEST(x, "192.0.2.9", "192.0.2.9", "1.1.1.1");      /* anybody may say so */
+    REQUEST(x, "192.0.2.9", "192.0.2.9", "1.1.1.1"); /* anybody may say so */
     REQUEST(x, "10.0.0.1", "10.0.0.1", NULL);
     REQUEST(x, "10.0.0.1", "192.0.2.1", "192.0.2.1");
     REQUEST(x, "::1", "2001:db8::7", "2001:db8::7");
-    REQUEST(x, "10.0.0.1", "192.0.2.1", "1.1.1.1, 192.0.2.1");         /* the client's own word is on the left */
+    REQUEST(x, "10.0.0.1", "192.0.2.1", "1.1.1.1, 192.0.2.1"); /* the client's own word is on the left */
     REQUEST(x, "10.0.0.1", "192.0.2.1", "1.1.1.1, 192.0.2.1 , 10.0.0.2");
     REQUEST(x, "10.0.0.1", "192.0.2.1", "1.1.1.1", "192.0.2.1, 10.3.0.2", "10.0.0.2"); /* fields are one list */
-    REQUEST(x, "10.0.0.1", "10.0.0.3", "10.0.0.3, 10.0.0.2");           /* a client within the network */
+    REQUEST(x, "10.0.0.1", "10.0.0.3", "10.0.0.3, 10.0.0.2");                          /* a client within the network */
     REQUEST(x, "10.0.0.1", "10.0.0.1", "1.1.1.1, unknown");
     REQUEST(x, "10.0.0.1", "10.0.0.2", "1.1.1.1, , 10.0.0.2");
     REQUEST(x, "10.0.0.1", "10.0.0.1", "");

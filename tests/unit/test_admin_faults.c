@@ -22,9 +22,7 @@ static long calls;
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 
-static void revoked(void *user) {
-    (void)user;
-}
+static void revoked(void *user) { (void)user; }
 
 static enum status ask(const char *text) {
     cJSON *request = cJSON_Parse(text), *reply = NULL;
@@ -63,8 +61,8 @@ static void strike_all(const char *text, bool is_sql) {
 }
 
 static void strike_commands(void) {
-    static const char *const requests[] = {"{\"command\":\"token-add\",\"name\":\"ann\"}", "{\"command\":\"token-list\"}",
-                                           "{\"command\":\"backup\"}"};
+    static const char *const requests[] = {"{\"command\":\"token-add\",\"name\":\"ann\"}",
+                                           "{\"command\":\"token-list\"}", "{\"command\":\"backup\"}"};
     for (size_t i = 0; i < sizeof requests / sizeof *requests; i++) {
         strike_all(requests[i], true);
         strike_all(requests[i], false);
@@ -74,11 +72,14 @@ static void strike_commands(void) {
 }
 
 static void check_nonsense(void) {
-    static const char *const bad[] = {"{}", "{\"command\":7}", "{\"command\":\"dance\"}",
+    static const char *const bad[] = {"{}",
+                                      "{\"command\":7}",
+                                      "{\"command\":\"dance\"}",
                                       "{\"command\":\"token-add\",\"name\":7}",
                                       "{\"command\":\"token-add\",\"name\":\"ann\",\"role\":7}",
                                       "{\"command\":\"token-add\",\"name\":\"ann\",\"role\":\"king\"}",
-                                      "{\"command\":\"token-add\",\"name\":\"7up\"}", "{\"command\":\"token-revoke\",\"which\":7}"};
+                                      "{\"command\":\"token-add\",\"name\":\"7up\"}",
+                                      "{\"command\":\"token-revoke\",\"which\":7}"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK_THAT(ask(bad[i]) == STATUS_INPUT && *err.message, "%s: %s", bad[i], status_name(err.status));
     CHECK(ask("{\"command\":\"token-revoke\",\"which\":\"nobody\"}") == STATUS_NOT_FOUND && *err.message);

@@ -33,7 +33,7 @@ int archive_read_support_filter_zstd(struct archive *a) {
 
 struct item {
     const char *name;
-    char kind; /* 'f' file, 'd' folder, 'l' symbolic link, 'h' hard link, 'c' device */
+    char kind;           /* 'f' file, 'd' folder, 'l' symbolic link, 'h' hard link, 'c' device */
     const char *content; /* or the link's target */
 };
 
@@ -56,8 +56,10 @@ static char *pack(const char *name, enum packing packing, const struct item *ite
         struct archive_entry *e = archive_entry_new();
         archive_entry_set_pathname(e, item[i].name);
         archive_entry_set_perm(e, 04777);
-        archive_entry_set_filetype(e, item[i].kind == 'd' ? AE_IFDIR : item[i].kind == 'l' ? AE_IFLNK
-                                      : item[i].kind == 'c' ? AE_IFCHR : AE_IFREG);
+        archive_entry_set_filetype(e, item[i].kind == 'd'   ? AE_IFDIR
+                                      : item[i].kind == 'l' ? AE_IFLNK
+                                      : item[i].kind == 'c' ? AE_IFCHR
+                                                            : AE_IFREG);
         size_t length = item[i].kind == 'f' ? strlen(item[i].content) : 0;
         if (item[i].kind == 'l')
             archive_entry_set_symlink(e, item[i].content);
@@ -87,10 +89,13 @@ static void check_content(const char *dir, const char *name, const char *wanted)
 }
 
 static void test_good(void) {
-    static const struct item items[] = {
-        {"./", 'd', NULL}, {"./room/", 'd', NULL}, {"room/mesh.ply", 'f', "ply"},
-        {"room/images/gr\xc3\xbc\xc3\x9f-\xe6\x97\xa5.png", 'f', "pixels"}, {"room//a/./b", 'f', ""},
-        {"__MACOSX/room/._mesh.ply", 'f', "litter"}, {"room/.DS_Store", 'f', "litter"}};
+    static const struct item items[] = {{"./", 'd', NULL},
+                                        {"./room/", 'd', NULL},
+                                        {"room/mesh.ply", 'f', "ply"},
+                                        {"room/images/gr\xc3\xbc\xc3\x9f-\xe6\x97\xa5.png", 'f', "pixels"},
+                                        {"room//a/./b", 'f', ""},
+                                        {"__MACOSX/room/._mesh.ply", 'f', "litter"},
+                                        {"room/.DS_Store", 'f', "litter"}};
     static const char *const names[] = {"good.zip", "good.tar", "good.tgz", "good.tzst"};
     for (enum packing p = ZIP; p <= TAR_ZST; p++) {
         setlocale(LC_CTYPE, "C.UTF-8"); /* for the writer; the code under test sees to itself */
@@ -114,14 +119,14 @@ static void test_good(void) {
     }
 }
 
-static void refuse(const char *name, const char *path, const struct archive_limits *limits,
-                   enum status wanted, const char *sentence) {
+static void refuse(const char *name, const char *path, const struct archive_limits *limits, enum status wanted,
+                   const char *sentence) {
     char *dir = file_join(work, "refused");
     struct error err = {.message = ""};
     enum status status = archive_unpack(path, name, dir, limits, &err);
     CHECK_THAT(status == wanted, "%s: %s: %s", name, status_name(status), err.message);
-    CHECK_THAT((status == STATUS_INTERNAL || strstr(err.message, name)) && strstr(err.message, sentence), "%s wants \"%s\": %s", name,
-               sentence, err.message);
+    CHECK_THAT((status == STATUS_INTERNAL || strstr(err.message, name)) && strstr(err.message, sentence),
+               "%s wants \"%s\": %s", name, sentence, err.message);
     CHECK_THAT(access(dir, F_OK) != 0, "%s left something", name);
     file_remove_tree(dir, NULL);
     mem_free(dir);
@@ -168,8 +173,8 @@ static void test_hostile(void) {
         while (count < 3 && table[i].item[count].name)
             count++;
         size_t length = strlen(table[i].name);
-        char *path = pack(table[i].name, strcmp(table[i].name + length - 3, "zip") == 0 ? ZIP : TAR,
-                          table[i].item, count);
+        char *path =
+            pack(table[i].name, strcmp(table[i].name + length - 3, "zip") == 0 ? ZIP : TAR, table[i].item, count);
         refuse(table[i].name, path, &generous, STATUS_INPUT, table[i].sentence);
         mem_free(path);
     }

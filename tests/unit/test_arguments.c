@@ -33,10 +33,11 @@ static void check_numbers(void) {
         char *name, *text;
         bool is_good;
     } cases[] = {
-        {"--count", "2", true},      {"--count", "9", true},   {"--count", "1", false},
-        {"--count", "2.5", false},   {"--count", "", false},   {"--count", "3x", false},
-        {"--count", "nan", false},   {"--turn", "-2.5", true}, {"--turn", "1e9999", false},
-        {"--seed", "9007199254740991", true},
+        {"--count", "2", true},      {"--count", "9", true},
+        {"--count", "1", false},     {"--count", "2.5", false},
+        {"--count", "", false},      {"--count", "3x", false},
+        {"--count", "nan", false},   {"--turn", "-2.5", true},
+        {"--turn", "1e9999", false}, {"--seed", "9007199254740991", true},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         uint32_t count = 7;

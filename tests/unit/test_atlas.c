@@ -65,8 +65,7 @@ static void check_padding(const struct atlas *atlas, const uint32_t *map) {
                     close += other != NONE && other != chart;
                 }
         }
-    CHECK_THAT(close == 0, "%zu pairs of texels of two charts are nearer than %d texels", close,
-               ATLAS_PADDING);
+    CHECK_THAT(close == 0, "%zu pairs of texels of two charts are nearer than %d texels", close, ATLAS_PADDING);
 }
 
 /* No texel's centre may lie well inside two triangles. */
@@ -84,8 +83,7 @@ static void check_overlap(const struct atlas *atlas, size_t triangle_count) {
                 int left = 0, right = 0;
                 for (int i = 0; i < 3; i++) {
                     vec2 e = vec2_sub(c[(i + 1) % 3], c[i]);
-                    double side = (double)e.x * (y + 0.5 - (double)c[i].y) -
-                                  (double)e.y * (x + 0.5 - (double)c[i].x);
+                    double side = (double)e.x * (y + 0.5 - (double)c[i].y) - (double)e.y * (x + 0.5 - (double)c[i].x);
                     double inside = 0.03 * sqrt((double)e.x * (double)e.x + (double)e.y * (double)e.y);
                     left += side > inside;
                     right += side < -inside;
@@ -99,8 +97,7 @@ static void check_overlap(const struct atlas *atlas, size_t triangle_count) {
     mem_free(taken);
 }
 
-static void check_segments(const struct atlas *atlas, const struct mesh *mesh,
-                           const struct segments *segments) {
+static void check_segments(const struct atlas *atlas, const struct mesh *mesh, const struct segments *segments) {
     uint32_t *segment = mem_array(atlas->chart_count, sizeof *segment);
     memset(segment, 0xff, atlas->chart_count * sizeof *segment);
     size_t crossed = 0, empty = 0;
@@ -138,8 +135,7 @@ static double check_areas(const struct atlas *atlas, const struct mesh *mesh) {
 }
 
 /* Returns the ratio of areas. */
-static double check_atlas(const struct atlas *atlas, const struct mesh *mesh,
-                          const struct segments *segments) {
+static double check_atlas(const struct atlas *atlas, const struct mesh *mesh, const struct segments *segments) {
     size_t covered;
     uint32_t *map = chart_map(atlas, mesh->triangle_count, &covered);
     CHECK_NEAR(atlas->utilisation, (double)covered / ((double)atlas->width * atlas->height), 1e-9);
@@ -153,8 +149,7 @@ static double check_atlas(const struct atlas *atlas, const struct mesh *mesh,
 static void check_same(const struct atlas *a, const struct atlas *b, size_t triangle_count) {
     CHECK(a->texels_per_metre == b->texels_per_metre && a->chart_count == b->chart_count);
     CHECK(memcmp(a->corner, b->corner, triangle_count * sizeof *a->corner) == 0);
-    CHECK(memcmp(a->chart_of_triangle, b->chart_of_triangle,
-                 triangle_count * sizeof *a->chart_of_triangle) == 0);
+    CHECK(memcmp(a->chart_of_triangle, b->chart_of_triangle, triangle_count * sizeof *a->chart_of_triangle) == 0);
 }
 
 static void test_room(const char *name, uint32_t size, double utilisation, double area_ratio) {
@@ -202,8 +197,7 @@ static vec3 noisy_sheet(float u, float v, void *user) {
     return (vec3){4.0f * u, 4.0f * v, 0.02f * (float)(seed * 2654435761u >> 8) * 0x1p-24f};
 }
 
-static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, uint32_t rows,
-                       size_t most_charts) {
+static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, uint32_t rows, size_t most_charts) {
     static const uint32_t sizes[] = {37, 200, 1024};
     struct mesh mesh = room_grid(columns, rows, place, NULL);
     struct segments segments;
@@ -212,11 +206,10 @@ static void test_shape(vec3 (*place)(float, float, void *), uint32_t columns, ui
     CHECK(mesh_check(&mesh, "shape", NULL, &err) == STATUS_OK);
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         struct atlas atlas;
-        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, &err) == STATUS_OK, "%s",
-                   err.message);
+        CHECK_THAT(atlas_make(&atlas, &mesh, &segments, sizes[i], 0.0f, &err) == STATUS_OK, "%s", err.message);
         check_atlas(&atlas, &mesh, &segments);
-        CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u",
-                   atlas.chart_count, columns, rows, sizes[i]);
+        CHECK_THAT(atlas.chart_count <= most_charts, "%zu charts of %u x %u quads at %u", atlas.chart_count, columns,
+                   rows, sizes[i]);
         atlas_release(&atlas);
     }
     segments_release(&segments);

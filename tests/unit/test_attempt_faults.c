@@ -262,8 +262,8 @@ static bool has_usage(int64_t owner) {
 
 static void check_charge(void) {
     struct attempt a = {0};
-    struct job_new new = {.scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3,
-                          .owner_id = 5};
+    struct job_new new = {
+        .scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3, .owner_id = 5};
     int64_t id;
     bool replayed;
     OK(store_job_add(store, &new, 100000, &id, &replayed, &err));

@@ -8,8 +8,14 @@
 static void check_vectors(void) {
     static const struct {
         const char *text, *bytes;
-    } vectors[] = {{"", ""}, {"Zg==", "f"}, {"Zm8=", "fo"}, {"Zm9v", "foo"}, {"Zm9vYg==", "foob"}, {"Zm9vYmE=", "fooba"},
-                   {"Zm9vYmFy", "foobar"}, {"+/+/", "\xfb\xff\xbf"}};
+    } vectors[] = {{"", ""},
+                   {"Zg==", "f"},
+                   {"Zm8=", "fo"},
+                   {"Zm9v", "foo"},
+                   {"Zm9vYg==", "foob"},
+                   {"Zm9vYmE=", "fooba"},
+                   {"Zm9vYmFy", "foobar"},
+                   {"+/+/", "\xfb\xff\xbf"}};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
         char bytes[8];
         size_t used, length = strlen(vectors[i].bytes);
@@ -24,7 +30,8 @@ static void check_vectors(void) {
 }
 
 static void check_broken(void) {
-    static const char *const bad[] = {"Z", "Zg", "Zg=", "Zg===", "====", "Z===", "Zm9v!A==", "Zm=v", "Zm9vYmFyZm9v", "-_-_"};
+    static const char *const bad[] = {
+        "Z", "Zg", "Zg=", "Zg===", "====", "Z===", "Zm9v!A==", "Zm=v", "Zm9vYmFyZm9v", "-_-_"};
     char bytes[8];
     size_t used;
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)

@@ -46,8 +46,8 @@ static void check_kept(uint32_t count, uint32_t levels) {
             size_t found = 0;
             while (found < best.count && kept[found] != sorted[k].index)
                 found++;
-            CHECK_THAT(found < best.count, "%u items, order %d: number %zu of the best, %u, is not kept", count, (int)order,
-                       k, sorted[k].index);
+            CHECK_THAT(found < best.count, "%u items, order %d: number %zu of the best, %u, is not kept", count,
+                       (int)order, k, sorted[k].index);
             if (order == FORTH && count <= MOST)
                 CHECK(kept[k] == k);
         }

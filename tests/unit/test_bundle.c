@@ -18,11 +18,13 @@ static struct parallel *pool;
 #define LENS "\"w\":8,\"h\":6,\"fl_x\":7,\"fl_y\":7.5,\"cx\":4,\"cy\":3"
 #define FRAME(name) "{\"file_path\":\"" name "\"," POSE "}"
 #define THREE FRAME("a.exr") "," FRAME("./b.png") "," FRAME("c.exr")
-#define MESH "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n" \
-             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+#define MESH                                                                                                           \
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"                  \
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
 #define OBJ "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
-#define CLOUD "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n" \
-              "end_header\n0 0 0\n"
+#define CLOUD                                                                                                          \
+    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"                  \
+    "end_header\n0 0 0\n"
 
 static void put(const char *name, const char *text) {
     char *path = file_join(work, name);
@@ -43,8 +45,8 @@ static void put_picture(const char *name, uint32_t width, uint32_t height, float
     for (size_t i = 0; i < (size_t)width * height * 3; i++)
         image.pixel[i] = value;
     char *path = file_join(work, name);
-    CHECK((exr ? image_write_exr(path, &image, IMAGE_FLOAT, false, NULL)
-               : image_write_png(path, &image, 1.0f, NULL)) == STATUS_OK);
+    CHECK((exr ? image_write_exr(path, &image, IMAGE_FLOAT, false, NULL) : image_write_png(path, &image, 1.0f, NULL)) ==
+          STATUS_OK);
     mem_free(path);
     image_release(&image);
 }
@@ -109,13 +111,12 @@ static void test_good(void) {
 /* Puts an eXIf chunk behind the header of a PNG: turned by 90 degrees, 1/50 s, f/2, ISO 400. */
 static void add_exif(const char *name) {
     static const uint8_t tiff[] = {
-        'I', 'I', 42, 0, 8, 0, 0, 0,
-        2, 0, 0x12, 0x01, 3, 0, 1, 0, 0, 0, 6, 0, 0, 0,       /* Orientation */
-        0x69, 0x87, 4, 0, 1, 0, 0, 0, 38, 0, 0, 0, 0, 0, 0, 0, /* where the Exif directory is */
-        3, 0, 0x9a, 0x82, 5, 0, 1, 0, 0, 0, 80, 0, 0, 0,      /* ExposureTime */
-        0x9d, 0x82, 5, 0, 1, 0, 0, 0, 88, 0, 0, 0,            /* FNumber */
-        0x27, 0x88, 3, 0, 1, 0, 0, 0, 0x90, 0x01, 0, 0,       /* ISO */
-        0, 0, 0, 0, 1, 0, 0, 0, 50, 0, 0, 0, 2, 0, 0, 0, 1, 0, 0, 0};
+        'I',  'I',  42,   0,    8, 0, 0, 0, 2,    0,    0x12, 0x01, 3, 0, 1, 0, 0, 0, 6, 0, 0, 0, /* Orientation */
+        0x69, 0x87, 4,    0,    1, 0, 0, 0, 38,   0,    0,    0,    0, 0, 0, 0, /* where the Exif directory is */
+        3,    0,    0x9a, 0x82, 5, 0, 1, 0, 0,    0,    80,   0,    0, 0,       /* ExposureTime */
+        0x9d, 0x82, 5,    0,    1, 0, 0, 0, 88,   0,    0,    0,                /* FNumber */
+        0x27, 0x88, 3,    0,    1, 0, 0, 0, 0x90, 0x01, 0,    0,                /* ISO */
+        0,    0,    0,    0,    1, 0, 0, 0, 50,   0,    0,    0,    2, 0, 0, 0, 1, 0, 0, 0};
     uint8_t chunk[12 + sizeof tiff] = {0, 0, 0, sizeof tiff, 'e', 'X', 'I', 'f'};
     memcpy(chunk + 8, tiff, sizeof tiff);
     uint32_t sum = (uint32_t)crc32(0, chunk + 4, 4 + sizeof tiff);
@@ -194,9 +195,9 @@ static void test_variants(void) {
 #define MATRIX(rows) ONE_OF_THREE("{\"file_path\":\"d.exr\",\"transform_matrix\":" rows "}")
 
 struct bad {
-    const char *transforms;          /* NULL: the good one */
-    const char *file, *content;      /* another file to replace; content NULL: remove it */
-    const char *blamed, *sentence;   /* what a problem must say */
+    const char *transforms;        /* NULL: the good one */
+    const char *file, *content;    /* another file to replace; content NULL: remove it */
+    const char *blamed, *sentence; /* what a problem must say */
 };
 
 static const struct bad bad_bundles[] = {
@@ -205,8 +206,8 @@ static const struct bad bad_bundles[] = {
     {"[]", NULL, NULL, "transforms.json", "array \"frames\""},
     {"{\"frames\": 3}", NULL, NULL, "transforms.json", "array \"frames\""},
     {"{" LENS ",\"frames\":[]}", NULL, NULL, "transforms.json", "only 0 of its 0 frames"},
-    {"{" LENS ",\"frames\":[" FRAME("a.exr") "," FRAME("b.png") "," FRAME("x.png") "]}", NULL, NULL,
-     "transforms.json", "only 2 of its 3 frames"},
+    {"{" LENS ",\"frames\":[" FRAME("a.exr") "," FRAME("b.png") "," FRAME("x.png") "]}", NULL, NULL, "transforms.json",
+     "only 2 of its 3 frames"},
     {NULL, "mesh.ply", NULL, "mesh.ply", "no mesh"},
     {NULL, "mesh.ply", CLOUD, "mesh.ply", "point clouds"},
     {NULL, "second.ply", MESH, "second.ply", "two meshes: mesh.ply and second.ply"},
@@ -225,8 +226,10 @@ static const struct bad bad_bundles[] = {
     {"{\"w\":\"8\",\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "\"w\" must be a number"},
     {"{\"fl_x\":7,\"camera_angle_x\":60,\"frames\":[" THREE "]}", NULL, NULL, "transforms.json", "radians"},
     {"{\"fl_x\":7,\"cx\":5000,\"frames\":[" THREE "]}", NULL, NULL, "a.exr", "principal point"},
-    {"{\"w\":9,\"h\":6,\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "b.png", "8 x 6 pixels, but frames[1] says 9 x 6"},
-    {MATRIX("[[1,0,0,0],[0,1,0,0],[1,1,0,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "frames[0] (d.exr): transform_matrix is singular"},
+    {"{\"w\":9,\"h\":6,\"fl_x\":7,\"frames\":[" THREE "]}", NULL, NULL, "b.png",
+     "8 x 6 pixels, but frames[1] says 9 x 6"},
+    {MATRIX("[[1,0,0,0],[0,1,0,0],[1,1,0,0],[0,0,0,1]]"), NULL, NULL, "transforms.json",
+     "frames[0] (d.exr): transform_matrix is singular"},
     {MATRIX("[[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "singular"},
     {MATRIX("[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "mirrors"},
     {MATRIX("[[1,0,0,0],[0,2,0,0],[0,0,1,0],[0,0,0,1]]"), NULL, NULL, "transforms.json", "not a rotation"},
@@ -238,13 +241,15 @@ static const struct bad bad_bundles[] = {
     {MATRIX("7"), NULL, NULL, "transforms.json", "4 (or 3) rows of 4"},
     {ONE_OF_THREE("{" POSE "}"), NULL, NULL, "transforms.json", "frames[0]: no file_path"},
     {ONE_OF_THREE("7"), NULL, NULL, "transforms.json", "frames[0]: must be an object"},
-    {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," POSE "}"), NULL, NULL, "transforms.json", "file_path \"../../a.exr\" leads out"},
+    {ONE_OF_THREE("{\"file_path\":\"../../a.exr\"," POSE "}"), NULL, NULL, "transforms.json",
+     "file_path \"../../a.exr\" leads out"},
     {ONE_OF_THREE("{\"file_path\":\"\"," POSE "}"), NULL, NULL, "transforms.json", "file_path is empty"},
     {ONE_OF_THREE(FRAME("./a.exr")), NULL, NULL, "transforms.json", "frames[0] and frames[3] both name a.exr"},
     {ONE_OF_THREE(FRAME("c")), NULL, NULL, "transforms.json", "frames[0] and frames[2] both name c.exr"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"split\":\"dev\"}"), NULL, NULL, "transforms.json", "split must be"},
     {ONE_OF_THREE("{\"file_path\":\"d\"," POSE ",\"exposure\":-1}"), NULL, NULL, "transforms.json", "exposure is -1"},
-    {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE ",\"mask_path\":\"m.png\"}," FRAME("b.png") "," FRAME("c.exr") "]}",
+    {"{" LENS ",\"frames\":[{\"file_path\":\"a.exr\"," POSE
+     ",\"mask_path\":\"m.png\"}," FRAME("b.png") "," FRAME("c.exr") "]}",
      NULL, NULL, "m.png", "the mask is not in the bundle"},
     {"{" LENS ",\"test_filenames\":[\"a.exr\",\"b.png\",\"c.exr\"],\"frames\":[" THREE "]}", NULL, NULL,
      "transforms.json", "held out"},
@@ -353,7 +358,8 @@ static void test_colmap(void) {
     scene_release(&scene);
     cJSON_Delete(problems);
     put("sparse/cameras.txt", "1 PINHOLE 9 6 7 7.5 4 3\n");
-    CHECK(load(&scene, &problems, &err) == STATUS_INPUT && strstr(err.message, "8 x 6 pixels, but frames[1] says 9 x 6"));
+    CHECK(load(&scene, &problems, &err) == STATUS_INPUT &&
+          strstr(err.message, "8 x 6 pixels, but frames[1] says 9 x 6"));
     cJSON_Delete(problems);
     put("sparse/cameras.txt", "1 PINHOLE 8 6 7\n");
     CHECK(load(&scene, &problems, &err) == STATUS_INPUT && strstr(err.message, "sparse/cameras.txt, line 1"));
@@ -391,7 +397,8 @@ static void test_many(void) {
 /* A bundle in a folder of its own, unpacked beside what a Mac adds. */
 static void test_single_folder(void) {
     put_good();
-    char *outer = mem_printf("%s-outer", work), *inner = file_join(outer, "room"), *litter = file_join(outer, "__MACOSX");
+    char *outer = mem_printf("%s-outer", work), *inner = file_join(outer, "room"),
+         *litter = file_join(outer, "__MACOSX");
     CHECK(mkdir(outer, 0700) == 0 && rename(work, inner) == 0 && mkdir(litter, 0700) == 0);
     struct scene scene;
     struct error err;
@@ -421,8 +428,7 @@ static void test_archive(void) {
     cJSON *problems = cJSON_CreateArray();
     CHECK(system(command) == 0);
     CHECK_THAT(bundle_unpack(archive, dir, &limits, &err) == STATUS_OK, "%s", err.message);
-    CHECK_THAT(bundle_load(dir, NULL, &limits, pool, &scene, problems, &err) == STATUS_OK, "%s",
-               err.message);
+    CHECK_THAT(bundle_load(dir, NULL, &limits, pool, &scene, problems, &err) == STATUS_OK, "%s", err.message);
     CHECK(scene.photograph_count == 3);
     scene_release(&scene);
     file_remove_tree(dir, NULL);
@@ -445,8 +451,7 @@ static bool is_inside(const struct image *truth, float x, float y, size_t id) {
     if (x < 1.0f || y < 1.0f || x >= (float)truth->width - 1.0f || y >= (float)truth->height - 1.0f)
         return false;
     for (int k = 0; k < 9; k++)
-        if (truth_pixel(truth, x + (float)(k % 3 - 1), y + (float)(k / 3 - 1))[id] !=
-            truth_pixel(truth, x, y)[id])
+        if (truth_pixel(truth, x + (float)(k % 3 - 1), y + (float)(k / 3 - 1))[id] != truth_pixel(truth, x, y)[id])
             return false;
     return true;
 }

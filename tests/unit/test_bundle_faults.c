@@ -22,11 +22,12 @@ static struct error err;
 
 #define POSE "1 0 0 0.5 0 1 0 0.5 0 0 1 -2 0 0 0 1"
 #define MATRIX "\"transform_matrix\":[[1,0,0,0.5],[0,1,0,0.5],[0,0,1,2],[0,0,0,1]]"
-#define CLOUD "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
+#define CLOUD                                                                                                          \
+    "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
 #define OBJ "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-#define GLTF                                                                                                        \
-    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"room.bin\"}],\"bufferViews\":"       \
-    "[{\"buffer\":0,\"byteLength\":36}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,"        \
+#define GLTF                                                                                                           \
+    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"room.bin\"}],\"bufferViews\":"         \
+    "[{\"buffer\":0,\"byteLength\":36}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,"          \
     "\"type\":\"VEC3\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}]}"
 
 enum kind { TRANSFORMS, INNER, COLMAP, REPLICA, SCANNET, KIND_COUNT };
@@ -76,8 +77,10 @@ static void put_bundle(enum kind kind) {
         put("room.gltf", GLTF);
         put("cloud.ply", CLOUD);
         put_picture("mask.png");
-        put("transforms.json", "{\"fl_x\":3,\"ply_file_path\":\"cloud.ply\",\"frames\":[{\"file_path\":\"images/0\"," MATRIX "},{\"file_path\":\"images/1\"," MATRIX
-                               ",\"mask_path\":\"mask.png\"},{\"file_path\":\"images/2.png\"," MATRIX "}]}");
+        put("transforms.json",
+            "{\"fl_x\":3,\"ply_file_path\":\"cloud.ply\",\"frames\":[{\"file_path\":\"images/0\"," MATRIX
+            "},{\"file_path\":\"images/1\"," MATRIX
+            ",\"mask_path\":\"mask.png\"},{\"file_path\":\"images/2.png\"," MATRIX "}]}");
     } else {
         put("room.obj", OBJ);
     }
@@ -115,8 +118,8 @@ static bool load_once(enum kind kind, long n, bool stays) {
     bool is_whole = status == STATUS_OK && scene.photograph_count == 3 && scene.mesh.triangle_count == 1;
     CHECK_THAT(is_whole || struck, "bundle %d: %s", kind, err.message);
     bool is_blamed = status == STATUS_IO || status == STATUS_NO_SPACE || status == STATUS_NOT_FOUND;
-    CHECK_THAT(is_whole || (is_blamed && *err.message),
-               "bundle %d, call %ld (%s), %d: %s: %s", kind, n, system_failed, stays, status_name(status), err.message);
+    CHECK_THAT(is_whole || (is_blamed && *err.message), "bundle %d, call %ld (%s), %d: %s: %s", kind, n, system_failed,
+               stays, status_name(status), err.message);
     scene_release(&scene);
     cJSON_Delete(problems);
     return struck;
@@ -180,7 +183,8 @@ static void check_mapping(void) {
     if (access(online, R_OK) != 0)
         printf("no %s here: no file that cannot be mapped\n", online);
     else
-        CHECK(mapping_open(&m, online, "online", "a text", &err) == STATUS_IO && strstr(err.message, "cannot map online"));
+        CHECK(mapping_open(&m, online, "online", "a text", &err) == STATUS_IO &&
+              strstr(err.message, "cannot map online"));
     CHECK(mapping_open(&m, dir, "folder", "a text", &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "folder is not a text: it is no regular file");
 }
@@ -195,7 +199,8 @@ static void check_blamed(enum kind kind, const char *file, const char *part) {
     bool found = false;
     cJSON_ArrayForEach(problem, problems) {
         const char *reason = cJSON_GetStringValue(cJSON_GetObjectItem(problem, "reason"));
-        found = found || (strcmp(cJSON_GetStringValue(cJSON_GetObjectItem(problem, "file")), file) == 0 && strstr(reason, part));
+        found = found ||
+                (strcmp(cJSON_GetStringValue(cJSON_GetObjectItem(problem, "file")), file) == 0 && strstr(reason, part));
     }
     char *text = json_text(problems);
     CHECK_THAT(found && !strstr(text, dir), "wanted is %s: %s, not %s", file, part, text);
@@ -243,7 +248,8 @@ static void check_folders(void) {
     struct bundle_limits limits = bundle_default_limits();
     CHECK(bundle_load(root, "./", &limits, pool, &scene, NULL, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "\"./\" is no name of a file");
-    put("transforms.json", "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/mask.png\"}]}");
+    put("transforms.json",
+        "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/mask.png\"}]}");
     check_blamed(TRANSFORMS, "room.bin/mask.png", "the mask is not in the bundle");
     put("room.gltf", "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"uri\":\"mask.png/room.bin\"}]}");
     check_blamed(TRANSFORMS, "room.gltf", "names the buffer mask.png/room.bin, which is not in the bundle");
@@ -260,7 +266,8 @@ static void check_content(void) {
     image_init(&image, 4, 3, 1, (const char *const[]){"Z"});
     OK(image_write_exr(path, &image, IMAGE_HALF, false, &err));
     image_release(&image);
-    put("transforms.json", "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/1.exr\"," MATRIX ",\"mask_path\":\"mask.png\"}]}");
+    put("transforms.json",
+        "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/1.exr\"," MATRIX ",\"mask_path\":\"mask.png\"}]}");
     check_blamed(TRANSFORMS, "images/1.exr", "the picture has no red, green and blue");
     mem_free(path);
 

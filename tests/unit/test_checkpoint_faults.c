@@ -168,7 +168,8 @@ static bool clear_once(bool is_sql, long n, bool stays) {
 }
 
 int main(void) {
-    static bool (*const all[])(bool is_sql, long n, bool stays) = {open_once, replace_once, save_once, load_once, clear_once};
+    static bool (*const all[])(bool is_sql, long n, bool stays) = {open_once, replace_once, save_once, load_once,
+                                                                   clear_once};
     snprintf(dir, sizeof dir, "%s/unbake-test-checkpoint-XXXXXX", check_fast_dir());
     if (!mkdtemp(dir))
         return 1;

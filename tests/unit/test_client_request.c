@@ -80,13 +80,15 @@ static void test_refusals(void) {
 
 static void test_watch(void) {
     struct script s = {0};
-    add_step(&s, SNAPSHOT "id: 6\nevent: progress\ndata: {\"stage\":\"refine\",\"done\":1,\"total\":4}\n\n"
-                          "id: 7\nevent: progress\ndata: {\"sta",
+    add_step(&s,
+             SNAPSHOT "id: 6\nevent: progress\ndata: {\"stage\":\"refine\",\"done\":1,\"total\":4}\n\n"
+                      "id: 7\nevent: progress\ndata: {\"sta",
              "GET /v1/jobs/7/events ", "Accept: text/event-stream", "!Last-Event-ID");
     add_step(&s, "", "Last-Event-ID: 6\r\n", NULL, NULL);
-    add_step(&s, STREAM "id: 6\nevent: state\ndata: {\"state\":\"running\",\"snapshot\":true}\n\n"
-                        "id: 7\nevent: log\ndata: {\"level\":\"warning\",\"message\":\"dim\"}\n\n"
-                        "id: 8\nevent: state\ndata: {\"state\":\"succeeded\"}\n\n",
+    add_step(&s,
+             STREAM "id: 6\nevent: state\ndata: {\"state\":\"running\",\"snapshot\":true}\n\n"
+                    "id: 7\nevent: log\ndata: {\"level\":\"warning\",\"message\":\"dim\"}\n\n"
+                    "id: 8\nevent: state\ndata: {\"state\":\"succeeded\"}\n\n",
              "Last-Event-ID: 6\r\n", NULL, NULL);
     add_reply(&s, "200 OK", "",
               "{\"id\":7,\"state\":\"succeeded\",\"started_at\":\"2024-01-01T00:00:00.000Z\","

@@ -41,7 +41,9 @@ static void test_sse(void) {
     check_stream("id: 7\nevent: state\ndata: {}\n\n: keepalive\n\ndata: a\ndata: b\n\n",
                  "state({})#7;message(a\nb)#7;");
     check_stream("data:x\r\ndata:  y\r\nid:1\r\n\r\ndata: z\r\r", "message(x\n y)#1;message(z)#1;");
-    check_stream("\xEF\xBB\xBF" "data: mark\n\n", "message(mark)#;");
+    check_stream("\xEF\xBB\xBF"
+                 "data: mark\n\n",
+                 "message(mark)#;");
     check_stream("event: lost\nid: 9\n\ndata\n\n", "message()#9;");
     check_stream("retry: 10\nunknown: 1\nid: 3\ndata: 1\n\nid: 4\ndata: cut", "message(1)#3;");
 
@@ -74,9 +76,9 @@ static void test_sse(void) {
 /* --- options.c, nearest.c ------------------------------------------------------------------ */
 
 static const struct client_option own[] = {
-    {"watch", 'w', OPTION_FLAG, NULL, ""},       {"name", 'n', OPTION_TEXT, "NAME", ""},
-    {"set", 's', OPTION_LIST, "KEY=VALUE", ""},  {"priority", 'p', OPTION_WHOLE, "N", ""},
-    {"retry", 0, OPTION_SECONDS, "SEC", ""},     {0},
+    {"watch", 'w', OPTION_FLAG, NULL, ""},      {"name", 'n', OPTION_TEXT, "NAME", ""},
+    {"set", 's', OPTION_LIST, "KEY=VALUE", ""}, {"priority", 'p', OPTION_WHOLE, "N", ""},
+    {"retry", 0, OPTION_SECONDS, "SEC", ""},    {0},
 };
 static const struct client_option shared[] = {{"json", 0, OPTION_FLAG, NULL, ""}, {0}};
 
@@ -90,8 +92,8 @@ static enum status parse(struct options *o, struct error *err, int count, const 
 static void test_options(void) {
     struct options o;
     struct error err;
-    static const char *const good[] = {"room", "-w", "--name=a b", "-sx=1", "--set", "y=2", "--json",
-                                       "-p", "-5", "--", "-file"};
+    static const char *const good[] = {"room",   "-w", "--name=a b", "-sx=1", "--set", "y=2",
+                                       "--json", "-p", "-5",         "--",    "-file"};
     CHECK(parse(&o, &err, 11, good) == STATUS_OK);
     CHECK(options_flag(&o, "watch") && options_flag(&o, "json") && !options_flag(&o, "retry"));
     CHECK_STRING(options_text(&o, "name", NULL), "a b");
@@ -224,17 +226,20 @@ static void test_bar(void) {
 static void test_text(void) {
     struct buf b;
     buf_init(&b, 1024);
-    terminal_clean(&b, "a\033[2Jb\n\xC2\x9B" "c \xFF \xE2\x82\xAC \xE2\x82");
+    terminal_clean(&b, "a\033[2Jb\n\xC2\x9B"
+                       "c \xFF \xE2\x82\xAC \xE2\x82");
     CHECK_STRING(buf_text(&b), "a?[2Jb?<U+009B>c ? \xE2\x82\xAC ??");
     buf_clear(&b);
     /* An override, an isolate, a separator, a mark, a soft hyphen, a tag; an emoji is left alone. */
     terminal_clean(&b, "\u202Egpj.exe \u2066 \u2028 \u200E \u00AD \U000E0041 \U0001F600");
     CHECK_STRING(buf_text(&b), "<U+202E>gpj.exe <U+2066> <U+2028> <U+200E> <U+00AD> <U+E0041> \U0001F600");
     buf_clear(&b);
-    buf_puts(&b, "\033[31m\xE2\x82\xAC" "bc\033[0m");
+    buf_puts(&b, "\033[31m\xE2\x82\xAC"
+                 "bc\033[0m");
     CHECK(text_columns(buf_text(&b)) == 3);
     text_cut(&b, 2);
-    CHECK_STRING(buf_text(&b), "\033[31m\xE2\x82\xAC" "b\033[0m");
+    CHECK_STRING(buf_text(&b), "\033[31m\xE2\x82\xAC"
+                               "b\033[0m");
     buf_release(&b);
 }
 
@@ -281,16 +286,16 @@ static void check_line(const struct client_view *v, size_t columns, bool bar, do
 static void test_view(void) {
     struct client_view v;
     view_init(&v, 17);
-    event(&v, "state", "{\"state\":\"queued\",\"snapshot\":true,\"progress\":0,\"eta_sec\":null,"
-                       "\"stage\":null,\"reason\":null,\"wanted\":\"run\"}");
+    event(&v, "state",
+          "{\"state\":\"queued\",\"snapshot\":true,\"progress\":0,\"eta_sec\":null,"
+          "\"stage\":null,\"reason\":null,\"wanted\":\"run\"}");
     check_line(&v, 80, true, 0.0, "job 17  queued");
     event(&v, "state", "{\"state\":\"running\",\"attempt\":1}");
     event(&v, "progress", "{\"stage\":\"refine\",\"done\":250,\"total\":1000,\"eta_sec\":75}");
     event(&v, "metric", "{\"series\":\"loss\",\"step\":250,\"value\":0.0123}");
     event(&v, "metric", "{\"series\":\"loss\",\"step\":251,\"value\":0.0122}");
     event(&v, "metric", "{\"series\":\"bad\",\"step\":251,\"value\":null}");
-    check_line(&v, 80, true, 5.0,
-               "job 17  refine  [#######------------------------]  25%  loss 0.01220  ETA 1m10s");
+    check_line(&v, 80, true, 5.0, "job 17  refine  [#######------------------------]  25%  loss 0.01220  ETA 1m10s");
     check_line(&v, 80, false, 500.0, "job 17  refine   25%  loss 0.01220");
     check_line(&v, 30, true, 0.0, "job 17  refine   25%  loss 0.0");
     /* More series than there is room for: the one reported longest ago gives way. */
@@ -309,8 +314,8 @@ static void test_view(void) {
 
 static void test_names(void) {
     static const char *const good[] = {"base_color.exr", "preview/x.png", "a/b/c", "a..b"};
-    static const char *const bad[] = {"", "/etc/passwd", "../x", "a/../b", "a//b", "a/", ".ssh/x",
-                                      "a/.", "a\\b", "a\nb", "..", "a\x7F"};
+    static const char *const bad[] = {"",       "/etc/passwd", "../x", "a/../b", "a//b", "a/",
+                                      ".ssh/x", "a/.",         "a\\b", "a\nb",   "..",   "a\x7F"};
     for (size_t i = 0; i < sizeof good / sizeof *good; i++)
         CHECK_THAT(get_name_is_safe(good[i]), "%s", good[i]);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)

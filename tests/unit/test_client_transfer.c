@@ -38,11 +38,10 @@ static void test_get_resumes(void) {
     struct script s = {0};
     clean();
     list_outputs(&s, "preview/a b.png", content);
-    add_step(&s, "HTTP/1.1 200 OK\r\nContent-Length: 20\r\n\r\n01234567",
-             "GET /v1/jobs/7/outputs/preview/a%20b.png ", "!Range:", NULL);
+    add_step(&s, "HTTP/1.1 200 OK\r\nContent-Length: 20\r\n\r\n01234567", "GET /v1/jobs/7/outputs/preview/a%20b.png ",
+             "!Range:", NULL);
     add_step(&s, "", "Range: bytes=8-\r\n", version, NULL);
-    add_reply(&s, "206 Partial", "Content-Range: bytes 8-19/20\r\n", content + 8, "Range: bytes=8-\r\n",
-              version, NULL);
+    add_reply(&s, "206 Partial", "Content-Range: bytes 8-19/20\r\n", content + 8, "Range: bytes=8-\r\n", version, NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "get 7 -o %s/got --json", root), 0);
     CHECK_PART(out_text, "\"action\":\"fetched\"");
@@ -60,8 +59,7 @@ static void test_get_resumes(void) {
     /* Half a file from an earlier run. */
     put_part("x.exr.part", "01234");
     list_outputs(&s, "x.exr", content);
-    add_reply(&s, "206 Partial", "Content-Range: bytes 5-19/20\r\n", content + 5, "Range: bytes=5-\r\n",
-              version, NULL);
+    add_reply(&s, "206 Partial", "Content-Range: bytes 5-19/20\r\n", content + 5, "Range: bytes=5-\r\n", version, NULL);
     script_start(&s);
     CHECK_EXIT(client(&s, "get 7 x.exr -o %s/got --json", root), 0);
     CHECK_PART(out_text, "\"action\":\"resumed\"");
@@ -158,12 +156,13 @@ static void test_submit(void) {
     add_reply(&s, "422 Invalid", "", UNKNOWN_SCENE, "POST /v1/jobs?dry_run=1 ", NULL, NULL);
     add_reply(&s, "200 OK", "", "{\"items\":[],\"next\":null}", "GET /v1/uploads?sha256=", NULL, NULL);
     /* "room" and 64 hex digits */
-    add_reply(&s, "201 Created", "Location: /v1/uploads/ab\r\n", "", "POST /v1/uploads ",
-              "Upload-Length: 3072\r\n", "Upload-Metadata: name cm9vbQ==,sha256 ");
+    add_reply(&s, "201 Created", "Location: /v1/uploads/ab\r\n", "", "POST /v1/uploads ", "Upload-Length: 3072\r\n",
+              "Upload-Metadata: name cm9vbQ==,sha256 ");
     add_step(&s, "", "PATCH /v1/uploads/ab ", "Upload-Offset: 0\r\n", "Content-Length: 3072\r\n"); /* broken off */
     add_reply(&s, "503 Busy", "Retry-After: 0\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
     add_reply(&s, "200 OK", "Upload-Offset: 1000\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
-    add_reply(&s, "409 Conflict", "", "{\"detail\":\"no\"}", "PATCH", "Upload-Offset: 1000\r\n", NULL); /* it moved on */
+    add_reply(&s, "409 Conflict", "", "{\"detail\":\"no\"}", "PATCH", "Upload-Offset: 1000\r\n",
+              NULL); /* it moved on */
     add_reply(&s, "200 OK", "Upload-Offset: 1500\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
     add_reply(&s, "204 No Content", "Upload-Offset: 2000\r\n", "", "PATCH", "Upload-Offset: 1500\r\n", NULL);
     add_reply(&s, "200 OK", "Upload-Offset: 2000\r\n", "", "HEAD /v1/uploads/ab ", NULL, NULL);
@@ -180,10 +179,13 @@ static void test_submit(void) {
     /* Another process had begun: this one finds it and goes on; that it is gone is no end either. */
     add_reply(&s, "404 Not Found", "", "{\"detail\":\"no\"}", "GET /v1/scenes/", NULL, NULL);
     add_reply(&s, "422 Invalid", "", UNKNOWN_SCENE, "POST /v1/jobs?dry_run=1 ", NULL, NULL);
-    add_reply(&s, "200 OK", "", "{\"items\":[{\"length\":3072,\"scene\":\"ab\",\"links\":{\"self\":\"/v1/uploads/1\"}},"
-              "{\"length\":3072,\"scene\":null,\"links\":{\"self\":\"/v1/uploads/2\"}}]}", "GET /v1/uploads?sha256=", NULL, NULL);
+    add_reply(&s, "200 OK", "",
+              "{\"items\":[{\"length\":3072,\"scene\":\"ab\",\"links\":{\"self\":\"/v1/uploads/1\"}},"
+              "{\"length\":3072,\"scene\":null,\"links\":{\"self\":\"/v1/uploads/2\"}}]}",
+              "GET /v1/uploads?sha256=", NULL, NULL);
     add_reply(&s, "200 OK", "Upload-Offset: 512\r\n", "", "HEAD /v1/uploads/2 ", NULL, NULL);
-    add_reply(&s, "404 Not Found", "", "{\"detail\":\"expired\"}", "PATCH /v1/uploads/2 ", "Upload-Offset: 512\r\n", NULL);
+    add_reply(&s, "404 Not Found", "", "{\"detail\":\"expired\"}", "PATCH /v1/uploads/2 ", "Upload-Offset: 512\r\n",
+              NULL);
     add_reply(&s, "200 OK", "", "{\"items\":[]}", "GET /v1/uploads?sha256=", NULL, NULL);
     add_reply(&s, "201 Created", "Location: /v1/uploads/3\r\n", "", "POST /v1/uploads ", NULL, NULL);
     add_reply(&s, "204 No Content", "Upload-Offset: 3072\r\n", "", "PATCH /v1/uploads/3", "Upload-Offset: 0\r\n", NULL);

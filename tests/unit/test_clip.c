@@ -31,8 +31,11 @@ static float shown(uint32_t x, uint32_t y) {
 
 static void take(void) {
     for (uint32_t t = 0; t < PHOTOGRAPHS; t++) {
-        photograph[t] = (struct photograph){.camera = {.width = SIDE, .height = SIDE}, .exposure = 1.0f,
-                                            .gain = {1.0f, 1.0f, 1.0f}, .is_hdr = t == 1, .is_test = t == 2,
+        photograph[t] = (struct photograph){.camera = {.width = SIDE, .height = SIDE},
+                                            .exposure = 1.0f,
+                                            .gain = {1.0f, 1.0f, 1.0f},
+                                            .is_hdr = t == 1,
+                                            .is_test = t == 2,
                                             .clip = t == 1 ? INFINITY : 1.0f};
         photograph[t].pixel = mem_array(PIXELS, sizeof *photograph[t].pixel);
         for (uint32_t i = 0; i < PIXELS; i++) {
@@ -81,7 +84,7 @@ int main(void) {
     CHECK_THAT(at.white > 0.95 && beyond.white > 0.98, "%g %g", at.white, beyond.white);
     CHECK(tiles.white == 0.0);
     CHECK_NEAR(tiles.mean, 0.05, 0.003);
-    CHECK(about.white < 0.05); /* a tenth is at the clip */
+    CHECK(about.white < 0.05);          /* a tenth is at the clip */
     CHECK_NEAR(about.mean, 0.79, 0.01); /* of those below it alone .767 */
     uint8_t *before = mem_array(PIXELS, 1);
     memcpy(before, photograph[0].saturated, PIXELS);

@@ -8,21 +8,19 @@
 #include "common/mem.h"
 #include "tests/check.h"
 
-#define CAMERAS                                                                                    \
-    "# Camera list\n7 PINHOLE 640 480 500 510 320 240\n\n3 OPENCV 640 480 500 510 321 241 -0.1 0.02 "      \
+#define CAMERAS                                                                                                        \
+    "# Camera list\n7 PINHOLE 640 480 500 510 320 240\n\n3 OPENCV 640 480 500 510 321 241 -0.1 0.02 "                  \
     "0.001 -0.002\r\n9 SIMPLE_RADIAL_FISHEYE 64 48 50 32 24 0.01\n"
 /* A turn by 90 degrees around x, twice as long as a unit: world y is the camera's forward. */
-#define IMAGES                                                                                     \
-    "# Image list\n# two lines each\n12 1.4142135623730951 -1.4142135623730951 0 0 1 2 3 7 b b.png\n"      \
+#define IMAGES                                                                                                         \
+    "# Image list\n# two lines each\n12 1.4142135623730951 -1.4142135623730951 0 0 1 2 3 7 b b.png\n"                  \
     "10.5 20.5 -1 30 40 5\n4 1 0 0 0 0 0 0 3 a.png\n\n5 1 0 0 0 -1 0 0 9 sub/c.jpg\r\n\n"
 
 static struct colmap_cameras *cameras_of(const char *text, struct error *err) {
     return colmap_cameras_parse(text, strlen(text), "cameras.txt", false, err);
 }
 
-static void put(struct buf *out, uint64_t value, size_t bytes) {
-    buf_append(out, &value, bytes);
-}
+static void put(struct buf *out, uint64_t value, size_t bytes) { buf_append(out, &value, bytes); }
 
 static void put_doubles(struct buf *out, const double *value, size_t count) {
     buf_append(out, value, count * sizeof *value);
@@ -42,7 +40,8 @@ static void make_cameras(struct buf *out) {
 static void make_images(struct buf *out) {
     buf_init(out, 4096);
     put(out, 3, 8);
-    put(out, 12, 4), put_doubles(out, (double[]){1.4142135623730951, -1.4142135623730951, 0, 0, 1, 2, 3}, 7), put(out, 7, 4);
+    put(out, 12, 4), put_doubles(out, (double[]){1.4142135623730951, -1.4142135623730951, 0, 0, 1, 2, 3}, 7),
+        put(out, 7, 4);
     buf_append(out, "b b.png", 8), put(out, 2, 8), put_doubles(out, (double[]){10.5, 20.5, 0, 30, 40, 0}, 6);
     put(out, 4, 4), put_doubles(out, (double[]){1, 0, 0, 0, 0, 0, 0}, 7), put(out, 3, 4);
     buf_append(out, "a.png", 6), put(out, 0, 8);
@@ -143,7 +142,8 @@ static void test_refused(void) {
     struct colmap_cameras *c;
     for (size_t i = 0; i < sizeof bad_cameras / sizeof *bad_cameras; i++) {
         c = cameras_of(bad_cameras[i][0], &err);
-        CHECK_THAT(!c && strstr(err.message, bad_cameras[i][1]) && strstr(err.message, "cameras.txt"), "%s", err.message);
+        CHECK_THAT(!c && strstr(err.message, bad_cameras[i][1]) && strstr(err.message, "cameras.txt"), "%s",
+                   err.message);
     }
     c = cameras_of(CAMERAS, &err);
     for (size_t i = 0; i < sizeof bad_images / sizeof *bad_images; i++) {
@@ -159,8 +159,8 @@ static void test_refused(void) {
     for (size_t i = 0; i < sizeof problems / sizeof *problems; i++) {
         struct findings f = {.problems = cJSON_CreateArray()};
         struct transforms t;
-        CHECK(colmap_images_parse(problems[i][0], strlen(problems[i][0]), "images.txt", false, c, "", &t, &f,
-                                  &err) == STATUS_OK);
+        CHECK(colmap_images_parse(problems[i][0], strlen(problems[i][0]), "images.txt", false, c, "", &t, &f, &err) ==
+              STATUS_OK);
         CHECK(f.problem_count == 1 && t.frame_count == 0 && t.named_count == 1);
         char *text = cJSON_PrintUnformatted(f.problems);
         CHECK_THAT(strstr(text, problems[i][1]) != NULL, "%s", text);
@@ -188,7 +188,8 @@ static void test_many(void) {
         put(&binary, 1, 4), put_doubles(&binary, (double[]){1, 0, 0, 0, 0, 0, 0}, 7), put(&binary, 7, 4);
         buf_append(&binary, "a.png", 6), put(&binary, 0, 8);
     }
-    CHECK(!colmap_cameras_parse(cameras.data, cameras.length, "cameras.txt", false, &err) && err.status == STATUS_INPUT);
+    CHECK(!colmap_cameras_parse(cameras.data, cameras.length, "cameras.txt", false, &err) &&
+          err.status == STATUS_INPUT);
     CHECK_STRING(err.message, "cameras.txt has more than 20000 cameras");
     struct colmap_cameras *c = cameras_of(CAMERAS, &err);
     CHECK(colmap_images_parse(text.data, text.length, "images.txt", false, c, "", &t, &f, &err) == STATUS_INPUT);

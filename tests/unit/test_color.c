@@ -12,9 +12,7 @@ static char scratch[] = "/tmp/unbake-test-color-XXXXXX";
 /* The columns: what Display P3's red, green and blue are in Rec. 709. */
 static const double p3[3][3] = {{1.2249, -0.2249, 0.0}, {-0.0420, 1.0420, 0.0}, {-0.0196, -0.0786, 1.0983}};
 
-static double srgb(double stored) {
-    return (double)image_srgb_to_linear((float)stored);
-}
+static double srgb(double stored) { return (double)image_srgb_to_linear((float)stored); }
 
 static bool read_bytes(const struct buf *file, struct image *image, struct image_info *info) {
     enum status status = image_read_memory("case", file->data, file->length, image, info, &err);
@@ -80,7 +78,8 @@ static void is_display_p3(const struct buf *file, double tolerance) {
         out[i] = p3[i][0] * in[0] + p3[i][1] * in[1] + p3[i][2] * in[2];
     pixel_is(&image, &info, 2, out[0], out[1], out[2], tolerance);
     pixel_is(&image, &info, 3, 1, 1, 1, tolerance);
-    CHECK(image.clipped && image.clipped[0] == 1 && image.clipped[1] == 2 && image.clipped[2] == 0 && image.clipped[3] == 7);
+    CHECK(image.clipped && image.clipped[0] == 1 && image.clipped[1] == 2 && image.clipped[2] == 0 &&
+          image.clipped[3] == 7);
     CHECK(info.outside_count == 2);
     CHECK_NEAR(info.clip, srgb(250 / 255.0), tolerance);
     image_release(&image);
@@ -115,8 +114,8 @@ static cmsInt32Number sample_p3(const cmsUInt16Number in[], cmsUInt16Number out[
 static void png_tables(void) {
     struct buf profile, file;
     cmsHPROFILE matrix = profile_rgb(profile_p3_xy, 0, "Display P3"), lab = cmsCreateLab4Profile(NULL);
-    cmsHTRANSFORM transform = cmsCreateTransform(matrix, TYPE_RGB_16, lab, TYPE_Lab_16, INTENT_RELATIVE_COLORIMETRIC,
-                                                 cmsFLAGS_NOOPTIMIZE);
+    cmsHTRANSFORM transform =
+        cmsCreateTransform(matrix, TYPE_RGB_16, lab, TYPE_Lab_16, INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE);
     cmsHPROFILE tables = profile_rgb(profile_p3_xy, 0, "Display P3");
     cmsSetPCS(tables, cmsSigLabData);
     cmsSetDeviceClass(tables, cmsSigInputClass);
@@ -146,7 +145,8 @@ static void profile_of_srgb(void) {
     profile_save(cmsCreate_sRGBProfile(), &profile);
     png_with(&profile, &file);
     if (read_bytes(&file, &image, &info)) {
-        CHECK(info.encoding == IMAGE_SRGB && info.color_space[0] == '\0' && info.color_warning[0] == '\0' && !image.clipped);
+        CHECK(info.encoding == IMAGE_SRGB && info.color_space[0] == '\0' && info.color_warning[0] == '\0' &&
+              !image.clipped);
         CHECK_NEAR(image.pixel[6], 200 / 255.0, 1e-7);
         image_release(&image);
     }
@@ -286,8 +286,8 @@ static void numbers(int chunks, uint32_t gama, const char *space, double r, doub
             middle[0] = srgb(middle[0]);
         CHECK_STRING(info.color_space, space);
         CHECK_STRING(info.color_warning, "");
-        CHECK_THAT(fabs(middle[0] - b) < 1e-3 && fabs(middle[1] - r) < 2e-3, "chunks %d: grey %g, red %g", chunks, middle[0],
-                   middle[1]);
+        CHECK_THAT(fabs(middle[0] - b) < 1e-3 && fabs(middle[1] - r) < 2e-3, "chunks %d: grey %g, red %g", chunks,
+                   middle[0], middle[1]);
         image_release(&image);
     }
     buf_release(&chrm);
@@ -318,7 +318,8 @@ static void cicp(uint8_t primaries, uint8_t transfer, uint8_t matrix, uint8_t ra
     png_end(&file, (const uint16_t[]){32768, 32768, 32768}, 3, 16);
     if (read_bytes(&file, &image, &info)) {
         CHECK_STRING(info.color_space, space);
-        CHECK_THAT(strstr(info.color_warning, warning) && !info.color_warning[0] == !*warning, "%s", info.color_warning);
+        CHECK_THAT(strstr(info.color_warning, warning) && !info.color_warning[0] == !*warning, "%s",
+                   info.color_warning);
         double found = (double)image.pixel[1];
         CHECK_NEAR(info.encoding == IMAGE_SRGB ? srgb(found) : found, middle, 1e-3);
         image_release(&image);
@@ -364,9 +365,17 @@ static void damaged_chunks(void) {
 
 /* What cameras write that have no profile: IFD0 -> Exif IFD -> interoperability IFD, index "R03". */
 static void adobe_rgb(void) {
-    static const char exif[] = "Exif\0\0II*\0\10\0\0\0" "\1\0" "\x69\x87\4\0\1\0\0\0\32\0\0\0" "\0\0\0\0"
-                               "\2\0" "\1\xa0\3\0\1\0\0\0\xff\xff\0\0" "\5\xa0\4\0\1\0\0\0\70\0\0\0" "\0\0\0\0"
-                               "\1\0" "\1\0\2\0\4\0\0\0R03\0" "\0\0\0\0";
+    static const char exif[] = "Exif\0\0II*\0\10\0\0\0"
+                               "\1\0"
+                               "\x69\x87\4\0\1\0\0\0\32\0\0\0"
+                               "\0\0\0\0"
+                               "\2\0"
+                               "\1\xa0\3\0\1\0\0\0\xff\xff\0\0"
+                               "\5\xa0\4\0\1\0\0\0\70\0\0\0"
+                               "\0\0\0\0"
+                               "\1\0"
+                               "\1\0\2\0\4\0\0\0R03\0"
+                               "\0\0\0\0";
     struct buf file, profile;
     struct image image;
     struct image_info info;

@@ -41,24 +41,26 @@ static void make_walls(void) {
 static void show_from(uint32_t from, uint32_t wall, float value, float mixing) {
     for (uint32_t i = wall * SIDE * SIDE + from; i < (wall + 1) * SIDE * SIDE; i++) {
         uint16_t half = image_half_from_float(value);
-        measured[i] = (struct measured){.weight = 1.0f, .value = {half, half, half},
-                                        .mixing = image_half_from_float(mixing)};
+        measured[i] =
+            (struct measured){.weight = 1.0f, .value = {half, half, half}, .mixing = image_half_from_float(mixing)};
     }
 }
 
-static void show(uint32_t wall, float value, float mixing) {
-    show_from(0, wall, value, mixing);
-}
+static void show(uint32_t wall, float value, float mixing) { show_from(0, wall, value, mixing); }
 
 int main(void) {
     make_walls();
     bool is_emitter[WALLS] = {[LAMP] = true};
-    struct scene scene = {.mesh = {.vertex_count = WALLS * 4, .position = position, .triangle_count = WALLS * 2,
-                                   .index = indices}};
+    struct scene scene = {
+        .mesh = {.vertex_count = WALLS * 4, .position = position, .triangle_count = WALLS * 2, .index = indices}};
     struct reconstruction r = {.scene = &scene, .pool = parallel_new(1), .is_emitter = is_emitter};
     r.segments = (struct segments){.count = WALLS, .of_triangle = of_triangle};
-    r.atlas = (struct atlas){.width = SIDE, .height = WALLS * SIDE, .texels_per_metre = SIDE, .chart_count = WALLS,
-                             .chart_of_triangle = of_triangle, .corner = corner};
+    r.atlas = (struct atlas){.width = SIDE,
+                             .height = WALLS * SIDE,
+                             .texels_per_metre = SIDE,
+                             .chart_count = WALLS,
+                             .chart_of_triangle = of_triangle,
+                             .corner = corner};
     inverse_uv_make(&r.inverse, &r.atlas, scene.mesh.triangle_count, r.pool);
     show(WHITE, 0.9f, 0.0f);
     show(MIXED, 3.0f, 20.0f);

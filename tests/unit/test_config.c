@@ -108,16 +108,15 @@ static void check_faults(void) {
     char *found = problems_of(&c, "max_runing = 2\n# fine\nthreads=x\n  max_attempts = 0 # low\n\n"
                                   "sandbox = maybe\nkeepalive_sec\nqueue_limit = 2.5\nqueue_limit = 7\n"
                                   "entirely_else = 1\r\nhead_timeout_sec = nan\nmax_running = 3\n");
-    CHECK_STRING(found,
-        ":1: unknown option \"max_runing\"; did you mean max_running?\n"
-        ":3: threads must be a whole number from 0 to 1024 threads, not \"x\"\n"
-        ":4: max_attempts must be a whole number from 1 to 100 attempts, not \"0\"\n"
-        ":6: sandbox must be yes or no, not \"maybe\"\n"
-        ":7: \"keepalive_sec\" is not of the form name = value\n"
-        ":8: queue_limit must be a whole number from 1 to 1000000 jobs, not \"2.5\"\n"
-        ":9: queue_limit is given twice\n"
-        ":10: unknown option \"entirely_else\"\n"
-        ":11: head_timeout_sec must be a number from 1 to 600 s, not \"nan\"\n");
+    CHECK_STRING(found, ":1: unknown option \"max_runing\"; did you mean max_running?\n"
+                        ":3: threads must be a whole number from 0 to 1024 threads, not \"x\"\n"
+                        ":4: max_attempts must be a whole number from 1 to 100 attempts, not \"0\"\n"
+                        ":6: sandbox must be yes or no, not \"maybe\"\n"
+                        ":7: \"keepalive_sec\" is not of the form name = value\n"
+                        ":8: queue_limit must be a whole number from 1 to 1000000 jobs, not \"2.5\"\n"
+                        ":9: queue_limit is given twice\n"
+                        ":10: unknown option \"entirely_else\"\n"
+                        ":11: head_timeout_sec must be a number from 1 to 600 s, not \"nan\"\n");
     CHECK(c.max_running == 3 && c.queue_limit == 1000);
     mem_free(found);
     struct buf problems;
@@ -146,15 +145,17 @@ static void check_faults(void) {
 static void check_lines(void) {
     struct config c;
     config_init(&c);
-    char *path = write_file("# a comment\nlisten = here\n\nmax_connections = 9\naccess = all\nlog_level = loud\nlog_format = xml\n"
-                            "data_dir =\ntls_certificate = a.pem\nproxy_field = Via\nmax_runing = 1\n");
+    char *path = write_file(
+        "# a comment\nlisten = here\n\nmax_connections = 9\naccess = all\nlog_level = loud\nlog_format = xml\n"
+        "data_dir =\ntls_certificate = a.pem\nproxy_field = Via\nmax_runing = 1\n");
     struct buf problems;
     struct error err;
     buf_init(&problems, 65536);
     CHECK(config_read(&c, path, &problems, &err) == STATUS_OK);
     config_check(&c, &problems);
-    static const char *const wanted[] = {":2: listen", ":4: max_streams", ":5: access", ":6: log_level", ":7: log_format",
-                                         ":8: data_dir", ":9: tls_certificate", ":10: proxy_field", ":11: unknown option"};
+    static const char *const wanted[] = {":2: listen",          ":4: max_streams",  ":5: access",
+                                         ":6: log_level",       ":7: log_format",   ":8: data_dir",
+                                         ":9: tls_certificate", ":10: proxy_field", ":11: unknown option"};
     size_t lines = 0;
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         char *start = mem_printf("%s%s", path, wanted[i]);
@@ -176,14 +177,23 @@ static void check_addresses(void) {
         int port; /* -1: refused */
         bool is_public;
     } cases[] = {
-        {"127.0.0.1:7117", "127.0.0.1", 7117, false}, {"127.8.9.1:0", "127.8.9.1", 0, false},
-        {"localhost:80", "127.0.0.1", 80, false},     {"[::1]:65535", "::1", 65535, false},
-        {"0.0.0.0:80", "0.0.0.0", 80, true}, {"[::]:80", "::", 80, true},
+        {"127.0.0.1:7117", "127.0.0.1", 7117, false},
+        {"127.8.9.1:0", "127.8.9.1", 0, false},
+        {"localhost:80", "127.0.0.1", 80, false},
+        {"[::1]:65535", "::1", 65535, false},
+        {"0.0.0.0:80", "0.0.0.0", 80, true},
+        {"[::]:80", "::", 80, true},
         {"192.168.1.1:80", "192.168.1.1", 80, true},
         {"[::ffff:127.0.0.1]:80", "::ffff:127.0.0.1", 80, true}, /* not known for loopback */
-        {"::1:80", "", -1, false},      {"127.0.0.1", "", -1, false},      {"127.0.0.1:65536", "", -1, false},
-        {"127.0.0.1:-1", "", -1, false}, {":80", "", -1, false},           {"127.1:80", "", -1, false},
-        {"127.0.0.1.evil.org:80", "", -1, false}, {"[127.0.0.1]:80", "", -1, false}, {"", "", -1, false},
+        {"::1:80", "", -1, false},
+        {"127.0.0.1", "", -1, false},
+        {"127.0.0.1:65536", "", -1, false},
+        {"127.0.0.1:-1", "", -1, false},
+        {":80", "", -1, false},
+        {"127.1:80", "", -1, false},
+        {"127.0.0.1.evil.org:80", "", -1, false},
+        {"[127.0.0.1]:80", "", -1, false},
+        {"", "", -1, false},
         {"127.0.0.1:8 ", "", -1, false},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -195,7 +205,8 @@ static void check_addresses(void) {
         if (cases[i].port < 0) {
             CHECK_THAT(status == STATUS_INPUT, "%s", cases[i].text);
         } else {
-            CHECK_THAT(status == STATUS_OK && port == cases[i].port && is_loopback != cases[i].is_public, "%s", cases[i].text);
+            CHECK_THAT(status == STATUS_OK && port == cases[i].port && is_loopback != cases[i].is_public, "%s",
+                       cases[i].text);
             CHECK_STRING(address, cases[i].address);
         }
     }
@@ -229,12 +240,17 @@ static void check_default_file(void) {
     const struct {
         const char *file, *option;
         int code, threads;
-    } cases[] = {{good, NULL, -1, 3}, {bad, NULL, EXIT_USAGE, 0}, {"/", NULL, EXIT_USAGE, 0}, {"/", "--data=x", -1, 0},
-                 {"/nowhere/unbaked.conf", NULL, -1, 0}, {NULL, NULL, -1, 0}};
+    } cases[] = {{good, NULL, -1, 3},
+                 {bad, NULL, EXIT_USAGE, 0},
+                 {"/", NULL, EXIT_USAGE, 0},
+                 {"/", "--data=x", -1, 0},
+                 {"/nowhere/unbaked.conf", NULL, -1, 0},
+                 {NULL, NULL, -1, 0}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char *option = cases[i].option ? mem_strdup(cases[i].option) : NULL, *argv[] = {"unbaked", option, NULL};
         struct invocation in;
-        CHECK_THAT(invocation_read(&in, option ? 2 : 1, argv, flags, cases[i].file) == cases[i].code, "%s", cases[i].file);
+        CHECK_THAT(invocation_read(&in, option ? 2 : 1, argv, flags, cases[i].file) == cases[i].code, "%s",
+                   cases[i].file);
         CHECK(in.config.threads == cases[i].threads);
         invocation_release(&in);
         mem_free(option);

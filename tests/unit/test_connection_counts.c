@@ -30,7 +30,8 @@ int main(void) {
     leave(c, "192.0.2.1");
     CHECK(enter(c, "192.0.2.1") == CONNECTION_OK);
     /* A /64 is one address. */
-    CHECK(enter(c, "2001:db8::1") == CONNECTION_OK && enter(c, "2001:db8::2") == CONNECTION_OK && enter(c, "2001:db8::3") == CONNECTION_OK);
+    CHECK(enter(c, "2001:db8::1") == CONNECTION_OK && enter(c, "2001:db8::2") == CONNECTION_OK &&
+          enter(c, "2001:db8::3") == CONNECTION_OK);
     CHECK(enter(c, "2001:db8::4") == CONNECTION_ADDRESS_FULL && enter(c, "2001:db8:0:1::4") == CONNECTION_OK);
     /* Seven so far. A proxy stands for many, loopback is the machine's own. */
     for (int i = 0; i < 11; i++)

@@ -48,9 +48,7 @@ static int meets(const struct coverage_triangle *t, int32_t cell, int32_t column
     return 1;
 }
 
-static int32_t pick(uint64_t a, uint64_t b, int32_t most) {
-    return (int32_t)(rng_key(a, b, 5) % (uint64_t)(most + 1));
-}
+static int32_t pick(uint64_t a, uint64_t b, int32_t most) { return (int32_t)(rng_key(a, b, 5) % (uint64_t)(most + 1)); }
 
 /* Corners in units; some on borders of cells, some flat or a point. */
 static struct coverage_triangle random_triangle(uint64_t i, int32_t cell) {
@@ -90,8 +88,7 @@ int main(void) {
                 mirrors += straight[y][x] != mirrored[y][SIZE - 1 - x];
             }
         CHECK_THAT(wrong == 0 && turns == 0 && mirrors == 0,
-                   "triangle %d: %d cells wrong, %d when turned, %d when mirrored", (int)i, wrong,
-                   turns, mirrors);
+                   "triangle %d: %d cells wrong, %d when turned, %d when mirrored", (int)i, wrong, turns, mirrors);
     }
     return check_result();
 }

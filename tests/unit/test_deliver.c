@@ -15,14 +15,37 @@ static bool is_public(const char *text) {
 }
 
 int main(void) {
-    static const char *const private[] = {
-        "0.0.0.0", "10.1.2.3", "100.64.0.1", "127.0.0.1", "127.255.255.254", "169.254.169.254", "172.16.0.1",
-        "172.31.255.255", "192.0.0.8", "192.0.2.1", "192.168.1.1", "198.18.0.1", "198.51.100.7", "203.0.113.9",
-        "224.0.0.1", "255.255.255.255", "::", "::1", "fe80::1", "fc00::1", "fd12:3456::1", "ff02::1",
-        "2001:db8::1", "::ffff:127.0.0.1", "::ffff:10.0.0.1", "64:ff9b::7f00:1", "2002:7f00:1::", "2001::1"};
-    static const char *const public[] = {"1.1.1.1", "8.8.8.8", "100.63.255.255", "100.128.0.1", "172.15.0.1",
-                                         "172.32.0.1", "192.167.1.1", "223.255.255.255", "2606:4700::1111",
-                                         "::ffff:8.8.8.8", "64:ff9b::808:808"};
+    static const char *const private[] = {"0.0.0.0",
+                                          "10.1.2.3",
+                                          "100.64.0.1",
+                                          "127.0.0.1",
+                                          "127.255.255.254",
+                                          "169.254.169.254",
+                                          "172.16.0.1",
+                                          "172.31.255.255",
+                                          "192.0.0.8",
+                                          "192.0.2.1",
+                                          "192.168.1.1",
+                                          "198.18.0.1",
+                                          "198.51.100.7",
+                                          "203.0.113.9",
+                                          "224.0.0.1",
+                                          "255.255.255.255",
+                                          "::",
+                                          "::1",
+                                          "fe80::1",
+                                          "fc00::1",
+                                          "fd12:3456::1",
+                                          "ff02::1",
+                                          "2001:db8::1",
+                                          "::ffff:127.0.0.1",
+                                          "::ffff:10.0.0.1",
+                                          "64:ff9b::7f00:1",
+                                          "2002:7f00:1::",
+                                          "2001::1"};
+    static const char *const public[] = {"1.1.1.1",         "8.8.8.8",        "100.63.255.255",  "100.128.0.1",
+                                         "172.15.0.1",      "172.32.0.1",     "192.167.1.1",     "223.255.255.255",
+                                         "2606:4700::1111", "::ffff:8.8.8.8", "64:ff9b::808:808"};
     for (size_t i = 0; i < sizeof private / sizeof *private; i++)
         CHECK_THAT(!is_public(private[i]), "%s", private[i]);
     for (size_t i = 0; i < sizeof public / sizeof *public; i++)
@@ -38,10 +61,26 @@ int main(void) {
     CHECK_STRING(url.host, "::1");
     CHECK_STRING(url.port, "8080");
     CHECK_STRING(url.target, "/a/b?c=d");
-    static const char *const bad[] = {
-        "", "ftp://x/", "file:///etc/passwd", "http://", "http:///x", "http://user@x/", "http://u:p@x/",
-        "http://x:0/", "http://x:65536/", "http://x:12345678/", "http://x:y/", "http://x y/", "http://x/\r\nHost: y",
-        "http://x/#f", "http://[::1/", "http://[x]/", "http://x\\y/", "HTTP://x/", "http://x:/", "http://[::1]x/"};
+    static const char *const bad[] = {"",
+                                      "ftp://x/",
+                                      "file:///etc/passwd",
+                                      "http://",
+                                      "http:///x",
+                                      "http://user@x/",
+                                      "http://u:p@x/",
+                                      "http://x:0/",
+                                      "http://x:65536/",
+                                      "http://x:12345678/",
+                                      "http://x:y/",
+                                      "http://x y/",
+                                      "http://x/\r\nHost: y",
+                                      "http://x/#f",
+                                      "http://[::1/",
+                                      "http://[x]/",
+                                      "http://x\\y/",
+                                      "HTTP://x/",
+                                      "http://x:/",
+                                      "http://[::1]x/"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         CHECK_THAT(url_parse(bad[i], &url, &err) == STATUS_INPUT, "%s", bad[i]);
 
@@ -49,9 +88,19 @@ int main(void) {
     CHECK(deliver_status("HTTP/1.0 404 Not Found\n") == 404);
     CHECK(deliver_status("HTTP/1.1 204\r\n") == 204);
     CHECK(deliver_status("HTTP/1.1 503") == 503);
-    static const char *const no_status[] = {"", "HTTP/1.1", "HTTP/1.1 ", "HTTP/1.1 20", "HTTP/1.1 -20 OK", "HTTP/1.1 2000 OK",
-                                            "HTTP/1.1 099 OK", "HTTP/1.1 200OK", "HTTP/1.1  200 OK", "HTTP/1.2 200 OK",
-                                            "HTTP/2 200", "http/1.1 200 OK", "ICY 200 OK"};
+    static const char *const no_status[] = {"",
+                                            "HTTP/1.1",
+                                            "HTTP/1.1 ",
+                                            "HTTP/1.1 20",
+                                            "HTTP/1.1 -20 OK",
+                                            "HTTP/1.1 2000 OK",
+                                            "HTTP/1.1 099 OK",
+                                            "HTTP/1.1 200OK",
+                                            "HTTP/1.1  200 OK",
+                                            "HTTP/1.2 200 OK",
+                                            "HTTP/2 200",
+                                            "http/1.1 200 OK",
+                                            "ICY 200 OK"};
     for (size_t i = 0; i < sizeof no_status / sizeof *no_status; i++)
         CHECK_THAT(deliver_status(no_status[i]) == 0, "%s", no_status[i]);
 

@@ -55,7 +55,8 @@ static void check(const char *scheme, const char *host, enum status wanted, cons
     struct order order = {.url = url, .secret = "secret", .body = "{}", .message_id = "msg_1", .allow_private = true};
     enum status status = task_deliver(&order, &(struct progress){.fd = -1}, &err);
     CHECK_THAT(status == wanted, "%s (%s): %s, %s", url, reply, status_name(status), err.message);
-    CHECK_THAT(wanted == STATUS_OK || (err.status == status && strstr(err.message, sentence)), "%s: %s", url, err.message);
+    CHECK_THAT(wanted == STATUS_OK || (err.status == status && strstr(err.message, sentence)), "%s: %s", url,
+               err.message);
 }
 
 int main(void) {

@@ -103,7 +103,8 @@ static bool start_once(long n, bool stays) {
         mem_free(left);
     }
     wait_for(&d);
-    CHECK_THAT(count_outbox() == 0 && count_sent() == 1 && is_trash_empty() && count_descriptors() == before, "call %ld", n);
+    CHECK_THAT(count_outbox() == 0 && count_sent() == 1 && is_trash_empty() && count_descriptors() == before,
+               "call %ld", n);
     return struck;
 }
 
@@ -122,8 +123,10 @@ static bool end_once(bool is_sql, long n, bool stays) {
     CHECK(d.id == 0 || (d.has_ended && d.delivered));
     CHECK_THAT(log_count("outcome cannot be recorded") <= 1, "call %ld: the log is filled", n);
     wait_for(&d);
-    CHECK_THAT(count_outbox() == 0 && count_sent() == 1, "call %ld of %s: it is sent again", n, is_sql ? "SQLite" : "the system");
-    CHECK_THAT(is_trash_empty() || log_count("/trash/message-") == 1, "call %ld: a folder is left, and nobody knows", n);
+    CHECK_THAT(count_outbox() == 0 && count_sent() == 1, "call %ld of %s: it is sent again", n,
+               is_sql ? "SQLite" : "the system");
+    CHECK_THAT(is_trash_empty() || log_count("/trash/message-") == 1, "call %ld: a folder is left, and nobody knows",
+               n);
     return struck;
 }
 

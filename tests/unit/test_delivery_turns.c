@@ -29,8 +29,14 @@ static int deliver(const char *dir) {
 }
 
 static int64_t add_job(struct daemon *d, int64_t owner, const char *url) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 1,
-                          .owner_id = owner, .webhook_url = url, .webhook_secret = "0123456789abcdef"};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .max_attempts = 1,
+                          .owner_id = owner,
+                          .webhook_url = url,
+                          .webhook_secret = "0123456789abcdef"};
     int64_t id = 0;
     bool replayed;
     OK(store_job_add(d->store, &new, 1000, &id, &replayed, &err));

@@ -26,8 +26,8 @@ static void test_room(struct parallel *pool) {
         vec3 direction = {r * cosf(turn), y, r * sinf(turn)};
         struct accel_hit hit;
         bool met = accel_intersect(room.world.accel, centre, direction, 0.0f, 10.0f, &hit);
-        CHECK_THAT(met, "a ray leaves the room at (%g, %g, %g)", (double)direction.x,
-                   (double)direction.y, (double)direction.z);
+        CHECK_THAT(met, "a ray leaves the room at (%g, %g, %g)", (double)direction.x, (double)direction.y,
+                   (double)direction.z);
         CHECK_THAT(!met || vec3_dot(mesh_cross(&room.mesh, hit.triangle), direction) < 0.0f,
                    "triangle %u shows its back", hit.triangle);
     }

@@ -12,7 +12,8 @@
 
 /* Two charts: the left half and the right one, with two columns between them that no triangle covers. */
 static uint32_t triangle[TEXELS], valid[TEXELS], chart_of_triangle[2] = {0, 1};
-static vec2 corner[2][3] = {{{0, 0}, {WIDTH / 2 - 1, 0}, {0, HEIGHT}}, {{WIDTH / 2 + 1, 0}, {WIDTH, 0}, {WIDTH, HEIGHT}}};
+static vec2 corner[2][3] = {{{0, 0}, {WIDTH / 2 - 1, 0}, {0, HEIGHT}},
+                            {{WIDTH / 2 + 1, 0}, {WIDTH, 0}, {WIDTH, HEIGHT}}};
 static const struct atlas atlas = {
     .width = WIDTH, .height = HEIGHT, .chart_count = 2, .chart_of_triangle = chart_of_triangle, .corner = corner};
 static struct inverse_uv inverse = {.width = WIDTH, .height = HEIGHT, .triangle = triangle, .valid = valid};
@@ -50,8 +51,7 @@ static void set(uint32_t x, uint32_t y, float value, float noise, float mixing) 
 static void measure(void) {
     for (uint32_t y = 0; y < HEIGHT; y++)
         for (uint32_t x = 0; x < WIDTH; x++)
-            set(x, y, truth(x, y) + DEVIATION * normal(1, y * WIDTH + x),
-                DEVIATION * normal(2, y * WIDTH + x), 0.0f);
+            set(x, y, truth(x, y) + DEVIATION * normal(1, y * WIDTH + x), DEVIATION * normal(2, y * WIDTH + x), 0.0f);
 }
 
 static void filter(void) {

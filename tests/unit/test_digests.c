@@ -64,8 +64,8 @@ int main(void) {
         fill((char)('a' + i));
         meanwhile = faults[i].meanwhile;
         enum status status = digests_hash(fd, NULL, &v, hex, &err);
-        CHECK_THAT(status == faults[i].status && strstr(err.message, faults[i].word), "%zu: %s, %s", i, status_name(status),
-                   err.message);
+        CHECK_THAT(status == faults[i].status && strstr(err.message, faults[i].word), "%zu: %s, %s", i,
+                   status_name(status), err.message);
         fill((char)('a' + i));
         meanwhile = INTERRUPT; /* which is no fault */
         CHECK_THAT(digests_hash(fd, NULL, &v, hex, &err) == STATUS_OK, "%s", err.message);

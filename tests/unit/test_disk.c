@@ -16,8 +16,8 @@ static int fault;
 
 int statvfs(const char *path, struct statvfs *info) {
     (void)path;
-    *info = (struct statvfs){.f_bsize = 4096, .f_frsize = 4096, .f_blocks = UINT32_MAX, .f_bfree = room / 4096,
-                             .f_bavail = room / 4096};
+    *info = (struct statvfs){
+        .f_bsize = 4096, .f_frsize = 4096, .f_blocks = UINT32_MAX, .f_bfree = room / 4096, .f_bavail = room / 4096};
     errno = fault;
     return fault ? -1 : 0;
 }

@@ -25,9 +25,7 @@ static rgb paint(void *user, vec3 place) {
     return rgb_mul(base_color, white_towards(vec3_normalize(vec3_sub(*from, place))));
 }
 
-static rgb paint_wrong(void *user, vec3 place) {
-    return rgb_scale(paint(user, place), 3.0f);
-}
+static rgb paint_wrong(void *user, vec3 place) { return rgb_scale(paint(user, place), 3.0f); }
 
 /* Stores what a photograph of that exposure and gain would, with a vignette. */
 static void expose(struct photograph *photo, float exposure, rgb gain) {
@@ -36,8 +34,8 @@ static void expose(struct photograph *photo, float exposure, rgb gain) {
     for (size_t i = 0; i < PLANE_PIXELS * PLANE_PIXELS; i++) {
         float falloff = photograph_falloff(photo, (float)(i % PLANE_PIXELS) + 0.5f, (float)(i / PLANE_PIXELS) + 0.5f);
         for (size_t c = 0; c < 3; c++)
-            photo->pixel[i][c] = image_half_from_float(image_float_from_half(photo->pixel[i][c]) * exposure * falloff *
-                                                       (&gain.r)[c]);
+            photo->pixel[i][c] =
+                image_half_from_float(image_float_from_half(photo->pixel[i][c]) * exposure * falloff * (&gain.r)[c]);
     }
 }
 
@@ -75,8 +73,13 @@ static void test_base_color(enum faults faults) {
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, to_light(), flux);
         probes.probe[i].light.noise = light_noise;
     }
-    struct divide divide = {.r = r, .views = &rig.views, .probes = &probes, .noise = &r->noise, .stride = 1,
-                            .typical = &typical, .highlight_samples = 4};
+    struct divide divide = {.r = r,
+                            .views = &rig.views,
+                            .probes = &probes,
+                            .noise = &r->noise,
+                            .stride = 1,
+                            .typical = &typical,
+                            .highlight_samples = 4};
     divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
     uint32_t texel = PLANE_MIDDLE;
     divide_texels(&divide, &texel, 1);
@@ -93,7 +96,8 @@ static void test_base_color(enum faults faults) {
     }
     /* White paint is Lambert's in divide_lambert but for its roughness, which is 1. */
     CHECK(divide_lambert(&divide, texel, &white));
-    float of_rough = bsdf_diffuse(1.0f, cosf(0.435f), 1.0f, to_light().z) / bsdf_diffuse(ROUGHNESS, cosf(0.435f), 1.0f, to_light().z);
+    float of_rough = bsdf_diffuse(1.0f, cosf(0.435f), 1.0f, to_light().z) /
+                     bsdf_diffuse(ROUGHNESS, cosf(0.435f), 1.0f, to_light().z);
     CHECK_NEAR(white.g, wanted_white.g * of_rough, 1e-4f);
     for (size_t i = 0; i < rig.scene.photograph_count; i++)
         rig.scene.photograph[i].mask = NULL;
@@ -109,8 +113,13 @@ static void test_nothing(void) {
     float typical = 0.5f;
     photograph_plane(&rig, NONE);
     probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
-    struct divide divide = {.r = &rig.r, .views = &rig.views, .probes = &probes, .noise = &rig.r.noise, .stride = 1,
-                            .typical = &typical, .highlight_samples = 4};
+    struct divide divide = {.r = &rig.r,
+                            .views = &rig.views,
+                            .probes = &probes,
+                            .noise = &rig.r.noise,
+                            .stride = 1,
+                            .typical = &typical,
+                            .highlight_samples = 4};
     divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
     uint32_t texel = PLANE_MIDDLE;
     divide_texels(&divide, &texel, 1);

@@ -15,9 +15,8 @@
 #include "tests/check.h"
 
 enum { BASE = 0, ROUGHNESS = 3, SPECULAR = 4, EMISSION = 5, OBJECT = 8, CHANNELS = 9 };
-static const char *const channels[CHANNELS] = {"base_color.R", "base_color.G", "base_color.B",
-                                               "roughness", "specular", "emission.R", "emission.G",
-                                               "emission.B", "object_id"};
+static const char *const channels[CHANNELS] = {"base_color.R", "base_color.G", "base_color.B", "roughness", "specular",
+                                               "emission.R",   "emission.G",   "emission.B",   "object_id"};
 
 /* A row of six pixels: objects 0 0 0 0 1 1. */
 static void test_score(void) {
@@ -34,11 +33,11 @@ static void test_score(void) {
         t[OBJECT] = i < 4 ? 0.0f : 1.0f;
     }
     float *f = found.pixel, *t = truth.pixel;
-    f[2 * CHANNELS + BASE] = 1.5f;            /* clamped to 1: off by 0.5 */
-    t[4 * CHANNELS + EMISSION] = 2.0f;        /* emits in truth alone */
-    t[5 * CHANNELS + EMISSION + 1] = 1.0f;    /* emits in both */
+    f[2 * CHANNELS + BASE] = 1.5f;         /* clamped to 1: off by 0.5 */
+    t[4 * CHANNELS + EMISSION] = 2.0f;     /* emits in truth alone */
+    t[5 * CHANNELS + EMISSION + 1] = 1.0f; /* emits in both */
     f[5 * CHANNELS + EMISSION + 1] = 3.0f;
-    f[0 * CHANNELS + EMISSION + 2] = 1.0f;    /* emits in ours alone */
+    f[0 * CHANNELS + EMISSION + 2] = 1.0f; /* emits in ours alone */
     const uint8_t plain = SCORE_PLAIN, both = SCORE_PLAIN | SCORE_SEEN;
     const uint8_t flags[6] = {both, both, both, plain, 0, 0};
     score_add(&score, &found, &truth, flags);
@@ -54,8 +53,7 @@ static void test_score(void) {
     CHECK(isinf(score_psnr_db(score.specular)));
     CHECK_NEAR(score_emission_iou(&score), 1.0 / 3.0, 1e-12);
     /* log 3, log 4 - log 2, log 2, squared, over 18 values */
-    CHECK_NEAR(score_mean(score.emission_log),
-               (log(3) * log(3) + log(2) * log(2) + log(2) * log(2)) / 18, 1e-7);
+    CHECK_NEAR(score_mean(score.emission_log), (log(3) * log(3) + log(2) * log(2) + log(2) * log(2)) / 18, 1e-7);
     struct score nothing = {0};
     CHECK(isnan(score_psnr_db(nothing.roughness)) && score_emission_iou(&nothing) == 1.0);
     image_release(&truth);
@@ -139,9 +137,23 @@ static void export_room(const char *dir, const struct room *room) {
     float *zero = mem_calloc(texels, sizeof *zero);
     bool is_emitter[ROOM_OBJECT_COUNT] = {false};
     cJSON *report = cJSON_CreateObject();
-    struct export_input in = {"room", &room->mesh, &room->segments, &room->atlas, &room->inverse,
-                              &room->materials, zero, zero, is_emitter, NULL, NULL, 0, NULL, report,
-                              {0.0f, 1.0f, 0.0f}, true, NULL};
+    struct export_input in = {"room",
+                              &room->mesh,
+                              &room->segments,
+                              &room->atlas,
+                              &room->inverse,
+                              &room->materials,
+                              zero,
+                              zero,
+                              is_emitter,
+                              NULL,
+                              NULL,
+                              0,
+                              NULL,
+                              report,
+                              {0.0f, 1.0f, 0.0f},
+                              true,
+                              NULL};
     enum status status = export_outputs(dir, &in, NULL, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     cJSON_Delete(report);
@@ -180,8 +192,7 @@ static void test_known(const char *dir, struct parallel *pool) {
     CHECK_THAT(score_psnr_db(v.score.roughness) > 50.0, "%g dB", score_psnr_db(v.score.roughness));
     CHECK_THAT(score_emission_iou(&v.score) > 0.95, "%g", score_emission_iou(&v.score));
     CHECK_THAT(v.msre < 0.1, "MSRE %g", v.msre);
-    CHECK_THAT(v.score.seen_pixels > v.score.plain_pixels / 10 &&
-                   v.score.seen_pixels < v.score.plain_pixels,
+    CHECK_THAT(v.score.seen_pixels > v.score.plain_pixels / 10 && v.score.seen_pixels < v.score.plain_pixels,
                "%zu of %zu", v.score.seen_pixels, v.score.plain_pixels); /* photographs are small */
 
     for (size_t i = 0; i < room.inverse.valid_count; i++)
@@ -227,7 +238,8 @@ static void test_picture(const char *dir, struct parallel *pool) {
     CHECK_NEAR(r.materials.emission[ROOM_CEILING_EMITTER].g, m->emission[ROOM_CEILING_EMITTER].g, 0.01);
     for (size_t i = 0; i < room.inverse.valid_count; i++) {
         uint32_t texel = room.inverse.valid[i], s = room.segments.of_triangle[room.inverse.triangle[texel]];
-        rgb wanted = materials_emission_of_texel(m, s, texel), found = materials_emission_of_texel(&r.materials, s, texel);
+        rgb wanted = materials_emission_of_texel(m, s, texel),
+            found = materials_emission_of_texel(&r.materials, s, texel);
         CHECK_NEAR(found.r, wanted.r, 2e-3f * wanted.r);
         CHECK_NEAR(found.g, wanted.g, 2e-3f * wanted.g);
         CHECK_NEAR(found.b, wanted.b, 2e-3f * wanted.b + 0.01f); /* its least is a share of a mean that is another */

@@ -23,8 +23,7 @@ struct announced {
 };
 
 /* The file is there, whole and under its final name, when it is announced. */
-static enum status hear(void *user, const char *type, const char *name, const char *content_type,
-                        struct error *err) {
+static enum status hear(void *user, const char *type, const char *name, const char *content_type, struct error *err) {
     struct announced *a = user;
     struct stat info;
     char *path = file_join(a->dir, name);
@@ -67,8 +66,7 @@ static void test_textures(const char *dir, const struct export_input *in) {
         float wanted = in->materials->base_color.texel[i][1];
         CHECK_NEAR(color.pixel[3 * i + 1], wanted, 1e-3f * wanted);
         CHECK_NEAR(roughness.pixel[3 * i], in->materials->roughness[s], 1e-3);
-        CHECK_NEAR(emission.pixel[3 * i + 2], in->materials->emission[s].b,
-                   1e-3f * in->materials->emission[s].b);
+        CHECK_NEAR(emission.pixel[3 * i + 2], in->materials->emission[s].b, 1e-3f * in->materials->emission[s].b);
         CHECK(confidence.pixel[2 * i] == in->confidence_count[i]);
     }
     CHECK_THAT(margin > in->inverse->valid_count / 20, "%zu texels of margin", margin);
@@ -109,8 +107,8 @@ static void test_comparison(void) {
     for (int i = 0; i < 30; i++)
         photograph.pixel[i] = render.pixel[i] = 2.0f;
     for (int c = 0; c < 3; c++) {
-        render.pixel[c] = 4.0f;      /* first pixel too bright */
-        render.pixel[3 + c] = 1.0f;  /* second too dark */
+        render.pixel[c] = 4.0f;     /* first pixel too bright */
+        render.pixel[3 + c] = 1.0f; /* second too dark */
         photograph.pixel[6 + c] = NAN;
     }
     struct export_comparison comparison = {"a", &photograph, &render, NULL};
@@ -187,8 +185,7 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
     CHECK(mesh.triangle_count == wanted->triangle_count && mesh.normal != NULL);
     for (size_t t = 0; t < mesh.triangle_count; t++)
         for (int k = 0; k < 3; k++)
-            CHECK(memcmp(&mesh.position[mesh.index[t][k]], &wanted->position[wanted->index[t][k]],
-                         sizeof(vec3)) == 0);
+            CHECK(memcmp(&mesh.position[mesh.index[t][k]], &wanted->position[wanted->index[t][k]], sizeof(vec3)) == 0);
     mesh_release(&mesh);
     mem_free(path);
 }
@@ -211,8 +208,8 @@ static void test_views(const char *dir, const struct camera *wanted) {
     CHECK(memcmp(camera.k, wanted->k, sizeof camera.k) == 0);
     CHECK(memcmp(camera.p, wanted->p, sizeof camera.p) == 0);
     for (int i = 0; i < 9; i++)
-        CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3],
-                   wanted->world_from_camera.rotation[i / 3][i % 3], 1e-6);
+        CHECK_NEAR(camera.world_from_camera.rotation[i / 3][i % 3], wanted->world_from_camera.rotation[i / 3][i % 3],
+                   1e-6);
     CHECK(camera.world_from_camera.translation.z == 3.0f);
     transforms_release(&transforms);
     cJSON_Delete(findings.problems);
@@ -238,8 +235,7 @@ static void test_environment(const char *dir, struct export_input *in, struct an
     CHECK(export_outputs(dir, in, hear, heard, &err) == STATUS_OK);
     CHECK(heard->outputs == 2 * outputs + 2 && heard->previews == 2 * previews + 1);
     read_back(dir, "environment.exr", &back);
-    CHECK(back.width == 8 && back.channel_count == 3 &&
-          memcmp(back.pixel, map.pixel, 32 * 3 * sizeof *map.pixel) == 0);
+    CHECK(back.width == 8 && back.channel_count == 3 && memcmp(back.pixel, map.pixel, 32 * 3 * sizeof *map.pixel) == 0);
     image_release(&back);
     read_back(dir, "environment_confidence.exr", &back);
     CHECK(back.pixel[0] == 2.0f && back.pixel[2 * 31] == 0.0f);
@@ -286,9 +282,17 @@ static void test_left_out(const char *dir, struct parallel *pool) {
     struct announced heard = {.dir = dir};
     char *path = file_join(dir, "report.json"), *old = file_join(dir, "scene.glb");
     CHECK(access(old, F_OK) == 0); /* of an earlier export into this folder */
-    struct export_input in = {.title = "strips", .has_materials = true, .mesh = &mesh, .segments = &segments, .atlas = &atlas,
-                              .inverse = &inverse, .materials = &materials, .confidence_count = zero,
-                              .confidence_spread = zero, .is_emitter = is_emitter, .report = report};
+    struct export_input in = {.title = "strips",
+                              .has_materials = true,
+                              .mesh = &mesh,
+                              .segments = &segments,
+                              .atlas = &atlas,
+                              .inverse = &inverse,
+                              .materials = &materials,
+                              .confidence_count = zero,
+                              .confidence_spread = zero,
+                              .is_emitter = is_emitter,
+                              .report = report};
     CHECK_THAT(export_outputs(dir, &in, hear, &heard, &err) == STATUS_OK, "%s", err.message);
     CHECK(access(old, F_OK) != 0);
     CHECK(json_read(path, 1 << 24, &written, &err) == STATUS_OK);
@@ -329,8 +333,14 @@ int main(void) {
     bool is_emitter[ROOM_OBJECT_COUNT] = {[ROOM_WALL_EMITTER] = true, [ROOM_CEILING_EMITTER] = true};
     struct image photograph;
     image_init_rgb(&photograph, 16, 12);
-    struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.5f,
-                            .k = {0.1f, -0.02f}, .p = {0.001f, 0.002f}};
+    struct camera camera = {.width = 16,
+                            .height = 12,
+                            .fx = 20.0f,
+                            .fy = 21.0f,
+                            .cx = 8.0f,
+                            .cy = 6.5f,
+                            .k = {0.1f, -0.02f},
+                            .p = {0.001f, 0.002f}};
     camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
     camera.camera_from_world = rigid_inverse(&camera.world_from_camera);
     struct export_comparison comparison = {"images/003.exr", &photograph, &photograph, &camera};
@@ -339,9 +349,23 @@ int main(void) {
                                "\"series\":{\"loss\":[[0,1],[1,0.5],[2,0.02]],\"one\":[[0,1]]},"
                                "\"views\":[{\"name\":\"a\",\"msre\":0.01}],\"settings\":{\"a\":1}}";
     CHECK(json_parse(text, strlen(text), "report", &report, &err) == STATUS_OK);
-    struct export_input in = {
-        "room <1> & \"2\"", &room.mesh, &room.segments, &room.atlas, &room.inverse, &room.materials,
-        NULL, NULL, is_emitter, NULL, NULL, 1, &comparison, report, {0.0f, 1.0f, 0.0f}, true, NULL};
+    struct export_input in = {"room <1> & \"2\"",
+                              &room.mesh,
+                              &room.segments,
+                              &room.atlas,
+                              &room.inverse,
+                              &room.materials,
+                              NULL,
+                              NULL,
+                              is_emitter,
+                              NULL,
+                              NULL,
+                              1,
+                              &comparison,
+                              report,
+                              {0.0f, 1.0f, 0.0f},
+                              true,
+                              NULL};
 
     struct announced heard = {.dir = dir};
     CHECK(export_preview(dir, &in, hear, &heard, &err) == STATUS_OK);

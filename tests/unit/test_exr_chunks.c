@@ -22,9 +22,7 @@ enum { WIDTH = 37, HEIGHT = 13, CHANNELS = 3, PIXELS = WIDTH * HEIGHT, ZIP_LEVEL
 
 #define RAW_MAX (PIXELS * CHANNELS * sizeof(float))
 
-static size_t raw_size(enum image_exr_type type) {
-    return (size_t)PIXELS * CHANNELS * (type == IMAGE_HALF ? 2 : 4);
-}
+static size_t raw_size(enum image_exr_type type) { return (size_t)PIXELS * CHANNELS * (type == IMAGE_HALF ? 2 : 4); }
 
 /* The chunk as EXR packs it: line by line, in each the channels in the order of their names. */
 static void pack(const struct image *image, enum image_exr_type type, uint8_t *out) {
@@ -51,7 +49,6 @@ static size_t deflate_chunk(const uint8_t *raw, size_t size, uint8_t *out, size_
     CHECK(compress2(out, &length, split, size, ZIP_LEVEL) == Z_OK);
     return length;
 }
-
 
 /* Noise, but for the first `quiet` values: more of these make the chunk smaller. */
 static void fill(struct image *image, uint64_t seed, size_t quiet) {
@@ -98,8 +95,8 @@ static void check_file(const struct image *image, enum image_exr_type type, bool
             wanted = image_float_from_half(image_half_from_float(wanted));
         wrong += back.pixel[i] != wanted;
     }
-    CHECK_THAT(wrong == 0, "deflated %zu of %zu, %s: %zu values are wrong", deflated_size, size, tiled ? "tiled" : "lines",
-               wrong);
+    CHECK_THAT(wrong == 0, "deflated %zu of %zu, %s: %zu values are wrong", deflated_size, size,
+               tiled ? "tiled" : "lines", wrong);
     image_release(&back);
 }
 

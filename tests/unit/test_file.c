@@ -69,8 +69,8 @@ static const struct step {
     enum status (*ask)(void);
     bool changes;
 } steps[] = {
-    {"replace", replace, true},    {"put_in_place", put_in_place, true},       {"read", read_it, false},
-    {"list", list_it, false},      {"look_how_full", look_how_full, false},
+    {"replace", replace, true}, {"put_in_place", put_in_place, true},    {"read", read_it, false},
+    {"list", list_it, false},   {"look_how_full", look_how_full, false},
 };
 
 static void strike(const struct step *step) {
@@ -81,7 +81,8 @@ static void strike(const struct step *step) {
         enum status status = step->ask();
         struck = system_faults_lift();
         enum status wanted = !struck ? STATUS_OK : system_fault == ENOSPC ? STATUS_NO_SPACE : STATUS_IO;
-        CHECK_THAT(status == wanted, "%s, call %ld: %s, not %s", step->name, n, status_name(status), status_name(wanted));
+        CHECK_THAT(status == wanted, "%s, call %ld: %s, not %s", step->name, n, status_name(status),
+                   status_name(wanted));
         CHECK_THAT(!struck || strstr(err.message, dir), "%s, call %ld: %s", step->name, n, err.message);
         /* Once it has its name it is new, though that may not be on disk. */
         char *found = content();

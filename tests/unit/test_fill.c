@@ -11,9 +11,7 @@
 #define HEIGHT 64
 #define KNOWN 4
 
-static vec3 direction_of(size_t at) {
-    return latlong_pixel(WIDTH, HEIGHT, (double)(at % WIDTH), (double)(at / WIDTH));
-}
+static vec3 direction_of(size_t at) { return latlong_pixel(WIDTH, HEIGHT, (double)(at % WIDTH), (double)(at / WIDTH)); }
 
 static double angle_between(size_t a, size_t b) {
     vec3 d = vec3_sub(direction_of(a), direction_of(b));
@@ -51,9 +49,7 @@ static void check_angles(void) {
 
 /* --- the horizon ---------------------------------------------------------------------------------- */
 
-static rgb sky_or_ground(size_t row) {
-    return row < HEIGHT / 2 ? (rgb){4.0f, 4.8f, 6.0f} : (rgb){1.2f, 1.1f, 0.8f};
-}
+static rgb sky_or_ground(size_t row) { return row < HEIGHT / 2 ? (rgb){4.0f, 4.8f, 6.0f} : (rgb){1.2f, 1.1f, 0.8f}; }
 
 /* The farthest from what is there, as a part of it, of the rows that a window shows (10 to 30 degrees high and deep)
  * and of those beyond. */

@@ -27,15 +27,18 @@ static const struct {
     uint32_t x, y;
     float times;
     bool is_spark;
-} bright[] = {{0, 0, 8.0f, true},    {95, 95, 3.5f, true},   {95, 7, 9.0f, true},    {40, 40, 100.0f, true},
-              {20, 20, 4.0f, true},  {23, 20, 4.0f, true},   {60, 60, 30.0f, false}, {61, 61, 30.0f, false},
-              {70, 10, 6.0f, false}, {71, 10, 6.0f, false},  {72, 10, 6.0f, false},  {50, 80, 1.4f, false}};
+} bright[] = {{0, 0, 8.0f, true},    {95, 95, 3.5f, true},  {95, 7, 9.0f, true},    {40, 40, 100.0f, true},
+              {20, 20, 4.0f, true},  {23, 20, 4.0f, true},  {60, 60, 30.0f, false}, {61, 61, 30.0f, false},
+              {70, 10, 6.0f, false}, {71, 10, 6.0f, false}, {72, 10, 6.0f, false},  {50, 80, 1.4f, false}};
 #define BRIGHT (sizeof bright / sizeof *bright)
 
 static void take(void) {
     for (uint32_t t = 0; t < PHOTOGRAPHS; t++) {
-        photograph[t] = (struct photograph){.camera = {.width = SIDE, .height = SIDE}, .exposure = 1.0f,
-                                            .gain = {1.0f, 1.0f, 1.0f}, .is_hdr = true, .is_test = t == 1,
+        photograph[t] = (struct photograph){.camera = {.width = SIDE, .height = SIDE},
+                                            .exposure = 1.0f,
+                                            .gain = {1.0f, 1.0f, 1.0f},
+                                            .is_hdr = true,
+                                            .is_test = t == 1,
                                             .clip = INFINITY};
         photograph[t].pixel = mem_array(PIXELS, sizeof *photograph[t].pixel);
         for (uint32_t i = 0; i < PIXELS; i++)
@@ -82,8 +85,8 @@ static void test_lookups(const struct photograph *photo) {
 
 /* Of 8 bits what should be black is not for its noise; what is brighter by far more than that still is a firefly. */
 static void test_black(struct parallel *pool) {
-    static struct photograph dark = {.camera = {.width = SIDE, .height = SIDE}, .exposure = 1.0f,
-                                     .gain = {1.0f, 1.0f, 1.0f}, .clip = 1.0f};
+    static struct photograph dark = {
+        .camera = {.width = SIDE, .height = SIDE}, .exposure = 1.0f, .gain = {1.0f, 1.0f, 1.0f}, .clip = 1.0f};
     static struct scene night = {.photograph = &dark, .photograph_count = 1};
     static struct views sees = {.scene = &night, .train_count = 1, .train = train};
     struct noise faint = noise;

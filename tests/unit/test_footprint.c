@@ -5,8 +5,8 @@
 #include "common/parallel.h"
 #include "tests/check.h"
 
-#define SIDE 256          /* texels */
-#define METRES 8.0f       /* of the plane */
+#define SIDE 256    /* texels */
+#define METRES 8.0f /* of the plane */
 #define TEXELS_A_METRE ((double)SIDE / 8.0)
 #define DISTANCE 3.0
 #define PIXELS 64
@@ -16,13 +16,17 @@ static uint32_t indices[2][3] = {{0, 1, 2}, {0, 2, 3}}, chart_of_triangle[2];
 static vec2 corner[2][3];
 static uint32_t chart_of_texel[SIDE * SIDE];
 static const struct mesh mesh = {.vertex_count = 4, .position = position, .triangle_count = 2, .index = indices};
-static const struct atlas atlas = {.width = SIDE, .height = SIDE, .chart_count = 1, .chart_of_triangle = chart_of_triangle,
-                                   .corner = corner};
+static const struct atlas atlas = {
+    .width = SIDE, .height = SIDE, .chart_count = 1, .chart_of_triangle = chart_of_triangle, .corner = corner};
 
 /* Looks at the origin from DISTANCE, at so many radians from the normal, with x to the right. */
 static struct camera camera_at(double tilt, float focal) {
     double s = sin(tilt), c = cos(tilt);
-    struct camera camera = {.width = PIXELS, .height = PIXELS, .fx = focal, .fy = focal, .cx = PIXELS / 2.0f + 0.5f,
+    struct camera camera = {.width = PIXELS,
+                            .height = PIXELS,
+                            .fx = focal,
+                            .fy = focal,
+                            .cx = PIXELS / 2.0f + 0.5f,
                             .cy = PIXELS / 2.0f + 0.5f};
     struct rigid w = {{{1, 0, 0}, {0, (float)-c, (float)s}, {0, (float)-s, (float)-c}},
                       {0.0f, (float)(-DISTANCE * s), (float)(DISTANCE * c)}};
@@ -66,9 +70,7 @@ static void check_unseen(const struct accel *accel) {
 
 /* --- texels --------------------------------------------------------------------------------------- */
 
-static double pattern(double x, double y) {
-    return 2.0 + cos(0.35 * x + 0.2 * y);
-}
+static double pattern(double x, double y) { return 2.0 + cos(0.35 * x + 0.2 * y); }
 
 static void check_texels(vec2 middle, vec2 across, vec2 down) {
     struct footprint f = {.middle = middle, .across = across, .down = down};
@@ -83,7 +85,8 @@ static void check_texels(vec2 middle, vec2 across, vec2 down) {
     for (int i = 0; i < fine * fine; i++) {
         double a = (i % fine + 0.5) / fine - 0.5, b = ((double)(i / fine) + 0.5) / fine - 0.5;
         exact += pattern((double)middle.x + a * (double)across.x + b * (double)down.x,
-                         (double)middle.y + a * (double)across.y + b * (double)down.y) / (fine * fine);
+                         (double)middle.y + a * (double)across.y + b * (double)down.y) /
+                 (fine * fine);
     }
     CHECK_NEAR(sum, 1.0, 1e-5);
     CHECK_NEAR(x, middle.x, 2e-3);

@@ -76,8 +76,7 @@ static void release_glb(struct glb *g) {
 }
 
 /* The accessor's elements, which must lie within its view and be aligned. */
-static const char *elements(const struct glb *g, double accessor, const char *type, size_t bytes,
-                            size_t *count) {
+static const char *elements(const struct glb *g, double accessor, const char *type, size_t bytes, size_t *count) {
     const cJSON *a = item(g, "accessors", accessor), *view = item(g, "bufferViews", number(a, "bufferView"));
     size_t offset = (size_t)number(a, "byteOffset"), start = (size_t)number(view, "byteOffset");
     *count = (size_t)number(a, "count");
@@ -102,8 +101,7 @@ static void check_bounds(const struct glb *g, double accessor, const char *posit
 }
 
 /* A mesh against the triangles of its segment; returns their number. */
-static size_t check_mesh(const struct glb *g, const struct export_input *in, const cJSON *mesh,
-                         uint32_t segment) {
+static size_t check_mesh(const struct glb *g, const struct export_input *in, const cJSON *mesh, uint32_t segment) {
     const cJSON *primitive = cJSON_GetArrayItem(cJSON_GetObjectItem(mesh, "primitives"), 0);
     const cJSON *attributes = cJSON_GetObjectItem(primitive, "attributes");
     size_t vertices, normals = 0, uvs, corners, triangle = 0;
@@ -144,8 +142,7 @@ static void check_material(const cJSON *material, const struct materials *m, uin
     double r = (ior - 1.0) / (ior + 1.0);
     CHECK_NEAR(weight * r * r, 0.08 * (double)m->specular[s], 1e-7);
     CHECK(weight == (m->specular[s] > 0.0f ? 1.0 : 0.0));
-    CHECK(number(cJSON_GetObjectItem(material, "pbrMetallicRoughness"), "roughnessFactor") ==
-          (double)m->roughness[s]);
+    CHECK(number(cJSON_GetObjectItem(material, "pbrMetallicRoughness"), "roughnessFactor") == (double)m->roughness[s]);
     CHECK(number(cJSON_GetObjectItem(material, "pbrMetallicRoughness"), "metallicFactor") == 0.0);
     bool shines = rgb_max(m->emission[s]) > 0.0f;
     CHECK(cJSON_IsTrue(cJSON_GetObjectItem(material, "doubleSided")) == !shines);
@@ -153,8 +150,8 @@ static void check_material(const cJSON *material, const struct materials *m, uin
     const float wanted[3] = {m->emission[s].r, m->emission[s].g, m->emission[s].b};
     for (int c = 0; c < 3 && shines; c++) {
         double f = cJSON_GetArrayItem(factor, c)->valuedouble;
-        double strength = number(cJSON_GetObjectItem(extensions, "KHR_materials_emissive_strength"),
-                                 "emissiveStrength");
+        double strength =
+            number(cJSON_GetObjectItem(extensions, "KHR_materials_emissive_strength"), "emissiveStrength");
         CHECK(f >= 0.0 && f <= 1.0);
         CHECK_NEAR(f * strength, wanted[c], 1e-6 * strength);
     }
@@ -249,8 +246,8 @@ static void test_obj(const char *dir, const struct export_input *in, const struc
     CHECK(count_lines(text, "o segment_") == parts->count);
     CHECK(first && sscanf(first, " v %f %f %f", &p.x, &p.y, &p.z) == 3);
     CHECK(memcmp(&p, in->mesh->position, sizeof p) == 0);
-    CHECK(face && sscanf(face, " f %u/%u/%u %u/%u/%u %u/%u/%u", v, uv, n, v + 1, uv + 1, n + 1, v + 2, uv + 2,
-                         n + 2) == 9);
+    CHECK(face &&
+          sscanf(face, " f %u/%u/%u %u/%u/%u %u/%u/%u", v, uv, n, v + 1, uv + 1, n + 1, v + 2, uv + 2, n + 2) == 9);
     for (int c = 0; c < 3; c++) {
         CHECK(v[c] == in->mesh->index[parts->order[0]][c] + 1 && n[c] == v[c]);
         CHECK(uv[c] == parts->seams.index[parts->order[0]][c] + 1);
@@ -268,8 +265,7 @@ static void test_obj(const char *dir, const struct export_input *in, const struc
 }
 
 /* What our own readers make of it is the mesh, by segments. */
-static void test_round(const char *dir, const char *name, const struct export_input *in,
-                       const struct parts *parts) {
+static void test_round(const char *dir, const char *name, const struct export_input *in, const struct parts *parts) {
     struct error err;
     struct mesh mesh;
     char *path = file_join(dir, name);
@@ -441,8 +437,12 @@ int main(void) {
     struct camera camera = {.width = 16, .height = 12, .fx = 20.0f, .fy = 21.0f, .cx = 8.0f, .cy = 6.0f};
     camera.world_from_camera = (struct rigid){{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {1.0f, 2.0f, 3.0f}};
     struct export_comparison comparison = {"images/003.exr", NULL, NULL, &camera};
-    struct export_input in = {.title = "room", .mesh = &room.mesh, .segments = &room.segments,
-                              .atlas = &room.atlas, .materials = &room.materials, .comparison_count = 1,
+    struct export_input in = {.title = "room",
+                              .mesh = &room.mesh,
+                              .segments = &room.segments,
+                              .atlas = &room.atlas,
+                              .materials = &room.materials,
+                              .comparison_count = 1,
                               .comparison = &comparison};
     CHECK(parts_make(&parts, &room.mesh, &room.segments, &room.atlas, &err) == STATUS_OK);
     CHECK(parts.count == ROOM_OBJECT_COUNT);

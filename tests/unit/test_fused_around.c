@@ -5,12 +5,13 @@
 #include "tests/unit/surface.h"
 
 static uint32_t chart_of_triangle[2] = {0, 1};
-static const struct atlas atlas = {.width = SIDE, .height = SIDE, .chart_count = 2, .chart_of_triangle = chart_of_triangle};
+static const struct atlas atlas = {
+    .width = SIDE, .height = SIDE, .chart_count = 2, .chart_of_triangle = chart_of_triangle};
 static uint16_t radiance[TEXELS][3];
 static float count[TEXELS];
 static bool is_bound[TEXELS];
-static const struct fused fused = {.width = SIDE, .height = SIDE, .radiance = radiance, .count = count,
-                                   .is_bound = is_bound};
+static const struct fused fused = {
+    .width = SIDE, .height = SIDE, .radiance = radiance, .count = count, .is_bound = is_bound};
 
 static void show(uint32_t texel, float value, float times) {
     for (size_t c = 0; c < 3; c++)
@@ -40,7 +41,7 @@ int main(void) {
     show(middle - 1, 100.0f, 1.0f);
     show(middle + 1, 100.0f, 0.0f);
     CHECK_NEAR(around(middle, 1), (12.0f + 6.0f) / 9.0f, 1e-6f);
-    CHECK_NEAR(around(0, 1), 1.0f, 1e-6f);                      /* the corner of the atlas */
+    CHECK_NEAR(around(0, 1), 1.0f, 1e-6f); /* the corner of the atlas */
     CHECK_NEAR(around(TEXELS - 2, SIDE), 64.0f, 1e-6f);
     return check_result();
 }

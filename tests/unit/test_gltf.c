@@ -14,13 +14,13 @@ static const uint8_t bytes[6] = {5, 4, 3, 2, 1, 0};
 
 #define ASSET "\"asset\":{\"version\":\"2.0\"}"
 #define BUFFER "\"buffers\":[{\"byteLength\":164}]"
-#define VIEWS                                                                                      \
-    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":144,\"byteStride\":12},"                        \
+#define VIEWS                                                                                                          \
+    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":144,\"byteStride\":12},"                                            \
     "{\"buffer\":0,\"byteOffset\":144,\"byteLength\":20}]"
-#define ACCESSORS                                                                                  \
-    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"},"      \
-    "{\"bufferView\":0,\"byteOffset\":72,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"},"   \
-    "{\"bufferView\":1,\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"},"                   \
+#define ACCESSORS                                                                                                      \
+    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"},"                          \
+    "{\"bufferView\":0,\"byteOffset\":72,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"},"                       \
+    "{\"bufferView\":1,\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"},"                                       \
     "{\"bufferView\":1,\"byteOffset\":12,\"componentType\":5121,\"count\":6,\"type\":\"SCALAR\"}]"
 #define TABLES ASSET "," BUFFER "," VIEWS "," ACCESSORS ","
 #define MESH(primitives) "\"meshes\":[{\"primitives\":[" primitives "]}]"
@@ -31,12 +31,10 @@ static const uint8_t bytes[6] = {5, 4, 3, 2, 1, 0};
 
 /* One point, and a triangle of the accessors and the view. */
 #define POINTS(count) "{\"bufferView\":0,\"componentType\":5126,\"count\":" #count ",\"type\":\"VEC3\"}"
-#define WITH(view, accessors, primitive)                                                           \
+#define WITH(view, accessors, primitive)                                                                               \
     "{" ASSET "," BUFFER ",\"bufferViews\":[" view "],\"accessors\":[" accessors "]," MESH(primitive) "," NODE "}"
 
-static void put_word(struct buf *out, uint32_t value) {
-    buf_append(out, &value, 4);
-}
+static void put_word(struct buf *out, uint32_t value) { buf_append(out, &value, 4); }
 
 static void put_data(struct buf *out) {
     buf_append(out, points, sizeof points);
@@ -106,9 +104,11 @@ static void test_modes(void) {
 static void test_transforms(void) {
     struct mesh mesh;
     /* moved and turned by 90 degrees around z within a node scaled by 2 */
-    take(WHOLE(MESH(ALL), "\"nodes\":[{\"children\":[1],\"scale\":[2,2,2]},{\"mesh\":0,\"translation\":[10,0,0],"
-               "\"rotation\":[0,0,0.7071067811865476,0.7071067811865476]}],\"scenes\":[{},{\"nodes\":[0]}],\"scene\":1"),
-         &mesh);
+    take(
+        WHOLE(MESH(ALL),
+              "\"nodes\":[{\"children\":[1],\"scale\":[2,2,2]},{\"mesh\":0,\"translation\":[10,0,0],"
+              "\"rotation\":[0,0,0.7071067811865476,0.7071067811865476]}],\"scenes\":[{},{\"nodes\":[0]}],\"scene\":1"),
+        &mesh);
     CHECK(is(corner(&mesh, 0, 1), 20, 2, 0) && is(corner(&mesh, 0, 2), 18, 0, 0));
     CHECK(mesh.normal && mesh.normal[0].y > 0.0f && fabsf(mesh.normal[0].x) < 1e-6f);
     mesh_release(&mesh);
@@ -129,13 +129,16 @@ static void test_objects(void) {
     static const int64_t wanted[] = {0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5};
     struct mesh mesh;
     take(WHOLE(MESH(BARE ",{\"attributes\":{\"POSITION\":0},\"material\":0},{\"attributes\":{\"POSITION\":0},"
-                    "\"material\":1}"), "\"nodes\":[{\"mesh\":0,\"children\":[1]},{\"mesh\":0}]"), &mesh);
+                         "\"material\":1}"),
+               "\"nodes\":[{\"mesh\":0,\"children\":[1]},{\"mesh\":0}]"),
+         &mesh);
     CHECK(mesh.triangle_count == 12 && mesh.object_id && memcmp(mesh.object_id, wanted, sizeof wanted) == 0);
     CHECK(mesh.vertex_count == 36);
     mesh_release(&mesh);
     take("{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6,"
          "\"type\":\"VEC3\"},{\"bufferView\":1,\"byteOffset\":6,\"componentType\":5123,\"count\":3,\"type\":"
-         "\"SCALAR\"}]," MESH("{\"attributes\":{\"POSITION\":0},\"indices\":1}") "," NODE "}", &mesh);
+         "\"SCALAR\"}]," MESH("{\"attributes\":{\"POSITION\":0},\"indices\":1}") "," NODE "}",
+         &mesh);
     CHECK(mesh.vertex_count == 3 && mesh.triangle_count == 1 && is(mesh.position[2], 1, 2, 3));
     mesh_release(&mesh);
 }
@@ -151,8 +154,8 @@ static void test_buffers(void) {
     buf_init(&data, 1 << 16);
     put_data(&data);
     CHECK(file_replace(bin, data.data, data.length, NULL) == STATUS_OK);
-    const char *json = "{" ASSET ",\"buffers\":[{\"byteLength\":164,\"uri\":\"./a%20b.bin\"}]," VIEWS "," ACCESSORS ","
-                       MESH(ALL) "," NODE "}";
+    const char *json = "{" ASSET ",\"buffers\":[{\"byteLength\":164,\"uri\":\"./a%20b.bin\"}]," VIEWS "," ACCESSORS
+                       "," MESH(ALL) "," NODE "}";
     CHECK(file_replace(path, json, strlen(json), NULL) == STATUS_OK);
     CHECK_THAT(gltf_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
     CHECK(mesh.triangle_count == 2 && is(corner(&mesh, 1, 2), 1, 2, 3));
@@ -162,10 +165,11 @@ static void test_buffers(void) {
     CHECK(gltf_read(path, "room.gltf", 1000, &mesh, NULL, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "room.gltf names the buffer a b.bin, which is not in the bundle");
     /* three points: 0 0 0, 1 0 0, 0 1 0 */
-    json = "{" ASSET ",\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
-           "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
-           "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]," MESH(BARE)
-           "," NODE "}";
+    json =
+        "{" ASSET ",\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+        "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE
+                                                                                                              "}";
     CHECK_THAT(gltf_parse(json, strlen(json), "room.gltf", NULL, 1000, &mesh, NULL, &err) == STATUS_OK, "%s",
                err.message);
     CHECK(is(corner(&mesh, 0, 1), 1, 0, 0) && is(corner(&mesh, 0, 2), 0, 1, 0));
@@ -201,50 +205,71 @@ static const struct {
     {WHOLE(MESH("{\"attributes\":{\"POSITION\":2}}"), NODE), "accessors[2] is of type SCALAR, wanted is VEC3"},
     {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"indices\":0}"), NODE), "accessors[0] is of type VEC3"},
     {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"indices\":4}"), NODE), "indices is none of the 4 accessors"},
-    {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"extensions\":{\"KHR_draco_mesh_compression\":{}}}"), NODE), "Draco"},
+    {WHOLE(MESH("{\"attributes\":{\"POSITION\":0},\"extensions\":{\"KHR_draco_mesh_compression\":{}}}"), NODE),
+     "Draco"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5123,\"count\":6,\"type\":"
-     "\"VEC3\"}]," MESH(BARE) "," NODE "}", "does not hold floats"},
+     "\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "does not hold floats"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5124,\"count\":6,\"type\":"
-     "\"VEC3\"}]," MESH(BARE) "," NODE "}", "componentType is none"},
+     "\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "componentType is none"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":13,\"type\":"
-     "\"VEC3\"}]," MESH(BARE) "," NODE "}", "promises 13 elements, but its bufferView holds 12"},
+     "\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "promises 13 elements, but its bufferView holds 12"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":0,\"type\":"
-     "\"VEC3\"}]," MESH(BARE) "," NODE "}", "accessors[0].count is not a whole number from 1"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}],"
-     MESH(BARE) "," NODE "}", "accessors[0] has no bufferView"},
+     "\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "accessors[0].count is not a whole number from 1"},
+    {"{" ASSET "," BUFFER "," VIEWS
+     ",\"accessors\":[{\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "accessors[0] has no bufferView"},
     {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"sparse\":{},\"componentType\":5126,"
-     "\"count\":6,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}", "sparse"},
-    {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"buffer\":0,\"byteOffset\":100,\"byteLength\":72}]," ACCESSORS ","
-     MESH(BARE) "," NODE "}", "does not lie within the 164 bytes of buffers[0]"},
-    {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"buffer\":0,\"byteLength\":72,\"byteStride\":8}]," ACCESSORS ","
-     MESH(BARE) "," NODE "}", "byteStride is not a whole number from 12"},
+     "\"count\":6,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "sparse"},
+    {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"buffer\":0,\"byteOffset\":100,\"byteLength\":72}]," ACCESSORS
+     "," MESH(BARE) "," NODE "}",
+     "does not lie within the 164 bytes of buffers[0]"},
+    {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"buffer\":0,\"byteLength\":72,\"byteStride\":8}]," ACCESSORS
+     "," MESH(BARE) "," NODE "}",
+     "byteStride is not a whole number from 12"},
     {"{" ASSET "," BUFFER ",\"bufferViews\":[{\"byteLength\":72}]," ACCESSORS "," MESH(BARE) "," NODE "}", "no buffer"},
-    {"{" ASSET ",\"buffers\":[{\"uri\":\"data:x;base64,!!\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", "base64"},
+    {"{" ASSET ",\"buffers\":[{\"uri\":\"data:x;base64,!!\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}",
+     "base64"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"../a.bin\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", ".."},
     {"{" ASSET ",\"extensionsRequired\":[3]}", "requires the extension (not a name)"},
     {WHOLE(MESH(BARE), "\"nodes\":[{\"mesh\":0,\"translation\":[1,2,3,4]}]"), "nodes[0].translation is not 3 numbers"},
     {WHOLE(MESH(BARE), "\"nodes\":[{\"mesh\":0,\"rotation\":[0,0,0]}]"), "nodes[0].rotation is not 4 numbers"},
-    {WHOLE(MESH("{\"attributes\":{\"POSITION\":0,\"NORMAL\":9}}"), NODE), "primitives[0].NORMAL is none of the 4 accessors"},
+    {WHOLE(MESH("{\"attributes\":{\"POSITION\":0,\"NORMAL\":9}}"), NODE),
+     "primitives[0].NORMAL is none of the 4 accessors"},
     {WITH("{\"buffer\":0,\"byteLength\":144}", POINTS(6) "," POINTS(5),
-          "{\"attributes\":{\"POSITION\":0,\"NORMAL\":1}}"), "meshes[0].primitives[0] has 6 positions and 5 normals"},
+          "{\"attributes\":{\"POSITION\":0,\"NORMAL\":1}}"),
+     "meshes[0].primitives[0] has 6 positions and 5 normals"},
     {WITH("{\"buffer\":0,\"byteLength\":144}",
           POINTS(6) ",{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"SCALAR\"}",
-          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"), "the indices of meshes[0].primitives[0] are not unsigned integers"},
+          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"),
+     "the indices of meshes[0].primitives[0] are not unsigned integers"},
     {WITH("{\"buffer\":0,\"byteLength\":144}", /* a float as an index, as its bits say */
           POINTS(6) ",{\"bufferView\":0,\"componentType\":5125,\"count\":6,\"type\":\"SCALAR\"}",
-          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"), "refers to vertex 1065353216, but there are 6"},
+          "{\"attributes\":{\"POSITION\":0},\"indices\":1}"),
+     "refers to vertex 1065353216, but there are 6"},
     {WITH("{\"buffer\":0,\"byteLength\":4}", POINTS(1), BARE), "promises 1 elements, but its bufferView holds 0"},
-    {WITH("{\"buffer\":0,\"byteOffset\":0.5,\"byteLength\":144}", POINTS(6), BARE), "bufferViews[0].byteOffset is not a whole"},
+    {WITH("{\"buffer\":0,\"byteOffset\":0.5,\"byteLength\":144}", POINTS(6), BARE),
+     "bufferViews[0].byteOffset is not a whole"},
     {WITH("{\"buffer\":0}", POINTS(6), BARE), "bufferViews[0].byteLength is not a whole number from 0"},
     {WITH("{\"buffer\":1,\"byteLength\":144}", POINTS(6), BARE), "bufferViews[0].buffer is none of the 1 buffers"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"byteOffset\":-1,\"componentType\":5126,\"count\":6,"
-     "\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}", "accessors[0].byteOffset is not a whole number from 0"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":1,\"count\":6,\"type\":\"VEC3\"}],"
-     MESH(BARE) "," NODE "}", "accessors[0].componentType is not a whole number from 5120 to 5126"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":2,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}],"
-     MESH(BARE) "," NODE "}", "accessors[0].bufferView is none of the 2 bufferViews"},
-    {"{" ASSET "," BUFFER "," VIEWS ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6}],"
-     MESH(BARE) "," NODE "}", "accessors[0] is of type none, wanted is VEC3"},
+    {"{" ASSET "," BUFFER "," VIEWS
+     ",\"accessors\":[{\"bufferView\":0,\"byteOffset\":-1,\"componentType\":5126,\"count\":6,"
+     "\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "accessors[0].byteOffset is not a whole number from 0"},
+    {"{" ASSET "," BUFFER "," VIEWS
+     ",\"accessors\":[{\"bufferView\":0,\"componentType\":1,\"count\":6,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE "}",
+     "accessors[0].componentType is not a whole number from 5120 to 5126"},
+    {"{" ASSET "," BUFFER "," VIEWS
+     ",\"accessors\":[{\"bufferView\":2,\"componentType\":5126,\"count\":6,\"type\":\"VEC3\"}]," MESH(BARE) "," NODE
+                                                                                                            "}",
+     "accessors[0].bufferView is none of the 2 bufferViews"},
+    {"{" ASSET "," BUFFER "," VIEWS
+     ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":6}]," MESH(BARE) "," NODE "}",
+     "accessors[0] is of type none, wanted is VEC3"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"data:x\"},{}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}",
      "buffers[0] is a data: URI that is not base64"},
     {"{" ASSET ",\"buffers\":[{\"uri\":\"a.bin\"}]," VIEWS "," ACCESSORS "," MESH(BARE) "," NODE "}", "is not in it"},

@@ -83,8 +83,8 @@ static void test_outlier(void) {
     for (int noisy = 0; noisy < 2; noisy++) {
         for (uint32_t i = 0; i < SAMPLES; i++) {
             float value = i < SAMPLES - 1 ? 1.0f : 3.0f;
-            sample[i] = (struct robust_sample){.value = rgb_gray(value), .gray = logf(value), .weight = 1.0f,
-                                               .deviation = noisy ? 1.0f : 0.01f};
+            sample[i] = (struct robust_sample){
+                .value = rgb_gray(value), .gray = logf(value), .weight = 1.0f, .deviation = noisy ? 1.0f : 0.01f};
         }
         rgb mean = robust_mean(sample, SAMPLES, 0.3f);
         if (noisy)
@@ -99,7 +99,8 @@ static void test_keep(void) {
     const float value[] = {0.9f, 0.02f, 1.1f, 0.03f, 1.0f};
     struct robust_sample sample[5];
     for (uint32_t i = 0; i < 5; i++)
-        sample[i] = (struct robust_sample){.gray = logf(value[i]), .weight = value[i] < 0.5f ? 10.0f : 1.0f, .source = i};
+        sample[i] =
+            (struct robust_sample){.gray = logf(value[i]), .weight = value[i] < 0.5f ? 10.0f : 1.0f, .source = i};
     CHECK(robust_keep(sample, 5, 0.7f) == 3);
     CHECK(sample[0].source == 0 && sample[1].source == 4 && sample[2].source == 2);
     CHECK(robust_keep(sample, 1, 0.7f) == 1);

@@ -20,9 +20,7 @@ struct job_files {
     char *dir, *checkpoint, *journal, *scrap, *output;
 };
 
-static void write_file(const char *path) {
-    OK(file_replace(path, "x", 1, &err));
-}
+static void write_file(const char *path) { OK(file_replace(path, "x", 1, &err)); }
 
 /* The files that a job has, and one that was being written. */
 static struct job_files make_files(int64_t id) {
@@ -49,9 +47,7 @@ static void release_files(struct job_files *f) {
     mem_free(f->output);
 }
 
-static bool is_there(const char *path) {
-    return access(path, F_OK) == 0;
-}
+static bool is_there(const char *path) { return access(path, F_OK) == 0; }
 
 static int64_t start_job(void) {
     int number;

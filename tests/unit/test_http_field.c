@@ -3,8 +3,7 @@
 
 #include "tests/check.h"
 
-static void check_range(const char *text, uint64_t size, enum field_range wanted, uint64_t first,
-                        uint64_t count) {
+static void check_range(const char *text, uint64_t size, enum field_range wanted, uint64_t first, uint64_t count) {
     uint64_t found_first = 0, found_count = 0;
     enum field_range found = field_range(text, size, &found_first, &found_count);
     CHECK_THAT(found == wanted, "\"%s\" of %llu bytes", text, (unsigned long long)size);
@@ -24,8 +23,10 @@ static void check_ranges(void) {
     check_range("bytes=10-", 10, FIELD_RANGE_OUTSIDE, 0, 0);
     check_range("bytes=-0", 10, FIELD_RANGE_OUTSIDE, 0, 0);
     check_range("bytes=0-", 0, FIELD_RANGE_OUTSIDE, 0, 0);
-    static const char *const whole[] = {"", "bytes", "bytes=", "bytes=-", "bytes=a-b", "bytes=5-2", "items=0-1",
-        "bytes=0-1,3-4", "bytes=1", "bytes=--1", "bytes=0x1-2", "bytes=99999999999999999999-", "bytes=1 -2"};
+    static const char *const whole[] = {"",          "bytes",     "bytes=",      "bytes=-",
+                                        "bytes=a-b", "bytes=5-2", "items=0-1",   "bytes=0-1,3-4",
+                                        "bytes=1",   "bytes=--1", "bytes=0x1-2", "bytes=99999999999999999999-",
+                                        "bytes=1 -2"};
     for (size_t i = 0; i < sizeof whole / sizeof *whole; i++)
         check_range(whole[i], 10, FIELD_RANGE_WHOLE, 0, 0);
 }
@@ -60,10 +61,10 @@ static void check_digests(void) {
 }
 
 static void check_hosts(void) {
-    static const char *const local[] = {"localhost", "localhost:80", "LOCALHOST", "127.0.0.1:7117", "127.9.9.9",
-        "[::1]", "[::1]:80", "a.localhost:1"};
+    static const char *const local[] = {"localhost", "localhost:80", "LOCALHOST", "127.0.0.1:7117",
+                                        "127.9.9.9", "[::1]",        "[::1]:80",  "a.localhost:1"};
     static const char *const other[] = {"evil.org", "127.evil.org", "127.0.0.1.evil.org", "localhost.evil.org",
-        "[::2]", "128.0.0.1", "notlocalhost", ".localhost"};
+                                        "[::2]",    "128.0.0.1",    "notlocalhost",       ".localhost"};
     static const char *const bad[] = {"", ":80", "a b", "a/b", "[::1", "[::1]x", "a:b", "a,b", "user@localhost"};
     size_t length;
     for (size_t i = 0; i < sizeof local / sizeof *local; i++)

@@ -44,8 +44,7 @@ static void halves(void) {
     for (uint32_t bits = 0; bits < 65536; bits++) {
         float value = image_float_from_half((uint16_t)bits);
         uint32_t exponent = bits >> 10 & 31, mantissa = bits & 0x3ff;
-        double wanted = exponent ? ldexp(1024 + mantissa, (int)exponent - 25)
-                                 : ldexp(mantissa, -24);
+        double wanted = exponent ? ldexp(1024 + mantissa, (int)exponent - 25) : ldexp(mantissa, -24);
         if (exponent == 31)
             CHECK(mantissa ? isnan(value) : isinf(value));
         else
@@ -131,8 +130,7 @@ static void exr_same_bytes(void) {
         free(bytes[1]);
     }
     image_release(&image);
-    CHECK(image_write_exr("/nonexistent/a.exr", &image, IMAGE_HALF, false, &err) ==
-          STATUS_NOT_FOUND);
+    CHECK(image_write_exr("/nonexistent/a.exr", &image, IMAGE_HALF, false, &err) == STATUS_NOT_FOUND);
 }
 
 static void exr_disk_full(void) {
@@ -229,8 +227,7 @@ static void png_round_trip(void) {
 
 static const float pixel_tolerance = 1e-6f;
 
-static void check_pixel(const struct image *image, uint32_t x, uint32_t y, double r, double g,
-                        double b) {
+static void check_pixel(const struct image *image, uint32_t x, uint32_t y, double r, double g, double b) {
     CHECK_NEAR(at(image, x, y, 0), r / 255, pixel_tolerance);
     CHECK_NEAR(at(image, x, y, 1), g / 255, pixel_tolerance);
     CHECK_NEAR(at(image, x, y, 2), b / 255, pixel_tolerance);

@@ -19,11 +19,11 @@ static char *path;
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
 /* Refused so, by a sentence with `word`. */
-#define IS(call, wanted, word)                                                                                      \
-    do {                                                                                                            \
-        enum status check_status = (call);                                                                          \
-        CHECK_THAT(check_status == (wanted) && strstr(err.message, word), "%s: %s", status_name(check_status),      \
-                   err.message);                                                                                    \
+#define IS(call, wanted, word)                                                                                         \
+    do {                                                                                                               \
+        enum status check_status = (call);                                                                             \
+        CHECK_THAT(check_status == (wanted) && strstr(err.message, word), "%s: %s", status_name(check_status),         \
+                   err.message);                                                                                       \
     } while (0)
 
 /* The library does not start while this is set, as another version of it would not. */
@@ -66,8 +66,8 @@ static enum status read_bytes(const void *data, size_t size) {
 /* Each call that reads fails once, by EIO and ENOSPC in turn. */
 static void check_reading(void) {
     static const char radiance[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\nabcdefgh";
-    const char *const files[] = {"tests/data/image/exif_little.jpg", "tests/data/image/exif.png", "tests/data/image/zip.exr",
-                                 path};
+    const char *const files[] = {"tests/data/image/exif_little.jpg", "tests/data/image/exif.png",
+                                 "tests/data/image/zip.exr", path};
     OK(file_replace(path, radiance, sizeof radiance - 1, &err));
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         bool struck = true;
@@ -221,7 +221,8 @@ static void make_header(const char *const *names, int count) {
     CHECK(exr_add_part(context, NULL, EXR_STORAGE_SCANLINE, &part) == EXR_ERR_SUCCESS);
     CHECK(exr_initialize_required_attr_simple(context, part, 1, 1, EXR_COMPRESSION_NONE) == EXR_ERR_SUCCESS);
     for (int i = 0; i < count; i++)
-        CHECK(exr_add_channel(context, part, names[i], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1) == EXR_ERR_SUCCESS);
+        CHECK(exr_add_channel(context, part, names[i], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LINEAR, 1, 1) ==
+              EXR_ERR_SUCCESS);
     CHECK(exr_write_header(context) == EXR_ERR_SUCCESS);
     exr_finish(&context);
 }

@@ -24,8 +24,8 @@ static void read_folder(const char *name, int *good, int *refused) {
         struct image image;
         err.message[0] = '\0';
         enum status status = image_read(path, &image, NULL, &err);
-        CHECK_THAT(status == STATUS_OK || ((status == STATUS_INPUT || status == STATUS_LIMIT) &&
-                                           strstr(err.message, entry->d_name)),
+        CHECK_THAT(status == STATUS_OK ||
+                       ((status == STATUS_INPUT || status == STATUS_LIMIT) && strstr(err.message, entry->d_name)),
                    "%s: %s: %s", entry->d_name, status_name(status), err.message);
         *(status == STATUS_OK ? good : refused) += 1;
         image_release(&image);
@@ -37,9 +37,8 @@ static void read_folder(const char *name, int *good, int *refused) {
 static void check_counts(const char *folder, int wanted_good, int wanted_refused) {
     int good, refused;
     read_folder(folder, &good, &refused);
-    CHECK_THAT(good == wanted_good && refused == wanted_refused,
-               "%s: %d decode, %d are refused; wanted %d and %d", folder, good, refused,
-               wanted_good, wanted_refused);
+    CHECK_THAT(good == wanted_good && refused == wanted_refused, "%s: %d decode, %d are refused; wanted %d and %d",
+               folder, good, refused, wanted_good, wanted_refused);
 }
 
 /* The means of the first three channels. */
@@ -77,17 +76,14 @@ int main(void) {
     check_means(PNG_SUITE "primary/tbbn0g04.png", 0.6733723958, 0.6733723958, 0.6733723958);
     check_means(PNG_SUITE "unused/cs3n3p08.png", 0.40625, 0.75, 0.34375);
     /* OpenEXR's Python module. */
-    check_means("rooms/staircase2/images/000.exr", 0.8019295231501261, 0.4764033489425977,
-                0.20041682459414006);
-    check_means(TINY_EXR "asakusa.exr", 0.4543026706075537, 0.44411304473876956,
-                0.43971586689804537);
-    check_means(TINY_EXR "test/unit/regression/000-issue194.exr", 0.08731053244065379,
-                0.08732513639228046, 0.08730849056792067);
-    check_means(TINY_EXR "test/unit/regression/issue-160-piz-decode.exr", 0.2382904362472616,
-                0.24185217369596018, 0.2436735310306566);
+    check_means("rooms/staircase2/images/000.exr", 0.8019295231501261, 0.4764033489425977, 0.20041682459414006);
+    check_means(TINY_EXR "asakusa.exr", 0.4543026706075537, 0.44411304473876956, 0.43971586689804537);
+    check_means(TINY_EXR "test/unit/regression/000-issue194.exr", 0.08731053244065379, 0.08732513639228046,
+                0.08730849056792067);
+    check_means(TINY_EXR "test/unit/regression/issue-160-piz-decode.exr", 0.2382904362472616, 0.24185217369596018,
+                0.2436735310306566);
     /* Pillow. */
-    check_means("redkitchen/images/frame-000056.color.jpg", 0.4885940053,
-                0.398431781, 0.3923687449);
+    check_means("redkitchen/images/frame-000056.color.jpg", 0.4885940053, 0.398431781, 0.3923687449);
     /* A decoder of its own in Python. */
     check_means("hdri/autoshop_01_1k.hdr", 0.534574082, 0.5742136127, 0.5368167649);
     check_means("hdri/lythwood_room_1k.hdr", 1.17049401, 0.8760428149, 0.5549853674);

@@ -25,15 +25,13 @@ static void fixture_release(struct fixture *f) {
 /* Makes atlas and inverse; checks one thread against several. */
 static void fixture_make(struct fixture *f, uint32_t size) {
     struct error err = {0};
-    CHECK_THAT(atlas_make(&f->atlas, &f->mesh, &f->segments, size, 0.0f, &err) == STATUS_OK, "%s",
-               err.message);
+    CHECK_THAT(atlas_make(&f->atlas, &f->mesh, &f->segments, size, 0.0f, &err) == STATUS_OK, "%s", err.message);
     struct parallel *one = parallel_new(1), *five = parallel_new(5);
     struct inverse_uv other;
     inverse_uv_make(&f->inverse, &f->atlas, f->mesh.triangle_count, one);
     inverse_uv_make(&other, &f->atlas, f->mesh.triangle_count, five);
     CHECK(other.valid_count == f->inverse.valid_count);
-    CHECK(memcmp(other.triangle, f->inverse.triangle,
-                 (size_t)size * size * sizeof *other.triangle) == 0);
+    CHECK(memcmp(other.triangle, f->inverse.triangle, (size_t)size * size * sizeof *other.triangle) == 0);
     CHECK(memcmp(other.valid, f->inverse.valid, other.valid_count * sizeof *other.valid) == 0);
     inverse_uv_release(&other);
     parallel_free(one);
@@ -72,8 +70,8 @@ static void check_round_trip(const struct fixture *f, uint32_t sample_count) {
         exact += moved_m < 0.02 / (double)f->atlas.texels_per_metre;
         CHECK(f->atlas.chart_of_triangle[back] == f->atlas.chart_of_triangle[t]);
     }
-    printf("%u samples: %zu lost, %zu far in the atlas, %zu far on the surface, %zu exact\n",
-           sample_count, lost, far_in_atlas, far_on_surface, exact);
+    printf("%u samples: %zu lost, %zu far in the atlas, %zu far on the surface, %zu exact\n", sample_count, lost,
+           far_in_atlas, far_on_surface, exact);
     CHECK(lost == 0);
     CHECK(far_in_atlas == 0);
     CHECK(far_on_surface <= sample_count / 500);
@@ -136,7 +134,7 @@ static void check_texels(const struct fixture *f) {
 /* A needle far thinner than a texel beside a square: it has texels of its own all along. */
 static void test_needle(void) {
     struct fixture f = {0};
-    static const vec3 position[7] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
+    static const vec3 position[7] = {{0, 0, 0}, {1, 0, 0},    {1, 1, 0},      {0, 1, 0},
                                      {0, 0, 2}, {1, 0.3f, 2}, {1, 0.3001f, 2}};
     static const uint32_t index[3][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}};
     f.mesh = room_new(7, 3);

@@ -6,15 +6,13 @@
 int main(void) {
     /* The diagram of job.h, row by row: Queued Running Paused Succeeded Failed Cancelled. */
     static const char *const arrows[JOB_STATE_COUNT] = {
-        [JOB_QUEUED] = ".RP..C", [JOB_RUNNING] = "Q.PSFC", [JOB_PAUSED] = "Q....C",
-        [JOB_SUCCEEDED] = "Q.....", [JOB_FAILED] = "Q.....", [JOB_CANCELLED] = "Q.....",
+        [JOB_QUEUED] = ".RP..C",    [JOB_RUNNING] = "Q.PSFC", [JOB_PAUSED] = "Q....C",
+        [JOB_SUCCEEDED] = "Q.....", [JOB_FAILED] = "Q.....",  [JOB_CANCELLED] = "Q.....",
     };
     for (int from = 0; from < JOB_STATE_COUNT; from++) {
         for (int to = 0; to < JOB_STATE_COUNT; to++)
-            CHECK_THAT(job_may_become((enum job_state)from, (enum job_state)to) ==
-                           (arrows[from][to] != '.'),
-                       "%s -> %s", job_state_name((enum job_state)from),
-                       job_state_name((enum job_state)to));
+            CHECK_THAT(job_may_become((enum job_state)from, (enum job_state)to) == (arrows[from][to] != '.'),
+                       "%s -> %s", job_state_name((enum job_state)from), job_state_name((enum job_state)to));
         enum job_state parsed;
         CHECK(job_state_parse(job_state_name((enum job_state)from), &parsed) && (int)parsed == from);
     }

@@ -67,7 +67,8 @@ static void test_invisible(void) {
     cJSON *object = cJSON_CreateObject();
     json_add_string(object, "\u202Ea", "\x7f\n\xC2\x9B\u2069\u200E\uFEFF\U000E0041 \u00E4\u20AC\U0001F600");
     char *text = json_text(object);
-    CHECK_STRING(text, "{\"\\u202ea\":\"\\u007f\\n\\u009b\\u2069\\u200e\\ufeff\\udb40\\udc41 \u00E4\u20AC\U0001F600\"}");
+    CHECK_STRING(text,
+                 "{\"\\u202ea\":\"\\u007f\\n\\u009b\\u2069\\u200e\\ufeff\\udb40\\udc41 \u00E4\u20AC\U0001F600\"}");
     cJSON *read = cJSON_Parse(text);
     CHECK(cJSON_Compare(object, read, true));
     cJSON_Delete(read);
@@ -80,9 +81,15 @@ static void test_numbers(void) {
         double number;
         const char *text;
     } cases[] = {
-        {0, "0"}, {-7, "-7"}, {2147483648.0, "2147483648"}, {9007199254740991.0, "9007199254740991"},
-        {-9007199254740991.0, "-9007199254740991"}, {0.1, "0.1"}, {1e300, "1e+300"},
-        {0.1 + 0.2, "0.30000000000000004"}, {1.0 / 3.0, "0.33333333333333331"},
+        {0, "0"},
+        {-7, "-7"},
+        {2147483648.0, "2147483648"},
+        {9007199254740991.0, "9007199254740991"},
+        {-9007199254740991.0, "-9007199254740991"},
+        {0.1, "0.1"},
+        {1e300, "1e+300"},
+        {0.1 + 0.2, "0.30000000000000004"},
+        {1.0 / 3.0, "0.33333333333333331"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         cJSON *object = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(object, "list");
@@ -90,8 +97,7 @@ static void test_numbers(void) {
         char *wanted = mem_printf("{\"list\":[%s]}", cases[i].text), *text = json_text(object);
         CHECK_STRING(text, wanted);
         cJSON *read = cJSON_Parse(text);
-        CHECK(cJSON_GetArrayItem(cJSON_GetObjectItem(read, "list"), 0)->valuedouble ==
-              cases[i].number);
+        CHECK(cJSON_GetArrayItem(cJSON_GetObjectItem(read, "list"), 0)->valuedouble == cases[i].number);
         cJSON_Delete(read);
         cJSON_Delete(object);
         mem_free(wanted);
@@ -140,8 +146,13 @@ static void test_suite(void) {
 
 /* What is no UTF-8 is made so: what we write can always be read. */
 static void test_strings(void) {
-    static const char *const pairs[][2] = {
-        {"Küche", "Küche"}, {"K\xC3", "K?"}, {"\xFF\xFE" "a", "??a"}, {"a\xE2\x82 b", "a?? b"}, {"", ""}};
+    static const char *const pairs[][2] = {{"Küche", "Küche"},
+                                           {"K\xC3", "K?"},
+                                           {"\xFF\xFE"
+                                            "a",
+                                            "??a"},
+                                           {"a\xE2\x82 b", "a?? b"},
+                                           {"", ""}};
     for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
         cJSON *object = cJSON_CreateObject();
         json_add_string(object, "a", pairs[i][0]);

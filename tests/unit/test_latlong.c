@@ -10,7 +10,8 @@
 
 /* Evenly over the sphere. */
 static vec3 direction(uint32_t i) {
-    double up = 1.0 - 2.0 * ((double)i + 0.5) / DIRECTIONS, turn = 2.399963229728653 * (double)i, r = sqrt(1.0 - up * up);
+    double up = 1.0 - 2.0 * ((double)i + 0.5) / DIRECTIONS, turn = 2.399963229728653 * (double)i,
+           r = sqrt(1.0 - up * up);
     return (vec3){(float)(r * sin(turn)), (float)up, (float)(-r * cos(turn))};
 }
 
@@ -38,8 +39,8 @@ static double integral_of(const struct lights *lights, uint32_t width, uint32_t 
     const uint32_t fine = 16;
     double sum = 0.0;
     for (uint32_t row = 0; row < (height - 1) * fine; row++) {
-        double y = (row + 0.5) / fine, band = cos(latlong_polar(height, (double)row / fine)) -
-                                              cos(latlong_polar(height, (row + 1.0) / fine));
+        double y = (row + 0.5) / fine,
+               band = cos(latlong_polar(height, (double)row / fine)) - cos(latlong_polar(height, (row + 1.0) / fine));
         for (uint32_t column = 0; column < width * fine; column++) {
             vec3 d = latlong_pixel(width, height, (column + 0.5) / fine, y);
             sum += band * 2.0 * PI / (width * fine) * (double)lights_environment(lights, d).r;
@@ -86,7 +87,8 @@ static void check_mitsuba(void) {
     int count = 0;
     for (bool head = true; file && fgets(line, sizeof line, file); head = false) {
         double v[8];
-        if (head || sscanf(line, "%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7) != 8)
+        if (head ||
+            sscanf(line, "%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7) != 8)
             continue;
         vec3 d = vec3_normalize((vec3){(float)v[0], (float)v[1], (float)v[2]});
         struct latlong at = latlong_of(d);

@@ -13,7 +13,7 @@
 #include "tests/check.h"
 
 static char dir[] = "/tmp/unbake-test-listing-XXXXXX";
-static long left;       /* entries that can still be read; negative: all */
+static long left; /* entries that can still be read; negative: all */
 static bool has_failed;
 
 /* libc's, until the disk fails. */
@@ -73,9 +73,7 @@ static enum status size_of_all(struct error *err) {
     return file_tree_size(dir, &files, &bytes, err);
 }
 
-static enum status remove_all(struct error *err) {
-    return file_remove_tree(dir, err);
-}
+static enum status remove_all(struct error *err) { return file_remove_tree(dir, err); }
 
 /* After each number of entries, until it needs no more. */
 static void check_fails(const char *name, enum status (*list)(struct error *), enum status in_peace) {

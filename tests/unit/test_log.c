@@ -25,9 +25,11 @@ static char *caught(void (*write_it)(void)) {
 }
 
 static void write_nasty(void) {
-    const struct log_field fields[] = {
-        {"path", "/a b\"c\\\n{\xff}", false}, {"status", "404", true}, {"user", NULL, false}, {"word", "plain", false},
-        {"name", "a\u202Eb", false}};
+    const struct log_field fields[] = {{"path", "/a b\"c\\\n{\xff}", false},
+                                       {"status", "404", true},
+                                       {"user", NULL, false},
+                                       {"word", "plain", false},
+                                       {"name", "a\u202Eb", false}};
     log_fields(LOG_WARNING, fields, 5, "it \"says\"\nlevel=error \x1b[31m");
 }
 
@@ -49,14 +51,17 @@ static void check_one_line(const char *text) {
 int main(void) {
     char *text = caught(write_nasty);
     check_one_line(text);
-    CHECK(strstr(text, "Z warning: it \"says\"?level=error ?[31m path=\"/a b\\\"c\\\\?{?}\" status=404 word=plain name=a<U+202E>b\n"));
+    CHECK(strstr(
+        text,
+        "Z warning: it \"says\"?level=error ?[31m path=\"/a b\\\"c\\\\?{?}\" status=404 word=plain name=a<U+202E>b\n"));
     mem_free(text);
 
     log_set_format(LOG_LOGFMT);
     text = caught(write_nasty);
     check_one_line(text);
     CHECK(strncmp(text, "time=2", 6) == 0);
-    CHECK(strstr(text, "Z level=warning msg=\"it \\\"says\\\"?level=error ?[31m\" path=\"/a b\\\"c\\\\?{?}\" status=404"));
+    CHECK(strstr(text,
+                 "Z level=warning msg=\"it \\\"says\\\"?level=error ?[31m\" path=\"/a b\\\"c\\\\?{?}\" status=404"));
     mem_free(text);
 
     log_set_format(LOG_JSON);

@@ -24,8 +24,7 @@ static void test_unbiased(void) {
     double two = 0.0, squares = 0.0, one = 0.0, loss = 0.0;
     for (int t = 0; t < trials; t++) {
         uint64_t bits = rng_key(1, (uint64_t)t, 0);
-        float x[2] = {-logf(1.0f - rng_to_float((uint32_t)bits)),
-                      -logf(1.0f - rng_to_float((uint32_t)(bits >> 32)))};
+        float x[2] = {-logf(1.0f - rng_to_float((uint32_t)bits)), -logf(1.0f - rng_to_float((uint32_t)(bits >> 32)))};
         rgb radiance[2] = {rgb_gray(a * x[0]), rgb_gray(a * x[1])}, d[2];
         loss += (double)loss_pair(&hdr, refs, radiance, 2, false, MEDIAN, d) / 3.0;
         double gradient = (double)(d[0].r * x[0] + d[1].r * x[1]);
@@ -38,8 +37,7 @@ static void test_unbiased(void) {
     one /= trials;
     double error = sqrt(squares / trials / trials);
     double wanted = 2.0 * w * (double)(a - target);
-    CHECK_THAT(fabs(two - wanted) < 4.0 * error, "two estimates: %g, wanted %g, sigma %g", two, wanted,
-               error);
+    CHECK_THAT(fabs(two - wanted) < 4.0 * error, "two estimates: %g, wanted %g, sigma %g", two, wanted, error);
     /* One estimate's bias is 2 w a Var(mean) = 2 w a / 2: the test could tell. */
     CHECK_NEAR(one - wanted, 2.0 * w * (double)a * 0.5, 0.1 * w);
     CHECK_NEAR(loss / trials, w * (double)((a - target) * (a - target)), 0.02 * w);
@@ -49,9 +47,8 @@ static void test_saturated(void) {
     struct photograph ldr = {.exposure = 1.0f, .gain = {1, 1, 1}, .clip = 0.98f};
     struct photograph_sample refs[2];
     for (int i = 0; i < 2; i++)
-        refs[i] = (struct photograph_sample){.radiance = {1, 1, 0.5f},
-                                             .saturated = {true, true, false},
-                                             .clip_radiance = {0.98f, 0.98f, 0.98f}};
+        refs[i] = (struct photograph_sample){
+            .radiance = {1, 1, 0.5f}, .saturated = {true, true, false}, .clip_radiance = {0.98f, 0.98f, 0.98f}};
     rgb brighter[2] = {{3, 0.2f, 0.5f}, {2, 0.2f, 0.5f}}, d[2];
     loss_pair(&ldr, refs, brighter, 2, false, MEDIAN, d);
     CHECK(d[0].r == 0.0f && d[1].r == 0.0f);

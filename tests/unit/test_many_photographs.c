@@ -53,8 +53,8 @@ static void test_bounds(void) {
     for (uint32_t i = 0; i < count; i++) {
         bool bound = i < count / 2;
         vec3 at = {0.01f * (float)(i % 7), 0.0f, bound ? 1.0f : FAR_OFF};
-        struct photograph *photo = plane_rig_add(&rig, at, (vec3){0.1f, 0.1f, 0.0f}, bound ? 0.2f : 0.4f, plane_paint_one,
-                                                 bound ? &blue_color : &near_color);
+        struct photograph *photo = plane_rig_add(&rig, at, (vec3){0.1f, 0.1f, 0.0f}, bound ? 0.2f : 0.4f,
+                                                 plane_paint_one, bound ? &blue_color : &near_color);
         if (bound)
             photo->is_hdr = false, photo->clip = 0.1f;
     }
@@ -72,8 +72,8 @@ static void test_exposure(void) {
     rgb right = {1.0f, 1.0f, 1.0f}, wrong = {3.0f / 64.0f, 3.0f / 64.0f, 3.0f / 64.0f};
     plane_rig_init(&rig, 9, 1);
     for (int i = 0; i < 9; i++) {
-        struct photograph *photo = plane_rig_add(&rig, (vec3){0.01f * (float)i, 0.0f, 2.0f}, (vec3){0.1f, 0.1f, 0.0f}, 0.2f,
-                                                 plane_paint_one, i < 4 ? &right : &wrong);
+        struct photograph *photo = plane_rig_add(&rig, (vec3){0.01f * (float)i, 0.0f, 2.0f}, (vec3){0.1f, 0.1f, 0.0f},
+                                                 0.2f, plane_paint_one, i < 4 ? &right : &wrong);
         photo->exposure = i < 4 ? 1.0f : 1.0f / 64.0f;
     }
     plane_rig_look(&rig, 0.01f);
@@ -93,8 +93,13 @@ static void test_divide(uint32_t count) {
     for (size_t i = 0; i < probes.count; i++)
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, (vec3){0, 0, 1}, rgb_gray((float)PI));
     float typical = 0.5f;
-    struct divide divide = {.r = &rig.r, .views = &rig.views, .probes = &probes, .noise = &rig.r.noise, .stride = 1,
-                            .typical = &typical, .highlight_samples = 4};
+    struct divide divide = {.r = &rig.r,
+                            .views = &rig.views,
+                            .probes = &probes,
+                            .noise = &rig.r.noise,
+                            .stride = 1,
+                            .typical = &typical,
+                            .highlight_samples = 4};
     divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
     uint32_t texel = PLANE_MIDDLE;
     divide_texels(&divide, &texel, 1);
@@ -110,8 +115,8 @@ static void test_emission_pattern(uint32_t count) {
     struct plane_rig rig;
     photograph_all(&rig, count, 1, paint_halves);
     rig.r.is_emitter[0] = true;
-    rig.r.evidence[0] = (struct emitter_evidence){.radiance = {0.5f, 0.5f, 0.5f}, .observed = {0.5f, 0.5f, 0.5f},
-                                                  .is_seen = true};
+    rig.r.evidence[0] =
+        (struct emitter_evidence){.radiance = {0.5f, 0.5f, 0.5f}, .observed = {0.5f, 0.5f, 0.5f}, .is_seen = true};
     emission_pattern_find(&rig.r, &rig.views);
     CHECK(rig.r.materials.emission_pattern != NULL);
     if (rig.r.materials.emission_pattern) {

@@ -14,8 +14,11 @@ static float mean_with(float dark, float other, float weight) {
     struct measured_observations observations = {.count = OBSERVATIONS};
     for (int i = 0; i < OBSERVATIONS; i++) {
         float value = i == 0 ? other : dark * (1.0f + 0.02f * (float)(i - OBSERVATIONS / 2));
-        observations.observation[i] = (struct robust_sample){.value = rgb_gray(value), .gray = logf(value), .deviation = 0.05f,
-                                               .weight = i == 0 ? weight : 1.0f, .source = (uint32_t)i};
+        observations.observation[i] = (struct robust_sample){.value = rgb_gray(value),
+                                                             .gray = logf(value),
+                                                             .deviation = 0.05f,
+                                                             .weight = i == 0 ? weight : 1.0f,
+                                                             .source = (uint32_t)i};
     }
     struct measured m = measured_mean(&observations, SCALE, rgb_gray(0.0f));
     return rgb_mean(measured_value(&m));
@@ -26,8 +29,8 @@ static void test_common_noise(void) {
     struct measured_observations observations = {.count = OBSERVATIONS};
     const rgb value = {0.5f, 0.25f, 0.125f}, common = {0.1f, -0.2f, 0.3f};
     for (int i = 0; i < OBSERVATIONS; i++)
-        observations.observation[i] = (struct robust_sample){.value = value, .gray = 0.0f, .deviation = 0.05f, .weight = 1.0f,
-                                               .source = (uint32_t)i, .sharp = 1.0f};
+        observations.observation[i] = (struct robust_sample){
+            .value = value, .gray = 0.0f, .deviation = 0.05f, .weight = 1.0f, .source = (uint32_t)i, .sharp = 1.0f};
     struct measured m = measured_mean(&observations, SCALE, common);
     rgb noise = rgb_from_half(m.noise);
     CHECK_NEAR(noise.r, value.r * common.r, 1e-4f);

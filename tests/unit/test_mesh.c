@@ -5,10 +5,8 @@
 #include "server/scene/adjacency.h"
 #include "tests/check.h"
 
-static struct mesh make(const vec3 *position, size_t vertex_count, const uint32_t (*index)[3],
-                        size_t triangle_count) {
-    struct mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count,
-                        .face_count = triangle_count};
+static struct mesh make(const vec3 *position, size_t vertex_count, const uint32_t (*index)[3], size_t triangle_count) {
+    struct mesh mesh = {.vertex_count = vertex_count, .triangle_count = triangle_count, .face_count = triangle_count};
     mesh.position = mem_array(vertex_count, sizeof *mesh.position);
     memcpy(mesh.position, position, vertex_count * sizeof *position);
     mesh.index = mem_array(triangle_count, sizeof *mesh.index);
@@ -50,15 +48,14 @@ static void test_refused(void) {
 }
 
 static void test_dropped(void) {
-    static const vec3 position[9] = {{0, 0, 0},     {1, 0, 0}, {1, 1, 0},        {0, 1, 0}, {0.5f, 0, 0},
+    static const vec3 position[9] = {{0, 0, 0},     {1, 0, 0}, {1, 1, 0},      {0, 1, 0},     {0.5f, 0, 0},
                                      {-0.0f, 0, 0}, {1, 1, 0}, {1e-25f, 0, 0}, {0, 1e-25f, 0}};
     static const uint32_t index[8][3] = {
-        {0, 4, 1}, /* on one line */
-        {0, 1, 2}, {0, 0, 2},
-        {2, 0, 1}, /* the second again, turned, */
-        {1, 0, 2}, /* the other way round, */
-        {5, 1, 6}, /* and over other vertices at the same places */
-        {0, 2, 3}, {0, 7, 8} /* its area is no float */
+        {0, 4, 1},                       /* on one line */
+        {0, 1, 2}, {0, 0, 2}, {2, 0, 1}, /* the second again, turned, */
+        {1, 0, 2},                       /* the other way round, */
+        {5, 1, 6},                       /* and over other vertices at the same places */
+        {0, 2, 3}, {0, 7, 8}             /* its area is no float */
     };
     struct mesh mesh = make(position, 9, index, 8);
     struct mesh_report report;
@@ -98,8 +95,7 @@ static void test_normals(void) {
 
 /* Three triangles on the edge from (0,0,0) to (1,1,0), one of them over vertices of its own. */
 static void test_adjacency(void) {
-    static const vec3 position[7] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
-                                     {1, 1, 0}, {-0.0f, 0, 0}, {0, 0, 1}};
+    static const vec3 position[7] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 1, 0}, {-0.0f, 0, 0}, {0, 0, 1}};
     static const uint32_t index[3][3] = {{0, 1, 2}, {0, 2, 3}, {4, 6, 5}};
     struct mesh mesh = make(position, 7, index, 3);
     struct adjacency adjacency;

@@ -87,7 +87,8 @@ static void test_ball(struct parallel *pool) {
 
 /* Its triangles differ from most of those beside them, and yet it has no noise. */
 static void test_box(struct parallel *pool) {
-    static const uint32_t side[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+    static const uint32_t side[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                        {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
     struct mesh m = {0}, before = {0};
     rough_grow(&m, 8, 12);
     rough_grow(&before, 8, 12);

@@ -33,8 +33,8 @@ static uint32_t word_at(const char *at) {
     return value;
 }
 
-static void check_file(const char *text, size_t length, const struct mesh *mesh,
-                       const struct segments *segments, const struct atlas *atlas) {
+static void check_file(const char *text, size_t length, const struct mesh *mesh, const struct segments *segments,
+                       const struct atlas *atlas) {
     const char *end = strstr(text, "end_header\n");
     const char *count = strstr(text, "element vertex ");
     CHECK(end && count && strstr(text, "element face 4\n"));

@@ -18,8 +18,8 @@ static void place_room(struct light_place place[WALL + DESK]) {
         float along = (float)(is_desk ? i - WALL : i) / (float)(is_desk ? DESK : WALL);
         float lit = is_desk ? 0.3f + along : 0.01f * along, known = 1.0f;
         float light = known * (is_desk ? 1.0f : 1.0f + 0.2f * along) + STRENGTH * lit;
-        place[i] = (struct light_place){.segment = is_desk, .shown = rgb_gray(0.5f * light), .white = rgb_gray(known),
-                                        .weight = 1.0f, .lit = lit};
+        place[i] = (struct light_place){
+            .segment = is_desk, .shown = rgb_gray(0.5f * light), .white = rgb_gray(known), .weight = 1.0f, .lit = lit};
     }
 }
 

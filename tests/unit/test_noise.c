@@ -69,13 +69,9 @@ static void test_photons(void) {
 }
 
 /* Waves of 24 pixels, a third of the brightness high. */
-static float waves(uint32_t x, uint32_t y) {
-    return 1.0f + 0.3f * sinf((float)x * 0.26f) * sinf((float)y * 0.26f);
-}
+static float waves(uint32_t x, uint32_t y) { return 1.0f + 0.3f * sinf((float)x * 0.26f) * sinf((float)y * 0.26f); }
 
-static float twice_as_much_on_the_right(float value, uint32_t x) {
-    return value * (x < SIDE / 2 ? 0.05f : 0.1f);
-}
+static float twice_as_much_on_the_right(float value, uint32_t x) { return value * (x < SIDE / 2 ? 0.05f : 0.1f); }
 
 static void test_places_and_texture(void) {
     struct noise noise;

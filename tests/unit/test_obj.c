@@ -6,8 +6,7 @@
 
 #define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
-static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report,
-                         struct error *err) {
+static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report, struct error *err) {
     return obj_parse(text, strlen(text), "room.obj", 1000, mesh, report, err);
 }
 
@@ -19,12 +18,14 @@ static void test_taken(void) {
     CHECK_THAT(parse("# made by hand\r\nmtllib a.mtl\r\n\r\n  v 0 0 0 1\r\nv 1 0 0 .5 .5 .5\nv 1 1 0\nv 0 \\\n 1 0\n"
                      "v 0 0 1\nv 1e0 +0 1\nv 1 1 1\nvt 0 0\nvt 1 1\nl 1 2\np 1\ns off\n"
                      "f 1/1 2/2 3/1 4/2\nf -3/1/ 6 7\\\n 8 # end\nf 1 2\nf 1/2 2/2 6/1 \\\r\n5/1 4/1",
-                     &mesh, &report, &err) == STATUS_INPUT, "%s", err.message);
+                     &mesh, &report, &err) == STATUS_INPUT,
+               "%s", err.message);
     CHECK_STRING(err.message, "room.obj, line 18: a corner of the face is not written as v, v/vt, v//vn or v/vt/vn");
     CHECK_THAT(parse("# made by hand\r\nmtllib a.mtl\r\n\r\n  v 0 0 0 1\r\nv 1 0 0 .5 .5 .5\nv 1 1 0\nv 0 \\\n 1 0\n"
                      "v 0 0 1\nv 1e0 +0 1\nv 1 1 1\nvt 0 0\nvt 1 1\nl 1 2\np 1\ns off\n"
                      "f 1/1 2/2 3/1 4/2\nf -3 6 7\\\n # end\nf 1 2\nf 1/2 2/2 6/1 \\\r\n5/1 4/1",
-                     &mesh, &report, &err) == STATUS_OK, "%s", err.message);
+                     &mesh, &report, &err) == STATUS_OK,
+               "%s", err.message);
     CHECK(mesh.triangle_count == 6 && mesh.face_count == 4 && mesh.vertex_count == 7);
     CHECK(!mesh.normal && !mesh.object_id);
     CHECK(report.small_count == 1 && report.polygon_count == 1);
@@ -55,7 +56,8 @@ static void test_objects(void) {
     struct mesh mesh;
     struct error err;
     CHECK(parse(SQUARE "o empty\no wall \nusemtl paint\nf 1 2 3\no lamp\nf 1 3 4\ng\nf 1 2 3\nusemtl glass\nf 1 2 4\n"
-                "usemtl paint\no\twall\r\nf 2 3 4\ng shade left\nf 1 2 3\n", &mesh, NULL, &err) == STATUS_OK);
+                       "usemtl paint\no\twall\r\nf 2 3 4\ng shade left\nf 1 2 3\n",
+                &mesh, NULL, &err) == STATUS_OK);
     CHECK(mesh.triangle_count == 6 && mesh.object_id && memcmp(mesh.object_id, wanted, sizeof wanted) == 0);
     mesh_release(&mesh);
     CHECK(parse("o one\n" SQUARE "f 1 2 3\nf 1 3 4\no none\n", &mesh, NULL, &err) == STATUS_OK);
@@ -119,7 +121,8 @@ static void test_large(void) {
         printf("no file of 32 GiB here, not even of holes\n");
     else
         CHECK_THAT(obj_read(path, "room.obj", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
-                   strcmp(err.message, "room.obj is larger than 34359738352 bytes") == 0, "%s", err.message);
+                       strcmp(err.message, "room.obj is larger than 34359738352 bytes") == 0,
+                   "%s", err.message);
     close(fd);
     unlink(path);
 }
@@ -147,7 +150,7 @@ static void test_others(void) {
             continue;
         CHECK_THAT(obj_read(path, table[i].file, 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
         CHECK_THAT(mesh.vertex_count == table[i].vertices && mesh.triangle_count == table[i].triangles &&
-                   mesh.face_count == table[i].faces && (mesh.normal != NULL) == table[i].has_normals,
+                       mesh.face_count == table[i].faces && (mesh.normal != NULL) == table[i].has_normals,
                    "%s", table[i].file);
         int64_t last = 0;
         for (size_t t = 0; mesh.object_id && t < mesh.triangle_count; t++)

@@ -10,8 +10,8 @@ static struct error err;
 
 static void put(const char *folder, const char *name, const char *text) {
     char *dir = mem_printf("%s/%s", root, folder), *path = file_join(dir, name);
-    CHECK_THAT(file_make_dirs(dir, &err) == STATUS_OK && file_replace(path, text, strlen(text), &err) == STATUS_OK, "%s",
-               err.message);
+    CHECK_THAT(file_make_dirs(dir, &err) == STATUS_OK && file_replace(path, text, strlen(text), &err) == STATUS_OK,
+               "%s", err.message);
     mem_free(path);
     mem_free(dir);
 }

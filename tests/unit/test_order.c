@@ -17,10 +17,10 @@ static enum status read_text(const char *text, struct order *order) {
 }
 
 #define COMMON "\"scene_id\":\"x\",\"thread_count\":2,\"memory_bytes\":1000,\"sandbox\":false"
-#define RECONSTRUCT                                                                                                   \
+#define RECONSTRUCT                                                                                                      \
     "\"kind\":\"reconstruct\",\"scene\":\"/s\",\"name\":\"n\",\"job_id\":7,\"attempt\":3,\"checkpoint_interval_sec\":5," \
     "\"settings\":{}"
-#define DELIVER                                                                                                       \
+#define DELIVER                                                                                                        \
     "\"kind\":\"deliver\",\"url\":\"http://x/\",\"secret\":\"s\",\"body\":\"b\",\"message_id\":\"m\",\"allow_private\":true"
 
 static void check_good(void) {
@@ -58,7 +58,8 @@ int main(void) {
         return 1;
     check_good();
     static const char *const texts[] = {"kind", "scene_id", "scene", "name", "reduced"};
-    static const char *const numbers[] = {"thread_count", "memory_bytes", "job_id", "attempt", "checkpoint_interval_sec"};
+    static const char *const numbers[] = {"thread_count", "memory_bytes", "job_id", "attempt",
+                                          "checkpoint_interval_sec"};
     static const char *const message[] = {"url", "secret", "body", "message_id", "allow_private"};
     for (size_t i = 0; i < 5; i++) {
         check_bad(texts[i], "7", "{" RECONSTRUCT "," COMMON "}");

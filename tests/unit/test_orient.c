@@ -17,26 +17,29 @@ static struct camera camera_at(float z) {
     return c;
 }
 
-static float front_z(const struct mesh *mesh, size_t t) {
-    return mesh_cross(mesh, t).z;
-}
+static float front_z(const struct mesh *mesh, size_t t) { return mesh_cross(mesh, t).z; }
 
 int main(void) {
     /* A wall to the left, one to the right of which a strip is out of sight, one behind both, and one that
      * only the held-out photograph shows. */
-    vec3 position[] = {{0, 0, 16},  {8, 0, 16},  {8, 16, 16},  {0, 16, 16},  {8, 0, 16},   {16, 0, 16},
-                       {16, 16, 16}, {8, 16, 16}, {90, 0, 16}, {90, 16, 16}, {0, 0, 17},  {16, 0, 17},
+    vec3 position[] = {{0, 0, 16},   {8, 0, 16},  {8, 16, 16}, {0, 16, 16},  {8, 0, 16}, {16, 0, 16},
+                       {16, 16, 16}, {8, 16, 16}, {90, 0, 16}, {90, 16, 16}, {0, 0, 17}, {16, 0, 17},
                        {16, 16, 17}, {0, 0, 48},  {16, 0, 48}, {16, 16, 48}};
     /* Clockwise as the camera sees it (x right, y down) is towards it: the left wall is right. */
-    uint32_t index[][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {5, 8, 9}, {5, 9, 6}, {10, 11, 12}, {13, 14, 15}};
+    uint32_t index[][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6},    {4, 6, 7},
+                           {5, 8, 9}, {5, 9, 6}, {10, 11, 12}, {13, 14, 15}};
     int64_t object[] = {0, 0, 1, 1, 1, 1, 2, 3};
     vec3 normal[16];
     for (int v = 0; v < 16; v++)
         normal[v] = (vec3){0, 0, v < 4 ? -1 : 1};
     struct photograph photograph[2] = {{.camera = camera_at(0)}, {.camera = camera_at(32), .is_test = true}};
     struct scene scene = {.photograph_count = 2, .photograph = photograph};
-    scene.mesh = (struct mesh){.vertex_count = 16, .position = position, .normal = normal, .triangle_count = 8,
-                               .index = index, .object_id = object};
+    scene.mesh = (struct mesh){.vertex_count = 16,
+                               .position = position,
+                               .normal = normal,
+                               .triangle_count = 8,
+                               .index = index,
+                               .object_id = object};
     CHECK(front_z(&scene.mesh, 0) < 0 && front_z(&scene.mesh, 2) > 0);
     uint32_t before[8][3];
     memcpy(before, index, sizeof before);

@@ -49,10 +49,10 @@ static void *damage(const void *data, size_t length, long at) {
     return copy;
 }
 
-#define REAL(type, name, ...)                                                                                           \
-    static type (*call)(__VA_ARGS__);                                                                                   \
-    if (!call)                                                                                                          \
-        *(void **)&call = dlsym(RTLD_NEXT, #name)
+#define REAL(type, name, ...)                                                                                          \
+    static type (*call)(__VA_ARGS__);                                                                                  \
+    if (!call)                                                                                                         \
+    *(void **)&call = dlsym(RTLD_NEXT, #name)
 
 ssize_t pwrite(int fd, const void *data, size_t length, off_t at) {
     REAL(ssize_t, pwrite, int, const void *, size_t, off_t);
@@ -93,7 +93,7 @@ size_t fwrite_unlocked(const void *data, size_t size, size_t count, FILE *file) 
 
 #define FRAME(name) "{\"file_path\":\"" name "\",\"transform_matrix\":[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,1]]}"
 #define MESH "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
-#define SETTINGS                                                                                                        \
+#define SETTINGS                                                                                                       \
     "{\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,\"cameras_per_texel\":1,"                       \
     "\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60}"
 
@@ -123,8 +123,14 @@ static void put_scene(void) {
 static enum status reconstruct(void) {
     cJSON *json = cJSON_Parse(SETTINGS);
     struct progress progress = {.fd = -1};
-    struct order order = {.dir = dir, .kind = "reconstruct", .thread_count = 1, .scene = scene, .scene_id = "x",
-                          .name = "", .reduced = "", .settings = json};
+    struct order order = {.dir = dir,
+                          .kind = "reconstruct",
+                          .thread_count = 1,
+                          .scene = scene,
+                          .scene_id = "x",
+                          .name = "",
+                          .reduced = "",
+                          .settings = json};
     err = (struct error){0};
     enum status status = task_reconstruct(&order, &progress, &err);
     cJSON_Delete(json);
@@ -163,7 +169,8 @@ static void reads(const char *name, const char *text, const struct mesh *mesh, c
     err = (struct error){0};
     enum status status = read_back(path, name, mesh, &err);
     if (complaint)
-        CHECK_THAT(status == STATUS_CORRUPT && strstr(err.message, complaint), "%s: %s", status_name(status), err.message);
+        CHECK_THAT(status == STATUS_CORRUPT && strstr(err.message, complaint), "%s: %s", status_name(status),
+                   err.message);
     else
         OK(status);
     mem_free(path);
@@ -174,7 +181,8 @@ static void read_meshes(void) {
     uint32_t index[2][3] = {{0, 1, 2}, {1, 3, 2}};
     struct mesh mesh = {.vertex_count = 4, .position = position, .triangle_count = 2, .index = index};
     reads("a.obj", MESH, &mesh, NULL);
-    reads("a.obj", "v 0 0 0\nv 0 0 1\nv 0 1 0\nv 0 1 1\nf 2 4 3\nf 1 2 3\n", &mesh, NULL); /* turned, in another order */
+    reads("a.obj", "v 0 0 0\nv 0 0 1\nv 0 1 0\nv 0 1 1\nf 2 4 3\nf 1 2 3\n", &mesh,
+          NULL); /* turned, in another order */
     reads("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n", &mesh, "1 triangles, not 2");
     reads("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1.1 0\nf 1 2 3\nf 2 4 3\n", &mesh, "lie elsewhere");
     reads("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 5 3\n", &mesh, "read back");

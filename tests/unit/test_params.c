@@ -14,8 +14,13 @@ static void test_step(void) {
     uint32_t texel[2] = {0, 1};
     rgb d_base[2] = {{1, -1, 0}, {1, -1, 0}};
     double d_roughness[2] = {1, 0}, d_specular[2] = {0, -1}, d_emission[2][3] = {{0}, {-1, -1, -1}};
-    struct gradient g = {.texel_count = 2, .texel = texel, .d_base_color = d_base, .segment_count = 2,
-                         .d_roughness = d_roughness, .d_specular = d_specular, .d_emission = d_emission};
+    struct gradient g = {.texel_count = 2,
+                         .texel = texel,
+                         .d_base_color = d_base,
+                         .segment_count = 2,
+                         .d_roughness = d_roughness,
+                         .d_specular = d_specular,
+                         .d_emission = d_emission};
     struct params_rates rates = {.base_color = 0.1f, .roughness = 0.1f, .specular = 0.1f, .emission = 0.1f};
     materials_init(&m, &inverse, 2, rgb_gray(0.5f), 0.5f, 0.5f);
     m.emission[0] = m.emission[1] = rgb_gray(2.0f);

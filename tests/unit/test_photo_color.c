@@ -10,7 +10,7 @@ static struct error err;
 static char dir[] = "/tmp/unbake-test-photo-color-XXXXXX";
 
 #define OK(call) CHECK_THAT((call) == STATUS_OK, "%s", err.message)
-#define FRAME(name, more)                                                                                               \
+#define FRAME(name, more)                                                                                              \
     "{\"file_path\":\"" name ".png\"" more ",\"transform_matrix\":[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,1]]}"
 #define MESH "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
 
@@ -92,8 +92,8 @@ int main(void) {
     CHECK(mkdtemp(dir) != NULL);
     profile_display_p3(&p3);
     put("room.obj", MESH, sizeof MESH - 1);
-    static const char transforms[] = "{\"fl_x\":4,\"frames\":[" FRAME("a", ",\"mask_path\":\"m.png\"") "," FRAME("b", "") ","
-                                     FRAME("c", "") "]}";
+    static const char transforms[] =
+        "{\"fl_x\":4,\"frames\":[" FRAME("a", ",\"mask_path\":\"m.png\"") "," FRAME("b", "") "," FRAME("c", "") "]}";
     put("transforms.json", transforms, sizeof transforms - 1);
     put_photograph("a.png", &p3);
     put_photograph("b.png", &p3);

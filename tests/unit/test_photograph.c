@@ -16,8 +16,8 @@
 
 static struct photograph make(void) {
     /* 3 x 2, red = column, green = 1 in the lower row, blue = 0.25 */
-    struct photograph p = {.exposure = 1.0f, .gain = {1.0f, 1.0f, 1.0f}, .clip = INFINITY,
-                           .camera = {.width = 3, .height = 2}};
+    struct photograph p = {
+        .exposure = 1.0f, .gain = {1.0f, 1.0f, 1.0f}, .clip = INFINITY, .camera = {.width = 3, .height = 2}};
     p.pixel = mem_calloc(6, sizeof *p.pixel);
     static const uint16_t red[3] = {H0, H1, H2};
     for (int i = 0; i < 6; i++) {
@@ -31,8 +31,8 @@ static struct photograph make(void) {
 /* A cubic look-up reads pixels as they are and straight lines between them, parabolas too away from the
  * border, and keeps more of a fine pattern than a bilinear one; it wants all its taps. */
 static void test_cubic(void) {
-    struct photograph p = {.exposure = 2.0f, .gain = {1.0f, 1.0f, 0.5f}, .clip = INFINITY,
-                           .camera = {.width = 12, .height = 8}};
+    struct photograph p = {
+        .exposure = 2.0f, .gain = {1.0f, 1.0f, 0.5f}, .clip = INFINITY, .camera = {.width = 12, .height = 8}};
     p.pixel = mem_calloc(96, sizeof *p.pixel);
     for (int i = 0; i < 96; i++) {
         float x = (float)(i % 12) + 0.5f, y = (float)(i / 12) + 0.5f;
@@ -64,14 +64,18 @@ static void test_cubic(void) {
 
 /* A black pixel reads as a little less than that, in shares of look-ups too; others, however dark, as they are. */
 static void test_black(void) {
-    struct photograph p = {.exposure = 0.5f, .gain = {1.0f, 2.0f, 1.0f}, .clip = 1.0f, .black = 0.25f,
+    struct photograph p = {.exposure = 0.5f,
+                           .gain = {1.0f, 2.0f, 1.0f},
+                           .clip = 1.0f,
+                           .black = 0.25f,
                            .camera = {.width = 4, .height = 4}};
     p.pixel = mem_calloc(16, sizeof *p.pixel);
     for (int i = 0; i < 16; i++)
         p.pixel[i][2] = i % 4 == 3 ? H_SUBNORMAL : H025;
     struct photograph_sample s;
     rgb sharp;
-    CHECK(photograph_sample(&p, 1.5f, 1.5f, &s) && s.radiance.r == -0.5f && s.radiance.g == -0.25f && s.radiance.b == 0.5f);
+    CHECK(photograph_sample(&p, 1.5f, 1.5f, &s) && s.radiance.r == -0.5f && s.radiance.g == -0.25f &&
+          s.radiance.b == 0.5f);
     CHECK(photograph_sample(&p, 3.5f, 1.5f, &s) && s.radiance.b == 0x1p-23f);
     CHECK(photograph_sample_cubic(&p, 1.75f, 2.0f, &sharp));
     CHECK_NEAR(sharp.r, -0.5, 1e-6);

@@ -59,8 +59,8 @@ static void check_cut(double limit_sec, double refine, double report, double det
     const double wanted[] = {refine, report, detail, measure, gather};
     const enum plan_part part[] = {PLAN_REFINE, PLAN_REPORT, PLAN_DETAIL, PLAN_MEASURE, PLAN_GATHER};
     for (int i = 0; i < 5; i++) {
-        CHECK_THAT(fabs(p.part[part[i]].now - wanted[i]) < 1e-6, "limit %g, part %d: %g, not %g", limit_sec, (int)part[i],
-                   p.part[part[i]].now, wanted[i]);
+        CHECK_THAT(fabs(p.part[part[i]].now - wanted[i]) < 1e-6, "limit %g, part %d: %g, not %g", limit_sec,
+                   (int)part[i], p.part[part[i]].now, wanted[i]);
         CHECK(plan_is_cut(&p, part[i]) == (wanted[i] < 100.0));
     }
     CHECK(!plan_is_cut(&p, PLAN_PREPARE) && plan_is_kept(&p) == kept);

@@ -6,8 +6,7 @@
 
 #define CUBE_CORNERS "0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
 
-static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report,
-                         struct error *err) {
+static enum status parse(const char *text, struct mesh *mesh, struct faces_report *report, struct error *err) {
     return ply_parse(text, strlen(text), "mesh.ply", 1000, mesh, report, err);
 }
 
@@ -67,17 +66,17 @@ static void test_binary(void) {
         const char *type;
         size_t bytes;
         int64_t id;
-    } table[] = {{"char", 1, -7}, {"uint8", 1, 200}, {"short", 2, -300}, {"ushort", 2, 60000},
-                 {"int", 4, -70000}, {"uint32", 4, 4000000000}};
+    } table[] = {{"char", 1, -7},      {"uint8", 1, 200},  {"short", 2, -300},
+                 {"ushort", 2, 60000}, {"int", 4, -70000}, {"uint32", 4, 4000000000}};
     for (size_t i = 0; i < 12; i++) {
         bool big = i % 2;
         uint8_t file[1024];
         size_t used = (size_t)snprintf((char *)file, sizeof file,
-            "ply\nformat binary_%s_endian 1.0\nelement vertex 3\nproperty float x\n"
-            "property double y\nproperty float z\nelement face 1\n"
-            "property list ushort ushort unused\nproperty %s object_id\n"
-            "property list uchar short vertex_indices\nend_header\n",
-            big ? "big" : "little", table[i / 2].type);
+                                       "ply\nformat binary_%s_endian 1.0\nelement vertex 3\nproperty float x\n"
+                                       "property double y\nproperty float z\nelement face 1\n"
+                                       "property list ushort ushort unused\nproperty %s object_id\n"
+                                       "property list uchar short vertex_indices\nend_header\n",
+                                       big ? "big" : "little", table[i / 2].type);
         size_t header = used;
         for (int k = 0; k < 3; k++) {
             double y = k * 0.125;
@@ -139,7 +138,8 @@ static void test_refusals(void) {
         {HEAD VERTEX(3) FACE(1) "end_header\n0 0 0\n1 0 0\n0 1 0\n5000 0 1 2\n", {"line 13", "corners"}},
         {HEAD VERTEX(3) FACE(1) "property float object_id\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 1\n",
          {"mesh.ply", "object_id"}},
-        {HEAD VERTEX(3) "element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        {HEAD VERTEX(
+             3) "element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
          {"mesh.ply", "vertex_indices"}},
     };
     for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
@@ -147,15 +147,15 @@ static void test_refusals(void) {
         struct error err = {.message = ""};
         CHECK_THAT(parse(table[i].text, &mesh, NULL, &err) == STATUS_INPUT, "case %zu: %s", i, err.message);
         for (int k = 0; k < 2; k++)
-            CHECK_THAT(strstr(err.message, table[i].sentence[k]), "case %zu wants \"%s\": %s", i,
-                       table[i].sentence[k], err.message);
+            CHECK_THAT(strstr(err.message, table[i].sentence[k]), "case %zu wants \"%s\": %s", i, table[i].sentence[k],
+                       err.message);
         CHECK(mesh.position == NULL && mesh.index == NULL);
     }
     struct mesh mesh;
     struct error err;
     CHECK(ply_parse(HEAD VERTEX(8) FACE(2) "end_header\n" CUBE_CORNERS "4 0 1 2 3\n4 4 5 6 7\n",
-                    strlen(HEAD VERTEX(8) FACE(2) "end_header\n" CUBE_CORNERS "4 0 1 2 3\n4 4 5 6 7\n"),
-                    "mesh.ply", 3, &mesh, NULL, &err) == STATUS_LIMIT);
+                    strlen(HEAD VERTEX(8) FACE(2) "end_header\n" CUBE_CORNERS "4 0 1 2 3\n4 4 5 6 7\n"), "mesh.ply", 3,
+                    &mesh, NULL, &err) == STATUS_LIMIT);
 }
 
 static double signed_area(const vec3 *corner, const uint32_t *t) {
@@ -170,11 +170,21 @@ static void test_polygons(void) {
         double area;
         vec3 corner[10];
     } table[] = {
-        {4, 1.0, {{0, 0, 0}, {2, 0, 0}, {0.5f, 0.5f, 0}, {0, 2, 0}}},         /* arrow, reflex at 2 */
-        {4, 1.0, {{0, 2, 0}, {0, 0, 0}, {2, 0, 0}, {0.5f, 0.5f, 0}}},         /* the same, turned */
+        {4, 1.0, {{0, 0, 0}, {2, 0, 0}, {0.5f, 0.5f, 0}, {0, 2, 0}}}, /* arrow, reflex at 2 */
+        {4, 1.0, {{0, 2, 0}, {0, 0, 0}, {2, 0, 0}, {0.5f, 0.5f, 0}}}, /* the same, turned */
         {8, 5.0, {{0, 0, 0}, {3, 0, 0}, {3, 2, 0}, {2, 2, 0}, {2, 1, 0}, {1, 1, 0}, {1, 2, 0}, {0, 2, 0}}},
-        {10, 15.0, /* a square hole, joined to the rim by a bridge */
-         {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0}, {1, 1, 0}, {1, 2, 0}, {2, 2, 0}, {2, 1, 0}, {1, 1, 0}}},
+        {10,
+         15.0, /* a square hole, joined to the rim by a bridge */
+         {{0, 0, 0},
+          {4, 0, 0},
+          {4, 4, 0},
+          {0, 4, 0},
+          {0, 0, 0},
+          {1, 1, 0},
+          {1, 2, 0},
+          {2, 2, 0},
+          {2, 1, 0},
+          {1, 1, 0}}},
     };
     for (size_t i = 0; i < 4; i++) {
         uint32_t t[10][3];
@@ -194,11 +204,13 @@ static void test_polygons(void) {
 
 /* More than the limit, and more than can be counted: a hole after the header. */
 static void test_large(void) {
-    static const char header[] = "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty char x\nproperty "
-                                 "char y\nproperty char z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n";
-    static const char faces[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-                                "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
-                                "3 0 1 2\n3 0 2 1\n";
+    static const char header[] =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 4294967295\nproperty char x\nproperty "
+        "char y\nproperty char z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    static const char faces[] =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n"
+        "3 0 1 2\n3 0 2 1\n";
     char path[] = "/tmp/unbake-test-ply-XXXXXX";
     struct mesh mesh;
     struct error err = {.message = ""};
@@ -211,7 +223,8 @@ static void test_large(void) {
         printf("no file of 13 GiB here, not even of holes\n");
     else
         CHECK_THAT(ply_read(path, "mesh.ply", 9, &mesh, NULL, &err) == STATUS_LIMIT &&
-                   strcmp(err.message, "mesh.ply has 4294967295 vertices, more than fit") == 0, "%s", err.message);
+                       strcmp(err.message, "mesh.ply has 4294967295 vertices, more than fit") == 0,
+                   "%s", err.message);
     close(fd);
     unlink(path);
 }

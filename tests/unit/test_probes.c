@@ -6,10 +6,10 @@
 #include "server/scene/materials.h"
 #include "tests/check.h"
 
-#define SIDE 64         /* texels of the plane */
+#define SIDE 64 /* texels of the plane */
 #define TEXELS (2 * SIDE * SIDE)
 #define METRES 4.0f
-#define LAMP_HALF 0.5   /* metres; it hangs over the middle, one metre above */
+#define LAMP_HALF 0.5 /* metres; it hangs over the middle, one metre above */
 #define SAMPLES 4096
 
 /* The plane z = 0, the lamp that faces it; each is a chart and a segment, beside each other in the texture. */
@@ -42,8 +42,12 @@ static void rig_init(struct rig *r) {
     *r = (struct rig){.pool = parallel_new(1)};
     r->mesh = (struct mesh){.vertex_count = 8, .position = position, .triangle_count = 4, .index = indices};
     r->segments = (struct segments){.count = 2, .of_triangle = of_triangle};
-    r->atlas = (struct atlas){.width = 2 * SIDE, .height = SIDE, .texels_per_metre = SIDE, .chart_count = 2,
-                              .chart_of_triangle = of_triangle, .corner = corner};
+    r->atlas = (struct atlas){.width = 2 * SIDE,
+                              .height = SIDE,
+                              .texels_per_metre = SIDE,
+                              .chart_count = 2,
+                              .chart_of_triangle = of_triangle,
+                              .corner = corner};
     inverse_uv_make(&r->inverse, &r->atlas, 4, r->pool);
     materials_init(&r->materials, &r->inverse, 2, rgb_gray(0.5f), 1.0f, 0.0f);
     r->materials.emission[1] = radiance;
@@ -131,8 +135,8 @@ static void test_mix(struct rig *r) {
         CHECK_NEAR(light.moment[0][0], x < SIDE ? 1.0f : 100.0f, 1e-3f);
         CHECK_NEAR(light.noise.r, 1.0, 1e-5);
         CHECK_NEAR(light.noise.g, light.moment[0][1], 1e-3f);
-        CHECK_THAT(r->fused.count[texel] == 0.0f || light.moment[0][2] < 0.05f, "texel %u, %u: %g of it by one that is unseen",
-                   x, texel / (2 * SIDE), (double)light.moment[0][2]);
+        CHECK_THAT(r->fused.count[texel] == 0.0f || light.moment[0][2] < 0.05f,
+                   "texel %u, %u: %g of it by one that is unseen", x, texel / (2 * SIDE), (double)light.moment[0][2]);
         if (x >= 24 && x < SIDE - 24 && texel / (2 * SIDE) >= 32) /* a ramp stays about one */
             CHECK_NEAR(light.moment[0][1], x, 2.0);
     }

@@ -81,7 +81,7 @@ static void stop_all(const int64_t *ids, const int *attempt, const char *token_u
     IS(add_refused(), STATUS_NO_SPACE);
     CHECK_THAT(strstr(err.message, "the disk is full"), "%s", err.message);
     IS(store_probe(store, &err), STATUS_NO_SPACE);
-    OK(store_job_cancel(store, ids[0], &err)); /* a wish, as it runs, */
+    OK(store_job_cancel(store, ids[0], &err));                      /* a wish, as it runs, */
     OK(store_job_stop(store, ids[0], attempt[0], "stopped", &err)); /* fulfilled */
     CHECK(state_of(ids[0]) == JOB_CANCELLED);
     OK(store_job_pause(store, ids[1], &err));
@@ -132,7 +132,8 @@ int main(void) {
         OK(store_job_start(store, ids[k], &attempt[k], &err));
     for (int i = 0; i < EVENTS; i++)
         for (int k = 0; k < 2; k++)
-            OK(store_event_add(store, ids[k], attempt[k], EVENT_METRIC, "{\"series\":\"loss\",\"step\":1,\"value\":2}", &err));
+            OK(store_event_add(store, ids[k], attempt[k], EVENT_METRIC, "{\"series\":\"loss\",\"step\":1,\"value\":2}",
+                               &err));
     fill_disk();
     work_until_full(ids[0], attempt[0]);
     stop_all(ids, attempt, "anna");

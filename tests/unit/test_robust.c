@@ -10,8 +10,8 @@
 #define SCALE 0.3f
 
 static struct robust_sample sample_of(float value, float weight, float deviation) {
-    return (struct robust_sample){.value = rgb_make(value, 2.0f * value, 0.0f), .gray = logf(value), .weight = weight,
-                                  .deviation = deviation};
+    return (struct robust_sample){
+        .value = rgb_make(value, 2.0f * value, 0.0f), .gray = logf(value), .weight = weight, .deviation = deviation};
 }
 
 /* The weight of the one of 9 samples that is off by so much in its logarithm. */
@@ -83,7 +83,8 @@ static void test_efficiency(void) {
         double sum = 0.0;
         for (uint32_t k = 0; k < FEW; k++) {
             float off = DEVIATION * normal(k, i);
-            sample[k] = (struct robust_sample){.value = rgb_gray(off), .gray = off, .weight = 1.0f, .deviation = DEVIATION};
+            sample[k] =
+                (struct robust_sample){.value = rgb_gray(off), .gray = off, .weight = 1.0f, .deviation = DEVIATION};
             sum += (double)off / FEW;
         }
         double mean = (double)robust_mean(sample, FEW, 1e-6f).r;

@@ -30,18 +30,18 @@
 #define NUMBER_SETXATTRAT 463
 #define NUMBER_FILE_SETATTR 469
 
-#define REFUSED(call) /* no call of this list is one that this kernel lacks without the sandbox */         \
-    do {                                                                                                          \
-        errno = 0;                                                                                                \
-        long result_ = (long)(call);                                                                              \
-        CHECK_THAT(result_ == -1 && errno == ENOSYS, "%s: %ld, %s", #call, result_, strerror(errno));          \
+#define REFUSED(call) /* no call of this list is one that this kernel lacks without the sandbox */                     \
+    do {                                                                                                               \
+        errno = 0;                                                                                                     \
+        long result_ = (long)(call);                                                                                   \
+        CHECK_THAT(result_ == -1 && errno == ENOSYS, "%s: %ld, %s", #call, result_, strerror(errno));                  \
     } while (0)
 
 static char root[] = "/tmp/unbake-test-sandbox-XXXXXX";
 static char *data, *writable, *readable, *photo;
-static pid_t victim;    /* another process of this user */
-static int ends[2];     /* a pipe that a confined process has, as workers have theirs */
-static int listening;   /* a TCP port of this machine, as the daemon's */
+static pid_t victim;  /* another process of this user */
+static int ends[2];   /* a pipe that a confined process has, as workers have theirs */
+static int listening; /* a TCP port of this machine, as the daemon's */
 static uint16_t port;
 
 static struct sockaddr_in loopback(uint16_t number) {

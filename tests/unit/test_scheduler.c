@@ -6,8 +6,7 @@
 
 /* --- the worker's side ----------------------------------------------------------------------- */
 
-static void announce(struct progress *p, const char *dir, const char *name, const char *claimed,
-                     uint64_t bytes) {
+static void announce(struct progress *p, const char *dir, const char *name, const char *claimed, uint64_t bytes) {
     char *path = mem_printf("%s/out/%s", dir, name);
     if (file_replace(path, "data", 4, &err) != STATUS_OK)
         _exit(99);
@@ -38,15 +37,16 @@ static int check_surroundings(const char *dir) {
 /* Says what no honest worker would: no JSON, too much of it, files that are not there, not its own or
  * of another size. An exit status where it cannot even lie. */
 static int lie(struct progress *p, const char *dir) {
-    static const char garbage[] = "\n{\"type\":\n[1,2]\n\"x\"\nnull\n{}\n{\"type\":7}\n\xff\xfe\n"
-                                  "{\"type\":\"progress\",\"stage\":3}\n"
-                                  "{\"type\":\"end\",\"status\":7}\n{\"type\":\"end\",\"status\":\"input\",\"message\":7}\n"
-                                  "{\"type\":\"end\",\"status\":\"input\",\"hint\":7}\n"
-                                  "{\"type\":\"checkpoint\",\"iteration\":\"x\"}\n{\"type\":\"checkpoint\",\"bytes\":\"x\"}\n"
-                                  "{\"type\":\"checkpoint\",\"seconds\":\"x\"}\n{\"type\":\"metric\",\"series\":7}\n"
-                                  "{\"type\":\"metric\",\"step\":\"x\"}\n{\"type\":\"metric\",\"value\":\"x\"}\n"
-                                  "{\"type\":\"output\",\"name\":7}\n{\"type\":\"output\",\"sha256\":7}\n"
-                                  "{\"type\":\"output\",\"content_type\":7}\n{\"type\":\"output\",\"bytes\":\"x\"}\n";
+    static const char garbage[] =
+        "\n{\"type\":\n[1,2]\n\"x\"\nnull\n{}\n{\"type\":7}\n\xff\xfe\n"
+        "{\"type\":\"progress\",\"stage\":3}\n"
+        "{\"type\":\"end\",\"status\":7}\n{\"type\":\"end\",\"status\":\"input\",\"message\":7}\n"
+        "{\"type\":\"end\",\"status\":\"input\",\"hint\":7}\n"
+        "{\"type\":\"checkpoint\",\"iteration\":\"x\"}\n{\"type\":\"checkpoint\",\"bytes\":\"x\"}\n"
+        "{\"type\":\"checkpoint\",\"seconds\":\"x\"}\n{\"type\":\"metric\",\"series\":7}\n"
+        "{\"type\":\"metric\",\"step\":\"x\"}\n{\"type\":\"metric\",\"value\":\"x\"}\n"
+        "{\"type\":\"output\",\"name\":7}\n{\"type\":\"output\",\"sha256\":7}\n"
+        "{\"type\":\"output\",\"content_type\":7}\n{\"type\":\"output\",\"bytes\":\"x\"}\n";
     if (write(PROGRESS_FD, garbage, sizeof garbage - 1) < 0)
         return 98;
     char *huge = mem_alloc(300000);
@@ -205,8 +205,7 @@ struct request_counts {
     int progress, metric, log, output, state;
 };
 
-static void tally_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
-                      const char *data) {
+static void tally_one(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
     struct request_counts *t = user;
     (void)id, (void)at_ms, (void)attempt;
     t->progress += strcmp(type, EVENT_PROGRESS) == 0 && strstr(data, "\"done\":3") != NULL;
@@ -236,7 +235,8 @@ static void check_talker(struct daemon *d) {
     int64_t id = submit(d, SCENE_A, "talker");
     expect(d, id, JOB_SUCCEEDED, 1, "", "");
     OK(store_event_list(d->store, id, 0, 100000, tally_talk, &t, &err));
-    CHECK_THAT(t.log == 1 && t.metric > 10 && t.metric < RIG_EVENTS_MAX && t.output == 2, "%d, %d, %d", t.log, t.metric, t.output);
+    CHECK_THAT(t.log == 1 && t.metric > 10 && t.metric < RIG_EVENTS_MAX && t.output == 2, "%d, %d, %d", t.log, t.metric,
+               t.output);
     OK(store_output_list(d->store, id, &rows, &count, &err));
     CHECK_THAT(count == 2, "%zu outputs", count);
     for (size_t i = 0; i < count; i++)
@@ -262,8 +262,8 @@ static void check_ruin(struct daemon *d) {
 static void check_whole_life(struct daemon *d, int64_t id, int states) {
     struct request_counts t = {0};
     OK(store_event_list(d->store, id, 0, 1000, tally_one, &t, &err));
-    CHECK_THAT(t.progress == 1 && t.metric == 1 && t.log == 2 && t.output == 1 && t.state == states,
-               "%d %d %d %d %d", t.progress, t.metric, t.log, t.output, t.state);
+    CHECK_THAT(t.progress == 1 && t.metric == 1 && t.log == 2 && t.output == 1 && t.state == states, "%d %d %d %d %d",
+               t.progress, t.metric, t.log, t.output, t.state);
     struct output_row *rows;
     size_t count;
     OK(store_output_list(d->store, id, &rows, &count, &err));
@@ -347,7 +347,8 @@ static void test_outcomes(struct daemon *d) {
     int64_t memory = submit(d, SCENE_A, "memory"), killed = submit(d, SCENE_A, "killed");
     int64_t silent = submit(d, SCENE_A, "silent"), deserter = submit(d, SCENE_A, "deserter");
     int64_t around = submit(d, SCENE_A, "surroundings"), damaged = submit(d, SCENE_A, "\"");
-    int64_t two_faced = submit(d, SCENE_A, "two-faced"), broken = submit(d, SCENE_A, "broken"), late = submit(d, SCENE_A, "late");
+    int64_t two_faced = submit(d, SCENE_A, "two-faced"), broken = submit(d, SCENE_A, "broken"),
+            late = submit(d, SCENE_A, "late");
     expect(d, good, JOB_SUCCEEDED, 1, "", "");
     check_whole_life(d, good, 3);
     expect(d, once, JOB_SUCCEEDED, 2, "", "");

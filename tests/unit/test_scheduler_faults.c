@@ -14,8 +14,8 @@
 #include "tests/check.h"
 #include "tests/system_faults.h"
 
-#define LIVES 60      /* of each kind */
-#define TRIES 30000   /* of 2 ms: others may have the machine */
+#define LIVES 60    /* of each kind */
+#define TRIES 30000 /* of 2 ms: others may have the machine */
 #define SHA "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 
 static struct error err;
@@ -64,7 +64,9 @@ static int worker(const char *dir) {
     if (json_read(path, 1 << 20, &order, &err) != STATUS_OK ||
         json_string(order, "kind", "job.json", "", &kind, &err) != STATUS_OK)
         return PROGRESS_EXIT_FAILED;
-    return strcmp(kind, "check") == 0 ? check(&p, dir) : strcmp(kind, "deliver") == 0 ? deliver(&p) : reconstruct(&p, dir);
+    return strcmp(kind, "check") == 0     ? check(&p, dir)
+           : strcmp(kind, "deliver") == 0 ? deliver(&p)
+                                          : reconstruct(&p, dir);
 }
 
 /* --- the daemon's side ------------------------------------------------------------------------------ */
@@ -83,9 +85,7 @@ static void *run(void *user) {
     return NULL;
 }
 
-static void nap(void) {
-    nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
-}
+static void nap(void) { nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL); }
 
 static void arm(bool is_sql, long n) {
     if (is_sql)
@@ -95,13 +95,16 @@ static void arm(bool is_sql, long n) {
 }
 
 /* What is left of n calls; none fails from now on. */
-static long lift(bool is_sql) {
-    return atomic_exchange(is_sql ? &sql_faults_left : &system_faults_left, 0);
-}
+static long lift(bool is_sql) { return atomic_exchange(is_sql ? &sql_faults_left : &system_faults_left, 0); }
 
 static bool begin(pthread_t *thread) {
-    struct scheduler_config config = {.data_dir = dir, .worker_binary = "/proc/self/exe", .max_running = 1, .thread_count = 1,
-                                      .checkpoint_interval_sec = 60, .stop_grace_sec = 1, .event_keep_sec = 1,
+    struct scheduler_config config = {.data_dir = dir,
+                                      .worker_binary = "/proc/self/exe",
+                                      .max_running = 1,
+                                      .thread_count = 1,
+                                      .checkpoint_interval_sec = 60,
+                                      .stop_grace_sec = 1,
+                                      .event_keep_sec = 1,
                                       .webhook_private = true};
     if (scheduler_new(&scheduler, &config, store, &err) != STATUS_OK)
         return false;

@@ -107,8 +107,7 @@ static pid_t worker_pid(const char *dir) {
         struct buf line;
         buf_init(&line, 4096);
         char *path = mem_printf("/proc/%s/cmdline", entry->d_name);
-        if (atoi(entry->d_name) > 0 && file_read(path, &line, NULL) == STATUS_OK &&
-            line.length > strlen(dir) &&
+        if (atoi(entry->d_name) > 0 && file_read(path, &line, NULL) == STATUS_OK && line.length > strlen(dir) &&
             memmem(line.data, line.length, dir, strlen(dir)) != NULL &&
             memmem(line.data, line.length, "worker", 7) != NULL)
             found = atoi(entry->d_name);
@@ -125,8 +124,10 @@ static void test_daemon_killed(struct daemon *d) {
     CHECK(pipe(ends) == 0);
     pid_t child = fork();
     if (child == 0) {
-        struct scheduler_config config = {.data_dir = d->dir, .worker_binary = "/proc/self/exe",
-                                          .max_running = 1, .thread_count = 1,
+        struct scheduler_config config = {.data_dir = d->dir,
+                                          .worker_binary = "/proc/self/exe",
+                                          .max_running = 1,
+                                          .thread_count = 1,
                                           .stop_grace_sec = 1};
         if (store_open(&d->store, d->dir, &err) != STATUS_OK ||
             scheduler_new(&d->scheduler, &config, d->store, &err) != STATUS_OK)

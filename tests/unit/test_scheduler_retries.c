@@ -78,7 +78,8 @@ static void test_postponed(struct daemon *d) {
     OK(file_replace(room, "", 0, &err));
     let_go_on(d, 20);
     CHECK(waits_for_room(d, SCENE_A) && count_tries(d) == 1);
-    sql_faults_arm_only("UPDATE scenes SET problems = '[]'", 1, true); /* before the other is lifted: it goes on at any time */
+    sql_faults_arm_only("UPDATE scenes SET problems = '[]'", 1,
+                        true); /* before the other is lifted: it goes on at any time */
     CHECK(system_faults_lift());
     let_go_on(d, 20);
     CHECK(waits_for_room(d, SCENE_A) && count_tries(d) == 1);
@@ -95,8 +96,8 @@ static void test_orphans(struct daemon *d) {
     daemon_start(d, 1, "/proc/self/exe");
     let_go_on(d, 3);
     for (long n = 1; n <= 60 && check_failed_count == 0; n++) {
-        struct job_new new = {.scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{\"role\":\"good\"}",
-                              .max_attempts = 2};
+        struct job_new new = {
+            .scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{\"role\":\"good\"}", .max_attempts = 2};
         struct job job = {0};
         int64_t id;
         int number;
@@ -145,7 +146,8 @@ static void test_unsettled(struct daemon *d) {
 
 /* A start that fails says why, whichever of its statements it is. */
 static void test_start(struct daemon *d) {
-    static const char *const statements[] = {"SELECT id FROM jobs WHERE state = ? LIMIT 1", "UPDATE scenes SET problems = '[]'"};
+    static const char *const statements[] = {"SELECT id FROM jobs WHERE state = ? LIMIT 1",
+                                             "UPDATE scenes SET problems = '[]'"};
     struct scheduler_config config = {.data_dir = d->dir, .worker_binary = "/proc/self/exe", .max_running = 1};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));
@@ -156,7 +158,8 @@ static void test_start(struct daemon *d) {
         sql_faults_arm_only(statements[i], 1, false);
         enum status status = scheduler_run(d->scheduler, &err);
         faults_are_off = true;
-        CHECK_THAT(sql_faults_lift() && status != STATUS_OK && status == err.status && *err.message, "%s", statements[i]);
+        CHECK_THAT(sql_faults_lift() && status != STATUS_OK && status == err.status && *err.message, "%s",
+                   statements[i]);
     }
     OK(scheduler_run(d->scheduler, &err));
     scheduler_free(d->scheduler);
@@ -165,8 +168,11 @@ static void test_start(struct daemon *d) {
 
 /* No disk has so much room. */
 static void test_low_disk(struct daemon *d) {
-    struct scheduler_config config = {.data_dir = d->dir, .worker_binary = "/proc/self/exe", .max_running = 1,
-                                      .low_disk_bytes = UINT64_MAX / 2, .stop_grace_sec = 1};
+    struct scheduler_config config = {.data_dir = d->dir,
+                                      .worker_binary = "/proc/self/exe",
+                                      .max_running = 1,
+                                      .low_disk_bytes = UINT64_MAX / 2,
+                                      .stop_grace_sec = 1};
     struct job job = {0};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));

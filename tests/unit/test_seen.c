@@ -12,8 +12,7 @@
 #define DISTANCE 8.0f
 
 static struct camera camera_at(float x) {
-    struct camera c = {.width = SIZE, .height = SIZE, .fx = DISTANCE, .fy = DISTANCE,
-                       .cx = SIZE / 2, .cy = SIZE / 2};
+    struct camera c = {.width = SIZE, .height = SIZE, .fx = DISTANCE, .fy = DISTANCE, .cx = SIZE / 2, .cy = SIZE / 2};
     for (int i = 0; i < 3; i++)
         c.world_from_camera.rotation[i][i] = 1.0f;
     c.world_from_camera.translation = (vec3){x + SIZE / 2, SIZE / 2, 0.0f};
@@ -22,15 +21,15 @@ static struct camera camera_at(float x) {
 }
 
 int main(void) {
-    vec3 position[] = {{-20, -20, 8}, {3.5f, -20, 8}, {3.5f, 20, 8}, {-20, 20, 8}, {12, -20, 8},
-                       {12, 20, 8},   {15, -20, 8},   {15, 20, 8}};
+    vec3 position[] = {{-20, -20, 8}, {3.5f, -20, 8}, {3.5f, 20, 8}, {-20, 20, 8},
+                       {12, -20, 8},  {12, 20, 8},    {15, -20, 8},  {15, 20, 8}};
     uint32_t index[][3] = {{0, 1, 2}, {0, 2, 3}, {1, 4, 5}, {1, 5, 2}, {4, 6, 7}, {4, 7, 5}};
     int64_t object[] = {0, 0, 1, 1, 2, 2};
     bool emits[] = {false, false, false, false, true, true};
     struct photograph photograph[2] = {{.camera = camera_at(0.0f)}, {.camera = camera_at(7.0f), .is_test = true}};
     struct scene scene = {.photograph_count = 2, .photograph = photograph};
-    scene.mesh = (struct mesh){.vertex_count = 8, .position = position, .triangle_count = 6, .index = index,
-                               .object_id = object};
+    scene.mesh = (struct mesh){
+        .vertex_count = 8, .position = position, .triangle_count = 6, .index = index, .object_id = object};
     struct parallel *pool = parallel_new(2);
     struct accel *accel;
     struct error err;
@@ -43,8 +42,8 @@ int main(void) {
     /* As the training picture itself: a look-up in columns 2 to 4 can read column 3. */
     seen_flags(&seen, &photograph[0].camera, pool, flags);
     for (int x = 0; x < SIZE; x++)
-        CHECK_THAT(flags[4 * SIZE + x] == (x >= 2 && x <= 4 ? SCORE_PLAIN : SCORE_PLAIN | SCORE_SEEN),
-                   "column %d: %d", x, flags[4 * SIZE + x]);
+        CHECK_THAT(flags[4 * SIZE + x] == (x >= 2 && x <= 4 ? SCORE_PLAIN : SCORE_PLAIN | SCORE_SEEN), "column %d: %d",
+                   x, flags[4 * SIZE + x]);
 
     /* Seven metres to the right: one column that the picture shows, then four that it does not, then
      * the lamp from x = 12 on. */

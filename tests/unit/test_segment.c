@@ -5,9 +5,7 @@
 #include "common/rng.h"
 #include "tests/unit/room.h"
 
-static float noise(uint64_t key) {
-    return rng_to_float((uint32_t)rng_key(key, 11, 0)) - 0.5f;
-}
+static float noise(uint64_t key) { return rng_to_float((uint32_t)rng_key(key, 11, 0)) - 0.5f; }
 
 /* A floor of 4 x 4 m with a box of 1 x 1 x 0.5 m on it, as a height field fused from depth: quads
  * of 4 cm, noise of up to 5 mm in every direction. */
@@ -16,8 +14,7 @@ static vec3 scanned_floor(float u, float v, void *user) {
     uint64_t key = (uint64_t)lrintf(u * 10000.0f) << 32 | (uint64_t)lrintf(v * 10000.0f);
     float x = 4.0f * u, y = 4.0f * v;
     bool box = x > 1.5f && x < 2.5f && y > 1.5f && y < 2.5f;
-    return (vec3){x + 0.01f * noise(key), y + 0.01f * noise(key + 1),
-                  (box ? 0.5f : 0.0f) + 0.01f * noise(key + 2)};
+    return (vec3){x + 0.01f * noise(key), y + 0.01f * noise(key + 1), (box ? 0.5f : 0.0f) + 0.01f * noise(key + 2)};
 }
 
 static uint32_t segment_at(const struct mesh *mesh, const struct segments *segments, float x, float y) {

@@ -20,8 +20,8 @@ static void test_table(void) {
         CHECK_THAT(i == 0 || strcmp(t[i - 1].name, t[i].name) < 0, "%s is out of order", t[i].name);
         CHECK(t[i].help && *t[i].help && t[i].unit);
         if (t[i].type == SETTING_INT || t[i].type == SETTING_REAL)
-            CHECK_THAT(s.number[i] >= t[i].minimum && s.number[i] <= t[i].maximum,
-                       "default of %s is out of its range", t[i].name);
+            CHECK_THAT(s.number[i] >= t[i].minimum && s.number[i] <= t[i].maximum, "default of %s is out of its range",
+                       t[i].name);
     }
     /* What settings_to_json writes, settings_apply reads back without a complaint. */
     cJSON *json = settings_to_json(&s);
@@ -80,8 +80,8 @@ static void test_method(void) {
     CHECK_STRING(reason, "only method=solve uses it, and the method is listing1");
     CHECK(problems_of("{\"base_color_rate\":0.1,\"roughness_rate\":0.1,\"specular_rate\":0.1}", reason) == 3);
     CHECK(problems_of("{\"emitters\":\"any\",\"method\":\"listing1\"}", reason) == 0);
-    CHECK(problems_of("{\"method\":\"solve\",\"denoise\":false,\"estimates\":\"one\",\"choose\":\"pixels\"}",
-                      reason) == 0);
+    CHECK(problems_of("{\"method\":\"solve\",\"denoise\":false,\"estimates\":\"one\",\"choose\":\"pixels\"}", reason) ==
+          0);
     /* The default changes nothing; a method that is none has no settings of its own. */
     CHECK(problems_of("{\"emitters\":\"decide\"}", reason) == 0);
     CHECK(problems_of("{\"emitters\":\"any\",\"method\":\"guess\"}", reason) == 1);

@@ -65,17 +65,15 @@ static int64_t kept_by(int64_t user) {
 }
 
 static int64_t job_of(int64_t user) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3,
-                          .owner_id = user};
+    struct job_new new = {
+        .scene_id = SCENE_A, .name = "job", .labels = "{}", .settings = "{}", .max_attempts = 3, .owner_id = user};
     int64_t id = 0;
     bool replayed;
     OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
     return id;
 }
 
-static char *job_dir(int64_t id) {
-    return mem_printf("%s/jobs/%lld", dir, (long long)id);
-}
+static char *job_dir(int64_t id) { return mem_printf("%s/jobs/%lld", dir, (long long)id); }
 
 static int64_t disk_of(int64_t id) {
     struct job job;
@@ -158,7 +156,8 @@ static void test_large_scene(void) {
     check_scene(SCENE_C, ALICE, BOB, limit, &row);
     CHECK(row.state == SCENE_REJECTED && access(files, F_OK) != 0 && row.disk_bytes == -1);
     CHECK_THAT(strstr(row.problems, "unpacked, it is too large: your scenes and jobs take 0.3 of the 0.4 MiB") &&
-                   strstr(row.problems, "then send it again"), "%s", row.problems);
+                   strstr(row.problems, "then send it again"),
+               "%s", row.problems);
     scene_row_release(&row);
     check_scene(SCENE_C, ALICE, 9, limit, &row);
     CHECK(row.state == SCENE_READY && access(files, F_OK) == 0);
@@ -178,7 +177,8 @@ static void test_job(void) {
     CHECK(kept_by(ALICE) == before && disk_of(id) == 0);
     CHECK(run_job(id, 0));
     int64_t size = size_of(folder);
-    CHECK_THAT(disk_of(id) == size && size >= (128 + 64) * KIB, "%lld of %lld bytes", (long long)disk_of(id), (long long)size);
+    CHECK_THAT(disk_of(id) == size && size >= (128 + 64) * KIB, "%lld of %lld bytes", (long long)disk_of(id),
+               (long long)size);
     CHECK(kept_by(ALICE) == before + size);
 
     struct scheduler_config with = config;
@@ -234,7 +234,8 @@ static void test_full(void) {
     CHECK(!run_job(second, limit));
     OK(store_job_get(store, second, &job, &err));
     CHECK(job.state == JOB_PAUSED && job.attempts_left == 3);
-    CHECK_THAT(strstr(job.reason, "that a user may keep") && strstr(job.hint, "then resume"), "%s; %s", job.reason, job.hint);
+    CHECK_THAT(strstr(job.reason, "that a user may keep") && strstr(job.hint, "then resume"), "%s; %s", job.reason,
+               job.hint);
     job_release(&job);
     int64_t others = job_of(BOB);
     CHECK(run_job(others, limit));

@@ -64,14 +64,17 @@ static void test_fit(const struct image *sky, const struct disc *disc, float rou
     for (int i = 0; i < PHOTOGRAPHS; i++) {
         float turn = 2.4f * (float)i, slant = 1.0f * sqrtf(((float)i + 0.5f) / PHOTOGRAPHS);
         struct seen_from from = {{6.0f * sinf(slant) * cosf(turn), 6.0f * sinf(slant) * sinf(turn), 6.0f * cosf(slant)},
-                                 disc, roughness, specular};
+                                 disc,
+                                 roughness,
+                                 specular};
         plane_rig_add(&rig, from.place, (vec3){0.0f, 0.0f, 0.0f}, 0.35f, paint, &from);
     }
     plane_rig_look(&rig, 0.01f);
     probes_init(&probes, 8, &rig.scene.mesh, &r->atlas, &r->inverse, &r->fused);
     for (size_t i = 0; i < probes.count; i++)
         for (size_t k = 0; k < disc->count; k++)
-            irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, disc->direction[k], rgb_gray(RADIANCE * disc->angle[k]));
+            irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, disc->direction[k],
+                           rgb_gray(RADIANCE * disc->angle[k]));
     uint16_t(*sent)[3] = mem_calloc(PLANE_TEXELS, sizeof *sent);
     struct light_field field = {&r->world, (const uint16_t(*)[3])sent, NULL, NULL};
     specular_fit(r, &rig.views, &probes, &field);

@@ -18,13 +18,15 @@ static struct specular_evidence evidence(double part, rgb color, double roughnes
     for (size_t k = 0; k < HIGHLIGHT_ROUGHNESSES; k++) {
         for (size_t m = 0; m < HIGHLIGHT_SPECULARS; m++) {
             size_t c = specular_candidate(k, m);
-            double r = (double)specular_levels.roughness[k] - roughness, s = (double)specular_levels.specular[m] - specular;
+            double r = (double)specular_levels.roughness[k] - roughness,
+                   s = (double)specular_levels.specular[m] - specular;
             t.likelihood[c] = exp(-0.5 * (r * r + s * s) / (error * error));
             if (t.likelihood[c] > most)
                 t.best = c, most = t.likelihood[c];
         }
     }
-    t.likelihood[SPECULAR_DIFFUSE] = exp(-0.5 * ((1.0 - roughness) * (1.0 - roughness) + specular * specular) / (error * error));
+    t.likelihood[SPECULAR_DIFFUSE] =
+        exp(-0.5 * ((1.0 - roughness) * (1.0 - roughness) + specular * specular) / (error * error));
     return t;
 }
 
@@ -52,7 +54,7 @@ static void test_between(void) {
 /* Four segments of weak evidence each, and of strong evidence together. */
 static void test_together(void) {
     struct specular_evidence four[] = {evidence(SMALL, white, 0.4, 0.5, 0.5), evidence(SMALL, white, 0.4, 0.5, 0.5),
-                                evidence(SMALL, white, 0.4, 0.5, 0.5), evidence(SMALL, white, 0.4, 0.5, 0.5)};
+                                       evidence(SMALL, white, 0.4, 0.5, 0.5), evidence(SMALL, white, 0.4, 0.5, 0.5)};
     double alone = specular_posterior(four, 1, 0).diffuse, last = alone;
     CHECK(alone > 0.1);
     for (size_t count = 2; count <= 4; count++) {

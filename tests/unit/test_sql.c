@@ -47,7 +47,8 @@ static void test_opening(const char *dir) {
 
 static void test_probe(struct store *store) {
     OK(store_probe(store, &err));
-    OK(sql_script(&store->sql, "CREATE TRIGGER lie AFTER INSERT ON probe BEGIN UPDATE probe SET at_ms = at_ms + 1; END", &err));
+    OK(sql_script(&store->sql, "CREATE TRIGGER lie AFTER INSERT ON probe BEGIN UPDATE probe SET at_ms = at_ms + 1; END",
+                  &err));
     IS(store_probe(store, &err), STATUS_CORRUPT);
     CHECK_THAT(strstr(err.message, "a row read back differs"), "%s", err.message);
     CHECK(sqlite3_get_autocommit(store->sql.db));

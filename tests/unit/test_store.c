@@ -38,8 +38,8 @@ static int64_t job_in(struct store *store, enum condition condition, int *attemp
 
 static enum condition condition_of(struct store *store, int64_t id) {
     static const enum condition plain[] = {
-        [JOB_QUEUED] = QUEUED, [JOB_RUNNING] = RUNNING, [JOB_PAUSED] = PAUSED,
-        [JOB_SUCCEEDED] = SUCCEEDED, [JOB_FAILED] = FAILED, [JOB_CANCELLED] = CANCELLED};
+        [JOB_QUEUED] = QUEUED,       [JOB_RUNNING] = RUNNING, [JOB_PAUSED] = PAUSED,
+        [JOB_SUCCEEDED] = SUCCEEDED, [JOB_FAILED] = FAILED,   [JOB_CANCELLED] = CANCELLED};
     struct job job;
     OK(store_job_get(store, id, &job, &err));
     enum condition found = plain[job.state];
@@ -59,18 +59,9 @@ static void test_transitions(void) {
     static const char letters[] = "QRUNPSFC";
     static const char *const table[ACTIONS] = {
         /*           QRUNPSFC */
-        [CANCEL] =  "CNN=C--=",
-        [PAUSE] =   "PU=-=---",
-        [RESUME] =  "==R-Q---",
-        [RETRY] =   "------QQ",
-        [AGAIN] =   "-----QQQ",
-        [EXTEND] =  "-----QQQ",
-        [START] =   "R-------",
-        [SUCCEED] = "-SSC----",
-        [FAIL] =    "-FFC----",
-        [CRASH] =   "-QPC----",
-        [STOP] =    "-QPC----",
-        [BLOCK] =   "-PPC----",
+        [CANCEL] = "CNN=C--=", [PAUSE] = "PU=-=---",  [RESUME] = "==R-Q---", [RETRY] = "------QQ",
+        [AGAIN] = "-----QQQ",  [EXTEND] = "-----QQQ", [START] = "R-------",  [SUCCEED] = "-SSC----",
+        [FAIL] = "-FFC----",   [CRASH] = "-QPC----",  [STOP] = "-QPC----",   [BLOCK] = "-PPC----",
     };
     char *dir = fresh_dir();
     struct store *store;
@@ -98,15 +89,14 @@ static void test_transitions(void) {
             case ACTIONS: break;
             }
             char wanted = table[action][from];
-            CHECK_THAT((status == STATUS_CONFLICT) == (wanted == '-'), "action %d from %c: %s",
-                       action, letters[from], err.message);
+            CHECK_THAT((status == STATUS_CONFLICT) == (wanted == '-'), "action %d from %c: %s", action, letters[from],
+                       err.message);
             CHECK(status == STATUS_OK || status == STATUS_CONFLICT);
             bool same = wanted == '-' || wanted == '=';
             char found = letters[condition_of(store, id)];
-            CHECK_THAT(found == (same ? letters[from] : wanted), "action %d from %c gave %c",
-                       action, letters[from], found);
-            CHECK_THAT(events_of(store, id) == before + !same, "action %d from %c: events", action,
-                       letters[from]);
+            CHECK_THAT(found == (same ? letters[from] : wanted), "action %d from %c gave %c", action, letters[from],
+                       found);
+            CHECK_THAT(events_of(store, id) == before + !same, "action %d from %c: events", action, letters[from]);
         }
     }
     store_close(store);
@@ -130,8 +120,7 @@ static void test_attempts(void) {
 
     /* The first attempt's process is still there and reports: every report is refused. */
     IS(store_event_add(store, id, first, EVENT_LOG, "{}", &err), STATUS_CONFLICT);
-    IS(store_output_put(store, id, first, EVENT_OUTPUT, "a.exr", 1, SCENE_A, "x/y", &err),
-       STATUS_CONFLICT);
+    IS(store_output_put(store, id, first, EVENT_OUTPUT, "a.exr", 1, SCENE_A, "x/y", &err), STATUS_CONFLICT);
     IS(store_job_succeed(store, id, first, &err), STATUS_CONFLICT);
     IS(store_job_fail(store, id, first, "", "", &err), STATUS_CONFLICT);
     IS(store_job_crash(store, id, first, "", "", 0, &err), STATUS_CONFLICT);
@@ -177,8 +166,8 @@ static void test_reconcile(void) {
     OK(store_reconcile(store, &requeued, &err));
     CHECK(requeued == 3);
     static const enum condition after[CONDITIONS] = {
-        [QUEUED] = QUEUED, [RUNNING] = QUEUED, [PAUSING] = PAUSED, [CANCELLING] = CANCELLED,
-        [PAUSED] = PAUSED, [SUCCEEDED] = SUCCEEDED, [FAILED] = FAILED, [CANCELLED] = CANCELLED};
+        [QUEUED] = QUEUED, [RUNNING] = QUEUED,      [PAUSING] = PAUSED, [CANCELLING] = CANCELLED,
+        [PAUSED] = PAUSED, [SUCCEEDED] = SUCCEEDED, [FAILED] = FAILED,  [CANCELLED] = CANCELLED};
     for (int i = 0; i < CONDITIONS; i++)
         CHECK_THAT(condition_of(store, id[i]) == after[i], "condition %d", i);
     struct job job;
@@ -231,8 +220,13 @@ static void check_order(struct queue *q) {
 
 /* Limits, keys, unknown and rejected scenes. */
 static void check_adding(struct queue *q) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
-                          .max_attempts = 3, .idempotency_key = "k1", .request_sha256 = "r1"};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .max_attempts = 3,
+                          .idempotency_key = "k1",
+                          .request_sha256 = "r1"};
     bool replayed;
     int64_t again;
     IS(store_job_add(q->store, &new, 1, &q->id, &replayed, &err), STATUS_LIMIT);
@@ -404,8 +398,8 @@ struct race {
 
 static void *submit_many(void *argument) {
     struct race *race = argument;
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
-                          .max_attempts = 3, .request_sha256 = "r"};
+    struct job_new new = {
+        .scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 3, .request_sha256 = "r"};
     for (int i = 0; i < 50; i++) {
         char key[16];
         bool replayed;
@@ -446,8 +440,7 @@ static void check_turns(struct store *store, const int64_t *wanted, size_t count
     for (size_t i = 0; i < count; i++) {
         int64_t id;
         OK(store_job_next(store, 0, &id, &err));
-        CHECK_THAT(id == wanted[i], "place %zu: job %lld, wanted %lld", i, (long long)id,
-                   (long long)wanted[i]);
+        CHECK_THAT(id == wanted[i], "place %zu: job %lld, wanted %lld", i, (long long)id, (long long)wanted[i]);
         OK(store_job_pause(store, id, &err));
     }
     for (size_t i = 0; i < count; i++)

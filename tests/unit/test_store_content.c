@@ -184,18 +184,14 @@ static void test_events(void) {
     CHECK(events_of(store, other) == 1);
 
     /* Outputs: names are plain, a later one replaces an earlier one, each has its event. */
-    static const char *const bad[] = {"", "/etc/passwd", "../x", "a/../b", "a//b", ".hidden",
-                                      "a/.b", "a b", "x/", "caf\xc3\xa9"};
+    static const char *const bad[] = {"",        "/etc/passwd", "../x", "a/../b", "a//b",
+                                      ".hidden", "a/.b",        "a b",  "x/",     "caf\xc3\xa9"};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
-        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err),
-           STATUS_INPUT);
+        IS(store_output_put(store, id, attempt, EVENT_OUTPUT, bad[i], 1, SCENE_A, "t", &err), STATUS_INPUT);
     IS(store_output_put(store, id, attempt, EVENT_OUTPUT, "a", 1, "short", "t", &err), STATUS_INPUT);
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png",
-                        &err));
-    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png",
-                        &err));
-    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A,
-                        "image/x-exr", &err));
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 1, SCENE_A, "image/png", &err));
+    OK(store_output_put(store, id, attempt, EVENT_PREVIEW, "preview/a.png", 2, SCENE_B, "image/png", &err));
+    OK(store_output_put(store, id, attempt, EVENT_OUTPUT, "base_color.exr", 3, SCENE_A, "image/x-exr", &err));
     struct output_row row, *rows;
     size_t count;
     OK(store_output_get(store, id, "preview/a.png", &row, &err));
@@ -229,25 +225,29 @@ static void check_again(struct store *store, int64_t id) {
     bool gave_up;
     double wait;
     const int64_t nobody = 0;
-    check_delivery(store, id, "\"state\":\"failed\",\"pending\":0,\"attempts\":30,\"last_status\":null,\"last_error\":\"no\"");
+    check_delivery(store, id,
+                   "\"state\":\"failed\",\"pending\":0,\"attempts\":30,\"last_status\":null,\"last_error\":\"no\"");
     OK(store_webhook_again(store, id, &err));
     check_delivery(store, id, "\"state\":\"pending\",\"pending\":1");
     IS(store_outbox_next(store, 0, &nobody, 1, &row, &err), STATUS_NOT_FOUND); /* whose turn it is not */
     OK(store_outbox_next(store, 0, NULL, 0, &row, &err));
     CHECK(strstr(row.body, "succeeded") && row.tries == 0 && row.owner_id == 0);
-    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.status = 500, .reason = "answered 500"}, &gave_up, &err));
+    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.status = 500, .reason = "answered 500"}, &gave_up,
+                           &err));
     OK(store_outbox_wait(store, &wait, &err));
     CHECK(!gave_up && wait > 0.1);
     check_delivery(store, id, "\"attempts\":1,\"last_status\":500,\"last_error\":\"answered 500\"");
     OK(store_webhook_again(store, id, &err)); /* the one that waits, now */
     check_delivery(store, id, "\"pending\":1");
     OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.delivered = true, .status = 204}, &gave_up, &err));
-    check_delivery(store, id, "\"state\":\"delivered\",\"pending\":0,\"attempts\":1,\"last_status\":204,\"last_error\":null");
+    check_delivery(store, id,
+                   "\"state\":\"delivered\",\"pending\":0,\"attempts\":1,\"last_status\":204,\"last_error\":null");
     /* What cannot be otherwise is not tried again. */
     outbox_row_release(&row);
     OK(store_webhook_again(store, id, &err));
     OK(store_outbox_next(store, 0, NULL, 0, &row, &err));
-    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.is_final = true, .reason = "private"}, &gave_up, &err));
+    OK(store_outbox_settle(store, row.id, &(struct outbox_outcome){.is_final = true, .reason = "private"}, &gave_up,
+                           &err));
     CHECK(gave_up);
     check_delivery(store, id, "\"state\":\"failed\"");
     outbox_row_release(&row);
@@ -259,8 +259,13 @@ static void test_outbox(void) {
     char *dir = fresh_dir();
     struct store *store;
     struct outbox_row first, second;
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 2,
-                          .webhook_url = "http://x/", .webhook_secret = "0123456789abcdef"};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .max_attempts = 2,
+                          .webhook_url = "http://x/",
+                          .webhook_secret = "0123456789abcdef"};
     int64_t id;
     int attempt;
     bool replayed, gave_up;
@@ -279,7 +284,8 @@ static void test_outbox(void) {
     CHECK(!gave_up);
     OK(store_outbox_wait(store, &wait, &err));
     CHECK_THAT(wait > 0.1 && wait <= 2.0, "%g s until the next time", wait);
-    OK(store_outbox_settle(store, first.id, &(struct outbox_outcome){.delivered = true, .status = 200}, &gave_up, &err));
+    OK(store_outbox_settle(store, first.id, &(struct outbox_outcome){.delivered = true, .status = 200}, &gave_up,
+                           &err));
     OK(store_outbox_wait(store, &wait, &err));
     CHECK(isinf(wait));
 
@@ -328,7 +334,10 @@ static void test_pruned_twice(void) {
 /* What an upload has on disk never becomes less, whoever counts late; and its hash is of so many bytes. */
 static void test_upload_offset(void) {
     static const char id[] = "00112233445566778899aabbccddeeff";
-    const struct { uint64_t counted, received; const char *hash, *kept; } steps[] = {
+    const struct {
+        uint64_t counted, received;
+        const char *hash, *kept;
+    } steps[] = {
         {100, 100, "AAAA", "AAAA"}, {300, 300, "BBBB", "BBBB"}, {200, 300, "CCCC", "BBBB"}, {300, 300, "DDDD", "BBBB"}};
     struct upload_row row = {.name = (char[]){"u"}, .metadata = (char[]){""}, .length = 500};
     char *dir = fresh_dir(), hash[4];
@@ -363,7 +372,8 @@ static void test_expired_no_more(void) {
     OK(store_job_cancel(store, id, &err));
     OK(store_scene_add(store, SCENE_B, "b", 10, 0, &existed, &err));
     OK(store_scene_ready(store, SCENE_B, "{}", &err));
-    struct upload_row row = {.id = "00112233445566778899aabbccddeeff", .name = (char[]){"u"}, .metadata = (char[]){""}, .length = 9};
+    struct upload_row row = {
+        .id = "00112233445566778899aabbccddeeff", .name = (char[]){"u"}, .metadata = (char[]){""}, .length = 9};
     OK(store_upload_add(store, &row, "0000", 4, &(struct count_limits){9, 9}, &err));
     OK(store_expired_list(store, later, 9, &list, &count, &err));
     CHECK_THAT(count == 4, "%zu", count);

@@ -65,7 +65,8 @@ static enum status list_scenes(void) {
     return status;
 }
 static enum status patch_scene(void) {
-    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct retention){.sets_expiry = true, .expires_ms = 1}, &err);
+    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct retention){.sets_expiry = true, .expires_ms = 1},
+                             &err);
 }
 static enum status access_scene(void) {
     enum access access;
@@ -128,22 +129,40 @@ static enum status unknown_disk(void) {
 }
 
 static enum status submit(void) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .owner_id = alice.user_id,
-                          .max_attempts = 9, .user_queue_limit = 9, .user_max_jobs = 9, .webhook_url = "http://x/", .webhook_secret = "s",
-                          .idempotency_key = "key", .request_sha256 = "hash"};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .owner_id = alice.user_id,
+                          .max_attempts = 9,
+                          .user_queue_limit = 9,
+                          .user_max_jobs = 9,
+                          .webhook_url = "http://x/",
+                          .webhook_secret = "s",
+                          .idempotency_key = "key",
+                          .request_sha256 = "hash"};
     bool replayed;
     return store_job_add(store, &new, 9, &job, &replayed, &err);
 }
 static enum status submit_second(void) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .owner_id = alice.user_id,
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .owner_id = alice.user_id,
                           .max_attempts = 1};
     bool replayed;
     return store_job_add(store, &new, 9, &second_job, &replayed, &err);
 }
 /* He keeps as many as he may. */
 static enum status submit_too_many(void) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .owner_id = alice.user_id,
-                          .max_attempts = 1, .user_max_jobs = 2};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .owner_id = alice.user_id,
+                          .max_attempts = 1,
+                          .user_max_jobs = 2};
     bool replayed;
     int64_t none;
     enum status status = store_job_add(store, &new, 9, &none, &replayed, &err);
@@ -186,7 +205,9 @@ static enum status running_jobs(void) {
 static enum status cancel_job(void) { return store_job_cancel(store, job, &err); }
 static enum status pause_job(void) { return store_job_pause(store, job, &err); }
 static enum status resume_job(void) { return store_job_resume(store, job, &(struct count_limits){9, 9}, &err); }
-static enum status retry_job(void) { return store_job_retry(store, job, 9, "refine", &(struct count_limits){9, 9}, &err); }
+static enum status retry_job(void) {
+    return store_job_retry(store, job, 9, "refine", &(struct count_limits){9, 9}, &err);
+}
 static enum status extend_job(void) { return store_job_extend(store, job, 9, "{}", NULL, &err); }
 static enum status start_job(void) { return store_job_start(store, job, &attempt, &err); }
 static enum status restarted_job(void) { return store_job_restarted(store, job, attempt, &err); }
@@ -222,9 +243,7 @@ static enum status many_events(void) { /* every 64th removes old ones */
 static void no_event(void *user, int64_t id, int64_t at_ms, int number, const char *type, const char *data) {
     (void)user, (void)id, (void)at_ms, (void)number, (void)type, (void)data;
 }
-static void no_row(void *user, const struct event_row *row) {
-    (void)user, (void)row;
-}
+static void no_row(void *user, const struct event_row *row) { (void)user, (void)row; }
 static enum status list_events(void) { return store_event_list(store, job, 0, 9, no_event, NULL, &err); }
 static enum status page_of(const struct caller *who, int64_t id) {
     struct event_page page;
@@ -295,7 +314,8 @@ static enum status next_message(void) {
 }
 static enum status settle(bool delivered) {
     bool gave_up;
-    return store_outbox_settle(store, 1, &(struct outbox_outcome){.delivered = delivered, .reason = delivered ? NULL : "no"}, &gave_up, &err);
+    return store_outbox_settle(
+        store, 1, &(struct outbox_outcome){.delivered = delivered, .reason = delivered ? NULL : "no"}, &gave_up, &err);
 }
 static enum status put_off(void) { return settle(false); }
 static enum status delivered(void) { return settle(true); }
@@ -331,7 +351,9 @@ static enum status list_uploads(void) {
 static enum status begin_upload(void) { return store_upload_begin(store, UPLOAD, "boot", &err); }
 static enum status advance_upload(void) { return store_upload_advance(store, UPLOAD, 7, "mesh", 4, &err); }
 static enum status finish_upload(void) { return store_upload_finish(store, UPLOAD, SCENE_A, &err); }
-static enum status keep_upload(void) { return store_upload_keep(store, UPLOAD, &(struct retention){.pin = KEEP_PIN_ON}, &err); }
+static enum status keep_upload(void) {
+    return store_upload_keep(store, UPLOAD, &(struct retention){.pin = KEEP_PIN_ON}, &err);
+}
 static enum status delete_upload(void) { return store_upload_delete(store, UPLOAD, &err); }
 
 static enum status keep(void) { return store_keep(store, 1, 1, 1, &err); }
@@ -377,28 +399,124 @@ static const struct step {
     enum status (*ask)(void);
     enum { IS_ONE, IS_MANY /* transactions */, IS_VAGUE /* another failure is told than SQLite's */ } kind;
 } steps[] = {
-#define STEP(function) {#function, function, IS_ONE}
-#define STEPS(function) {#function, function, IS_MANY}
-    STEP(probe), STEP(has_files), STEP(look_for_users), STEP(add_token), STEP(find_token), STEP(valid_token), STEP(list_tokens),
-    STEP(keep), STEP(add_scene), STEP(add_other_scene), STEP(next_unchecked), STEP(postpone), STEP(check_again), STEP(reject),
-    STEP(add_scene), STEP(ready), STEP(other_ready), STEP(get_scene), STEP(find_scene), STEP(list_scenes), STEP(patch_scene),
-    STEP(access_scene), STEP(user_bytes), STEP(check_share), STEP(check_scene_share), STEP(would_delete_scene),
-    STEP(add_upload), STEP(add_other_upload), STEP(get_upload), STEP(list_uploads), STEP(begin_upload), STEP(advance_upload),
-    STEP(finish_upload), STEP(keep_upload), STEP(delete_upload), STEP(list_expired), STEP(expire_upload),
-    STEP(submit), STEP(submit), STEP(submit_second), STEP(submit_too_many), STEP(unknown_disk), STEP(enter_disk),
-    STEP(get_job), STEP(list_jobs), STEP(list_queued), STEP(place_first), STEP(place_last), STEP(place_before), STEP(count), STEP(next_job), STEP(pause_job), STEP(resume_job), STEPS(explain),
+#define STEP(function)                                                                                                 \
+    { #function, function, IS_ONE }
+#define STEPS(function)                                                                                                \
+    { #function, function, IS_MANY }
+    STEP(probe),
+    STEP(has_files),
+    STEP(look_for_users),
+    STEP(add_token),
+    STEP(find_token),
+    STEP(valid_token),
+    STEP(list_tokens),
+    STEP(keep),
+    STEP(add_scene),
+    STEP(add_other_scene),
+    STEP(next_unchecked),
+    STEP(postpone),
+    STEP(check_again),
+    STEP(reject),
+    STEP(add_scene),
+    STEP(ready),
+    STEP(other_ready),
+    STEP(get_scene),
+    STEP(find_scene),
+    STEP(list_scenes),
+    STEP(patch_scene),
+    STEP(access_scene),
+    STEP(user_bytes),
+    STEP(check_share),
+    STEP(check_scene_share),
+    STEP(would_delete_scene),
+    STEP(add_upload),
+    STEP(add_other_upload),
+    STEP(get_upload),
+    STEP(list_uploads),
+    STEP(begin_upload),
+    STEP(advance_upload),
+    STEP(finish_upload),
+    STEP(keep_upload),
+    STEP(delete_upload),
+    STEP(list_expired),
+    STEP(expire_upload),
+    STEP(submit),
+    STEP(submit),
+    STEP(submit_second),
+    STEP(submit_too_many),
+    STEP(unknown_disk),
+    STEP(enter_disk),
+    STEP(get_job),
+    STEP(list_jobs),
+    STEP(list_queued),
+    STEP(place_first),
+    STEP(place_last),
+    STEP(place_before),
+    STEP(count),
+    STEP(next_job),
+    STEP(pause_job),
+    STEP(resume_job),
+    STEPS(explain),
     STEPS(explain_no_more),
-    STEP(start_job), STEP(progress), STEP(progress), STEPS(many_events), STEP(put_output), STEP(get_output), STEP(list_outputs),
-    STEP(next_digest), STEP(enter_digest), STEP(want_digest),
-    STEP(list_events), STEP(page_of_job), STEP(page_of_all), STEP(page_of_mine), STEP(last_event_of_job),
-    STEP(last_event_of_all), STEP(newest_event), STEP(running_jobs), STEP(charge), STEP(charge), STEP(pay), STEP(next_message),
-    STEP(put_off), STEP(wait_for_message), STEP(delivered),
-    STEP(crash_job), STEP(start_job), STEP(stop_job), STEP(start_job), STEP(block_job), STEP(resume_job), STEP(start_job),
-    STEP(pause_job), STEP(resume_job), STEPS(reconcile), STEP(start_job), STEP(fail_job), STEP(retry_job), STEP(start_job),
-    STEP(restarted_job), STEP(cancel_job), STEP(stop_job), STEP(extend_job), STEP(cancel_job), STEP(retry_job),
-    STEP(start_job), STEP(succeed_job), STEP(prune_events), STEP(list_expired), STEP(expire_job), STEP(delete_job),
-    STEP(share_scene), STEP(disown_scene), STEP(expire_scene), STEP(delete_scene), STEP(revoke_number), STEP(add_token),
-    STEP(revoke_name), {"back_up", back_up, IS_VAGUE},
+    STEP(start_job),
+    STEP(progress),
+    STEP(progress),
+    STEPS(many_events),
+    STEP(put_output),
+    STEP(get_output),
+    STEP(list_outputs),
+    STEP(next_digest),
+    STEP(enter_digest),
+    STEP(want_digest),
+    STEP(list_events),
+    STEP(page_of_job),
+    STEP(page_of_all),
+    STEP(page_of_mine),
+    STEP(last_event_of_job),
+    STEP(last_event_of_all),
+    STEP(newest_event),
+    STEP(running_jobs),
+    STEP(charge),
+    STEP(charge),
+    STEP(pay),
+    STEP(next_message),
+    STEP(put_off),
+    STEP(wait_for_message),
+    STEP(delivered),
+    STEP(crash_job),
+    STEP(start_job),
+    STEP(stop_job),
+    STEP(start_job),
+    STEP(block_job),
+    STEP(resume_job),
+    STEP(start_job),
+    STEP(pause_job),
+    STEP(resume_job),
+    STEPS(reconcile),
+    STEP(start_job),
+    STEP(fail_job),
+    STEP(retry_job),
+    STEP(start_job),
+    STEP(restarted_job),
+    STEP(cancel_job),
+    STEP(stop_job),
+    STEP(extend_job),
+    STEP(cancel_job),
+    STEP(retry_job),
+    STEP(start_job),
+    STEP(succeed_job),
+    STEP(prune_events),
+    STEP(list_expired),
+    STEP(expire_job),
+    STEP(delete_job),
+    STEP(share_scene),
+    STEP(disown_scene),
+    STEP(expire_scene),
+    STEP(delete_scene),
+    STEP(revoke_number),
+    STEP(add_token),
+    STEP(revoke_name),
+    {"back_up", back_up, IS_VAGUE},
 };
 
 /* --- the rounds -------------------------------------------------------------------------------- */
@@ -409,14 +527,16 @@ static void hash_content(char hex[SHA256_HEX_SIZE]) {
     sqlite3_stmt *tables, *rows;
     sqlite3 *db = store->sql.db;
     sha256_init(&hash);
-    CHECK(sqlite3_prepare_v2(db, "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name", -1, &tables, NULL) == 0);
+    CHECK(sqlite3_prepare_v2(db, "SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name", -1, &tables,
+                             NULL) == 0);
     while (sqlite3_step(tables) == SQLITE_ROW) {
         char *query = mem_printf("SELECT * FROM %s", (const char *)sqlite3_column_text(tables, 0));
         CHECK(sqlite3_prepare_v2(db, query, -1, &rows, NULL) == 0);
         while (sqlite3_step(rows) == SQLITE_ROW)
             for (int i = 0; i < sqlite3_column_count(rows); i++) {
                 const unsigned char *text = sqlite3_column_text(rows, i);
-                sha256_update(&hash, text ? (const char *)text : "NULL", text ? (size_t)sqlite3_column_bytes(rows, i) + 1 : 4);
+                sha256_update(&hash, text ? (const char *)text : "NULL",
+                              text ? (size_t)sqlite3_column_bytes(rows, i) + 1 : 4);
             }
         sqlite3_finalize(rows);
         mem_free(query);
@@ -446,8 +566,8 @@ static bool strike(const struct step *step, long n) {
     }
     enum status wanted = step->kind == IS_VAGUE ? STATUS_IO : sql_fault->status;
     hash_content(after);
-    CHECK_THAT(status == wanted || (status != STATUS_OK && step->kind == IS_VAGUE), "%s, call %ld: %s, not %s: %s", step->name,
-               n, status_name(status), status_name(wanted), err.message);
+    CHECK_THAT(status == wanted || (status != STATUS_OK && step->kind == IS_VAGUE), "%s, call %ld: %s, not %s: %s",
+               step->name, n, status_name(status), status_name(wanted), err.message);
     CHECK_THAT(err.status == status && *err.message, "%s, call %ld: no sentence", step->name, n);
     CHECK_THAT(sqlite3_get_autocommit(store->sql.db), "%s, call %ld: its transaction is left open", step->name, n);
     CHECK_THAT(step->kind == IS_MANY || strcmp(before, after) == 0, "%s, call %ld: half of it is done", step->name, n);
@@ -471,7 +591,8 @@ static long strike_open(void) {
 
 /* What is not there, and what makes no sense. */
 static void check_refusals(void) {
-    static const char *const progress_[] = {"{", "{\"stage\":7}", "{\"done\":\"x\"}", "{\"total\":\"x\"}", "{\"eta_sec\":\"x\"}"};
+    static const char *const progress_[] = {"{", "{\"stage\":7}", "{\"done\":\"x\"}", "{\"total\":\"x\"}",
+                                            "{\"eta_sec\":\"x\"}"};
     struct scene_row scenes[1];
     struct upload_row row;
     size_t count;

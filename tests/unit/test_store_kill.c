@@ -22,7 +22,7 @@ static struct error err;
 
 /* What the child says, after the store said that it is so. */
 struct acknowledged {
-    int key;             /* of the job */
+    int key; /* of the job */
     int64_t id;
     enum job_state state;
     int attempt;
@@ -39,8 +39,7 @@ static void child(const char *dir, int first_key, int fd) {
     struct store *store;
     size_t requeued;
     bool existed, replayed;
-    if (store_open(&store, dir, &err) != STATUS_OK ||
-        store_reconcile(store, &requeued, &err) != STATUS_OK ||
+    if (store_open(&store, dir, &err) != STATUS_OK || store_reconcile(store, &requeued, &err) != STATUS_OK ||
         store_scene_add(store, SCENE, "s", 1, 0, &existed, &err) != STATUS_OK)
         _exit(2);
     if (!existed)
@@ -48,8 +47,13 @@ static void child(const char *dir, int first_key, int fd) {
     for (int key = first_key; key < KEYS_MAX; key++) {
         char text[32];
         snprintf(text, sizeof text, "key-%d", key);
-        struct job_new new = {.scene_id = SCENE, .name = text, .labels = "{}", .settings = "{}",
-                              .max_attempts = 3, .idempotency_key = text, .request_sha256 = text};
+        struct job_new new = {.scene_id = SCENE,
+                              .name = text,
+                              .labels = "{}",
+                              .settings = "{}",
+                              .max_attempts = 3,
+                              .idempotency_key = text,
+                              .request_sha256 = text};
         struct acknowledged a = {.key = key, .state = JOB_QUEUED};
         if (store_job_add(store, &new, 1000000, &a.id, &replayed, &err) != STATUS_OK)
             _exit(3);
@@ -61,8 +65,7 @@ static void child(const char *dir, int first_key, int fd) {
         a.state = JOB_RUNNING;
         tell(fd, &a);
         for (int i = 0; i < key % 5; i++) {
-            if (store_event_add(store, a.id, a.attempt, EVENT_METRIC, "{\"step\":1}", &err) !=
-                STATUS_OK)
+            if (store_event_add(store, a.id, a.attempt, EVENT_METRIC, "{\"step\":1}", &err) != STATUS_OK)
                 _exit(5);
             a.metric_count++;
             tell(fd, &a);
@@ -83,8 +86,7 @@ struct found {
     int metric_count, state_count;
 };
 
-static void count_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type,
-                        const char *data) {
+static void count_event(void *user, int64_t id, int64_t at_ms, int attempt, const char *type, const char *data) {
     struct found *found = user;
     (void)id, (void)at_ms, (void)attempt, (void)data;
     found->metric_count += strcmp(type, EVENT_METRIC) == 0;
@@ -103,8 +105,8 @@ static void verify(struct store *store, const struct acknowledged *a) {
     if (job_is_terminal(a->state))
         CHECK_THAT(job.state == a->state, "%s: %s", name, job_state_name(job.state));
     OK(store_event_list(store, a->id, 0, 1000, count_event, &found, &err));
-    CHECK_THAT(found.metric_count >= a->metric_count, "%s: %d metrics of %d", name,
-               found.metric_count, a->metric_count);
+    CHECK_THAT(found.metric_count >= a->metric_count, "%s: %d metrics of %d", name, found.metric_count,
+               a->metric_count);
     CHECK(found.state_count >= 1);
     job_release(&job);
 }
@@ -172,8 +174,7 @@ int main(void) {
         int64_t jobs = 0;
         for (int i = 0; i < JOB_STATE_COUNT; i++)
             jobs += counts.jobs_by_state[i];
-        CHECK_THAT(jobs == next_key || jobs == next_key + 1, "%lld jobs, %d keys",
-                   (long long)jobs, next_key);
+        CHECK_THAT(jobs == next_key || jobs == next_key + 1, "%lld jobs, %d keys", (long long)jobs, next_key);
         CHECK(counts.jobs_by_state[JOB_RUNNING] == 0);
         store_close(store);
         check_integrity(dir);

@@ -44,7 +44,9 @@ static double degrees_between(vec3 a, vec3 b) {
 static void check_sun(double azimuth_deg, double elevation_deg, double radius_deg, double most_deg) {
     struct environment e;
     make_environment(&e);
-    struct sun sun = {.is_there = true, .radius_rad = (float)(radius_deg * PI / 180.0), .irradiance = {4.0f, 3.0f, 2.0f},
+    struct sun sun = {.is_there = true,
+                      .radius_rad = (float)(radius_deg * PI / 180.0),
+                      .irradiance = {4.0f, 3.0f, 2.0f},
                       .direction = latlong_direction(azimuth_deg / 360.0, (90.0 - elevation_deg) / 180.0)};
     sun_draw(&sun, &e);
     double all;
@@ -87,7 +89,7 @@ int main(void) {
     for (size_t a = 0; a < 4; a++)
         for (size_t i = 0; i < 7; i++)
             check_sun(azimuth[a], elevation[i], 6.0, 0.45); /* pixels of 5.8 degrees */
-    check_sun(33.0, 88.0, 1.2, 0.1); /* of .7 */
+    check_sun(33.0, 88.0, 1.2, 0.1);                        /* of .7 */
     check_sun(200.0, 57.0, 1.2, 0.1);
     check_refined();
     return check_result();

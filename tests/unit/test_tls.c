@@ -29,7 +29,8 @@ static void make(unsigned char serial, int times) {
     struct buf chain;
     buf_init(&chain, 1 << 20);
     CHECK(gnutls_x509_privkey_init(&private) == 0 && gnutls_x509_crt_init(&crt) == 0);
-    CHECK(gnutls_x509_privkey_generate(private, GNUTLS_PK_ECDSA, GNUTLS_CURVE_TO_BITS(GNUTLS_ECC_CURVE_SECP256R1), 0) == 0);
+    CHECK(gnutls_x509_privkey_generate(private, GNUTLS_PK_ECDSA, GNUTLS_CURVE_TO_BITS(GNUTLS_ECC_CURVE_SECP256R1), 0) ==
+          0);
     CHECK(gnutls_x509_crt_set_version(crt, 3) == 0 && gnutls_x509_crt_set_serial(crt, &serial, 1) == 0);
     CHECK(gnutls_x509_crt_set_dn(crt, "CN=lab.example.org", NULL) == 0);
     CHECK(gnutls_x509_crt_set_activation_time(crt, time(NULL) - 60) == 0);
@@ -93,7 +94,8 @@ static void check_suites(void) {
     CHECK_THAT(gnutls_priority_init(&priorities, TLS_PRIORITIES, &fault) == 0, "%s", fault ? fault : "");
     size_t of_12 = 0, of_13 = 0;
     unsigned number;
-    for (unsigned i = 0; gnutls_priority_get_cipher_suite_index(priorities, i, &number) != GNUTLS_E_REQUESTED_DATA_NOT_AVAILABLE; i++) {
+    for (unsigned i = 0;
+         gnutls_priority_get_cipher_suite_index(priorities, i, &number) != GNUTLS_E_REQUESTED_DATA_NOT_AVAILABLE; i++) {
         unsigned char id[2];
         gnutls_kx_algorithm_t kx;
         gnutls_cipher_algorithm_t cipher;
@@ -104,7 +106,8 @@ static void check_suites(void) {
             continue;
         of_13 += id[0] == 0x13;
         of_12 += id[0] != 0x13;
-        CHECK_THAT(id[0] == 0x13 || kx == GNUTLS_KX_ECDHE_RSA || kx == GNUTLS_KX_ECDHE_ECDSA || kx == GNUTLS_KX_DHE_RSA, "%s", name);
+        CHECK_THAT(id[0] == 0x13 || kx == GNUTLS_KX_ECDHE_RSA || kx == GNUTLS_KX_ECDHE_ECDSA || kx == GNUTLS_KX_DHE_RSA,
+                   "%s", name);
         CHECK_THAT(mac != GNUTLS_MAC_SHA1 && !strstr(name, "SHA1"), "%s", name);
     }
     CHECK_THAT(of_12 > 5 && of_13 >= 3, "%zu and %zu suites", of_12, of_13);

@@ -68,7 +68,8 @@ static void test_replica(void) {
     CHECK(trajectory_find(dir) == NULL);
     put("traj.txt", POSE "\n\n" LOST "\r\n" POSE);
     CHECK(trajectory_find(dir) == NULL);
-    put("cam_params.json", "{\"camera\":{\"w\":1200,\"h\":680,\"fx\":600,\"fy\":601,\"cx\":599.5,\"cy\":339.5,\"scale\":6553.5}}");
+    put("cam_params.json",
+        "{\"camera\":{\"w\":1200,\"h\":680,\"fx\":600,\"fy\":601,\"cx\":599.5,\"cy\":339.5,\"scale\":6553.5}}");
     char *text = read_it(&t, &warnings);
     CHECK_STRING(text, "[]");
     CHECK(t.frame_count == 2 && t.named_count == 3 && warnings == 1);

@@ -7,8 +7,13 @@
 static struct store *store;
 
 static int64_t job_of(int64_t user, int priority) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}",
-                          .priority = priority, .max_attempts = 2, .owner_id = user,
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .priority = priority,
+                          .max_attempts = 2,
+                          .owner_id = user,
                           .user_queue_limit = 3};
     int64_t id = 0;
     bool replayed;
@@ -19,8 +24,7 @@ static int64_t job_of(int64_t user, int priority) {
 static int64_t owner_next(int limit) {
     struct job job = {0};
     int64_t id, owner = -1;
-    if (store_job_next(store, limit, &id, &err) == STATUS_OK &&
-        store_job_get(store, id, &job, &err) == STATUS_OK)
+    if (store_job_next(store, limit, &id, &err) == STATUS_OK && store_job_get(store, id, &job, &err) == STATUS_OK)
         owner = job.owner_id;
     job_release(&job);
     return owner;
@@ -100,8 +104,15 @@ static void test_full_queue(void) {
 
 /* Jobs that have ended count, others' do not; what is known by its key is there already; nobody has no limit. */
 static void test_kept(void) {
-    struct job_new new = {.scene_id = SCENE_A, .name = "n", .labels = "{}", .settings = "{}", .max_attempts = 2,
-                          .owner_id = 31, .user_max_jobs = 3, .idempotency_key = "first", .request_sha256 = "x"};
+    struct job_new new = {.scene_id = SCENE_A,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .max_attempts = 2,
+                          .owner_id = 31,
+                          .user_max_jobs = 3,
+                          .idempotency_key = "first",
+                          .request_sha256 = "x"};
     char hint[64];
     int64_t ids[3], id, others;
     bool replayed;
@@ -114,8 +125,8 @@ static void test_kept(void) {
     CHECK_STRING(err.hint, "delete jobs that you do not need");
     for (int i = 0; i < 3; i++)
         OK(store_job_cancel(store, ids[i], &err));
-    OK(store_job_patch(store, ids[0], -1, &(struct job_patch){.priority = INT_MIN, .shared = -1, .retention.pin = KEEP_PIN_ON},
-                       &err));
+    OK(store_job_patch(store, ids[0], -1,
+                       &(struct job_patch){.priority = INT_MIN, .shared = -1, .retention.pin = KEEP_PIN_ON}, &err));
     IS(store_job_add(store, &new, 1000, &id, &replayed, &err), STATUS_NO_SPACE);
     snprintf(hint, sizeof hint, "the oldest that has ended is %lld", (long long)ids[1]);
     CHECK_THAT(strstr(err.hint, hint), "%s", err.hint);

@@ -13,18 +13,14 @@
 #define WAYS 256
 #define KNOWN 0.1f
 
-static float number(uint64_t a, uint64_t b) {
-    return rng_to_float((uint32_t)rng_key(7, a, b));
-}
+static float number(uint64_t a, uint64_t b) { return rng_to_float((uint32_t)rng_key(7, a, b)); }
 
 static vec3 direction_of(uint64_t a, uint64_t b) {
     float z = 2.0f * number(a, b) - 1.0f, turn = 6.2831853f * number(a, b + 1), r = sqrtf(1.0f - z * z);
     return (vec3){r * cosf(turn), z, r * sinf(turn)};
 }
 
-static float sky(vec3 d) {
-    return d.y < 0.0f ? 0.2f : 0.2f + 3.0f * d.y;
-}
+static float sky(vec3 d) { return d.y < 0.0f ? 0.2f : 0.2f + 3.0f * d.y; }
 
 static void test_corners(void) {
     for (uint64_t i = 0; i < 1000; i++) {

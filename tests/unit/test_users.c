@@ -29,8 +29,13 @@ static void test_tokens(void) {
     size_t count;
     OK(store_open(&store, dir, &err));
     CHECK(!store_has_users(store));
-    static const char *const bad[] = {"", "7up", "a b", "a/b", ".", "\xc3\xa9t\xc3\xa9",
-        "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"};
+    static const char *const bad[] = {"",
+                                      "7up",
+                                      "a b",
+                                      "a/b",
+                                      ".",
+                                      "\xc3\xa9t\xc3\xa9",
+                                      "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         IS(store_token_add(store, bad[i], ROLE_USER, token, &id, &err), STATUS_INPUT);
     CHECK(!store_has_users(store));
@@ -113,8 +118,13 @@ static size_t scenes_seen(struct store *store, const struct caller *who) {
 }
 
 static int64_t add_own_job(struct store *store, const char *scene, int64_t owner, const char *key) {
-    struct job_new new = {.scene_id = scene, .owner_id = owner, .name = "n", .labels = "{}",
-                          .settings = "{}", .max_attempts = 2, .idempotency_key = key,
+    struct job_new new = {.scene_id = scene,
+                          .owner_id = owner,
+                          .name = "n",
+                          .labels = "{}",
+                          .settings = "{}",
+                          .max_attempts = 2,
+                          .idempotency_key = key,
                           .request_sha256 = "x"};
     int64_t id = 0;
     bool replayed;
@@ -277,7 +287,8 @@ static void test_lists(void) {
     job_release(&job);
     OK(store_scene_access(store, &bob, SCENE_A, &access, &err));
     CHECK(access == ACCESS_READ && jobs_seen(store, &bob, -1) == 2 && scenes_seen(store, &bob) == 2);
-    OK(store_job_patch(store, first, -1, &(struct job_patch){.name = "x", .priority = INT_MIN, .shared = -1}, &err)); /* stays shared */
+    OK(store_job_patch(store, first, -1, &(struct job_patch){.name = "x", .priority = INT_MIN, .shared = -1},
+                       &err)); /* stays shared */
     CHECK(jobs_seen(store, &bob, -1) == 2);
     OK(store_job_patch(store, first, -1, &(struct job_patch){.priority = INT_MIN, .shared = 0}, &err));
     CHECK(jobs_seen(store, &bob, -1) == 1);
@@ -285,7 +296,8 @@ static void test_lists(void) {
     /* Both have sent the same bytes: the scene stays until the last of them removes it. */
     OK(store_scene_add(store, SCENE_A, "a", 1, bob.user_id, &existed, &err));
     CHECK(!existed && scenes_seen(store, &bob) == 2);
-    const struct retention past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON}, loose = {.pin = KEEP_PIN_OFF};
+    const struct retention past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON},
+                           loose = {.pin = KEEP_PIN_OFF};
     OK(store_scene_patch(store, &alice, SCENE_A, "mine", &pin, &err));
     IS(store_scene_patch(store, &bob, SCENE_A, NULL, &loose, &err), STATUS_CONFLICT);
     IS(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err), STATUS_CONFLICT);

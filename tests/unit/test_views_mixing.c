@@ -23,14 +23,20 @@ static float mixing_at(const struct views *v, float x, uint32_t triangle) {
 
 int main(void) {
     /* A pixel is 1 x 1 m of the plane z = 8; fronts face the camera. */
-    vec3 position[] = {{-40, -40, 8}, {EDGE_AT + 0.5f, -40, 8}, {EDGE_AT + 0.5f, 40, 8}, {-40, 40, 8},
-                       {-90, -90, 9}, {90, -90, 9},             {90, 90, 9},             {-90, 90, 9}};
+    vec3 position[] = {{-40, -40, 8},
+                       {EDGE_AT + 0.5f, -40, 8},
+                       {EDGE_AT + 0.5f, 40, 8},
+                       {-40, 40, 8},
+                       {-90, -90, 9},
+                       {90, -90, 9},
+                       {90, 90, 9},
+                       {-90, 90, 9}};
     uint32_t index[][3] = {{0, 2, 1}, {0, 3, 2}, {4, 6, 5}, {4, 7, 6}}, of_triangle[] = {0, 0, 1, 1};
-    struct photograph photograph = {.exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY, .is_hdr = true,
-                                    .pixel = pixel};
+    struct photograph photograph = {
+        .exposure = 1.0f, .gain = {1, 1, 1}, .clip = INFINITY, .is_hdr = true, .pixel = pixel};
     struct camera *c = &photograph.camera;
-    *c = (struct camera){.width = WIDTH, .height = HEIGHT, .fx = DISTANCE, .fy = DISTANCE, .cx = WIDTH / 2,
-                         .cy = HEIGHT / 2};
+    *c = (struct camera){
+        .width = WIDTH, .height = HEIGHT, .fx = DISTANCE, .fy = DISTANCE, .cx = WIDTH / 2, .cy = HEIGHT / 2};
     for (int i = 0; i < 3; i++)
         c->world_from_camera.rotation[i][i] = 1.0f;
     c->world_from_camera.translation = (vec3){WIDTH / 2, HEIGHT / 2, 0.0f};

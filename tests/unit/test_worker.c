@@ -68,7 +68,10 @@ int main(void) {
     CHECK_THAT(strstr(buf_text(&said), "job.json") != NULL, "%s", buf_text(&said));
 
     static const char *const wrong[] = {
-        "{", "[]", "{\"kind\":\"dance\"}", "{\"kind\":7}",
+        "{",
+        "[]",
+        "{\"kind\":\"dance\"}",
+        "{\"kind\":7}",
         "{\"kind\":\"reconstruct\",\"thread_count\":1}",
         "{\"kind\":\"reconstruct\",\"scene\":\"x\",\"settings\":3}",
     };
@@ -76,8 +79,7 @@ int main(void) {
         write_text(dir, "job.json", wrong[i]);
         child = start(dir, &from);
         CHECK_THAT(finish(child, from, &said) == PROGRESS_EXIT_FAILED, "%s", wrong[i]);
-        CHECK_THAT(strstr(buf_text(&said), "\"status\":\"internal\"") != NULL, "%s: %s", wrong[i],
-                   buf_text(&said));
+        CHECK_THAT(strstr(buf_text(&said), "\"status\":\"internal\"") != NULL, "%s: %s", wrong[i], buf_text(&said));
     }
 
     /* What is no archive is the input's fault; nothing of it stays. */

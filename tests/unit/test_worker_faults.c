@@ -24,12 +24,12 @@ static struct error err;
 
 #define FRAME(name) "{\"file_path\":\"" name "\",\"transform_matrix\":[[1,0,0,0.3],[0,1,0,0.3],[0,0,1,1]]}"
 #define MESH "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
-#define SETTINGS                                                                                                    \
-    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                             \
+#define SETTINGS                                                                                                       \
+    "\"texture_size\":64,\"iterations\":1,\"texels_per_iteration\":64,"                                                \
     "\"cameras_per_texel\":1,\"samples_per_camera\":2,\"report_samples\":1,\"preview_interval_sec\":60"
 
 static char dir[64]; /* in memory where possible: much is made sure to be on disk */
-static char *scene; /* its files */
+static char *scene;  /* its files */
 
 static void put(const char *name, const char *text) {
     char *path = mem_printf("%s/%s", dir, name);
@@ -52,7 +52,8 @@ static void put_scene(void) {
         image_release(&image);
         mem_free(path);
     }
-    put("scene/transforms.json", "{\"fl_x\":8,\"frames\":[" FRAME("a") "," FRAME("b") "," FRAME("c") "," FRAME("d") "]}");
+    put("scene/transforms.json",
+        "{\"fl_x\":8,\"frames\":[" FRAME("a") "," FRAME("b") "," FRAME("c") "," FRAME("d") "]}");
     char *command = mem_printf("tar -C '%s' -cf '%s/archive' .", scene, dir);
     CHECK(system(command) == 0);
     mem_free(command);
@@ -68,8 +69,14 @@ static enum status check(void) {
 
 static enum status reconstruct(const char *settings, const char *from, const char *reduced) {
     cJSON *json = cJSON_Parse(settings);
-    struct order order = {.dir = dir, .kind = "reconstruct", .thread_count = 1, .scene = from, .scene_id = "x",
-                          .name = "", .reduced = reduced, .settings = json};
+    struct order order = {.dir = dir,
+                          .kind = "reconstruct",
+                          .thread_count = 1,
+                          .scene = from,
+                          .scene_id = "x",
+                          .name = "",
+                          .reduced = reduced,
+                          .settings = json};
     err = (struct error){0};
     enum status status = task_reconstruct(&order, &silent, &err);
     cJSON_Delete(json);
@@ -106,7 +113,8 @@ static void attempt_fails(const char *calls, long n, bool stays, const char *par
     enum status status = reconstruct("{" SETTINGS "}", scene, "");
     bool struck = system_faults_lift();
     faults_are_off = true;
-    CHECK_THAT(struck && status == STATUS_IO && strstr(err.message, part), "%s: %s: %s", calls, status_name(status), err.message);
+    CHECK_THAT(struck && status == STATUS_IO && strstr(err.message, part), "%s: %s: %s", calls, status_name(status),
+               err.message);
 }
 
 static void check_attempts(void) {
@@ -136,7 +144,8 @@ static void check_attempts(void) {
         enum status read = reconstruct("{" SETTINGS "}", scene, "");
         CHECK(system_faults_lift());
         faults_are_off = true;
-        CHECK_THAT(read == STATUS_OK || (read == STATUS_IO && strstr(err.message, "cannot read")), "read %ld: %s: %s", n, status_name(read), err.message);
+        CHECK_THAT(read == STATUS_OK || (read == STATUS_IO && strstr(err.message, "cannot read")), "read %ld: %s: %s",
+                   n, status_name(read), err.message);
         is_output = strstr(err.message, "/out/") != NULL;
     }
     put("checkpoint.db", ""); /* all is to be saved again */

@@ -171,13 +171,13 @@ static int open_any(int folder, const char *path, int flags, mode_t mode) {
     return fd;
 }
 
-#define OPEN_MODE(last)                                                                                   \
-    mode_t mode = 0;                                                                                      \
-    if (flags & O_CREAT || (flags & O_TMPFILE) == O_TMPFILE) {                                            \
-        va_list args;                                                                                     \
-        va_start(args, last);                                                                             \
-        mode = va_arg(args, mode_t);                                                                      \
-        va_end(args);                                                                                     \
+#define OPEN_MODE(last)                                                                                                \
+    mode_t mode = 0;                                                                                                   \
+    if (flags & O_CREAT || (flags & O_TMPFILE) == O_TMPFILE) {                                                         \
+        va_list args;                                                                                                  \
+        va_start(args, last);                                                                                          \
+        mode = va_arg(args, mode_t);                                                                                   \
+        va_end(args);                                                                                                  \
     }
 
 int open(const char *path, int flags, ...) {
@@ -212,9 +212,7 @@ int mkdirat(int folder, const char *path, mode_t mode) {
     return result;
 }
 
-int mkdir(const char *path, mode_t mode) {
-    return mkdirat(AT_FDCWD, path, mode);
-}
+int mkdir(const char *path, mode_t mode) { return mkdirat(AT_FDCWD, path, mode); }
 
 static void random_end(char *end) {
     uint64_t number = 0;
@@ -234,9 +232,7 @@ int mkostemp(char *template, int flags) {
     return -1;
 }
 
-int mkstemp(char *template) {
-    return mkostemp(template, 0);
-}
+int mkstemp(char *template) { return mkostemp(template, 0); }
 
 char *mkdtemp(char *template) {
     for (int i = 0; i < 100; i++) {
@@ -280,13 +276,9 @@ int unlinkat(int folder, const char *path, int flags) {
     return result;
 }
 
-int unlink(const char *path) {
-    return unlinkat(AT_FDCWD, path, 0);
-}
+int unlink(const char *path) { return unlinkat(AT_FDCWD, path, 0); }
 
-int rmdir(const char *path) {
-    return unlinkat(AT_FDCWD, path, AT_REMOVEDIR);
-}
+int rmdir(const char *path) { return unlinkat(AT_FDCWD, path, AT_REMOVEDIR); }
 
 /* --- content ------------------------------------------------------------------------------------------ */
 
@@ -305,9 +297,7 @@ ssize_t pwrite(int fd, const void *data, size_t length, off_t at) {
     return -1;
 }
 
-ssize_t pwrite64(int fd, const void *data, size_t length, off64_t at) {
-    return pwrite(fd, data, length, at);
-}
+ssize_t pwrite64(int fd, const void *data, size_t length, off64_t at) { return pwrite(fd, data, length, at); }
 
 ssize_t write(int fd, const void *data, size_t length) {
     uint64_t inode;
@@ -341,9 +331,7 @@ int ftruncate(int fd, off_t length) {
     return result;
 }
 
-int ftruncate64(int fd, off64_t length) {
-    return ftruncate(fd, length);
-}
+int ftruncate64(int fd, off64_t length) { return ftruncate(fd, length); }
 
 int fallocate(int fd, int mode, off_t at, off_t length) {
     uint64_t inode;
@@ -357,17 +345,11 @@ int fallocate(int fd, int mode, off_t at, off_t length) {
     return result;
 }
 
-int posix_fallocate(int fd, off_t at, off_t length) {
-    return fallocate(fd, 0, at, length) == 0 ? 0 : errno;
-}
+int posix_fallocate(int fd, off_t at, off_t length) { return fallocate(fd, 0, at, length) == 0 ? 0 : errno; }
 
-int fallocate64(int fd, int mode, off64_t at, off64_t length) {
-    return fallocate(fd, mode, at, length);
-}
+int fallocate64(int fd, int mode, off64_t at, off64_t length) { return fallocate(fd, mode, at, length); }
 
-int posix_fallocate64(int fd, off64_t at, off64_t length) {
-    return posix_fallocate(fd, at, length);
-}
+int posix_fallocate64(int fd, off64_t at, off64_t length) { return posix_fallocate(fd, at, length); }
 
 /* --- streams ------------------------------------------------------------------------------------------- */
 
@@ -375,9 +357,7 @@ static ssize_t stream_write(void *cookie, const char *data, size_t length) {
     return write((int)(intptr_t)cookie, data, length);
 }
 
-static int stream_close(void *cookie) {
-    return close((int)(intptr_t)cookie);
-}
+static int stream_close(void *cookie) { return close((int)(intptr_t)cookie); }
 
 FILE *fopen(const char *path, const char *mode) {
     char full[4096];
@@ -389,7 +369,8 @@ FILE *fopen(const char *path, const char *mode) {
     int fd = open_any(AT_FDCWD, path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return NULL;
-    FILE *file = fopencookie((void *)(intptr_t)fd, "w", (cookie_io_functions_t){.write = stream_write, .close = stream_close});
+    FILE *file =
+        fopencookie((void *)(intptr_t)fd, "w", (cookie_io_functions_t){.write = stream_write, .close = stream_close});
     if (!file)
         close(fd);
     return file;
@@ -422,14 +403,8 @@ static int sync_any(long call, int fd) {
     return 0;
 }
 
-int fsync(int fd) {
-    return sync_any(SYS_fsync, fd);
-}
+int fsync(int fd) { return sync_any(SYS_fsync, fd); }
 
-int fdatasync(int fd) {
-    return sync_any(SYS_fdatasync, fd);
-}
+int fdatasync(int fd) { return sync_any(SYS_fdatasync, fd); }
 
-int syncfs(int fd) {
-    return sync_any(SYS_syncfs, fd);
-}
+int syncfs(int fd) { return sync_any(SYS_syncfs, fd); }

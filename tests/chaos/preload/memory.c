@@ -51,30 +51,20 @@ static bool fails(void) {
     return true;
 }
 
-void *malloc(size_t bytes) {
-    return fails() ? NULL : __libc_malloc(bytes);
-}
+void *malloc(size_t bytes) { return fails() ? NULL : __libc_malloc(bytes); }
 
-void *calloc(size_t count, size_t size) {
-    return fails() ? NULL : __libc_calloc(count, size);
-}
+void *calloc(size_t count, size_t size) { return fails() ? NULL : __libc_calloc(count, size); }
 
-void *realloc(void *old, size_t bytes) {
-    return fails() ? NULL : __libc_realloc(old, bytes);
-}
+void *realloc(void *old, size_t bytes) { return fails() ? NULL : __libc_realloc(old, bytes); }
 
 void *reallocarray(void *old, size_t count, size_t size) {
     size_t bytes;
     return __builtin_mul_overflow(count, size, &bytes) ? NULL : realloc(old, bytes);
 }
 
-void *memalign(size_t alignment, size_t bytes) {
-    return fails() ? NULL : __libc_memalign(alignment, bytes);
-}
+void *memalign(size_t alignment, size_t bytes) { return fails() ? NULL : __libc_memalign(alignment, bytes); }
 
-void *aligned_alloc(size_t alignment, size_t bytes) {
-    return memalign(alignment, bytes);
-}
+void *aligned_alloc(size_t alignment, size_t bytes) { return memalign(alignment, bytes); }
 
 int posix_memalign(void **out, size_t alignment, size_t bytes) {
     void *made = memalign(alignment, bytes);
