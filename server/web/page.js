@@ -25,7 +25,8 @@ async function ask(path, options = {}) {
   if (!reply.ok) {
     const problem = await reply.json().catch(() => ({}));
     const params = (problem.invalid_params ?? []).map((p) => `${p.name} ${p.reason}`).join("; ");
-    throw new Error([problem.detail ?? `${path}: ${reply.status}`, params, problem.hint].filter(Boolean).join(". "));
+    const text = [problem.detail ?? `${path}: ${reply.status}`, params, problem.hint].filter(Boolean).join(". ");
+    throw Object.assign(new Error(text), { status: reply.status });
   }
   return reply;
 }
@@ -108,8 +109,8 @@ function refresh(id) {
     asked.delete(id);
     try {
       jobs.set(id, await get(`v1/jobs/${id}`));
-    } catch {
-      jobs.delete(id); // gone, or no longer shared
+    } catch (problem) { // a busy server's 503 does not take a job off the list
+      if (problem.status === 404 || problem.status === 403) jobs.delete(id); // gone, or no longer shared
     }
     showJobs();
     if (id === chosen) showJob();
