@@ -14,14 +14,15 @@ slow_asan="render/test_conformance render/test_rooms render/test_listing1 api/te
 render/test_calibrate_poses render/test_emission_pattern render/test_environment render/test_specular
 render/test_held_out_light render/test_saturated_light render/test_short render/test_sky_room
 render/test_fireflies_left_out render/test_sun render/test_split api/test_resume api/test_readme
+render/test_emitters render/test_hidden_lamp render/test_changing_light render/test_sky_doubt
+unit/test_outputs_read_back api/test_http_faults chaos/test_clock
 api/test_backup api/test_axe api/test_webhook_library
 chaos/test_start_faults chaos/test_worker_calls chaos/test_worker_kill"
 # The thread sanitizer has nothing to find in one thread either, nor in whole reconstructions what those of
 # api/test_webhooks, of a small room, do not tell.
-slow_tsan="$slow_asan unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults unit/test_outputs_read_back
-gradient/test_path render/test_calibrate_light render/test_changing_light render/test_detail
-render/test_emitters render/test_hidden_lamp render/test_sky_doubt unit/test_evaluate api/test_metrics
-api/test_http_faults api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_clock chaos/test_power_cut chaos/test_disk_faults
+slow_tsan="$slow_asan api/test_one_job unit/test_many_photographs unit/test_atlas unit/test_bundle unit/test_inverse_uv unit/test_segment unit/test_worker_faults
+gradient/test_path render/test_calibrate_light render/test_detail unit/test_evaluate api/test_metrics
+api/test_http_durable api/test_http_threads api/test_client_commands chaos/test_power_cut chaos/test_disk_faults
 chaos/test_memory_faults
 $(cd tests && echo fuzz/test_*.c | sed 's/\.c//g')"
 

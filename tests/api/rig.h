@@ -128,13 +128,15 @@ static inline void rig_send(int fd, const void *data, size_t length) {
     }
 }
 
-/* Reads into *out until the other side closes, or `until` (if not NULL) has come. */
+/* Reads into *out until the other side closes, or `until` (if not NULL) has come, as it must. */
 static inline void rig_receive(int fd, struct buf *out, const char *until) {
     char chunk[16384];
     while (!until || !strstr(buf_text(out), until)) {
         ssize_t got = recv(fd, chunk, sizeof chunk, 0);
-        if (got <= 0)
+        if (got <= 0) {
+            CHECK_THAT(!until, "\"%s\" never came: %s", until, buf_text(out));
             return;
+        }
         buf_append(out, chunk, (size_t)got);
     }
 }

@@ -97,7 +97,7 @@ static void test_streams(struct rig *rig, const char *one, const char *other) {
         fd[i] = rig_connect(rig);
         rig_send(fd[i], text, strlen(text));
         buf_init(&reply, 1 << 20);
-        rig_receive(fd[i], &reply, i == 1 ? "yours already" : "retry:");
+        rig_receive(fd[i], &reply, i == 1 ? "user_max_streams" : "retry:");
         CHECK_THAT(rig_status(&reply) == (i == 1 ? 429 : 200), "stream %d: %d", i, rig_status(&reply));
         buf_release(&reply);
         mem_free(text);
