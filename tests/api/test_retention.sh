@@ -156,7 +156,7 @@ if [ "$(id -u)" -eq 0 ] && mkdir "$work/disk" && mount -t tmpfs -o size=90m none
 
     # --- a room that does not fit when it is unpacked is no faulty room: it waits for more space ---
     make_room "$work/wide"
-    head -c 2000000 /dev/urandom | base64 -w 100 | sed "s/\$/$(printf '%1500s')/" >"$work/wide/notes.txt" # 40 MB; packed, 2
+    head -c 2000000 /dev/urandom | base64 -w 100 | sed "s/\$/$(printf '%1000s')/" >"$work/wide/notes.txt" # 30 MB; packed, 2
     tar -C "$work/wide" -czf "$work/wide.tar.gz" .
     head -c 50m /dev/zero >"$work/disk/filler"
     call POST /v1/scenes -T "$work/wide.tar.gz"; expect 201
