@@ -1,13 +1,13 @@
 #!/bin/bash
 # The demo: makes a small room whose materials are known, reconstructs it through the daemon and
 # the client as a user would, and compares what was found with what is true. Everything stays
-# under BUILD/demo. UNBAKE_DEMO_QUALITY is that of the reconstruction (draft).
+# under BUILD/demo. UNBAKE_DEMO_QUALITY is that of the reconstruction (standard).
 #
 # usage: tests/demo.sh BUILD
 set -u
 build=${1:-build}
 dir=$build/demo
-quality=${UNBAKE_DEMO_QUALITY:-draft}
+quality=${UNBAKE_DEMO_QUALITY:-standard}
 daemon=
 
 fail() {
