@@ -327,7 +327,7 @@ static enum status ask_daemon(int socket_fd, const cJSON *request, cJSON **reply
     if (status == STATUS_OK && message) {
         json_string(*reply, "hint", "the daemon's reply", "", &hint, NULL);
         json_number(*reply, "status", "the daemon's reply", STATUS_INTERNAL, &number, NULL);
-        status = number > 0 && number < STATUS_COUNT ? (enum status)(int)number : STATUS_INTERNAL;
+        status = number > 0 && number < (double)STATUS_COUNT ? (enum status)(int)number : STATUS_INTERNAL;
         error_set(err, status, "%s", message);
         error_hint(err, "%s", hint);
     }

@@ -58,7 +58,13 @@ static struct curve_point *read_series(const cJSON *series, size_t *count) {
 }
 
 /* A curve and its axes. The y axis is logarithmic if all values are positive and span a factor of 8. */
-enum { LEFT = 56, RIGHT = 8, TOP = 8, BOTTOM = 22, WIDTH = 480, HEIGHT = 200 };
+/* Pixels: margins, and the whole. */
+#define LEFT 56
+#define RIGHT 8
+#define TOP 8
+#define BOTTOM 22
+#define WIDTH 480
+#define HEIGHT 200
 
 struct curve {
     size_t count;
