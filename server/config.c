@@ -10,7 +10,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "common/nearest.h"
-#include "server/http/address.h"
+#include "server/net/address.h"
 
 #define FILE_MAX_BYTES ((size_t)1 << 20)
 #define DEFAULT "default" /* where an option is from that was not set */

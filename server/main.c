@@ -24,12 +24,12 @@
 #include "server/commands.h"
 #include "server/data/collector.h"
 #include "server/data/folder.h"
-#include "server/http/address.h"
 #include "server/http/hub.h"
 #include "server/http/listener.h"
 #include "server/http/service.h"
 #include "server/job/scheduler.h"
 #include "server/libraries.h"
+#include "server/net/address.h"
 #include "server/notify.h"
 #include "server/store/store.h"
 

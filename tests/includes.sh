@@ -39,29 +39,31 @@ forbid "server/ingest server/export" "server/($(echo "$engine_order" | cut -d' '
 forbid server/ingest 'server/export/' 'ingest does not see export'
 forbid server/export 'server/ingest/' 'export does not see ingest'
 forbid "$(for folder in $engine_order ingest export; do echo "server/$folder"; done)" \
-    'server/(http|uploads|data|store|job|worker)/' 'the engine never sees http, SQL or jobs'
+    'server/(http|net|uploads|data|store|job|worker)/' 'the engine never sees http, SQL or jobs'
 
 forbid common 'server/|client/' 'common depends on nothing of ours'
 forbid client 'server/' 'the client knows only common'
-# The daemon: http -> uploads -> data -> store; store knows of data only the paths.
+# The daemon: http -> uploads -> data -> store; store knows of data only the paths. Below http, net: connections and the
+# syntax of what comes over them, which knows of nothing else.
+forbid server/net 'server/[^n]' 'net sees only common'
 forbid server/http "$engine|server/worker/" 'http never sees the engine or the worker'
-forbid server/uploads "$engine|server/(http|job|worker|admin)/" 'uploads see only data and store'
-forbid server/data "$engine|server/(http|uploads|job|worker|admin)/" 'data sees only store'
-forbid server/admin "$engine|server/(uploads|job)/|server/http/[^t]" 'admin sees data and store, and of http only tls.h'
-forbid server/store "$engine|server/(http|uploads|worker|admin)/|server/data/[^l]" 'store sees only job.h and data/layout.h'
-forbid server/job "$engine|server/(http|uploads|admin)/" 'job never sees the engine, http or uploads'
+forbid server/uploads "$engine|server/(http|net|job|worker|admin)/" 'uploads see only data and store'
+forbid server/data "$engine|server/(http|net|uploads|job|worker|admin)/" 'data sees only store'
+forbid server/admin "$engine|server/(uploads|job|http)/|server/net/[^t]" 'admin sees data and store, and of net only tls.h'
+forbid server/store "$engine|server/(http|net|uploads|worker|admin)/|server/data/[^l]" 'store sees only job.h and data/layout.h'
+forbid server/job "$engine|server/(http|net|uploads|admin)/" 'job never sees the engine, http or uploads'
 forbid server/job 'server/worker/[^p]' 'job sees only worker/progress.h'
-forbid server/worker 'server/(http|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
+forbid server/worker 'server/(http|net|uploads|job)/|server/data/[^l]|server/store/(store|internal)' \
     "the worker never sees the daemon's memory"
 
-forbid "server/demo server/evaluate" 'server/(http|uploads|data|store|job|worker)/' 'tools know only the engine'
+forbid "server/demo server/evaluate" 'server/(http|net|uploads|data|store|job|worker)/' 'tools know only the engine'
 forbid server/demo 'server/(ingest|capture|gather|state|material|light|refine|reconstruct|export|evaluate)/' 'demo sees only render and scene'
 forbid "$(ls -d server/*/ | grep -vE 'demo|evaluate' | tr '\n' ' ')" 'server/(demo|evaluate)/' \
     'only main.c sees the tools'
 
 own 'embree[34]/' server/render/accel.c
 own 'microhttpd\.h' server/http/exchange.h
-own 'gnutls/' server/http/tls.c server/worker/deliver.c
+own 'gnutls/' server/net/tls.c server/worker/deliver.c
 own 'sqlite3\.h' server/store/store.c server/store/sql.h server/worker/checkpoint.c server/main.c
 own 'curl/' client/request.c
 own 'openexr' common/exr_stream.h
@@ -72,7 +74,7 @@ own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
 paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
-    server/*.c server/{http,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
+    server/*.c server/{http,net,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
 [ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 
 # Each unit and one that it includes, a pair a line.

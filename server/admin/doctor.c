@@ -24,8 +24,8 @@
 #include "server/admin/admin.h"
 #include "server/admin/commands.h"
 #include "server/data/layout.h"
-#include "server/http/tls.h"
 #include "server/libraries.h"
+#include "server/net/tls.h"
 #include "server/worker/sandbox.h"
 
 const struct flag doctor_flags[] = {INVOCATION_FLAGS, {"--help", NULL, "print this help"}, {0}};

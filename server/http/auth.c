@@ -9,11 +9,11 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/address.h"
 #include "server/http/auth_throttle.h"
-#include "server/http/field.h"
 #include "server/http/problem.h"
 #include "server/http/route.h"
+#include "server/net/address.h"
+#include "server/net/field.h"
 
 bool auth_is_open(const struct api *api) {
     return api->config.access == API_ACCESS_OPEN ||

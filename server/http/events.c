@@ -3,12 +3,12 @@
 
 #include "common/protocol.h"
 #include "server/http/auth.h"
-#include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
 #include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
+#include "server/net/field.h"
 
 #define WAIT_MAX_SEC 300
 

@@ -10,14 +10,14 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/address.h"
 #include "server/http/auth.h"
 #include "server/http/file_stream.h"
 #include "server/http/head.h"
 #include "server/http/problem.h"
-#include "server/http/routes.h"
 #include "server/http/request_counts.h"
-#include "server/http/tls.h"
+#include "server/http/routes.h"
+#include "server/net/address.h"
+#include "server/net/tls.h"
 
 #define PIECE_BYTES ((size_t)256 << 10)      /* of a body that is stored: so much goes to the disk at once, at most */
 #define DRAIN_BYTES ((size_t)64 << 20)       /* read and forgotten after a refusal, so that it is seen */
@@ -318,7 +318,8 @@ static enum MHD_Result begin(struct exchange *x, const char *method, const char 
     MHD_get_connection_values_n(x->connection, MHD_HEADER_KIND, take_field, r);
     struct address peer =
         address_of_socket(MHD_get_connection_info(x->connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS)->client_addr);
-    r->address = l->api->config.proxies ? address_of_request(r, &peer, l->api->config.proxies) : peer;
+    r->address =
+        l->api->config.proxies ? address_of_request(r->fields, r->field_count, &peer, l->api->config.proxies) : peer;
     head_request_id(r);
     const char *length = request_field(r, "Content-Length");
     r->has_body = request_field(r, "Transfer-Encoding") || (length && strcmp(length, "0") != 0);

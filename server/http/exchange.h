@@ -17,11 +17,11 @@
 #include <microhttpd.h>
 #include <pthread.h>
 
-#include "server/http/acceptor.h"
 #include "server/http/api.h"
-#include "server/http/guard.h"
 #include "server/http/message.h"
-#include "server/http/pool.h"
+#include "server/net/acceptor.h"
+#include "server/net/guard.h"
+#include "server/net/pool.h"
 
 enum exchange_place {
     EXCHANGE_WITH_LIBRARY,

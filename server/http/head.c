@@ -6,8 +6,8 @@
 #include <strings.h>
 #include <sys/random.h>
 
-#include "server/http/field.h"
 #include "server/http/problem.h"
+#include "server/net/field.h"
 
 static size_t field_occurrences(const struct request *r, const char *name) {
     size_t count = 0;

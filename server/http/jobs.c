@@ -11,13 +11,13 @@
 #include "server/data/layout.h"
 #include "server/data/trash.h"
 #include "server/http/auth.h"
-#include "server/http/field.h"
 #include "server/http/handlers.h"
-#include "server/http/retention.h"
+#include "server/http/job_request.h"
 #include "server/http/problem.h"
+#include "server/http/retention.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
-#include "server/http/job_request.h"
+#include "server/net/field.h"
 
 /* The reply that shows a job as it is now; takes it. */
 static struct response *show_job(const struct request *r, struct job *job, int status) {

@@ -12,12 +12,12 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/acceptor.h"
-#include "server/http/address.h"
-#include "server/http/connection_counts.h"
 #include "server/http/exchange.h"
 #include "server/http/hub.h"
-#include "server/http/tls.h"
+#include "server/net/acceptor.h"
+#include "server/net/address.h"
+#include "server/net/connection_counts.h"
+#include "server/net/tls.h"
 
 #define LIBRARY_THREADS 4
 #define QUICK_THREADS 4

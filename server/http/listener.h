@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #include "server/http/api.h"
-#include "server/http/guard.h"
+#include "server/net/guard.h"
 
 struct listener_config {
     const char *address;                     /* numeric: "127.0.0.1", "::1" */

@@ -14,23 +14,15 @@
 #include "common/buf.h"
 #include "common/error.h"
 #include "common/json.h"
-#include "server/http/target.h"
+#include "server/net/address.h"
+#include "server/net/field.h"
+#include "server/net/target.h"
 #include "server/store/users.h"
 
 enum method { METHOD_GET, METHOD_POST, METHOD_PATCH, METHOD_DELETE, METHOD_OPTIONS, METHOD_COUNT };
 
 #define REQUEST_ID_SIZE 65
 #define RESPONSE_FIELDS_MAX 12
-
-/* Of IPv6, or of IPv4 as ::ffff:a.b.c.d, in network order; all 0 where it is not known. */
-struct address {
-    uint8_t bytes[16];
-};
-#define ADDRESS_TEXT_SIZE 46 /* INET6_ADDRSTRLEN */
-
-struct field {
-    char *name, *value; /* owned */
-};
 
 struct route;
 struct upload;

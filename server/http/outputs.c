@@ -14,10 +14,10 @@
 #include "common/mem.h"
 #include "server/data/job_file.h"
 #include "server/http/auth.h"
-#include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
 #include "server/http/views.h"
+#include "server/net/field.h"
 #include "server/uploads/digests.h"
 
 #define ETAG_SIZE 80

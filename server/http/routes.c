@@ -6,11 +6,11 @@
 
 #include "common/protocol.h"
 #include "server/http/auth.h"
-#include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
 #include "server/http/scene_body.h"
 #include "server/http/uploads.h"
+#include "server/net/field.h"
 #include "server/uploads/upload.h"
 
 static const struct route table[] = {

@@ -5,10 +5,10 @@
 #include <strings.h>
 
 #include "common/utf8.h"
-#include "server/http/field.h"
 #include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/space.h"
+#include "server/net/field.h"
 #include "server/uploads/upload.h"
 
 static struct response *check_request(const struct request *r) {

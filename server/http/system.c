@@ -8,13 +8,13 @@
 #include "common/protocol.h"
 #include "common/settings.h"
 #include "server/http/embedded.h"
-#include "server/http/field.h"
 #include "server/http/handlers.h"
 #include "server/http/hub.h"
 #include "server/http/limits.h"
 #include "server/http/listener.h"
 #include "server/http/problem.h"
 #include "server/http/readiness.h"
+#include "server/net/field.h"
 
 /* --- the web page -------------------------------------------------------------------------- */
 

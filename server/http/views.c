@@ -6,8 +6,8 @@
 #include <time.h>
 
 #include "common/mem.h"
-#include "server/http/field.h"
 #include "server/http/problem.h"
+#include "server/net/field.h"
 
 #define LIMIT_DEFAULT 50
 #define LIMIT_MAX 200

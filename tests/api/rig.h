@@ -14,9 +14,9 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "common/protocol.h"
-#include "server/http/address.h"
 #include "server/http/listener.h"
 #include "server/http/service.h"
+#include "server/net/address.h"
 #include "tests/check.h"
 
 struct rig {

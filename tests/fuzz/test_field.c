@@ -1,6 +1,6 @@
 /* test_field.c -- the syntax of header fields: ranges, entity tags, digests, base64, numbers, hosts. */
 #include "common/base64.h"
-#include "server/http/field.h"
+#include "server/net/field.h"
 
 #include "tests/fuzz/fuzz.h"
 

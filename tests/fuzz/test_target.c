@@ -1,6 +1,6 @@
 /* test_target.c -- the request target: what comes out of it is UTF-8 without control bytes, climbs
  * nowhere, and reads back the same when it is written. */
-#include "server/http/target.h"
+#include "server/net/target.h"
 
 #include "common/mem.h"
 #include "common/utf8.h"

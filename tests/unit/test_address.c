@@ -1,6 +1,6 @@
 /* test_address.c -- where requests come from, with proxies that are trusted and words that are not; and the throttle on
  * wrong tokens that goes by it. */
-#include "server/http/address.h"
+#include "server/net/address.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -104,7 +104,7 @@ static void check_request(const char *field, const char *peer, const char *const
             memcpy(fields[r.field_count].name, "Forwarded", 10);
         fields[r.field_count].value = mem_strdup(values[r.field_count]);
     }
-    struct address from = at(peer), a = address_of_request(&r, &from, &p);
+    struct address from = at(peer), a = address_of_request(r.fields, r.field_count, &from, &p);
     address_text(&a, shown);
     CHECK_THAT(strcmp(shown, wanted) == 0, "%s: %s", values[0] ? values[0] : "(none)", shown);
     for (size_t i = 0; i < r.field_count; i++) {

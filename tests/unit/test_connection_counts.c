@@ -1,5 +1,5 @@
 /* test_connection_counts.c -- how many connections an address may have, and who is not bound by that. */
-#include "server/http/connection_counts.h"
+#include "server/net/connection_counts.h"
 
 #include "tests/check.h"
 

@@ -1,5 +1,5 @@
 /* Header fields: entity tags, ranges, digests, hosts. */
-#include "server/http/field.h"
+#include "server/net/field.h"
 
 #include "tests/check.h"
 

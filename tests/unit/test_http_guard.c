@@ -1,6 +1,6 @@
 /* Deadlines: who is shut down when, with the time as a parameter. */
 #include "common/clock.h"
-#include "server/http/guard.h"
+#include "server/net/guard.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

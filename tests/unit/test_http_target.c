@@ -1,5 +1,5 @@
 /* Request targets: what is decoded, what is refused. */
-#include "server/http/target.h"
+#include "server/net/target.h"
 
 #include "common/mem.h"
 #include "tests/check.h"

@@ -1,6 +1,6 @@
 /* test_tls.c -- the daemon's certificate: what is no certificate is refused with its file's name, and connections
  * that begin meanwhile get the last one that was good. */
-#include "server/http/tls.h"
+#include "server/net/tls.h"
 
 #include <gnutls/abstract.h>
 #include <gnutls/gnutls.h>

@@ -1,5 +1,5 @@
 /* guard.c -- see guard.h. */
-#include "server/http/guard.h"
+#include "server/net/guard.h"
 
 #include <linux/sockios.h>
 #include <linux/tcp.h>

@@ -1,6 +1,6 @@
 /* pool.h -- a queue of tasks and a few threads that do them, in order of arrival. */
-#ifndef UNBAKE_HTTP_POOL_H
-#define UNBAKE_HTTP_POOL_H
+#ifndef UNBAKE_NET_POOL_H
+#define UNBAKE_NET_POOL_H
 
 #include <stddef.h>
 

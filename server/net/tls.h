@@ -2,8 +2,8 @@
  * only include of GnuTLS.
  *
  * The certificate in use is one of the process: libmicrohttpd asks for it without saying for whom. */
-#ifndef UNBAKE_HTTP_TLS_H
-#define UNBAKE_HTTP_TLS_H
+#ifndef UNBAKE_NET_TLS_H
+#define UNBAKE_NET_TLS_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* pool.c -- see pool.h. */
-#include "server/http/pool.h"
+#include "server/net/pool.h"
 
 #include <pthread.h>
 #include <stdbool.h>

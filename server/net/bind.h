@@ -1,6 +1,6 @@
 /* bind.h -- the socket that the daemon listens on. */
-#ifndef UNBAKE_HTTP_BIND_H
-#define UNBAKE_HTTP_BIND_H
+#ifndef UNBAKE_NET_BIND_H
+#define UNBAKE_NET_BIND_H
 
 #include <stdint.h>
 

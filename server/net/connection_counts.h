@@ -5,10 +5,10 @@
  *      any other address                 of_one, and none of the last connections that are kept for loopback
  *
  * An IPv6 address stands for its /64, which is one customer's. Thread-safe. */
-#ifndef UNBAKE_HTTP_CONNECTION_COUNTS_H
-#define UNBAKE_HTTP_CONNECTION_COUNTS_H
+#ifndef UNBAKE_NET_CONNECTION_COUNTS_H
+#define UNBAKE_NET_CONNECTION_COUNTS_H
 
-#include "server/http/address.h"
+#include "server/net/address.h"
 
 struct connection_counts; /* opaque */
 

@@ -1,5 +1,5 @@
 /* tls.c -- see tls.h. */
-#include "server/http/tls.h"
+#include "server/net/tls.h"
 
 #include <gnutls/abstract.h>
 #include <gnutls/gnutls.h>

@@ -1,5 +1,5 @@
 /* bind.c -- see bind.h. */
-#include "server/http/bind.h"
+#include "server/net/bind.h"
 
 #include <errno.h>
 #include <netdb.h>

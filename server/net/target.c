@@ -1,5 +1,5 @@
 /* target.c -- see target.h. */
-#include "server/http/target.h"
+#include "server/net/target.h"
 
 #include <stdint.h>
 #include <string.h>

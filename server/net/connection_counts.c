@@ -1,5 +1,5 @@
 /* connection_counts.c -- see connection_counts.h. */
-#include "server/http/connection_counts.h"
+#include "server/net/connection_counts.h"
 
 #include <pthread.h>
 #include <string.h>

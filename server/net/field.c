@@ -1,5 +1,5 @@
 /* field.c -- see field.h. */
-#include "server/http/field.h"
+#include "server/net/field.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* address.c -- see address.h. */
-#include "server/http/address.h"
+#include "server/net/address.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -157,13 +157,14 @@ static void take_for(const char **text, size_t *length) {
     *length = 0;
 }
 
-struct address address_of_request(const struct request *r, const struct address *peer, const struct proxies *p) {
+struct address address_of_request(const struct field *field, size_t count, const struct address *peer,
+                                  const struct proxies *p) {
     struct address at = *peer, next;
     bool is_forwarded = p->field && strcmp(p->field, "Forwarded") == 0;
-    for (size_t i = r->field_count; i-- > 0;) {
-        if (!p->field || strcasecmp(r->fields[i].name, p->field) != 0)
+    for (size_t i = count; i-- > 0;) {
+        if (!p->field || strcasecmp(field[i].name, p->field) != 0)
             continue;
-        const char *value = r->fields[i].value, *element;
+        const char *value = field[i].value, *element;
         size_t left = strlen(value), size;
         while (take_last(value, &left, &element, &size)) {
             if (is_forwarded)

@@ -3,8 +3,8 @@
  *
  * Whoever asks can write these fields: they are read from the right, where the trusted proxy next to us put what it
  * saw, and only as far as the addresses are trusted proxies'. */
-#ifndef UNBAKE_HTTP_ADDRESS_H
-#define UNBAKE_HTTP_ADDRESS_H
+#ifndef UNBAKE_NET_ADDRESS_H
+#define UNBAKE_NET_ADDRESS_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -12,9 +12,15 @@
 #include <sys/socket.h>
 
 #include "common/error.h"
-#include "server/http/message.h"
+#include "server/net/field.h"
 
 #define ADDRESS_PROXIES_MAX 64
+#define ADDRESS_TEXT_SIZE 46 /* INET6_ADDRSTRLEN */
+
+/* Of IPv6, or of IPv4 as ::ffff:a.b.c.d, in network order; all 0 where it is not known. */
+struct address {
+    uint8_t bytes[16];
+};
 
 /* Addresses of proxies; IPv4 ones are of ::ffff:0:0/96. */
 struct proxies {
@@ -37,8 +43,9 @@ struct address address_of_socket(const struct sockaddr *from);
 /* As people write it: "10.1.2.3", "2001:db8::1". */
 void address_text(const struct address *a, char text[ADDRESS_TEXT_SIZE]);
 
-/* Where r comes from, whose connection is from `peer`. What a trusted proxy says and is no address counts
- * as the proxy's own. */
-struct address address_of_request(const struct request *r, const struct address *peer, const struct proxies *p);
+/* Where a request with field[count] comes from, whose connection is from `peer`. What a trusted proxy says and is no
+ * address counts as the proxy's own. */
+struct address address_of_request(const struct field *field, size_t count, const struct address *peer,
+                                  const struct proxies *p);
 
 #endif

@@ -1,5 +1,5 @@
 /* acceptor.c -- see acceptor.h. */
-#include "server/http/acceptor.h"
+#include "server/net/acceptor.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -10,7 +10,7 @@
 
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/bind.h"
+#include "server/net/bind.h"
 
 #define PAUSE_MS 100 /* before the next try, when there are no descriptors or no memory left */
 

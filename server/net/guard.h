@@ -11,8 +11,8 @@
  *    over each window. What we take for the reply itself is not its fault.
  * 2. A late connection's socket is shut down under the mutex that guard_remove takes too, so
  *    never one that was closed and given to somebody else. */
-#ifndef UNBAKE_HTTP_GUARD_H
-#define UNBAKE_HTTP_GUARD_H
+#ifndef UNBAKE_NET_GUARD_H
+#define UNBAKE_NET_GUARD_H
 
 #include <stdbool.h>
 #include <stddef.h>

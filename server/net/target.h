@@ -5,8 +5,8 @@
  * 1. A segment is decoded after the path was split, so an encoded slash never splits a path.
  * 2. Decoded text is UTF-8 and holds no control byte; no path holds an empty, "." or ".." part,
  *    whether written with slashes or with %2F. */
-#ifndef UNBAKE_HTTP_TARGET_H
-#define UNBAKE_HTTP_TARGET_H
+#ifndef UNBAKE_NET_TARGET_H
+#define UNBAKE_NET_TARGET_H
 
 #include <stddef.h>
 

@@ -3,8 +3,8 @@
  *
  * libmicrohttpd would accept, too, but not stop: MHD_quiesce_daemon and each thread that waits by epoll remove the
  * socket from the thread's set, and the second to do so aborts the process (0.9.75, daemon.c). */
-#ifndef UNBAKE_HTTP_ACCEPTOR_H
-#define UNBAKE_HTTP_ACCEPTOR_H
+#ifndef UNBAKE_NET_ACCEPTOR_H
+#define UNBAKE_NET_ACCEPTOR_H
 
 #include <stdbool.h>
 #include <stddef.h>

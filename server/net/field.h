@@ -1,10 +1,14 @@
 /* field.h -- the syntax of header fields (RFC 9110), as pure functions. */
-#ifndef UNBAKE_HTTP_FIELD_H
-#define UNBAKE_HTTP_FIELD_H
+#ifndef UNBAKE_NET_FIELD_H
+#define UNBAKE_NET_FIELD_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+struct field {
+    char *name, *value; /* owned */
+};
 
 bool field_is_token(const char *text); /* RFC 9110, 5.6.2; not empty */
 
