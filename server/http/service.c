@@ -24,6 +24,7 @@ static enum status forget_upload(void *resumables, const char *id, struct error 
 static enum status open_folder(struct api *api, struct error *err) {
     struct store *store = api->store;
     enum status status = folder_open(&api->folder, api->config.data_dir, renew_reserve, store, err);
+    scheduler_use_trash(api->scheduler, api->folder.trash);
     api->resumables = resumables_new(
         &(struct resumables_config){store, &api->folder, api->config.empty_upload_ms, scene_added, api->scheduler});
     api->collector_config =

@@ -10,6 +10,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+#include "server/data/trash.h"
 #include "server/job/worker_messages.h"
 #include "server/job/housekeeping.h"
 #include "server/job/measure.h"
@@ -146,12 +147,14 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
 
 /* What the archive was unpacked to: a check that was killed could not tidy up. A ready scene needs it,
  * of another only the archive is kept. */
-static void remove_unpacked(const struct attempt *a) {
+static void remove_unpacked(const struct attempt *a, struct trash *trash) {
     struct error err;
-    char *files = layout_files(a->dir);
-    if (file_remove_tree(files, &err) != STATUS_OK)
+    char *scene = trash ? layout_scene(NULL, a->scene_id) : mem_strdup(a->dir), *files = layout_files(scene);
+    enum status status = trash ? trash_take(trash, files, &err) : file_remove_tree(files, &err);
+    if (status != STATUS_OK)
         log_warning("scene %.12s: %s", a->scene_id, err.message);
     mem_free(files);
+    mem_free(scene);
 }
 
 static void add_problem(struct attempt *a, const char *reason, const char *hint) {
@@ -193,7 +196,8 @@ static bool is_good(const struct attempt *a, const struct verdict *v) {
     return v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts;
 }
 
-static enum status settle_check(struct attempt *a, struct store *store, const struct verdict *v, struct error *err) {
+static enum status settle_check(struct attempt *a, struct store *store, struct trash *trash, const struct verdict *v,
+                                struct error *err) {
     if (v->outcome == OUTCOME_STOPPED) /* still `checking`: checked again */
         return STATUS_OK;
     enum status status = is_good(a, v) ? settle_size(a, store, err) : STATUS_OK;
@@ -205,7 +209,7 @@ static enum status settle_check(struct attempt *a, struct store *store, const st
         status = store_scene_ready(store, a->scene_id, text, err);
     } else {
         bool waits = v->outcome == OUTCOME_BLOCKED; /* the content is not at fault */
-        remove_unpacked(a);
+        remove_unpacked(a, trash);
         if (waits || cJSON_GetArraySize(a->problems) == 0)
             add_problem(a,
                         a->killed           ? "its check took too long"
@@ -241,7 +245,8 @@ static enum status make_up(struct attempt *a, struct store *store, struct error 
     return is_unwanted ? STATUS_OK : status;
 }
 
-enum status outcome_settle(struct attempt *a, struct store *store, struct counters *counters, struct error *err) {
+enum status outcome_settle(struct attempt *a, struct store *store, struct trash *trash, struct counters *counters,
+                           struct error *err) {
     struct verdict verdict;
     attempt_charge(a, store, counters);
     housekeeping_drop_temporary(a->dir);
@@ -250,7 +255,7 @@ enum status outcome_settle(struct attempt *a, struct store *store, struct counte
     if (status == STATUS_OK && a->job_id)
         status = measure_job(store, a->job_id, a->dir, err);
     if (status == STATUS_OK)
-        status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, &verdict, err);
+        status = a->job_id ? settle_job(a, store, &verdict, err) : settle_check(a, store, trash, &verdict, err);
     /* Fenced, or deleted meanwhile: there is nothing left to enter. */
     if (status != STATUS_OK && status != STATUS_CONFLICT && status != STATUS_NOT_FOUND)
         return status;

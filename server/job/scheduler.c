@@ -47,6 +47,7 @@ struct scheduler {
     size_t job_slots, slot_count;
     struct attempt *slot; /* [slot_count]; the first job_slots are of jobs */
     struct checks checks;
+    struct trash *trash;    /* NULL: trees are removed by this thread */
     bool must_retry;        /* something failed that may work later */
     double housekeeping_at; /* as clock_sec */
     struct disk_watch disk;
@@ -81,6 +82,8 @@ enum status scheduler_new(struct scheduler **out, const struct scheduler_config 
     *out = s;
     return STATUS_OK;
 }
+
+void scheduler_use_trash(struct scheduler *s, struct trash *trash) { s->trash = trash; }
 
 void scheduler_free(struct scheduler *s) {
     if (!s)
@@ -341,7 +344,7 @@ static void listen_and_settle(struct scheduler *s) {
         struct error err;
         worker_messages_read(a, s->store, &s->counters);
         bool is_postponed = i >= s->job_slots && outcome_lacks_room(a);
-        if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, &s->counters, &err) != STATUS_OK)
+        if (a->phase == ATTEMPT_ENDED && outcome_settle(a, s->store, s->trash, &s->counters, &err) != STATUS_OK)
             retry_later(s, "cannot record how an attempt ended", &err);
         else if (is_postponed)
             postpone_check(s);

@@ -14,12 +14,15 @@
 #include "server/store/store.h"
 
 struct scheduler; /* opaque */
+struct trash;     /* data/trash.h */
 
 /* Nothing runs yet. What `config` points to and the store are borrowed; fails where the system has no
  * descriptor left. */
 enum status scheduler_new(struct scheduler **s, const struct scheduler_config *config, struct store *store,
                           struct error *err);
 void scheduler_free(struct scheduler *s);
+/* Before scheduler_run: what a failed check has unpacked goes to `trash` (borrowed), so that no job waits for its removal. */
+void scheduler_use_trash(struct scheduler *s, struct trash *trash);
 /* Reconciles, then works until scheduler_stop; running workers checkpoint and their jobs go back
  * to the queue before it returns. */
 enum status scheduler_run(struct scheduler *s, struct error *err);

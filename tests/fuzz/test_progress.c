@@ -131,7 +131,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     a.phase = ATTEMPT_ENDED;
     a.wait_status = (data[0] & 2 ? PROGRESS_EXIT_OK : data[0] & 4 ? PROGRESS_EXIT_INPUT : PROGRESS_EXIT_FAILED) << 8;
     struct error err;
-    enum status status = outcome_settle(&a, store, &counters, &err);
+    enum status status = outcome_settle(&a, store, NULL, &counters, &err);
     if (status != STATUS_OK)
         fprintf(stderr, "%s\n", err.message);
     MUST(status == STATUS_OK && a.phase == ATTEMPT_EMPTY);

@@ -110,6 +110,7 @@ struct daemon {
     char *dir;
     struct store *store;
     struct scheduler *scheduler;
+    struct trash *trash; /* of those to come; NULL: none */
     pthread_t thread;
 };
 
@@ -132,6 +133,7 @@ static inline void daemon_start(struct daemon *d, int max_running, const char *b
                                       .sandbox = false};
     OK(store_open(&d->store, d->dir, &err));
     OK(scheduler_new(&d->scheduler, &config, d->store, &err));
+    scheduler_use_trash(d->scheduler, d->trash);
     CHECK(pthread_create(&d->thread, NULL, run_scheduler, d) == 0);
 }
 

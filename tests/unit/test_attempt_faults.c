@@ -50,7 +50,7 @@ static void hear_to_the_end(struct attempt *a) {
 
 static void settle(struct attempt *a) {
     hear_to_the_end(a);
-    OK(outcome_settle(a, store, &figures, &err));
+    OK(outcome_settle(a, store, NULL, &figures, &err));
     CHECK(a->phase == ATTEMPT_EMPTY);
 }
 
@@ -125,7 +125,7 @@ static bool end_once(bool is_sql, long n, bool stays) {
     OK(attempt_start_job(&a, &config, store, &figures, id, 1, &err));
     strike(is_sql, n, stays);
     hear_to_the_end(&a);
-    enum status status = outcome_settle(&a, store, &figures, &err);
+    enum status status = outcome_settle(&a, store, NULL, &figures, &err);
     bool struck = lift();
     CHECK_THAT(status == STATUS_OK || (a.phase == ATTEMPT_ENDED && *err.message && state_of(id) == JOB_RUNNING),
                "call %ld: lost", n);
@@ -180,7 +180,7 @@ static bool check_once(bool is_sql, long n, bool stays) {
     }
     hear_to_the_end(&a);
     strike(is_sql, n, stays);
-    status = outcome_settle(&a, store, &figures, &why);
+    status = outcome_settle(&a, store, NULL, &figures, &why);
     struck = lift() || struck;
     if (status != STATUS_OK) {
         CHECK(*why.message && scene_state(id) == SCENE_CHECKING);
@@ -270,7 +270,7 @@ static void check_charge(void) {
     OK(attempt_start_job(&a, &config, store, &figures, id, 1, &err));
     hear_to_the_end(&a);
     strike_sql("usage", 1, true);
-    OK(outcome_settle(&a, store, &figures, &err));
+    OK(outcome_settle(&a, store, NULL, &figures, &err));
     CHECK(lift() && state_of(id) == JOB_SUCCEEDED && !has_usage(5));
     OK(store_usage_pay(store, &err));
     CHECK(has_usage(5));
@@ -289,7 +289,7 @@ static void check_unpacked(void) {
         hear_to_the_end(&a);
         if (i == 0)
             strike_system("unlinkat", 1, true);
-        OK(outcome_settle(&a, store, &figures, &err));
+        OK(outcome_settle(&a, store, NULL, &figures, &err));
         CHECK(lift() == (i == 0) && scene_state(id) == SCENE_REJECTED && (access(files, F_OK) == 0) == (i == 0));
         CHECK(log_count("cannot remove") == 1 && log_count(files) == (i == 0));
         mem_free(files);

@@ -1,8 +1,13 @@
 /* test_scheduler.c -- how attempts of jobs and checks of scenes end, and what the scheduler makes of it; a worker plays all
  * that may happen (scheduler_rig.h). */
+#include <stdatomic.h>
 #include <sys/stat.h>
 
+#include "server/data/layout.h"
+#include "server/data/trash.h"
 #include "tests/unit/scheduler_rig.h"
+
+#define TRASH_SCENE "7777777777777777777777777777777777777777777777777777777777777777"
 
 /* --- the worker's side ----------------------------------------------------------------------- */
 
@@ -373,11 +378,33 @@ static void test_outcomes(struct daemon *d) {
     daemon_stop(d);
 }
 
+/* What a check that crashed has unpacked is removed by the trash, which the scheduler does not wait for. */
+static void count_emptied(void *user) { atomic_fetch_add((atomic_int *)user, 1); }
+
+static void test_trash(struct daemon *d) {
+    atomic_int emptied = 0;
+    char *folder = layout_trash(d->dir);
+    OK(file_make_dirs(folder, &err));
+    OK(trash_new(&d->trash, d->dir, count_emptied, &emptied, &err));
+    trash_wait(d->trash);
+    int before = atomic_load(&emptied);
+    daemon_start(d, 1, "/proc/self/exe");
+    add_scene(d, TRASH_SCENE, "crash");
+    expect_problems(d, TRASH_SCENE, SCENE_REJECTED, "");
+    trash_wait(d->trash);
+    CHECK_THAT(atomic_load(&emptied) > before, "the trash had nothing to do");
+    daemon_stop(d);
+    trash_free(d->trash);
+    d->trash = NULL;
+    mem_free(folder);
+}
+
 int main(int argc, char **argv) {
     struct daemon d;
     daemon_begin(&d, argc, argv);
     test_outcomes(&d);
     test_no_room(&d);
+    test_trash(&d);
     daemon_end(&d);
     return check_result();
 }

@@ -98,7 +98,7 @@ static struct scheduler_config limited(uint64_t bytes) {
 static void settle(struct attempt *a) {
     for (; a->phase == ATTEMPT_ALIVE; usleep(1000))
         worker_messages_read(a, store, &figures);
-    OK(outcome_settle(a, store, &figures, &err));
+    OK(outcome_settle(a, store, NULL, &figures, &err));
 }
 
 /* Runs one attempt of the job to its end; false where it did not begin. */
