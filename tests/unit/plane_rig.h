@@ -8,6 +8,7 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/gather/probes.h"
+#include "server/material/divide.h"
 #include "server/state/evidence.h"
 #include "server/state/reconstruction.h"
 #include "tests/check.h"
@@ -115,6 +116,24 @@ static inline void plane_rig_release(struct plane_rig *rig) {
 static inline rgb plane_paint_one(void *user, vec3 place) {
     (void)place;
     return *(const rgb *)user;
+}
+
+/* Base colour at the middle texel, without highlights, as `probes` have the light; *divide stays for more, its `measured`
+ * is to be freed. *typical is to outlive it. */
+static inline const struct measured *plane_rig_divide(struct plane_rig *rig, const struct probes *probes,
+                                                      float *typical, struct divide *divide) {
+    static const uint32_t texel = PLANE_MIDDLE;
+    *typical = 0.5f;
+    *divide = (struct divide){.r = &rig->r,
+                              .views = &rig->views,
+                              .probes = probes,
+                              .noise = &rig->r.noise,
+                              .stride = 1,
+                              .typical = typical,
+                              .highlight_samples = 4};
+    divide->measured = mem_calloc(PLANE_TEXELS, sizeof *divide->measured);
+    divide_texels(divide, &texel, 1);
+    return &divide->measured[texel];
 }
 
 #endif

@@ -65,7 +65,7 @@ static void photograph_plane(struct plane_rig *rig, enum faults faults) {
 static void test_base_color(enum faults faults) {
     struct plane_rig rig;
     struct probes probes;
-    float typical = 0.5f;
+    float typical;
     photograph_plane(&rig, faults);
     struct reconstruction *r = &rig.r;
     probes_init(&probes, 8, &rig.scene.mesh, &r->atlas, &r->inverse, &r->fused);
@@ -73,17 +73,8 @@ static void test_base_color(enum faults faults) {
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, to_light(), flux);
         probes.probe[i].light.noise = light_noise;
     }
-    struct divide divide = {.r = r,
-                            .views = &rig.views,
-                            .probes = &probes,
-                            .noise = &r->noise,
-                            .stride = 1,
-                            .typical = &typical,
-                            .highlight_samples = 4};
-    divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
-    uint32_t texel = PLANE_MIDDLE;
-    divide_texels(&divide, &texel, 1);
-    const struct measured *m = &divide.measured[texel];
+    struct divide divide;
+    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
     rgb found = measured_value(m), noise = rgb_from_half(m->noise);
     CHECK(m->weight > 0.0f);
     /* What all photographs share: the error of the light that arrives, as a share of it. */
@@ -95,7 +86,7 @@ static void test_base_color(enum faults faults) {
         CHECK_NEAR((&noise.r)[c] / base, (&light_noise.r)[c] / (&arrives.r)[c], 4e-3);
     }
     /* White paint is Lambert's in divide_lambert but for its roughness, which is 1. */
-    CHECK(divide_lambert(&divide, texel, &white));
+    CHECK(divide_lambert(&divide, PLANE_MIDDLE, &white));
     float of_rough = bsdf_diffuse(1.0f, cosf(0.435f), 1.0f, to_light().z) /
                      bsdf_diffuse(ROUGHNESS, cosf(0.435f), 1.0f, to_light().z);
     CHECK_NEAR(white.g, wanted_white.g * of_rough, 1e-4f);
@@ -110,24 +101,16 @@ static void test_base_color(enum faults faults) {
 static void test_nothing(void) {
     struct plane_rig rig;
     struct probes probes;
-    float typical = 0.5f;
+    float typical;
     photograph_plane(&rig, NONE);
     probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
-    struct divide divide = {.r = &rig.r,
-                            .views = &rig.views,
-                            .probes = &probes,
-                            .noise = &rig.r.noise,
-                            .stride = 1,
-                            .typical = &typical,
-                            .highlight_samples = 4};
-    divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
-    uint32_t texel = PLANE_MIDDLE;
-    divide_texels(&divide, &texel, 1);
-    rgb found = measured_value(&divide.measured[texel]);
-    CHECK(isfinite(found.r) && isfinite(found.g) && isfinite(found.b) && isfinite(divide.measured[texel].weight));
+    struct divide divide;
+    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
+    rgb found = measured_value(m);
+    CHECK(isfinite(found.r) && isfinite(found.g) && isfinite(found.b) && isfinite(m->weight));
     rig.r.is_emitter[0] = true;
-    divide_texels(&divide, &texel, 1);
-    CHECK(divide.measured[texel].weight == 0.0f);
+    divide_texels(&divide, &(uint32_t){PLANE_MIDDLE}, 1);
+    CHECK(m->weight == 0.0f);
     rig.r.is_emitter[0] = false;
     mem_free(divide.measured);
     probes_release(&probes);

@@ -92,18 +92,10 @@ static void test_divide(uint32_t count) {
     probes_init(&probes, 8, &rig.scene.mesh, &rig.r.atlas, &rig.r.inverse, &rig.r.fused);
     for (size_t i = 0; i < probes.count; i++)
         irradiance_add(&probes.probe[i].light, (vec3){0, 0, 1}, (vec3){0, 0, 1}, rgb_gray((float)PI));
-    float typical = 0.5f;
-    struct divide divide = {.r = &rig.r,
-                            .views = &rig.views,
-                            .probes = &probes,
-                            .noise = &rig.r.noise,
-                            .stride = 1,
-                            .typical = &typical,
-                            .highlight_samples = 4};
-    divide.measured = mem_calloc(PLANE_TEXELS, sizeof *divide.measured);
-    uint32_t texel = PLANE_MIDDLE;
-    divide_texels(&divide, &texel, 1);
-    rgb found = measured_value(&divide.measured[texel]);
+    float typical;
+    struct divide divide;
+    const struct measured *m = plane_rig_divide(&rig, &probes, &typical, &divide);
+    rgb found = measured_value(m);
     CHECK_THAT(fabsf(found.r - near_color.r) < 0.05f, "of %u photographs: %g", count, (double)found.r);
     mem_free(divide.measured);
     probes_release(&probes);
