@@ -48,8 +48,9 @@ async function lookAtAll(scheme) {
     console.log(`list-${scheme}: the focus is lost`, ++faults);
   await page.$eval("#jobs tr:last-child button", (button) => button.click()); // the first job, which is done
   await page.waitForSelector("#pictures img[src]");
-  await page.click("#job details:first-of-type summary");
-  await page.click("#log-details summary");
+  // Not by the mouse: pictures that arrive move what is below them while it aims.
+  for (const summary of ["#job details:first-of-type summary", "#log-details summary"])
+    await page.$eval(summary, (element) => element.click());
   await page.waitForFunction(() => document.querySelectorAll("#files a").length > 5);
   await new Promise((done) => setTimeout(done, 500));
   await look(page, `job-${scheme}`);
