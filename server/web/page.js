@@ -43,6 +43,23 @@ function element(name, text, attributes = {}) {
   return Object.assign(made, attributes);
 }
 
+// The children of `parent` are made to be one for each of `items`, in their order. A child whose key stays is changed
+// in place, so that the focus, a selection and a button that is held down outlive an event.
+function showEach(parent, items, key, make, fill) {
+  const old = new Map([...parent.children].map((child) => [child.dataset.key, child]));
+  const children = items.map((item) => {
+    const child = old.get(String(key(item))) ?? make(item);
+    child.dataset.key = key(item);
+    fill(child, item);
+    return child;
+  });
+  for (const child of old.values())
+    if (!children.includes(child)) child.remove();
+  children.forEach((child, i) => {
+    if (parent.children[i] !== child) parent.insertBefore(child, parent.children[i] ?? null);
+  });
+}
+
 const bytes = (n) =>
   n < 1024 ? `${n} B`
   : n < 2 ** 20 ? `${(n / 1024).toFixed(0)} KiB`
@@ -82,22 +99,29 @@ $("sign-out").addEventListener("click", async () => {
 
 // --- all jobs -------------------------------------------------------------------------------
 
+function makeJobRow(job) {
+  const row = element("tr", null), number = element("td", null);
+  number.append(element("button", job.id, { onclick: () => choose(job.id) }));
+  const bar = element("progress", null, { max: 1, ariaLabel: `progress of job ${job.id}` }), cell = element("td", null);
+  cell.append(bar);
+  row.append(number, element("td", null), cell, element("td", null), element("td", null));
+  return row;
+}
+
+function fillJobRow(row, job) {
+  const [, state, bar, name, owner] = row.children;
+  row.className = job.id === chosen ? "chosen" : "";
+  state.textContent = job.state;
+  bar.firstChild.hidden = job.state !== "running";
+  bar.firstChild.value = job.progress;
+  name.textContent = job.name;
+  owner.textContent = job.owner ?? "";
+}
+
 function showJobs() {
-  const rows = [...jobs.values()].sort((a, b) => b.id - a.id).map((job) => {
-    const row = element("tr", null, { className: job.id === chosen ? "chosen" : "" });
-    const link = element("button", job.id, { onclick: () => choose(job.id) });
-    link.dataset.job = job.id;
-    const number = element("td", null);
-    number.append(link);
-    const bar = element("td", null);
-    if (job.state === "running") bar.append(element("progress", null, { max: 1, value: job.progress, ariaLabel: `progress of job ${job.id}` }));
-    row.append(number, element("td", job.state), bar, element("td", job.name), element("td", job.owner ?? ""));
-    return row;
-  });
-  const focused = document.activeElement?.dataset.job; // rows are made anew at each event: whoever is on one stays there
-  $("jobs").replaceChildren(...rows);
-  if (focused) $("jobs").querySelector(`[data-job="${focused}"]`)?.focus();
-  $("no-jobs").hidden = rows.length > 0;
+  const newest = [...jobs.values()].sort((a, b) => b.id - a.id);
+  showEach($("jobs"), newest, (job) => job.id, makeJobRow, fillJobRow);
+  $("no-jobs").hidden = newest.length > 0;
 }
 
 // One request for a job however many events about it come at once.
@@ -173,11 +197,11 @@ function showJob() {
   $("job-progress").value = job.state === "succeeded" ? 1 : job.progress;
   $("job-reason").textContent = [job.reason, job.hint].filter(Boolean).join(". ");
   const mine = me.role === "admin" || (me.role === "user" && job.owner === me.user);
-  const buttons = (mine ? ACTIONS[job.state] ?? [] : []).map((action) =>
-    element("button", action, { onclick: () => act(`v1/jobs/${job.id}/${action}`) }));
-  if (mine && !me.open)
-    buttons.push(element("button", job.shared ? "unshare" : "share", { onclick: () => share(job) }));
-  $("actions").replaceChildren(...buttons.flatMap((b) => [b, " "]));
+  const actions = mine ? [...ACTIONS[job.state] ?? []] : [];
+  if (mine && !me.open) actions.push(job.shared ? "unshare" : "share");
+  showEach($("actions"), actions, (action) => action, (action) => element("button", action), (button, action) => {
+    button.onclick = () => action.endsWith("share") ? share(job) : act(`v1/jobs/${job.id}/${action}`);
+  });
 }
 
 async function act(path) {
@@ -232,26 +256,32 @@ async function showOutputs() {
   const { items } = await get(`v1/jobs/${id}/outputs`);
   if (id !== chosen) return;
   const pictures = items.filter((o) => /^(preview|compare)\/.*\.png$/.test(o.name)); // others are too large
-  for (const output of pictures) { // changed in place: no flicker
-    let figure = $("pictures").querySelector(`[data-name="${CSS.escape(output.name)}"]`);
-    if (!figure) {
-      figure = element("figure", null);
-      figure.dataset.name = output.name;
-      figure.append(element("img", null, { alt: output.name }),
-                    element("figcaption", output.name.replace(/^preview\//, "")));
-      $("pictures").append(figure);
-    }
-    if (figure.dataset.sha256 !== output.sha256) {
-      figure.dataset.sha256 = output.sha256;
-      load(figure.firstChild, output.href.slice(1));
-    }
-  }
-  $("files").replaceChildren(...items.map((output) => {
-    const row = element("tr", null), cell = element("td", null);
-    cell.append(element("a", output.name, { href: output.href.slice(1) }));
-    row.append(cell, element("td", bytes(output.bytes)));
-    return row;
-  }));
+  showEach($("pictures"), pictures, (output) => output.name, makePicture, fillPicture);
+  showEach($("files"), items, (output) => output.name, makeFileRow, fillFileRow);
+}
+
+function makePicture(output) {
+  const figure = element("figure", null);
+  figure.append(element("img", null, { alt: output.name }), element("figcaption", output.name.replace(/^preview\//, "")));
+  return figure;
+}
+
+function fillPicture(figure, output) {
+  if (figure.dataset.sha256 === output.sha256) return;
+  figure.dataset.sha256 = output.sha256;
+  load(figure.firstChild, output.href.slice(1));
+}
+
+function makeFileRow(output) {
+  const row = element("tr", null), cell = element("td", null);
+  cell.append(element("a", output.name));
+  row.append(cell, element("td", null));
+  return row;
+}
+
+function fillFileRow(row, output) { // a file of the same name may have been another job's
+  row.firstChild.firstChild.href = output.href.slice(1);
+  row.lastChild.textContent = bytes(output.bytes);
 }
 
 async function showLog() {
