@@ -15,6 +15,7 @@
 #include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
+#include "server/ingest/reading_apply.h"
 #include "server/ingest/trajectory.h"
 #include "server/ingest/transforms.h"
 
@@ -221,14 +222,29 @@ static enum status find_mesh(const char *root, const char *transforms_name, cons
     return search_mesh(root, found, f, err);
 }
 
-static enum status load_mesh(const char *root, const char *name, uint64_t triangle_limit, struct scene *scene,
-                             struct findings *f, struct error *err) {
+/* The one that the reading names. */
+static enum status choose_mesh(const char *root, const char *name, char **found, struct findings *f,
+                               struct error *err) {
+    struct error own;
+    enum status status = path_clean(name, found, &own);
+    if (status == STATUS_OK && !file_is_in(root, *found)) {
+        findings_problem(f, name, "the mesh that was chosen, %s, is not in the bundle", name);
+        mem_free(*found);
+        *found = NULL;
+    }
+    return findings_settle(f, name, status, &own, err);
+}
+
+static enum status load_mesh(const char *root, const char *name, const struct reading *reading, uint64_t triangle_limit,
+                             struct scene *scene, struct findings *f, struct error *err) {
     struct faces_report report;
     struct error own;
     char *path = file_join(root, name);
     size_t limit = triangle_limit < MESH_MAX_TRIANGLES ? (size_t)triangle_limit : MESH_MAX_TRIANGLES;
     enum status status = mesh_file_read(path, name, limit, &scene->mesh, &report, &own);
     mem_free(path);
+    if (status == STATUS_OK)
+        reading_apply_mesh(reading, &scene->mesh);
     if (status == STATUS_OK)
         status = mesh_check(&scene->mesh, name, &scene->mesh_report, &own);
     if (status != STATUS_OK)
@@ -295,11 +311,13 @@ static enum status sum_up(const struct findings *f, struct error *err) {
     return error_set(err, STATUS_INPUT, "%zu problems; the first: %s: %s", f->problem_count, file, reason);
 }
 
-enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
+enum status bundle_load(const char *dir, const struct reading *given, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err) {
     struct findings f = {.problems = problems};
     struct transforms t;
     char *root = NULL, *mesh = NULL, *name = NULL;
+    struct reading reading = given ? *given : reading_default();
+    const char *transforms = reading.transforms;
     *scene = (struct scene){0};
     enum status status = path_clean(transforms ? transforms : BUNDLE_TRANSFORMS, &name, err);
     if (status == STATUS_OK && name[0] == '\0')
@@ -314,9 +332,13 @@ enum status bundle_load(const char *dir, const char *transforms, const struct bu
     bool has_frames = f.problem_count == 0 || t.frame_count > 0;
     if (status != STATUS_OK)
         goto out;
-    status = find_mesh(root, name, &t, &mesh, &f, err);
+    reading_apply_frames(&reading, &t);
+    if (reading.mesh)
+        status = choose_mesh(root, reading.mesh, &mesh, &f, err);
+    else
+        status = find_mesh(root, name, &t, &mesh, &f, err);
     if (mesh)
-        status = load_mesh(root, mesh, limits->triangles, scene, &f, err);
+        status = load_mesh(root, mesh, &reading, limits->triangles, scene, &f, err);
     if (status == STATUS_OK && has_frames)
         status = photos_load(root, name, &t, limits->photograph_pixels, pool, scene, &f, err);
     if (status == STATUS_OK && f.problem_count > 0)

@@ -11,6 +11,7 @@
 #include "common/error.h"
 #include "common/json.h"
 #include "common/parallel.h"
+#include "common/reading.h"
 #include "server/scene/scene.h"
 
 #define BUNDLE_TRANSFORMS "transforms.json"
@@ -32,9 +33,8 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
 
 /* Reads an unpacked bundle: cameras, mesh, photographs. Collects as many problems as possible, each an object
  * {"file", "reason"} with an optional "hint", in the array `problems`; then returns STATUS_INPUT with a summary in
- * *err. Other statuses are failures of the machine. `transforms` names the file to read instead of transforms.json
- * (NULL: default). On success the scene is the caller's (scene_release); otherwise it is empty. */
-enum status bundle_load(const char *dir, const char *transforms, const struct bundle_limits *limits,
+ * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). On success the scene is the caller's (scene_release); otherwise it is empty. */
+enum status bundle_load(const char *dir, const struct reading *reading, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err);
 
 #endif

@@ -136,7 +136,7 @@ enum status colmap_images_parse(const void *data, size_t size, const char *name,
                                 struct findings *f, struct error *err) {
     struct colmap_cursor r = {.name = name, .data = data, .size = size, .err = err};
     struct images in = {.cameras = cameras, .prefix = prefix, .t = t, .findings = f};
-    *t = (struct transforms){0};
+    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
     enum status status = binary ? read_images_binary(&r, &in) : read_images_text(&r, &in);
     if (t->frame_count > 1)
         qsort(t->frame, t->frame_count, sizeof *t->frame, by_file);
@@ -172,7 +172,7 @@ enum status colmap_read(const char *root, const char *images, struct transforms 
     struct colmap_cameras *found = NULL;
     struct mapping file;
     struct error own = {0};
-    *t = (struct transforms){0};
+    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
     enum status status = mapping_open(&file, path, cameras, "a file of cameras", &own);
     if (status == STATUS_OK) {
         found = colmap_cameras_parse(file.data, file.size, cameras, binary, &own);

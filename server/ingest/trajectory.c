@@ -89,7 +89,7 @@ enum status trajectory_parse(const void *data, size_t size, const char *name, co
                              struct transforms *t, struct findings *f, struct error *err) {
     const char *text = data, *end = size > 0 ? text + size : text;
     size_t line = 0, capacity = 0, lost_count = 0;
-    *t = (struct transforms){0};
+    *t = (struct transforms){.axes = AXES_OPENCV};
     while (text < end) {
         const char *newline = memchr(text, '\n', (size_t)(end - text)), *stop = newline ? newline : end;
         char *own = mem_strndup(text, (size_t)(stop - text)), place[48];
@@ -236,7 +236,7 @@ static enum status read_scannet(const char *root, struct transforms *t, struct f
 enum status trajectory_read(const char *root, const char *found, struct transforms *t, struct findings *f,
                             struct error *err) {
     struct error own = {0};
-    *t = (struct transforms){0};
+    *t = (struct transforms){.axes = AXES_OPENCV};
     bool is_replica = strcmp(found, TRAJECTORY) == 0;
     enum status status = is_replica ? read_replica(root, t, f, &own) : read_scannet(root, t, f, &own);
     return findings_settle(f, found, status, &own, err);

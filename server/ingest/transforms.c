@@ -287,14 +287,14 @@ static bool read_split(struct context *c, struct transforms_frame *frame) {
 
 /* --- the file ---------------------------------------------------------------------------- */
 
-static void frame_release(struct transforms_frame *frame) {
+void transforms_frame_release(struct transforms_frame *frame) {
     mem_free(frame->file);
     mem_free(frame->mask);
 }
 
 void transforms_release(struct transforms *t) {
     for (size_t i = 0; i < t->frame_count; i++)
-        frame_release(&t->frame[i]);
+        transforms_frame_release(&t->frame[i]);
     mem_free(t->frame);
     mem_free(t->mesh);
     mem_free(t->point_cloud);
@@ -361,7 +361,7 @@ static bool read_top(struct context *c, struct transforms *t) {
 
 void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f) {
     struct context c = {.root = root, .name = name, .findings = f};
-    *t = (struct transforms){0};
+    *t = (struct transforms){.axes = AXES_OPENGL};
     if (!read_top(&c, t))
         return;
     const cJSON *frames = cJSON_GetObjectItemCaseSensitive(root, "frames"), *object;
@@ -372,7 +372,7 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
         if (read_frame(&c, object, frame))
             t->frame_count++;
         else
-            frame_release(frame);
+            transforms_frame_release(frame);
     }
     if (c.scaled_count > 0)
         findings_warning(f, "%s: the rotation of %zu frames carries a scale, which was taken out", name,

@@ -12,6 +12,7 @@
 #include <stddef.h>
 
 #include "common/json.h"
+#include "common/reading.h"
 #include "server/ingest/findings.h"
 #include "server/scene/camera.h"
 
@@ -45,6 +46,7 @@ struct transforms_frame {
 };
 
 struct transforms {
+    enum matrix_axes axes; /* of the file's matrices; the frames' are with our axes already */
     char *mesh;         /* clean path or NULL; owned */
     char *point_cloud;  /* ply_file_path, a mesh or a point cloud, or NULL; owned */
     size_t named_count; /* frames in the file */
@@ -56,6 +58,7 @@ struct transforms {
  * (transforms_release) in any case. */
 void transforms_read(const cJSON *root, const char *name, struct transforms *t, struct findings *f);
 void transforms_release(struct transforms *t);
+void transforms_frame_release(struct transforms_frame *frame);
 
 /* The camera of a frame whose picture is width x height pixels. STATUS_INPUT when the file states another size or an
  * invalid lens. */

@@ -42,12 +42,15 @@ enum status task_check(const struct order *order, struct progress *progress, str
     struct parallel *pool = parallel_new(order->thread_count);
     cJSON *problems = cJSON_CreateArray();
     struct scene scene;
+    struct reading reading;
     /* What an earlier check left that was killed, or of an earlier opinion on the content. */
-    enum status status = file_remove_tree(files, err);
+    enum status status = reading_parse(order->reading, &reading, err);
+    if (status == STATUS_OK)
+        status = file_remove_tree(files, err);
     if (status == STATUS_OK)
         status = bundle_unpack(archive, files, &limits, err);
     if (status == STATUS_OK) {
-        status = bundle_load(files, NULL, &limits, pool, &scene, problems, err);
+        status = bundle_load(files, &reading, &limits, pool, &scene, problems, err);
         tell_problems(progress, problems);
         if (status == STATUS_OK)
             status = flush(order->dir, err);
@@ -57,6 +60,7 @@ enum status task_check(const struct order *order, struct progress *progress, str
             file_remove_tree(files, NULL); /* a rejected scene keeps only its archive */
         scene_release(&scene);
     }
+    reading_release(&reading);
     cJSON_Delete(problems);
     parallel_free(pool);
     mem_free(files);

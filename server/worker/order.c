@@ -71,6 +71,7 @@ enum status order_read(struct order *o, const char *dir, struct error *err) {
     if (status == STATUS_OK)
         status = json_bool(o->json, "sandbox", WHAT, true, &o->sandbox, err);
     if (status == STATUS_OK) {
+        o->reading = cJSON_GetObjectItemCaseSensitive(o->json, "reading");
         o->thread_count = (int)thread_count;
         o->memory_bytes = (uint64_t)memory_bytes;
     }

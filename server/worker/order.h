@@ -1,9 +1,9 @@
 /* order.h -- job.json: what the daemon tells a worker to do; written by server/job/attempt.c.
  *
- *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","settings":{…},
+ *   {"kind":"reconstruct","scene":"DATA/scenes/ID/files","scene_id":"…","reading":{…},"settings":{…},
  *    "name":"my room","job_id":17,"attempt":2,"thread_count":4,"memory_bytes":0,"sandbox":true,
  *    "checkpoint_interval_sec":60}
- *   {"kind":"check","scene_id":"…","thread_count":4,"memory_bytes":0,"sandbox":true}
+ *   {"kind":"check","scene_id":"…","reading":{…},"thread_count":4,"memory_bytes":0,"sandbox":true}
  *   {"kind":"deliver","url":"https://…","secret":"…","body":"…","message_id":"msg_7",
  *    "allow_private":false,"sandbox":true}
  *
@@ -24,6 +24,7 @@ struct order {
     int thread_count;
     uint64_t memory_bytes; /* 0: no limit */
     bool sandbox;
+    const cJSON *reading; /* how the scene is to be read (common/reading.h); NULL: as its files say */
     /* kind "reconstruct" */
     const char *scene;     /* folder of the unpacked bundle */
     const char *name;      /* of the job, for the report's title; may be "" */

@@ -273,10 +273,19 @@ static enum status write_outputs(struct worker_run *run, const struct reconstruc
 static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
                               struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
+    struct reading reading;
+    const char *transforms = settings_text(settings, "transforms");
+    enum status status = reading_parse(run->order->reading, &reading, err);
+    if (status != STATUS_OK)
+        return status;
+    if (strcmp(transforms, BUNDLE_TRANSFORMS) != 0) { /* this job's, in place of the scene's */
+        mem_free(reading.transforms);
+        reading.transforms = mem_strdup(transforms);
+    }
     cJSON *problems = cJSON_CreateArray();
     tell_stage(run, "load");
-    enum status status =
-        bundle_load(run->order->scene, settings_text(settings, "transforms"), &limits, pool, scene, problems, err);
+    status = bundle_load(run->order->scene, &reading, &limits, pool, scene, problems, err);
+    reading_release(&reading);
     /* Only with another transforms file than the one that the scene's check has read. */
     const cJSON *problem;
     cJSON_ArrayForEach(problem, problems) {

@@ -122,8 +122,11 @@ static enum status run(int argc, char **argv, struct error *err) {
     struct scene scene = {0};
     struct reconstruction r = {0};
     struct bundle_limits limits = bundle_default_limits();
+    struct reading reading = reading_default();
+    reading.transforms = mem_strdup(settings_text(&settings, "transforms"));
     if (status == STATUS_OK)
-        status = bundle_load(argv[1], settings_text(&settings, "transforms"), &limits, pool, &scene, NULL, err);
+        status = bundle_load(argv[1], &reading, &limits, pool, &scene, NULL, err);
+    reading_release(&reading);
     printf("loaded in %.1f s\n", clock_sec() - begin);
     if (status == STATUS_OK)
         status = reconstruct_run(&scene, &settings, pool, &hooks, &r, err);

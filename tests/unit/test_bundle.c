@@ -409,7 +409,9 @@ static void test_single_folder(void) {
     limits.photograph_pixels = 40;
     CHECK(bundle_load(outer, NULL, &limits, pool, &scene, problems, &err) == STATUS_INPUT);
     CHECK(strstr(err.message, "48 pixels"));
-    CHECK(bundle_load(outer, "../transforms.json", &limits, pool, &scene, problems, &err) == STATUS_INPUT);
+    struct reading reading = reading_default();
+    reading.transforms = "../transforms.json";
+    CHECK(bundle_load(outer, &reading, &limits, pool, &scene, problems, &err) == STATUS_INPUT);
     cJSON_Delete(problems);
     file_remove_tree(outer, NULL);
     mem_free(outer);
@@ -504,7 +506,9 @@ static void test_real(const char *root, const char *room, const char *transforms
     struct error err = {.message = ""};
     struct bundle_limits limits = bundle_default_limits();
     cJSON *problems = cJSON_CreateArray();
-    enum status status = bundle_load(dir, transforms, &limits, pool, &scene, problems, &err);
+    struct reading reading = reading_default();
+    reading.transforms = (char *)transforms;
+    enum status status = bundle_load(dir, &reading, &limits, pool, &scene, problems, &err);
     CHECK_THAT(status == STATUS_OK, "%s: %s", room, err.message);
     if (status == STATUS_OK) {
         cJSON *facts = facts_of(&scene);

@@ -246,7 +246,9 @@ static void check_folders(void) {
     put_bundle(TRANSFORMS);
     struct scene scene;
     struct bundle_limits limits = bundle_default_limits();
-    CHECK(bundle_load(root, "./", &limits, pool, &scene, NULL, &err) == STATUS_INPUT);
+    struct reading reading = reading_default();
+    reading.transforms = "./";
+    CHECK(bundle_load(root, &reading, &limits, pool, &scene, NULL, &err) == STATUS_INPUT);
     CHECK_STRING(err.message, "\"./\" is no name of a file");
     put("transforms.json",
         "{\"fl_x\":3,\"frames\":[{\"file_path\":\"images/0\"," MATRIX ",\"mask_path\":\"room.bin/mask.png\"}]}");
