@@ -1,4 +1,5 @@
-/* exchange.h -- one request on its way, between libmicrohttpd's threads and those that may wait. For listener.c.
+/* exchange.h -- one request and its reply, handed between libmicrohttpd's threads, which must not block, and the pools,
+ * whose threads may. For listener.c, callbacks.c and reply.c.
  *
  *              library: on_request                    pools: quick, slow
  *   head   ──> head_check, routes_find ──suspend──>   routes_begin ─────┐ no body
@@ -6,11 +7,11 @@
  *          ──> a piece is full         ──suspend──>   routes_data       │
  *   end    ──>                         ──suspend──>   routes_finish  <──┘
  *   reply  <── queued                  <──resume───
- *   stream <── stream->read            ──suspend──>   stream->fill, or later, when it is woken
+ *   stream <── stream->read            ──suspend──>   stream->fill, now or when woken
  *   over   ──> on_completed            ────────────>  files are closed and removed
  *
- * 1. Whoever has the exchange (enum exchange_place) is the only one to touch it, but for what the mutex guards.
- * 2. Its connection is suspended while it is elsewhere than with the library. */
+ * 1. Only the owner of an exchange (enum exchange_place) touches it, except for what the mutex guards.
+ * 2. Its connection is suspended unless the library owns it. */
 #ifndef UNBAKE_HTTP_EXCHANGE_H
 #define UNBAKE_HTTP_EXCHANGE_H
 
@@ -26,27 +27,28 @@
 enum exchange_place {
     EXCHANGE_WITH_LIBRARY,
     EXCHANGE_WITH_POOL,
-    EXCHANGE_WAITING /* a stream that has nothing to say */
+    EXCHANGE_WAITING /* a stream with nothing to send; in listener->waiting */
 };
 
 struct exchange {
-    struct task task; /* of a pool; the first member */
+    struct task task; /* for a pool; the first member: tasks are cast to exchanges */
     struct listener *listener;
     struct MHD_Connection *connection;
     struct guarded *guarded;
     struct request request;
-    struct error target_error;    /* what is wrong with the request target, if status is set */
-    struct response *reply;       /* kept until the library has sent it */
-    bool has_begun, is_beginning; /* a pool has begun with it, and the library asks again */
+    struct error target_error; /* what is wrong with the request target, if status is set */
+    struct response *reply;    /* kept until the library has sent it */
+    bool has_begun;            /* the head was seen */
+    bool is_beginning;         /* a pool works on the head; the library will call again */
     bool has_replied_early;
     char *piece; /* [PIECE_BYTES] of a body that is stored; NULL before its first bytes */
     size_t piece_bytes;
     uint64_t taken, drained; /* bytes of the body */
-    double begun_sec;        /* the request line was there */
+    double begun_sec;        /* when the request line arrived; clock_sec */
     /* Under listener->mutex: */
     enum exchange_place place;
-    bool is_woken;                    /* while it was not waiting */
-    bool reply_pending;               /* a pool's reply, a short one, is on its way */
+    bool is_woken;                    /* a wake-up came while it was not waiting */
+    bool reply_pending;               /* a pool has made a short reply; it is not sent yet */
     struct exchange *next, *previous; /* among the waiting streams */
 };
 
@@ -55,26 +57,32 @@ struct listener {
     struct MHD_Daemon *daemon;
     struct guard *guard;
     struct tls *tls;           /* NULL: plain HTTP */
-    struct acceptor *acceptor; /* has the listening socket */
+    struct acceptor *acceptor; /* owns the listening socket */
     struct connection_counts *connection_counts;
     uint16_t port;
     struct pool *quick, *slow; /* see route.h */
-    pthread_mutex_t mutex;     /* guards what follows; nobody waits for anything else while he has it */
+    pthread_mutex_t mutex;     /* guards what follows; nothing blocks while it is held */
     pthread_cond_t changed;
     bool is_closing;
     struct exchange *waiting;   /* streams, doubly linked */
-    size_t working_count;       /* exchanges with a pool */
-    size_t stream_count;        /* event streams that are open */
-    size_t pending_reply_count; /* exchanges that are owed a reply */
+    size_t working_count;       /* exchanges that a pool owns */
+    size_t stream_count;        /* open event streams */
+    size_t pending_reply_count; /* exchanges with reply_pending */
 };
 
-/* The library's callbacks: a request's line is there; its head, body or end; it is over. */
-void *exchange_on_target(void *listener, const char *target, struct MHD_Connection *connection);
-enum MHD_Result exchange_on_request(void *user, struct MHD_Connection *connection, const char *url, const char *method,
-                                    const char *version, const char *data, size_t *length, void **context);
-void exchange_on_completed(void *user, struct MHD_Connection *connection, void **context,
-                           enum MHD_RequestTerminationCode code);
-/* Wakes all streams that wait; from then on (is_closing) they end. The mutex is held. */
-void exchange_wake_all(struct listener *l);
+/* Suspends the connection and queues the exchange in the pool, which calls run(&x->task). false, and nothing is done, when
+ * the daemon is closing. */
+bool exchange_give(struct exchange *x, struct pool *pool, void (*run)(struct task *task));
+/* Resumes the connection: from here on only the library may touch x. The mutex is held. */
+void exchange_give_back(struct exchange *x);
+/* The pool that works on the request's route. */
+struct pool *exchange_pool(const struct exchange *x);
+
+/* What a pool runs: the head's part of the handler, a piece of the body, the end of the body. */
+void exchange_begin_task(struct task *task);
+void exchange_piece_task(struct task *task);
+void exchange_finish_task(struct task *task);
+/* Frees the exchange, its reply and its files. A resumable upload keeps what has arrived. */
+void exchange_end_task(struct task *task);
 
 #endif

@@ -12,8 +12,9 @@
 #include "common/clock.h"
 #include "common/log.h"
 #include "common/mem.h"
-#include "server/http/exchange.h"
+#include "server/http/callbacks.h"
 #include "server/http/hub.h"
+#include "server/http/reply.h"
 #include "server/net/acceptor.h"
 #include "server/net/address.h"
 #include "server/net/connection_counts.h"
@@ -110,12 +111,12 @@ static enum status start_library(struct listener *l, const struct listener_confi
     struct MHD_OptionItem plain[] = {{MHD_OPTION_END, 0, NULL}};
     l->daemon = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_NO_LISTEN_SOCKET | MHD_ALLOW_SUSPEND_RESUME |
                                      MHD_USE_ITC | MHD_USE_ERROR_LOG | (l->tls ? (unsigned)MHD_USE_TLS : 0),
-                                 0, NULL, NULL, exchange_on_request, l, MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
+                                 0, NULL, NULL, callbacks_on_request, l, MHD_OPTION_EXTERNAL_LOGGER, log_library, NULL,
                                  MHD_OPTION_THREAD_POOL_SIZE, (unsigned)LIBRARY_THREADS, MHD_OPTION_CONNECTION_LIMIT,
                                  LIBRARY_LIMIT_FACTOR * config->connection_max, MHD_OPTION_CONNECTION_TIMEOUT,
                                  (unsigned)config->limits.idle_sec, MHD_OPTION_CONNECTION_MEMORY_LIMIT, POOL_BYTES,
-                                 MHD_OPTION_URI_LOG_CALLBACK, exchange_on_target, l, MHD_OPTION_NOTIFY_COMPLETED,
-                                 exchange_on_completed, l, MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
+                                 MHD_OPTION_URI_LOG_CALLBACK, callbacks_on_target, l, MHD_OPTION_NOTIFY_COMPLETED,
+                                 callbacks_on_completed, l, MHD_OPTION_NOTIFY_CONNECTION, on_connection, l,
                                  MHD_OPTION_ARRAY, l->tls ? tls : plain, MHD_OPTION_END);
     return l->daemon ? STATUS_OK : error_set_errno(err, errno, "libmicrohttpd does not start");
 }
@@ -173,7 +174,7 @@ static void wait_for_none(struct listener *l, const size_t *count) {
 static void settle(struct listener *l) {
     pthread_mutex_lock(&l->mutex);
     l->is_closing = true;
-    exchange_wake_all(l);
+    reply_end_streams(l);
     wait_for_none(l, &l->stream_count);
     while (l->working_count > 0)
         pthread_cond_wait(&l->changed, &l->mutex);
