@@ -4,9 +4,9 @@
 #include "common/protocol.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
-#include "server/http/hub.h"
 #include "server/http/limits.h"
 #include "server/http/problem.h"
+#include "server/http/subscriber.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
 
@@ -53,7 +53,7 @@ static struct response *stream_reply(struct api *api, const struct request *r, c
     response_field(reply, "Cache-Control", "no-store");
     response_field(reply, "X-Accel-Buffering", "no"); /* nginx: pass it on at once */
     if (!r->is_head)
-        reply->stream = hub_subscribe(api, &r->caller, what);
+        reply->stream = subscriber_new(api, &r->caller, what);
     else
         cJSON_Delete(what->snapshot);
     return reply;

@@ -45,12 +45,14 @@ struct response *jobs_add(struct api *api, struct request *r);
 struct response *jobs_get(struct api *api, struct request *r);
 struct response *jobs_patch(struct api *api, struct request *r);
 struct response *jobs_delete(struct api *api, struct request *r);
-struct response *jobs_cancel(struct api *api, struct request *r);
-struct response *jobs_pause(struct api *api, struct request *r);
-struct response *jobs_redeliver(struct api *api, struct request *r);
-struct response *jobs_resume(struct api *api, struct request *r);
-struct response *jobs_retry(struct api *api, struct request *r);
-struct response *jobs_extend(struct api *api, struct request *r);
+
+/* job_action.c */
+struct response *job_action_cancel(struct api *api, struct request *r);
+struct response *job_action_pause(struct api *api, struct request *r);
+struct response *job_action_redeliver(struct api *api, struct request *r);
+struct response *job_action_resume(struct api *api, struct request *r);
+struct response *job_action_retry(struct api *api, struct request *r);
+struct response *job_action_extend(struct api *api, struct request *r);
 
 /* outputs.c */
 struct response *outputs_list(struct api *api, struct request *r);

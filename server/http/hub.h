@@ -1,12 +1,10 @@
-/* hub.h -- what happens, as it happens: the events of a job or of all jobs, as Server-Sent Events
- * or JSON lines, and the replies that wait for something to happen.
+/* hub.h -- the open event streams: wakes those that a change in the store concerns.
  *
- * 1. The database is the queue: a stream holds the id it has sent up to and one batch of text, so
- *    a slow reader costs neither memory nor anybody else's time, and what it lags behind it
- *    reads from the database (where an overtaken progress event is no longer). Where what it has
- *    not read is gone altogether it gets a `resync`.
- * 2. hub_changed only marks and wakes; the text is made by the stream's fill, on a thread that may wait.
- * 3. Lock order: hub, then listener, then libmicrohttpd. The store is never called with any. */
+ * 1. The database is the queue. hub_changed only marks a stream and wakes it; the stream's fill, on a thread that may
+ *    block, reads the events (subscriber.h).
+ * 2. Lock order: hub, then listener, then libmicrohttpd. No store call is made while any of them is held.
+ *
+ * Thread-safe. */
 #ifndef UNBAKE_HTTP_HUB_H
 #define UNBAKE_HTTP_HUB_H
 
@@ -14,10 +12,25 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "common/buf.h"
 #include "server/http/message.h"
+#include "server/store/store.h"
 
-struct api;
-struct hub; /* the open streams; opaque; thread-safe */
+struct hub;
+
+/* One open stream. After hub_join the hub's mutex guards the second part. */
+struct hub_member {
+    struct stream *stream;
+    int64_t job_id; /* 0: events of all jobs */
+    int64_t user_id;
+    double end_sec; /* when its wait ends, as clock_sec; 0: never */
+
+    struct hub_member *next, *previous;
+    bool is_dirty;   /* the database may have new events for it */
+    bool is_due;     /* a keep-alive is due, or its wait has ended */
+    bool is_suspect; /* its token may have been revoked */
+    double sent_sec; /* when it last sent something, as clock_sec */
+};
 
 struct hub *hub_new(double keepalive_sec);
 void hub_free(struct hub *hub); /* all streams must be closed */
@@ -29,17 +42,29 @@ void hub_recheck(struct hub *hub);
 size_t hub_count(struct hub *hub);
 size_t hub_count_of(struct hub *hub, int64_t user_id); /* the streams of one user */
 
-struct subscription {
-    int64_t job_id; /* 0: all that the caller may read */
-    int64_t after;  /* the newest event that the client has */
-    bool is_ahead;  /* it has seen later ones, which this database does not know: it was put back */
+/* m->stream->wake must be set. */
+void hub_join(struct hub *hub, struct hub_member *m);
+void hub_leave(struct hub *hub, struct hub_member *m);
+void hub_mark_dirty(struct hub *hub, struct hub_member *m);
+void hub_sent(struct hub *hub, struct hub_member *m); /* sets sent_sec */
+/* Return a mark and clear it. A member that was due counts as one that has sent something. */
+bool hub_take_dirty(struct hub *hub, struct hub_member *m);
+bool hub_take_due(struct hub *hub, struct hub_member *m);
+bool hub_take_suspect(struct hub *hub, struct hub_member *m);
+
+/* One batch of a job's events as text. The latest is shared: most streams of a job ask for the same one. */
+struct hub_batch {
+    int64_t job_id; /* 0: no batch */
+    int64_t after;  /* its events are newer than this one */
     bool is_ndjson;
-    bool is_past;     /* ends with what is stored by now */
-    double wait_sec;  /* above 0: ends with the first events, or when so much time has passed */
-    int64_t revision; /* not 0: no events, but the job itself, once its revision is another one or,
-                          * for -1, once it has ended; or when wait_sec have passed */
-    cJSON *snapshot;  /* data of a first `state` event; taken; NULL: none */
 };
-struct stream *hub_subscribe(struct api *api, const struct caller *caller, const struct subscription *what);
+/* Grows with every change of the store. */
+uint64_t hub_version(struct hub *hub);
+/* Appends the shared batch to text if it is this one, nothing has changed since, and `who` may read the job. */
+bool hub_find_batch(struct hub *hub, const struct hub_batch *batch, const struct caller *who, struct event_page *page,
+                    struct buf *text);
+/* Shares a batch; version: before its events were read. */
+void hub_share_batch(struct hub *hub, const struct hub_batch *batch, uint64_t version, const struct event_page *page,
+                     const struct buf *text);
 
 #endif

@@ -1,9 +1,7 @@
-/* jobs.c -- /v1/jobs: submit, look, change, act. */
+/* jobs.c -- /v1/jobs: list, submit, show, change, delete. */
 #include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "common/mem.h"
 #include "common/settings.h"
@@ -12,35 +10,13 @@
 #include "server/data/trash.h"
 #include "server/http/auth.h"
 #include "server/http/handlers.h"
+#include "server/http/job_reply.h"
 #include "server/http/job_request.h"
 #include "server/http/problem.h"
 #include "server/http/retention.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
-
-/* The reply that shows a job as it is now; takes it. */
-static struct response *show_job(const struct request *r, struct job *job, int status) {
-    char etag[48];
-    snprintf(etag, sizeof etag, "\"rev-%lld\"", (long long)job->revision);
-    struct response *reply;
-    if (status == 200 && r->method == METHOD_GET) {
-        reply = view_tagged(r, view_job(job, &r->caller), etag);
-    } else {
-        reply = response_json(status, view_job(job, &r->caller));
-        response_field(reply, "ETag", "%s", etag);
-    }
-    job_release(job);
-    return reply;
-}
-
-static struct response *show(struct api *api, const struct request *r, int64_t id, int status) {
-    struct job job;
-    struct error err;
-    if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    return show_job(r, &job, status);
-}
 
 struct response *jobs_get(struct api *api, struct request *r) {
     struct response *refusal = NULL;
@@ -49,7 +25,7 @@ struct response *jobs_get(struct api *api, struct request *r) {
         return refusal;
     struct response *reply = target_query(&r->target, "wait") ? events_wait(api, r, &job) : NULL;
     if (!reply)
-        return show_job(r, &job, 200);
+        return job_reply(r, &job, 200);
     job_release(&job);
     return reply;
 }
@@ -158,7 +134,7 @@ static struct response *add_job(struct api *api, const struct request *r, const 
         return problem_from(r, &err);
     if (!replayed)
         scheduler_wake(api->scheduler);
-    struct response *reply = show(api, r, id, replayed ? 200 : 201);
+    struct response *reply = job_reply_of(api, r, id, replayed ? 200 : 201);
     response_field(reply, "Location", "/v1/jobs/%lld", (long long)id);
     if (replayed)
         response_field(reply, "Idempotency-Replayed", "true");
@@ -258,7 +234,7 @@ struct response *jobs_patch(struct api *api, struct request *r) {
         else if (status != STATUS_OK)
             reply = problem_from(r, &err);
         else
-            reply = show(api, r, id, 200);
+            reply = job_reply_of(api, r, id, 200);
     }
     scheduler_wake(api->scheduler);
     cJSON_Delete(params);
@@ -298,190 +274,4 @@ struct response *jobs_delete(struct api *api, struct request *r) {
         mem_free(path);
     }
     return status == STATUS_OK ? response_new(204) : problem_from(r, &err);
-}
-
-static struct response *act(struct api *api, const struct request *r,
-                            enum status (*action)(struct api *api, int64_t id, struct error *err)) {
-    struct response *refusal = NULL;
-    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
-    if (refusal)
-        return refusal;
-    struct error err;
-    if (action(api, id, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    scheduler_wake(api->scheduler);
-    return show(api, r, id, 202);
-}
-
-static enum status do_cancel(struct api *api, int64_t id, struct error *err) {
-    return store_job_cancel(api->store, id, err);
-}
-
-static enum status do_pause(struct api *api, int64_t id, struct error *err) {
-    return store_job_pause(api->store, id, err);
-}
-
-static struct count_limits limits_of(const struct api *api) {
-    return (struct count_limits){api->config.queue_limit, api->config.user_queue_limit};
-}
-
-static enum status do_resume(struct api *api, int64_t id, struct error *err) {
-    struct count_limits limits = limits_of(api);
-    return store_job_resume(api->store, id, &limits, err);
-}
-
-static enum status do_redeliver(struct api *api, int64_t id, struct error *err) {
-    return store_webhook_again(api->store, id, err);
-}
-
-struct response *jobs_redeliver(struct api *api, struct request *r) {
-    return act(api, r, do_redeliver);
-}
-
-struct response *jobs_cancel(struct api *api, struct request *r) {
-    return act(api, r, do_cancel);
-}
-
-struct response *jobs_pause(struct api *api, struct request *r) {
-    return act(api, r, do_pause);
-}
-
-struct response *jobs_resume(struct api *api, struct request *r) {
-    return act(api, r, do_resume);
-}
-
-struct response *jobs_retry(struct api *api, struct request *r) {
-    struct response *refusal = NULL;
-    const char *from = target_query(&r->target, "from");
-    bool keeps_checkpoint;
-    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
-    if (!refusal && from && !job_stage_parse(from, &keeps_checkpoint))
-        refusal =
-            problem_full(r, 400, "from must name a stage", "load, prepare, fuse, solve, refine, report, export", NULL);
-    if (refusal)
-        return refusal;
-    struct error err;
-    struct count_limits limits = limits_of(api);
-    if (store_job_retry(api->store, id, api->config.max_attempts, from, &limits, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    scheduler_wake(api->scheduler);
-    return show(api, r, id, 202);
-}
-
-/* --- extending --------------------------------------------------------------------------- */
-
-/* What the database has as the job's settings: as they were given, and with all that they leave out. *given is
- * the caller's. */
-static enum status read_settings(const struct job *job, cJSON **given, struct settings *full, struct error *err) {
-    enum status status = json_parse(job->settings, strlen(job->settings), "the text of its settings", given, err);
-    if (status == STATUS_OK)
-        status = settings_apply(full, *given, NULL, err);
-    if (status == STATUS_OK)
-        return status;
-    error_prefix(err, "job %lld", (long long)job->id);
-    return err->status = STATUS_CORRUPT; /* they were checked when the job was made */
-}
-
-/* What may be put off of the job's limits, by its name in a request: iterations, where it has that limit; else the
- * observations at each part of the texture, where it has an end by them, and the time, where that is limited. The name of
- * the setting; NULL: not that. */
-static const char *limit_setting(const struct settings *full, const char *name) {
-    const char *looks = settings_is(full, "method", "solve") ? "refine_looks" : "listing1_looks";
-    bool by_iterations = settings_number(full, "iterations") > 0.0;
-    if (strcmp(name, "iterations") == 0)
-        return by_iterations ? "iterations" : NULL;
-    if (strcmp(name, "looks") == 0)
-        return !by_iterations && settings_number(full, looks) > 0.0 ? looks : NULL;
-    if (strcmp(name, "time_limit_sec") == 0)
-        return !by_iterations && settings_number(full, name) > 0.0 ? "time_limit_sec" : NULL;
-    return NULL;
-}
-
-/* Puts off the limit that the body names, in the settings as they were given; problems go to params. All of a time is
- * used: the job may have ended before the old one. */
-static void put_off(cJSON *settings, struct settings *full, const cJSON *body, cJSON *params) {
-    static const char *const names[] = {"iterations", "time_limit_sec", "looks"};
-    const char *limit = limit_setting(full, body->string), *right = NULL;
-    double more = cJSON_IsNumber(body) ? body->valuedouble : -1.0;
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        right = !right && limit_setting(full, names[i]) ? names[i] : right;
-    if (!limit) {
-        problem_param(params, body->string, NULL, "is not what limits this job: %s is", right);
-        return;
-    }
-    double sum = settings_number(full, limit) + more;
-    if (!(more > 0.0) || sum <= settings_number(full, limit)) { /* one that counts, too */
-        problem_param(params, body->string, NULL, "must be a number above 0");
-        return;
-    }
-    if (strcmp(limit, "time_limit_sec") != 0 && more != floor(more)) {
-        problem_param(params, body->string, NULL, "must be a whole number");
-        return;
-    }
-    cJSON_DeleteItemFromObjectCaseSensitive(settings, limit);
-    json_add_number(settings, limit, sum);
-    if (strcmp(limit, "time_limit_sec") == 0) {
-        cJSON_DeleteItemFromObjectCaseSensitive(settings, "refine_looks");
-        if (settings_is(full, "method", "solve"))
-            json_add_number(settings, "refine_looks", 0);
-    }
-    settings_apply(full, settings, params, NULL);
-}
-
-/* The job's settings with its limit put off by what the body says; NULL, and *refusal, where that makes no sense. The
- * caller's (mem_free). */
-static char *longer_settings(const struct request *r, const struct job *job, struct response **refusal) {
-    struct error err;
-    cJSON *body = NULL, *settings = NULL, *params = cJSON_CreateArray();
-    struct settings full;
-    char *text = NULL;
-    settings_init(&full);
-    if (json_parse(buf_text(&r->body), r->body.length, "the request body", &body, &err) != STATUS_OK) {
-        *refusal = problem(r, 400, "%s", err.message);
-    } else if (!cJSON_IsObject(body) || cJSON_GetArraySize(body) != 1) {
-        *refusal =
-            problem(r, 400, "the request body is not {\"looks\": N}, {\"iterations\": N} or {\"time_limit_sec\": SEC}");
-    } else if (read_settings(job, &settings, &full, &err) != STATUS_OK) {
-        *refusal = problem_from(r, &err);
-    } else {
-        put_off(settings, &full, body->child, params);
-        if (cJSON_GetArraySize(params) > 0) {
-            *refusal = problem_invalid(r, "the extension is invalid", params);
-            params = NULL;
-        } else {
-            text = json_text(settings);
-        }
-    }
-    settings_release(&full);
-    cJSON_Delete(params);
-    cJSON_Delete(settings);
-    cJSON_Delete(body);
-    return text;
-}
-
-struct response *jobs_extend(struct api *api, struct request *r) {
-    struct response *refusal = NULL;
-    struct job job;
-    struct error err;
-    struct count_limits limits = limits_of(api);
-    int64_t id = auth_job_id(api, r, ACCESS_CHANGE, &refusal);
-    if (refusal)
-        return refusal;
-    if (store_job_get(api->store, id, &job, &err) != STATUS_OK)
-        return problem_from(r, &err);
-    char *settings = longer_settings(r, &job, &refusal);
-    char *folder = layout_job(api->config.data_dir, id), *checkpoint = layout_checkpoint(folder);
-    if (!refusal && job_is_terminal(job.state) && access(checkpoint, F_OK) != 0)
-        refusal = problem_full(r, 409, "the job's checkpoint is no longer there: there is nothing to go on from",
-                               "submit the room again, with more iterations or time", NULL);
-    if (!refusal && store_job_extend(api->store, id, api->config.max_attempts, settings, &limits, &err) != STATUS_OK)
-        refusal = problem_from(r, &err);
-    mem_free(checkpoint);
-    mem_free(folder);
-    mem_free(settings);
-    job_release(&job);
-    if (refusal)
-        return refusal;
-    scheduler_wake(api->scheduler);
-    return show(api, r, id, 202);
 }
