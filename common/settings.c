@@ -26,6 +26,8 @@ static const struct setting table[] = {
      "what an optimiser step looks at: texels evenly over the surface, or pixels evenly over the photographs"},
     {"coarse_levels", SETTING_INT, "", 0, 8, NULL, "5", "listing1",
      "listing1: base colour moves in blocks of 2^n texels a side at first, then smaller ones, at last single texels"},
+    {"crop", SETTING_BOX, "m", 0, 0, NULL, "", NULL,
+     "the part of the mesh to keep, as \"x0 y0 z0 x1 y1 z1\" in its coordinates; triangles whose centre lies outside are left out"},
     {"denoise", SETTING_BOOL, "", 0, 0, NULL, "true", "solve", "solve: take the photographs' noise out of base colour"},
     {"denoise_mesh", SETTING_BOOL, "", 0, 0, NULL, "true", NULL,
      "put the vertices of a rough mesh back to where its surfaces are; one that has normals stays as it is"},
@@ -34,9 +36,12 @@ static const struct setting table[] = {
     {"emission_rate", SETTING_REAL, "", 1e-5, 10, NULL, "0.002", NULL,
      "first step size of emission, in logarithms of radiance"},
     {"emitters", SETTING_CHOICE, "", 0, 0, "decide|any", "decide", "listing1",
-     "which segments emit: decided from the evidence; or, of listing1, any may to the end"},
+     "which segments emit: decided from the evidence; or, of listing1, any may to the end; emitters.27=on or off says so of "
+     "segment 27 of an earlier report"},
     {"estimates", SETTING_CHOICE, "", 0, 0, "two|one", "two", NULL,
      "of a look's radiance in the loss: two independent ones, or one, whose squared error is biased"},
+    {"exclude", SETTING_TEXT, "", 0, 0, NULL, "", NULL,
+     "photographs to leave out: names or patterns with * and ?, separated by commas"},
     {"gather_samples", SETTING_INT, "rays", 16, 1048576, NULL, "512", "solve",
      "solve: directions from which light is gathered at each point where it is"},
     {"gloss_passes", SETTING_INT, "", 1, 2, NULL, "2", "solve",
@@ -146,6 +151,9 @@ static int choice_index(const char *choices, const char *word) {
     return -1;
 }
 
+/* Settings that are stored in `text`. */
+static bool is_text(const struct setting *t) { return t->type == SETTING_TEXT || t->type == SETTING_BOX; }
+
 /* Default of a setting that is stored in `number`. */
 static double default_number(const struct setting *t) {
     switch (t->type) {
@@ -153,7 +161,8 @@ static double default_number(const struct setting *t) {
     case SETTING_CHOICE: return choice_index(t->choices, t->default_text);
     case SETTING_INT:
     case SETTING_REAL:
-    case SETTING_TEXT: break;
+    case SETTING_TEXT:
+    case SETTING_BOX: break;
     }
     return strtod(t->default_text, NULL);
 }
@@ -182,7 +191,7 @@ double settings_of_quality(const struct settings *s, const char *name) {
 /* Sets values that were not given from the quality. */
 static void follow_quality(struct settings *s) {
     for (size_t i = 0; i < TABLE_COUNT; i++) {
-        if (table[i].type != SETTING_TEXT && !s->is_given[i])
+        if (!is_text(&table[i]) && !s->is_given[i])
             s->number[i] = usual_number(s, i);
     }
 }
@@ -191,8 +200,10 @@ void settings_init(struct settings *s) {
     s->is_given = mem_calloc(TABLE_COUNT, sizeof *s->is_given);
     s->number = mem_calloc(TABLE_COUNT, sizeof *s->number);
     s->text = mem_calloc(TABLE_COUNT, sizeof *s->text);
+    s->segment = NULL;
+    s->segment_count = 0;
     for (size_t i = 0; i < TABLE_COUNT; i++) {
-        if (table[i].type == SETTING_TEXT)
+        if (is_text(&table[i]))
             s->text[i] = mem_strdup(table[i].default_text);
         else
             s->number[i] = default_number(&table[i]);
@@ -203,6 +214,7 @@ void settings_release(struct settings *s) {
     for (size_t i = 0; s->text && i < TABLE_COUNT; i++)
         mem_free(s->text[i]);
     mem_free(s->text);
+    mem_free(s->segment);
     mem_free(s->number);
     mem_free(s->is_given);
     *s = (struct settings){0};
@@ -235,10 +247,42 @@ const char *settings_text(const struct settings *s, const char *name) {
     return s->text[i];
 }
 
+/* Six numbers with spaces or commas between them. */
+static bool parse_box(const char *text, double lower[3], double upper[3]) {
+    for (int i = 0; i < 6; i++) {
+        char *end;
+        text += strspn(text, " ,");
+        double value = strtod(text, &end);
+        if (end == text || !isfinite(value))
+            return false;
+        *(i < 3 ? &lower[i] : &upper[i - 3]) = value;
+        text = end;
+    }
+    return text[strspn(text, " ")] == '\0' && lower[0] < upper[0] && lower[1] < upper[1] && lower[2] < upper[2];
+}
+
+bool settings_box(const struct settings *s, const char *name, double lower[3], double upper[3]) {
+    int i = index_of(name);
+    assert(i >= 0 && table[i].type == SETTING_BOX);
+    return *s->text[i] && parse_box(s->text[i], lower, upper);
+}
+
+bool settings_emitter(const struct settings *s, uint32_t segment, bool decided) {
+    for (size_t i = 0; i < s->segment_count; i++)
+        if (s->segment[i].segment == segment)
+            return s->segment[i].is_emitter;
+    return decided;
+}
+
+static void set_text(struct settings *s, size_t i, const char *text) {
+    mem_free(s->text[i]);
+    s->text[i] = mem_strdup(text);
+}
+
 /* Applies one value; on a problem writes the reason and returns false. */
 static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *reason, size_t size) {
     const struct setting *t = &table[i];
-    double number = value->valuedouble;
+    double number = value->valuedouble, lower[3], upper[3];
     int choice;
     switch (t->type) {
     case SETTING_INT:
@@ -275,15 +319,47 @@ static bool apply_one(struct settings *s, size_t i, const cJSON *value, char *re
         s->number[i] = choice;
         return true;
     case SETTING_TEXT:
-        if (!cJSON_IsString(value) || !*value->valuestring || strlen(value->valuestring) > TEXT_MAX_LENGTH) {
-            snprintf(reason, size, "must be a text of 1 to %d bytes", TEXT_MAX_LENGTH);
+        if (!cJSON_IsString(value) || (!*value->valuestring && *t->default_text) ||
+            strlen(value->valuestring) > TEXT_MAX_LENGTH) {
+            snprintf(reason, size, "must be a text of %d to %d bytes", *t->default_text ? 1 : 0, TEXT_MAX_LENGTH);
             return false;
         }
-        mem_free(s->text[i]);
-        s->text[i] = mem_strdup(value->valuestring);
+        set_text(s, i, value->valuestring);
+        return true;
+    case SETTING_BOX:
+        if (!cJSON_IsString(value) || (*value->valuestring && !parse_box(value->valuestring, lower, upper))) {
+            snprintf(reason, size, "must be six numbers, the lower corner and the upper, such as \"-1 -1 0 4 3 2.5\"");
+            return false;
+        }
+        set_text(s, i, value->valuestring);
         return true;
     }
     return false;
+}
+
+#define SEGMENT_PREFIX "emitters."
+#define SEGMENTS_MAX 1000
+
+/* Applies "emitters.27": "on"; false with a reason when it is faulty. */
+static bool apply_segment(struct settings *s, const cJSON *value, char *reason, size_t size) {
+    const char *digits = value->string + strlen(SEGMENT_PREFIX), *word = cJSON_GetStringValue(value);
+    bool is_number = *digits && strspn(digits, "0123456789") == strlen(digits) && strlen(digits) <= 9;
+    if (!is_number || !word || (strcmp(word, "on") != 0 && strcmp(word, "off") != 0)) {
+        snprintf(reason, size, is_number ? "must be on or off" : "must end in the number of a segment, as emitters.27");
+        return false;
+    }
+    uint32_t segment = (uint32_t)strtoul(digits, NULL, 10);
+    size_t at = 0;
+    while (at < s->segment_count && s->segment[at].segment != segment)
+        at++;
+    if (at == SEGMENTS_MAX) {
+        snprintf(reason, size, "is one of more than %d segments", SEGMENTS_MAX);
+        return false;
+    }
+    if (at == s->segment_count)
+        s->segment = mem_realloc_array(s->segment, ++s->segment_count, sizeof *s->segment);
+    s->segment[at] = (struct segment_setting){segment, strcmp(word, "on") == 0};
+    return true;
 }
 
 /* Problems of an object of settings. */
@@ -346,7 +422,10 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
     for (const cJSON *value = object->child; value; value = value->next) {
         char reason[256] = "";
         int i = index_of(value->string);
-        if (i < 0) {
+        if (strncmp(value->string, SEGMENT_PREFIX, strlen(SEGMENT_PREFIX)) == 0) {
+            if (!apply_segment(s, value, reason, sizeof reason))
+                add_fault(&faults, value->string, reason, "");
+        } else if (i < 0) {
             add_unknown(&faults, value->string);
         } else if (!apply_one(s, (size_t)i, value, reason, sizeof reason)) {
             add_fault(&faults, value->string, reason, table[i].help);
@@ -356,6 +435,8 @@ enum status settings_apply(struct settings *s, const cJSON *object, cJSON *probl
         }
     }
     follow_quality(s);
+    if (s->segment_count > 0 && settings_is(s, "emitters", "any"))
+        add_fault(&faults, "emitters", "with emitters=any nothing is decided of single segments", "leave one out");
     check_method(s, object, method_is_good ? &faults : NULL);
     if (faults.count == 0)
         return STATUS_OK;
@@ -393,7 +474,7 @@ static void add_value(cJSON *object, const char *key, size_t i, const struct set
         json_add_bool(object, key, s->number[i] != 0.0);
     else if (t->type == SETTING_CHOICE)
         json_add_string(object, key, choice_at(t->choices, (int)s->number[i], word, sizeof word));
-    else if (t->type == SETTING_TEXT)
+    else if (is_text(t))
         json_add_string(object, key, s->text[i]);
     else
         json_add_number(object, key, s->number[i]);
@@ -403,6 +484,11 @@ cJSON *settings_to_json(const struct settings *s) {
     cJSON *object = cJSON_CreateObject();
     for (size_t i = 0; i < TABLE_COUNT; i++)
         add_value(object, table[i].name, i, s);
+    for (size_t i = 0; i < s->segment_count; i++) {
+        char name[NAME_MAX_LENGTH];
+        snprintf(name, sizeof name, SEGMENT_PREFIX "%u", s->segment[i].segment);
+        json_add_string(object, name, s->segment[i].is_emitter ? "on" : "off");
+    }
     return object;
 }
 
@@ -423,7 +509,7 @@ static void add_help(cJSON *entry, const struct setting *t) {
 }
 
 cJSON *settings_describe(void) {
-    static const char *const type_names[] = {"int", "real", "bool", "choice", "text"};
+    static const char *const type_names[] = {"int", "real", "bool", "choice", "text", "box"};
     struct settings defaults;
     settings_init(&defaults);
     cJSON *list = cJSON_CreateArray();

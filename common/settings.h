@@ -12,7 +12,7 @@
 #include "common/error.h"
 #include "common/json.h"
 
-enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT };
+enum setting_type { SETTING_INT, SETTING_REAL, SETTING_BOOL, SETTING_CHOICE, SETTING_TEXT, SETTING_BOX };
 
 struct setting {
     const char *name;
@@ -20,6 +20,7 @@ struct setting {
     const char *unit;        /* "texels", "s", ...; "" where there is none */
     double minimum, maximum; /* inclusive, for numbers */
     const char *choices;     /* "a|b|c" for SETTING_CHOICE */
+    /* of a SETTING_BOX: text of six numbers, the lower corner and the upper; "": none */
     const char *default_text;
     const char *method; /* the only one that uses it; NULL: every method does */
     const char *help;   /* one sentence */
@@ -32,12 +33,20 @@ const struct setting *settings_find(const char *name);
 /* The valid name nearest to `name` by edit distance, or NULL when none is near. */
 const char *settings_nearest(const char *name);
 
+/* What the user says of one segment: "emitters.27": "on". */
+struct segment_setting {
+    uint32_t segment;
+    bool is_emitter;
+};
+
 /* A job's settings: one value per table entry. Values that are not given come from the setting `quality` where it
  * sets an amount of work, else from the default. */
 struct settings {
-    bool *is_given; /* [table count] settings_apply was given a value; owned */
-    double *number; /* [table count] numbers and booleans (0 or 1); choices by index; owned */
-    char **text;    /* [table count] SETTING_TEXT values, NULL for the others; owned */
+    bool *is_given;                  /* [table count] settings_apply was given a value; owned */
+    double *number;                  /* [table count] numbers and booleans (0 or 1); choices by index; owned */
+    char **text;                     /* [table count] SETTING_TEXT and SETTING_BOX values, NULL for the others; owned */
+    struct segment_setting *segment; /* [segment_count] one of each segment at most; owned */
+    size_t segment_count;
 };
 
 void settings_init(struct settings *s); /* all defaults */
@@ -49,6 +58,12 @@ bool settings_bool(const struct settings *s, const char *name);
 /* Whether a SETTING_CHOICE has the value `word`. */
 bool settings_is(const struct settings *s, const char *name, const char *word);
 const char *settings_text(const struct settings *s, const char *name); /* borrowed */
+
+/* The value of a SETTING_BOX; false where it is "". */
+bool settings_box(const struct settings *s, const char *name, double lower[3], double upper[3]);
+
+/* Whether a segment emits: what the user says of it, else `decided`. */
+bool settings_emitter(const struct settings *s, uint32_t segment, bool decided);
 
 /* Checks a JSON object and applies it over *s. Collects all problems: each appends an object {"name", "reason",
  * "hint"?} to the array `problems` (may be NULL); STATUS_INPUT if any. A setting that the method does not use is a

@@ -236,6 +236,17 @@ static void prepare_advance(struct stage_run *run, double share) {
     pace_advance(run->r, run->hooks, "prepare", PLAN_PREPARE, share);
 }
 
+/* The segments that settings name must be there. */
+static enum status check_segment_settings(const struct reconstruction *r, struct error *err) {
+    for (size_t i = 0; i < r->settings->segment_count; i++) {
+        uint32_t segment = r->settings->segment[i].segment;
+        if (segment >= r->segments.count)
+            return error_set(err, STATUS_INPUT, "emitters.%u: there are %zu segments, from 0", segment,
+                             r->segments.count);
+    }
+    return STATUS_OK;
+}
+
 static enum status prepare(struct stage_run *run, struct error *err) {
     struct reconstruction *r = run->r;
     const struct mesh *mesh = &r->scene->mesh;
@@ -269,7 +280,7 @@ static enum status prepare(struct stage_run *run, struct error *err) {
     add_prepare_figures(run);
     pace_measure_room(r);
     prepare_advance(run, 1.0 - MAP_SHARE - VIEWS_SHARE - CALIBRATE_SHARE);
-    return status;
+    return status == STATUS_OK ? check_segment_settings(r, err) : status;
 }
 
 /* Logs the hidden lamps and the sun. */

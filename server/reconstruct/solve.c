@@ -250,8 +250,9 @@ static void decide(void *user, size_t segment, int thread) {
     bool doubts_sky = e->emitted_share > needed && !r->sky_is_fitted;
     e->sky_lambert = doubts_sky ? sky_doubt(r, d->texels.texel + first, count) : 0.0f;
     e->changing_share = changing_light(&d->solve->divide, d->texels.texel + first, count, thread);
-    r->is_emitter[segment] = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
-                             radiance - lambert - SKY_DOUBT * e->sky_lambert > needed * radiance;
+    bool emits = e->is_hidden || e->changing_share > EMITTER_CHANGES ||
+                 radiance - lambert - SKY_DOUBT * e->sky_lambert > needed * radiance;
+    r->is_emitter[segment] = settings_emitter(r->settings, (uint32_t)segment, emits);
 }
 
 static void decide_emitters(struct solve *s) {

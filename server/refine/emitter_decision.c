@@ -63,7 +63,8 @@ void emitter_decision_make(struct reconstruction *r, struct observation_batch *b
     by_segment_release(&job.texels);
     for (size_t s = 0; s < r->segments.count; s++) {
         struct emitter_evidence *e = &evidence[s];
-        r->is_emitter[s] = e->is_hidden || e->emitted_share >= EMITTER_SHARE;
+        r->is_emitter[s] =
+            settings_emitter(r->settings, (uint32_t)s, e->is_hidden || e->emitted_share >= EMITTER_SHARE);
         rgb own = rgb_sub(e->radiance, rgb_scale(e->lambert, NEUTRAL_BASE_COLOR));
         r->materials.emission[s] =
             r->is_emitter[s] ? rgb_make(fmaxf(own.r, 0.0f), fmaxf(own.g, 0.0f), fmaxf(own.b, 0.0f)) : rgb_gray(0.0f);

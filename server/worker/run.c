@@ -28,7 +28,9 @@
 #include "server/export/outputs.h"
 #include "server/ingest/bundle.h"
 #include "server/ingest/photo_color.h"
+#include "server/ingest/photos.h"
 #include "server/reconstruct/reconstruct.h"
+#include "server/scene/select.h"
 #include "server/worker/checkpoint.h"
 #include "server/worker/read_back.h"
 #include "server/worker/results.h"
@@ -219,6 +221,12 @@ static char *fingerprint_of(const struct order *order) {
     cJSON_Delete(kept);
     sha256_of(settings, strlen(settings), hex);
     mem_free(settings);
+    if (order->reading && order->reading->child) { /* another reading is another scene */
+        char *reading = json_text(order->reading), *text;
+        text = mem_printf("scene %s settings %s reading %s", order->scene_id, hex, reading);
+        mem_free(reading);
+        return text;
+    }
     return mem_printf("scene %s settings %s", order->scene_id, hex);
 }
 
@@ -270,6 +278,25 @@ static enum status write_outputs(struct worker_run *run, const struct reconstruc
 
 /* --- the whole ---------------------------------------------------------------------------------- */
 
+/* Leaves out what the settings exclude and crop. */
+static enum status select_parts(struct worker_run *run, const struct settings *settings, struct scene *scene,
+                                struct error *err) {
+    double lower[3], upper[3];
+    size_t frames = 0, triangles = 0;
+    enum status status = scene_exclude(scene, settings_text(settings, "exclude"), &frames, err);
+    if (status == STATUS_OK && settings_box(settings, "crop", lower, upper))
+        status = scene_crop(scene, lower, upper, &triangles, err);
+    if (status != STATUS_OK || frames + triangles == 0)
+        return status;
+    char *text = mem_printf("left out as the settings say: %zu photographs, %zu triangles", frames, triangles);
+    progress_log(run->progress, "info", text);
+    mem_free(text);
+    if (scene->photograph_count < PHOTOS_MIN_COUNT)
+        return error_set(err, STATUS_INPUT, "exclude leaves %zu photographs; %d are needed", scene->photograph_count,
+                         PHOTOS_MIN_COUNT);
+    return STATUS_OK;
+}
+
 static enum status load_scene(struct worker_run *run, const struct settings *settings, struct parallel *pool,
                               struct scene *scene, struct error *err) {
     struct bundle_limits limits = bundle_default_limits();
@@ -294,6 +321,11 @@ static enum status load_scene(struct worker_run *run, const struct settings *set
         mem_free(text);
     }
     cJSON_Delete(problems);
+    if (status == STATUS_OK) {
+        status = select_parts(run, settings, scene, err);
+        if (status != STATUS_OK)
+            scene_release(scene);
+    }
     for (size_t i = 0; status == STATUS_OK && i < scene->warning_count; i++)
         progress_log(run->progress, "warning", scene->warning[i]);
     char *color = status == STATUS_OK ? photo_color_fact(scene) : NULL;

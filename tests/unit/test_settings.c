@@ -150,7 +150,45 @@ static void test_assignments(void) {
     cJSON_Delete(object);
 }
 
+/* What a user says of single segments, and of a box. */
+static void test_corrections(void) {
+    static const char *const faults[] = {"{\"emitters.x\":\"on\"}",
+                                         "{\"emitters.\":\"on\"}",
+                                         "{\"emitters.1\":true}",
+                                         "{\"emitters.1\":\"yes\"}",
+                                         "{\"crop\":\"1 2 3 4 5\"}",
+                                         "{\"crop\":\"0 0 0 1 1 1 1\"}",
+                                         "{\"crop\":\"0 0 0 1 0 1\"}",
+                                         "{\"emitters.1\":\"on\",\"emitters\":\"any\","
+                                         "\"method\":\"listing1\"}"};
+    struct error err;
+    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
+        struct settings s;
+        cJSON *json = cJSON_Parse(faults[i]);
+        settings_init(&s);
+        CHECK_THAT(settings_apply(&s, json, NULL, &err) == STATUS_INPUT, "%s", faults[i]);
+        settings_release(&s);
+        cJSON_Delete(json);
+    }
+    cJSON *json = cJSON_Parse("{\"emitters.27\":\"on\",\"emitters.3\":\"off\",\"crop\":\"-1,0 .5 2 3 4\"}");
+    struct settings s, again;
+    settings_init(&s);
+    settings_init(&again);
+    CHECK(settings_apply(&s, json, NULL, &err) == STATUS_OK);
+    cJSON *all = settings_to_json(&s);
+    CHECK_THAT(settings_apply(&again, all, NULL, &err) == STATUS_OK, "%s", err.message);
+    CHECK(settings_emitter(&again, 27, false) && !settings_emitter(&again, 3, true));
+    CHECK(settings_emitter(&again, 4, true) && !settings_emitter(&again, 4, false));
+    double lower[3], upper[3];
+    CHECK(settings_box(&again, "crop", lower, upper) && lower[0] == -1.0 && lower[2] == 0.5 && upper[2] == 4.0);
+    cJSON_Delete(all);
+    cJSON_Delete(json);
+    settings_release(&s);
+    settings_release(&again);
+}
+
 int main(void) {
+    test_corrections();
     test_table();
     test_problems_all_at_once();
     test_method();

@@ -1,0 +1,69 @@
+/* test_corrections.c -- what a user puts right of a job: photographs left out, a part of the mesh kept, a segment that
+ * emits or does not. */
+#include "tests/unit/tiny_scene.h"
+
+#define SETTINGS TINY_SETTINGS ",\"quality\":\"draft\""
+
+static cJSON *report(void) {
+    cJSON *json = NULL;
+    char *path = mem_printf("%s/out/report.json", dir);
+    OK(json_read(path, 1 << 20, &json, &err));
+    mem_free(path);
+    return json;
+}
+
+static double number(const cJSON *json, const char *object, const char *key) {
+    return cJSON_GetNumberValue(cJSON_GetObjectItem(cJSON_GetObjectItem(json, object), key));
+}
+
+/* How many segments emit. */
+static int emitters(const cJSON *json) {
+    int count = 0;
+    const cJSON *segment;
+    cJSON_ArrayForEach(segment, cJSON_GetObjectItem(json, "segments"))
+        count += cJSON_IsTrue(cJSON_GetObjectItem(segment, "emitter"));
+    return count;
+}
+
+static void refused(const char *settings, const char *part) {
+    CHECK_THAT(reconstruct(settings, scene, "") == STATUS_INPUT && strstr(err.message, part), "%s: %s", settings,
+               err.message);
+}
+
+static void check_photographs(void) {
+    refused("{" SETTINGS ",\"exclude\":\"b,x*\"}", "no photograph is named x*");
+    refused("{" SETTINGS ",\"exclude\":\"[ab]\"}", "exclude leaves 1 photographs; 3 are needed");
+    OK(reconstruct("{" SETTINGS ",\"exclude\":\"\"}", scene, ""));
+}
+
+static void check_mesh(void) {
+    OK(reconstruct("{" SETTINGS "}", scene, ""));
+    cJSON *whole = report();
+    OK(reconstruct("{" SETTINGS ",\"crop\":\"0 0 -1, .5 .5 1\"}", scene, ""));
+    cJSON *part = report();
+    CHECK(number(whole, "prepare", "triangles") == 2.0 && number(part, "prepare", "triangles") == 1.0);
+    refused("{" SETTINGS ",\"crop\":\"5 5 5 6 6 6\"}", "no triangle");
+    refused("{" SETTINGS ",\"crop\":\"1 0 0 0 1 1\"}", "six numbers");
+    cJSON_Delete(whole);
+    cJSON_Delete(part);
+}
+
+static void check_emitters(void) {
+    OK(reconstruct("{" SETTINGS ",\"emitters.0\":\"on\"}", scene, ""));
+    cJSON *lit = report();
+    OK(reconstruct("{" SETTINGS ",\"emitters.0\":\"off\"}", scene, ""));
+    cJSON *dark = report();
+    CHECK_THAT(emitters(lit) == 1 && emitters(dark) == 0, "%d, %d", emitters(lit), emitters(dark));
+    cJSON_Delete(lit);
+    cJSON_Delete(dark);
+}
+
+int main(void) {
+    tiny_scene_make("corrections");
+    check_photographs();
+    check_mesh();
+    check_emitters();
+    refused("{" SETTINGS ",\"emitters.7\":\"on\"}", "emitters.7: there are");
+    tiny_scene_remove();
+    return check_result();
+}
