@@ -22,14 +22,14 @@ ALL_LDFLAGS = -pthread $(SANITIZE) $(LDFLAGS)
 EXR_CFLAGS = $(shell pkg-config --cflags OpenEXR)
 EXR_LIBS = -lOpenEXRCore
 COMMON_LIBS = -lcjson -lm
-IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -llcms2 -lz
+IMAGE_LIBS = $(EXR_LIBS) -lpng -ljpeg -ltiff -lheif -lwebpdemux -lwebp -llcms2 -lz
 SERVER_LIBS = -lmicrohttpd -lgnutls -lsqlite3 -larchive -lseccomp $(EMBREE_LIB) $(IMAGE_LIBS) $(COMMON_LIBS)
 CLIENT_LIBS = -lcurl -larchive $(COMMON_LIBS)
 EMBREE_LIB = $(if $(wildcard /usr/include/embree4/rtcore.h /usr/local/include/embree4/rtcore.h),-lembree4,-lembree3)
 
 COMMON_SRC = $(wildcard common/*.c)
 # The engine's libraries stay out of the client: it links only these.
-CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_codec.c common/image_read.c common/exr_%.c common/png_%.c common/jpeg.c common/hdr.c common/exif.c common/color.c common/color_icc.c,$(COMMON_SRC))
+CLIENT_COMMON_SRC = $(filter-out common/image.c common/image_%.c common/exr_%.c common/png_%.c common/tiff%.c common/jpeg.c common/heif.c common/webp.c common/hdr.c common/exif.c common/color.c common/color_%.c,$(COMMON_SRC))
 CLIENT_SRC = $(wildcard client/*.c)
 SERVER_SRC = $(wildcard server/*.c server/*/*.c)
 SERVER_LIB_SRC = $(filter-out server/main.c,$(SERVER_SRC))
@@ -106,6 +106,7 @@ $(B)/tests/fuzz/%: $(B)/obj/tests/fuzz/%.o $(B)/obj/tests/fuzz/seeds.o $(FUZZ_DR
                    $(B)/libclient.a $(B)/libserver.a $(B)/libcommon.a
 	@mkdir -p $(@D)
 	$(CC) $(ALL_LDFLAGS) -o $@ $^ $(SERVER_LIBS) -lcurl
+$(B)/tests/unit/test_image_formats: TEST_LIBS = -lwebpmux
 $(B)/tests/bench/perturb_mesh: TEST_LIBS = $(if $(wildcard /usr/include/meshoptimizer.h),-lmeshoptimizer)
 
 # What a test slips under a program of ours.

@@ -221,3 +221,55 @@ void color_set_profile(struct color *color, const void *profile, size_t size, bo
         color->curve = NULL;
     }
 }
+
+/* --- inks ----------------------------------------------------------------------------------- */
+
+struct color_inks {
+    struct color_icc *icc; /* NULL: the plain formula */
+};
+
+static bool make_ink_transform(struct color_icc *icc, const void *data, size_t size) {
+    if (size == 0 || size > UINT32_MAX || !icc->context)
+        return false;
+    icc->profile = cmsOpenProfileFromMemTHR(icc->context, data, (cmsUInt32Number)size);
+    if (!icc->profile || cmsGetColorSpace(icc->profile) != cmsSigCmykData)
+        return false;
+    icc->rec709 = cmsCreate_sRGBProfileTHR(icc->context);
+    if (icc->rec709)
+        icc->transform = cmsCreateTransformTHR(icc->context, icc->profile, TYPE_CMYK_FLT, icc->rec709, TYPE_RGB_FLT,
+                                               INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOCACHE);
+    return icc->transform != NULL;
+}
+
+struct color_inks *color_inks_new(const void *profile, size_t size, char warning[COLOR_WARNING_SIZE]) {
+    struct color_inks *inks = mem_calloc(1, sizeof *inks);
+    inks->icc = start();
+    if (make_ink_transform(inks->icc, profile, size))
+        return inks;
+    snprintf(warning, COLOR_WARNING_SIZE, "it is CMYK and %s: its colours are estimated",
+             size == 0 ? "no profile says of which inks" : "its ICC profile is unusable");
+    release_profile(inks->icc);
+    inks->icc = NULL;
+    return inks;
+}
+
+void color_inks_convert(const struct color_inks *inks, const float *cmyk, float *rgb, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        const float *ink = cmyk + 4 * i;
+        float *out = rgb + 3 * i, percent[4];
+        for (int c = 0; c < 4; c++)
+            percent[c] = 100.0f * fminf(fmaxf(ink[c], 0.0f), 1.0f);
+        for (int c = 0; c < 3; c++)
+            out[c] = (1.0f - 0.01f * percent[c]) * (1.0f - 0.01f * percent[3]);
+        if (inks->icc)
+            cmsDoTransform(inks->icc->transform, percent, out, 1);
+        for (int c = 0; c < 3; c++)
+            out[c] = fminf(fmaxf(out[c], 0.0f), 1.0f);
+    }
+}
+
+void color_inks_free(struct color_inks *inks) {
+    if (inks->icc)
+        release_profile(inks->icc);
+    mem_free(inks);
+}

@@ -9,4 +9,11 @@
  * sRGB. */
 void color_set_profile(struct color *color, const void *profile, size_t size, bool is_grey, int bits);
 
+/* CMYK: from inks, 0 (none) to 1 (full), to stored values of sRGB. By the profile, which is borrowed and may have size
+ * 0; without a usable one by the plain formula (1 - C)(1 - K), and *warning says so. */
+struct color_inks;
+struct color_inks *color_inks_new(const void *profile, size_t size, char warning[COLOR_WARNING_SIZE]);
+void color_inks_convert(const struct color_inks *inks, const float *cmyk, float *rgb, size_t count);
+void color_inks_free(struct color_inks *inks);
+
 #endif

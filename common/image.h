@@ -3,7 +3,8 @@
  * Pixels are float, interleaved, top row first. Readers accept what an uploaded bundle may
  * hold, so every size is capped (IMAGE_MAX_SIDE, IMAGE_MAX_PIXELS) before memory is asked
  * for, and damage is STATUS_INPUT with a sentence, never a crash. Thread-safe: no shared
- * state. exr_*.c are the only include of OpenEXRCore, png_*.c of libpng, jpeg.c of libjpeg. */
+ * state. Each library has its file: exr_*.c OpenEXRCore, png_*.c libpng, jpeg.c libjpeg, heif.c libheif,
+ * tiff*.c libtiff, webp.c libwebp. */
 #ifndef UNBAKE_COMMON_IMAGE_H
 #define UNBAKE_COMMON_IMAGE_H
 
@@ -17,6 +18,9 @@
 #define IMAGE_MAX_SIDE 65536
 #define IMAGE_MAX_PIXELS ((size_t)1 << 29)
 #define IMAGE_MAX_CHANNELS 64
+
+/* What image_read reads, for messages. */
+#define IMAGE_FORMATS "EXR, PNG, JPEG, TIFF, HEIC, AVIF, WebP or Radiance HDR"
 
 struct image {
     uint32_t width, height;
@@ -35,9 +39,9 @@ struct image {
 
 /* Relation of pixel values to linear light. */
 enum image_encoding {
-    IMAGE_LINEAR,   /* EXR, Radiance: linear light, unbounded */
-    IMAGE_SRGB,     /* PNG, JPEG: as stored, in [0, 1]; linear only after image_srgb_to_linear */
-    IMAGE_CONVERTED /* PNG, JPEG of another colour space: converted to linear light; image.clipped marks lower bounds */
+    IMAGE_LINEAR,   /* EXR, Radiance, TIFF of floats: linear light, unbounded */
+    IMAGE_SRGB,     /* others: as stored, in [0, 1]; linear only after image_srgb_to_linear */
+    IMAGE_CONVERTED /* others of another colour space: converted to linear light; image.clipped marks lower bounds */
 };
 
 struct image_info {
@@ -45,7 +49,8 @@ struct image_info {
     int bits; /* per channel as stored: 8, 16, 32 */
     /* From EXIF where present, else 0. */
     double exposure_time_sec, iso, f_number;
-    int orientation;      /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate */
+    int orientation;      /* EXIF orientation 1..8, 1 when absent; the reader does NOT rotate. HEIC and AVIF: 1, since
+                           * their rotation is part of the picture and has been applied */
     bool is_adobe_rgb;    /* EXIF says so; cameras without profile do that */
     bool is_uncalibrated; /* EXIF says that the colour space is not sRGB, without naming it */
     /* Set by reading, not by probing: */
@@ -73,17 +78,17 @@ void image_allocate(struct image *image);
 /* Index of a channel by its exact name; -1 when absent. */
 int image_channel(const struct image *image, const char *name);
 
-/* Reads EXR, PNG, JPEG or Radiance HDR by content (not by extension). Channels are in the order R, G, B, A if they
+/* Reads EXR, PNG, JPEG, TIFF, HEIC, AVIF, WebP or Radiance HDR by content (not by extension). Channels are in the order R, G, B, A if they
  * exist, then the others by name; grey PNG/JPEG, and Y of an EXR without R, G, B, become R = G = B. An EXR's picture
  * is its display window, to which cameras refer: pixels outside of the data window are 0; of several parts the first
  * with R, G, B is read. info may be NULL. On error *image is empty (releasing it does no harm).
  *
  * Colours are linear or sRGB of Rec. 709's primaries and white D65. Files that specify others (ICC profile; PNG's
- * cICP, cHRM and gAMA; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these; colour
+ * cICP, cHRM and gAMA; HEIF's nclx; EXIF for Adobe RGB; EXR's chromaticities) are converted to linear light of these; colour
  * information that cannot be used gives a warning in info. */
 enum status image_read(const char *path, struct image *image, struct image_info *info, struct error *err);
 
-/* The same with stored values of PNG and JPEG, without colour conversion: for masks. */
+/* The same with stored values of PNG, JPEG and others, without colour conversion: for masks. */
 enum status image_read_stored(const char *path, struct image *image, struct error *err);
 
 /* The same from memory; `name` stands for the path in messages. */
@@ -92,6 +97,11 @@ enum status image_read_memory(const char *name, const void *data, size_t size, s
 
 /* The same without reading pixels: only width, height, channels and info; pixel is NULL. */
 enum status image_probe(const char *path, struct image *image, struct image_info *info, struct error *err);
+
+/* Version of libheif; and which decoder it was installed without, as a sentence, or NULL (its decoders are packages of
+ * their own since Debian 13). */
+const char *image_heif_version(void);
+const char *image_heif_lacks(void);
 
 enum image_exr_type { IMAGE_HALF, IMAGE_FLOAT };
 

@@ -1,4 +1,4 @@
-/* image_codec.h -- what the codecs (exr_*.c, hdr.c, jpeg.c, png_*.c) share with image_read.c, which
+/* image_codec.h -- what the codecs (exr_*.c, hdr.c, heif.c, jpeg.c, png_*.c, tiff*.c, webp.c) share with image_read.c, which
  * chooses among them; private to them.
  *
  * A codec reads from a source, which is a file or memory, at any offset: nothing is loaded
@@ -44,6 +44,13 @@ enum status image_read_hdr(struct image_source *source, bool probe, struct image
 enum status image_read_png(struct image_source *source, bool probe, struct image *image, struct image_info *info,
                            struct error *err);
 enum status image_read_jpeg(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                            struct error *err);
+
+enum status image_read_heif(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                            struct error *err);
+enum status image_read_tiff(struct image_source *source, bool probe, struct image *image, struct image_info *info,
+                            struct error *err);
+enum status image_read_webp(struct image_source *source, bool probe, struct image *image, struct image_info *info,
                             struct error *err);
 
 /* Whether written files hold these pictures; called by image_write_exr and image_write_png. STATUS_CORRUPT says what

@@ -34,6 +34,8 @@ struct jpeg_reader {
     enum status status;
     JSAMPLE *row;
     JOCTET *profile; /* ICC; libjpeg's (malloc) */
+    struct color_inks *inks; /* NULL unless the picture is CMYK */
+    float *ink_row;
     bool is_profile_damaged;
     struct color color;
     JOCTET buffer[16384];
@@ -129,11 +131,11 @@ static void read_exif(struct jpeg_reader *r) {
 static void read_header(struct jpeg_reader *r) {
     const char *name = r->source->name;
     jpeg_read_header(&r->jpeg, TRUE);
-    if (r->jpeg.num_components != 1 && r->jpeg.num_components != 3)
+    int components = r->jpeg.num_components;
+    if (components != 1 && components != 3 && components != 4)
         stop(r, error_set(r->err, STATUS_INPUT,
-                          "%s: a JPEG of %d components (CMYK?) is not a photograph; expected grey, "
-                          "YCbCr or RGB",
-                          name, r->jpeg.num_components));
+                          "%s: a JPEG of %d components is not a photograph; expected grey, YCbCr, RGB or CMYK", name,
+                          components));
     uint64_t width = r->jpeg.image_width, height = r->jpeg.image_height;
     enum status status = image_header(r->image, name, width, height, 3, image_rgba, r->err);
     if (status != STATUS_OK)
@@ -149,8 +151,11 @@ static void read_header(struct jpeg_reader *r) {
 /* Before decompression ends, which drops the segments. */
 static void read_color(struct jpeg_reader *r) {
     unsigned length = 0;
+    bool has_profile = jpeg_read_icc_profile(&r->jpeg, &r->profile, &length);
     color_init(&r->color);
-    if (jpeg_read_icc_profile(&r->jpeg, &r->profile, &length))
+    if (r->jpeg.num_components == 4)
+        r->inks = color_inks_new(r->profile, has_profile ? length : 0, r->color.warning);
+    else if (has_profile)
         color_set_profile(&r->color, r->profile, length, r->jpeg.num_components == 1, 8);
     else if (r->is_profile_damaged)
         snprintf(r->color.warning, sizeof r->color.warning, "the segments of its ICC profile do not fit together");
@@ -158,19 +163,41 @@ static void read_color(struct jpeg_reader *r) {
         image_color_by_exif(r->info, &r->color);
 }
 
+static void put_row(const struct jpeg_reader *r, size_t width, float *to) {
+    for (size_t i = 0; i < 3 * width; i++)
+        to[i] = (float)r->row[i] / 255.0f;
+}
+
+/* Adobe's programs, which mark their files, write the share of white paper instead of ink. */
+static void put_ink_row(const struct jpeg_reader *r, size_t width, float *to) {
+    for (size_t i = 0; i < 4 * width; i++) {
+        float stored = (float)r->row[i] / 255.0f;
+        r->ink_row[i] = r->jpeg.saw_Adobe_marker ? 1.0f - stored : stored;
+    }
+    color_inks_convert(r->inks, r->ink_row, to, width);
+}
+
 static void read_pixels(struct jpeg_reader *r) {
-    r->jpeg.out_color_space = JCS_RGB; /* grey too */
+    bool has_inks = r->jpeg.num_components == 4;
+    r->jpeg.out_color_space = has_inks ? JCS_CMYK : JCS_RGB; /* grey too */
     jpeg_start_decompress(&r->jpeg);
     struct image *image = r->image;
-    size_t row_floats = (size_t)image->width * 3;
-    r->row = mem_array(row_floats, sizeof *r->row);
+    size_t width = image->width;
+    r->row = mem_array((has_inks ? 4 : 3) * width, sizeof *r->row);
+    if (has_inks) {
+        r->ink_row = mem_array(4 * width, sizeof *r->ink_row);
+        if (!r->inks) /* values as stored: a mask's */
+            r->inks = color_inks_new(NULL, 0, r->color.warning);
+    }
     image_allocate(image);
     while (r->jpeg.output_scanline < image->height) {
-        float *to = image->pixel + r->jpeg.output_scanline * row_floats;
+        float *to = image->pixel + r->jpeg.output_scanline * 3 * width;
         if (jpeg_read_scanlines(&r->jpeg, &r->row, 1) != 1)
             continue;
-        for (size_t i = 0; i < row_floats; i++)
-            to[i] = (float)r->row[i] / 255.0f;
+        if (has_inks)
+            put_ink_row(r, width, to);
+        else
+            put_row(r, width, to);
     }
     jpeg_finish_decompress(&r->jpeg);
 }
@@ -198,6 +225,9 @@ enum status image_read_jpeg(struct image_source *source, bool probe, struct imag
     }
     jpeg_destroy_decompress(&r->jpeg);
     mem_free(r->row);
+    mem_free(r->ink_row);
+    if (r->inks)
+        color_inks_free(r->inks);
     free(r->profile);
     color_release(&r->color);
     enum status status = r->status;

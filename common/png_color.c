@@ -1,4 +1,4 @@
-/* png_color.c -- see png_color.h. Chunks: PNG specification, third edition, 11.3.2; cICP's numbers: ITU-T H.273.
+/* png_color.c -- see png_color.h. Chunks: PNG specification, third edition, 11.3.2.
  *
  * libpng is not used: before 1.6.46 it ignores cICP, and of several kinds of chunks it keeps the first. */
 #include "common/png_color.h"
@@ -8,6 +8,7 @@
 #include <string.h>
 #include <zlib.h>
 
+#include "common/color_cicp.h"
 #include "common/color_icc.h"
 #include "common/mem.h"
 
@@ -68,48 +69,7 @@ static void find_chunks(struct image_source *source, struct chunk found[KIND_COU
 /* --- each kind ------------------------------------------------------------------------------ */
 
 static bool use_cicp(const uint8_t *data, int bits, struct color *color) {
-    const struct color_primaries *primaries = NULL;
-    enum color_transfer transfer = COLOR_SRGB;
-    double gamma = 1.0;
-    const char *name = "";
-    switch (data[0]) {
-    case 1: primaries = &color_rec709, name = "Rec. 709"; break;
-    case 5: primaries = &color_rec601_625, name = "Rec. 601 (625 lines)"; break;
-    case 6:
-    case 7: primaries = &color_rec601_525, name = "Rec. 601 (525 lines)"; break;
-    case 9: primaries = &color_rec2020, name = "Rec. 2020"; break;
-    case 11: primaries = &color_dci_p3, name = "DCI-P3"; break;
-    case 12: primaries = &color_display_p3, name = "Display P3"; break;
-    default: break;
-    }
-    switch (data[1]) {
-    case 1:
-    case 6:
-    case 14:
-    case 15: transfer = COLOR_REC709; break;
-    case 4: transfer = COLOR_POWER, gamma = 2.2; break;
-    case 5: transfer = COLOR_POWER, gamma = 2.8; break;
-    case 8: transfer = COLOR_POWER; break;
-    case 13: break;
-    case 16: transfer = COLOR_PQ; break;
-    case 18: transfer = COLOR_HLG; break;
-    default: primaries = NULL;
-    }
-    if (!primaries || data[2] != 0 || data[3] != 1) {
-        snprintf(color->warning, sizeof color->warning,
-                 "its chunk cICP has the numbers %d, %d, %d, %d, which are not known here", data[0], data[1], data[2],
-                 data[3]);
-        return false;
-    }
-    static const char *const curve[] = {[COLOR_SRGB] = "",
-                                        [COLOR_POWER] = ", a power",
-                                        [COLOR_REC709] = ", its curve",
-                                        [COLOR_PQ] = ", PQ",
-                                        [COLOR_HLG] = ", HLG"};
-    char full[COLOR_NAME_SIZE];
-    snprintf(full, sizeof full, "%s%s", name, transfer == COLOR_POWER && gamma == 1.0 ? ", linear" : curve[transfer]);
-    color_set(color, full, primaries, transfer, gamma, bits);
-    return color->warning[0] == '\0';
+    return color_set_cicp(color, "its chunk cICP", data, bits);
 }
 
 /* A name, 0, the method (0: deflate), the profile. */

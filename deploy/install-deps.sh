@@ -7,8 +7,9 @@
 # is said and the exit status is still 0.
 set -eu
 packages="gcc make pkg-config libc6-dev libembree-dev libopenexr-dev libmicrohttpd-dev libgnutls28-dev libcjson-dev
-libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev|libjpeg-dev liblcms2-dev libcurl4-openssl-dev libseccomp-dev
-zlib1g-dev curl jq sqlite3 zip zstd ca-certificates"
+libsqlite3-dev libarchive-dev libpng-dev libjpeg62-turbo-dev|libjpeg-dev libtiff-dev libwebp-dev libheif-dev
+liblcms2-dev libcurl4-openssl-dev libseccomp-dev zlib1g-dev
+curl jq sqlite3 zip zstd ca-certificates"
 fuzz_packages="clang libclang-rt-14-dev|libclang-rt-19-dev|libclang-rt-18-dev"
 coverage_packages="gcovr"
 portable_packages="mmdebstrap"
@@ -68,6 +69,11 @@ install() {
 
 # shellcheck disable=SC2086
 install $packages
+# Decoders of HEIC and AVIF, which are packages of their own since libheif 1.16 (Debian 13).
+case $(dpkg-query -W -f '${Version}' libheif1 2>/dev/null) in
+1.?.* | 1.1[0-5].*) ;;
+*) install libheif-plugin-libde265 libheif-plugin-aomdec ;;
+esac
 # shellcheck disable=SC2086
 case ${1:-} in
 fuzz) install $fuzz_packages ;;

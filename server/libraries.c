@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/buf.h"
+#include "common/image.h"
 #include "common/mem.h"
 #include "server/http/listener.h"
 #include "server/render/accel.h"
@@ -23,6 +24,7 @@ void libraries_list(struct library list[LIBRARY_COUNT]) {
     list[2] = named("embree", "Embree ", accel_library_version());
     list[3] = named("libarchive", "libarchive ", archive_version_string());
     list[4] = named("cjson", "", cJSON_Version());
+    list[5] = named("libheif", "", image_heif_version());
 }
 
 char *libraries_text(void) {
@@ -40,5 +42,5 @@ char *libraries_text(void) {
 const char *libraries_lack(void) {
     return !archive_zlib_version()      ? "libarchive was built without zlib: no .zip or .tar.gz can be read"
            : !archive_libzstd_version() ? "libarchive was built without zstd: no .tar.zst can be read"
-                                        : NULL;
+                                        : image_heif_lacks();
 }

@@ -70,6 +70,9 @@ own 'openexr' common/exr_stream.h
 own 'png\.h' common/png_memory.h
 own 'lcms2' common/color_icc.c
 own 'jpeglib\.h' common/jpeg.c
+own 'libheif/' common/heif.c
+own 'tiffio\.h' common/tiff.h
+own 'webp/' common/webp.c
 own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)

@@ -265,7 +265,6 @@ static void jpeg(void) {
         check_pixel(&image, 23, 15, 230, 225, 128);
         image_release(&image);
     }
-    check_refused("tests/data/image/cmyk.jpg", "CMYK");
 }
 
 /* A file cut anywhere must be refused: a half-decoded photograph would be taken for light. */
@@ -341,7 +340,7 @@ static void other_files(void) {
     image_release(&image);
     write_file("", 0);
     check_refused(scratch, "empty");
-    write_file("GIF89a........", 14);
+    write_file("no picture....", 14);
     check_refused(scratch, "not a picture");
     check_refused("/tmp", "regular");
     unlink(scratch);

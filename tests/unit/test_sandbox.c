@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 
 #include "common/file.h"
+#include "common/image.h"
 #include "common/mem.h"
 #include "tests/check.h"
 
@@ -25,6 +26,35 @@ static void *other_thread(void *argument) {
     (void)argument;
     CHECK(socket(AF_INET, SOCK_STREAM, 0) < 0);
     return NULL;
+}
+
+/* Pictures whose decoders are libraries of their own, which may be opened only now, and may start threads. */
+static const char *const pictures[] = {"turned.heic", "blocks.avif", "alpha.avif"};
+#define PICTURE_COUNT (sizeof pictures / sizeof *pictures)
+
+static void read_pictures(const char *readable) {
+    for (size_t i = 0; i < PICTURE_COUNT; i++) {
+        struct image image;
+        struct error err;
+        char *path = file_join(readable, pictures[i]);
+        CHECK_THAT(image_read(path, &image, NULL, &err) == STATUS_OK, "%s", err.message);
+        image_release(&image);
+        mem_free(path);
+    }
+}
+
+static void copy_pictures(const char *readable) {
+    for (size_t i = 0; i < PICTURE_COUNT; i++) {
+        struct buf bytes;
+        struct error err;
+        char *from = file_join("tests/data/image", pictures[i]), *to = file_join(readable, pictures[i]);
+        buf_init(&bytes, 1 << 20);
+        CHECK(file_read(from, &bytes, &err) == STATUS_OK);
+        CHECK(file_replace(to, bytes.data, bytes.length, &err) == STATUS_OK);
+        buf_release(&bytes);
+        mem_free(from);
+        mem_free(to);
+    }
 }
 
 /* In a child: there is no way back. */
@@ -66,6 +96,7 @@ static int confined(const char *writable, const char *readable, const char *othe
     CHECK(fd >= 0 && write(fd, "x", 1) == 1 && ftruncate(fd, 0) == 0);
     close(fd);
     CHECK(open(photo, O_RDONLY) >= 0);
+    read_pictures(readable);
     char *path = file_join(writable, "out/b");
     char *dir = file_join(writable, "out");
     CHECK_THAT(file_make_dirs(dir, &err) == STATUS_OK, "%s", err.message);
@@ -94,6 +125,7 @@ int main(void) {
     }
     close(open_new(dir[1], "photo"));
     close(open_new(dir[2], "secret"));
+    copy_pictures(dir[1]);
     fflush(stdout);
     pid_t child = fork();
     if (child == 0)
