@@ -164,7 +164,7 @@ static enum status write_transforms(const struct generator *g, struct error *err
         char name[64];
         snprintf(name, sizeof name, "images/%03u.%s", f, g->settings->sdr ? "png" : "exr");
         json_add_string(frame, "file_path", name);
-        json_add(frame, "transform_matrix", camera_transform_matrix(&g->camera[f]));
+        json_add(frame, "transform_matrix", camera_transform_matrix(&g->camera[f], (double[3]){0.0}));
         json_add_string(frame, "split", is_test(g, f) ? "test" : "train");
         if (g->settings->sdr)
             json_add_number(frame, "exposure", (double)frame_exposure(g, f));

@@ -35,8 +35,8 @@ static const struct transforms_frame *find_frame(const struct transforms *t, con
     return NULL;
 }
 
-static enum status choose_camera(const struct transforms *t, const char *path, const char *view, struct camera *camera,
-                                 struct error *err) {
+static enum status choose_camera(const struct transforms *t, const char *path, const char *view, const double offset[3],
+                                 struct camera *camera, struct error *err) {
     const struct transforms_frame *frame = find_frame(t, view);
     if (!frame)
         return error_set(err, STATUS_NOT_FOUND, "%s: has no view \"%s\" among its %zu", path, view, t->frame_count);
@@ -45,11 +45,12 @@ static enum status choose_camera(const struct transforms *t, const char *path, c
                          "%s: frames[%zu] does not say how large its picture is: "
                          "w and h are missing",
                          path, frame->number);
-    return transforms_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, camera, err);
+    return transforms_camera(frame, (uint32_t)frame->lens.width, (uint32_t)frame->lens.height, offset, camera, err);
 }
 
-static enum status read_camera(const char *outputs, const struct relight_settings *settings, struct camera *camera,
-                               struct error *err) {
+/* For a mesh with that offset. */
+static enum status read_camera(const char *outputs, const struct relight_settings *settings, const double offset[3],
+                               struct camera *camera, struct error *err) {
     char *path = settings->cameras ? mem_strdup(settings->cameras) : file_join(outputs, "views.json");
     struct findings findings = {.problems = cJSON_CreateArray()};
     struct transforms t = {0};
@@ -62,7 +63,7 @@ static enum status read_camera(const char *outputs, const struct relight_setting
             status = error_set(err, STATUS_INPUT, "%s: %s", path,
                                cJSON_GetStringValue(cJSON_GetObjectItem(first, "reason")));
         else
-            status = choose_camera(&t, path, settings->view, camera, err);
+            status = choose_camera(&t, path, settings->view, offset, camera, err);
     }
     transforms_release(&t);
     cJSON_Delete(findings.problems);
@@ -147,9 +148,9 @@ enum status relight(const char *outputs, const struct relight_settings *settings
     struct image film;
     char *scene = file_join(outputs, "scene.ply");
     *image = (struct image){0};
-    enum status status = read_camera(outputs, settings, &camera, err);
+    enum status status = ply_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
     if (status == STATUS_OK)
-        status = ply_read(scene, scene, MESH_MAX_TRIANGLES, &mesh, NULL, err);
+        status = read_camera(outputs, settings, mesh.offset, &camera, err);
     if (status != STATUS_OK)
         goto out;
     status = recovered_load(outputs, &mesh, pool, &room, err);

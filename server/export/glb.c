@@ -235,6 +235,25 @@ static void add_cameras(struct glb *g) {
         cJSON_Delete(cameras);
 }
 
+static double along(const double v[3], int axis, double sign) { return v[axis] != 0.0 ? sign * v[axis] : 0.0; }
+
+/* Where upright() puts the mesh's offset. */
+static void add_translation(cJSON *room, const double o[3], vec3 up) {
+    double sign = up.x + up.y + up.z < 0.0f ? -1.0 : 1.0;
+    double at[3] = {along(o, 0, 1.0), along(o, 1, sign), along(o, 2, sign)};
+    if (up.x != 0.0f) {
+        at[0] = along(o, 1, -sign);
+        at[1] = along(o, 0, sign);
+        at[2] = along(o, 2, 1.0);
+    } else if (up.z != 0.0f) {
+        at[0] = along(o, 0, 1.0);
+        at[1] = along(o, 2, sign);
+        at[2] = along(o, 1, -sign);
+    }
+    if (o[0] != 0.0 || o[1] != 0.0 || o[2] != 0.0)
+        json_add(room, "translation", cJSON_CreateDoubleArray(at, 3));
+}
+
 /* The rotation, as a quaternion x y z w, that brings an axis to +y. */
 static const float *upright(vec3 up) {
     static const float rotation[6][4] = {
@@ -250,6 +269,7 @@ static void add_room(struct glb *g) {
     g->node_count++;
     json_add_string(room, "name", "room");
     add_numbers(room, "rotation", upright(g->in->up), 4);
+    add_translation(room, g->in->mesh->offset, g->in->up);
     if (g->in->environment) {
         cJSON *extras = add_object(room, "extras");
         json_add_string(extras, "environment", "environment.exr");

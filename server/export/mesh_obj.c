@@ -21,6 +21,7 @@ enum status mesh_obj_write(const char *path, const struct export_input *input, c
     enum status status = sink_open(&out, path, UINT32_MAX, err);
     if (status != STATUS_OK)
         return status;
+    sink_offset(&out, "#", mesh->offset, "\n");
     sink_printf(&out, "mtllib scene.mtl\n");
     for (size_t v = 0; v < mesh->vertex_count; v++)
         sink_printf(&out, "v " SINK_FLOAT " " SINK_FLOAT " " SINK_FLOAT "\n", (double)mesh->position[v].x,

@@ -5,8 +5,9 @@
 #include "server/export/sink.h"
 
 static void put_header(struct sink *out, const struct mesh *mesh, size_t vertex_count) {
+    sink_printf(out, "ply\nformat binary_little_endian 1.0\n");
+    sink_offset(out, "comment", mesh->offset, "\n");
     sink_printf(out,
-                "ply\nformat binary_little_endian 1.0\n"
                 "comment s t: atlas coordinates, origin lower left\n"
                 "element vertex %zu\n"
                 "property float x\nproperty float y\nproperty float z\n%s"

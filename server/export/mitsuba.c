@@ -95,6 +95,7 @@ enum status mitsuba_xml_write(const char *path, const struct export_input *in, c
                 "  <default name=\"max_depth\" value=\"%d\"/>\n"
                 "  <integrator type=\"path\"><integer name=\"max_depth\" value=\"$max_depth\"/></integrator>\n",
                 SPP, MAX_DEPTH);
+    sink_offset(&out, "  <!--", in->mesh->offset, ": to be added to all coordinates for those of the input -->\n");
     for (size_t i = 0; i < in->comparison_count && i < SENSORS_MAX; i++)
         if (in->comparison[i].camera->model == CAMERA_OPENCV)
             put_sensor(&out, i, in->comparison[i].camera);

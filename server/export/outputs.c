@@ -299,7 +299,7 @@ static enum status put_formats(struct export *e, struct error *err) {
 /* --- held-out views -------------------------------------------------------------------------- */
 
 static enum status put_views(struct export *e, struct error *err) {
-    cJSON *views = views_json(e->input->comparison, e->input->comparison_count);
+    cJSON *views = views_json(e->input->comparison, e->input->comparison_count, e->input->mesh->offset);
     char *text = json_page(views), *path = file_join(e->dir, "views.json");
     enum status status = replace_checked(path, text, strlen(text), err);
     if (status == STATUS_OK)
@@ -427,6 +427,7 @@ static enum status put_page(struct export *e, const cJSON *report, struct error 
 static enum status put_report(struct export *e, struct error *err) {
     cJSON *report = cJSON_Duplicate(e->input->report, true);
     json_add_string(report, "title", e->input->title);
+    json_add(report, "offset", cJSON_CreateDoubleArray(e->input->mesh->offset, 3));
     json_add(report, "segments", describe_segments(e->input));
     json_add(report, "files", cJSON_Duplicate(e->files, true));
     if (e->left_out->child)

@@ -29,6 +29,10 @@
  *   report.json      every setting, version, stage time and metric
  *   report.html      the same for the eye; needs no other file and no network
  *
+ * Coordinates are relative to the mesh's offset (report.json: "offset"), which is 0 unless the input lies far from its
+ * origin. scene.ply and scene.obj have it as a comment, "unbake offset X Y Z", which our readers add; scene.glb as the
+ * translation of its root node; scene.xml as a comment; the cameras of views.json contain it.
+ *
  * Those of glb.h, mesh_obj.h and mitsuba.h are left out where they would have too many objects or bytes;
  * report.json says so under "left_out". */
 #ifndef UNBAKE_EXPORT_OUTPUTS_H

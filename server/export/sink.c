@@ -89,6 +89,11 @@ void sink_printf(struct sink *s, const char *format, ...) {
         mem_free(text);
 }
 
+void sink_offset(struct sink *s, const char *prefix, const double offset[3], const char *suffix) {
+    if (offset[0] != 0.0 || offset[1] != 0.0 || offset[2] != 0.0)
+        sink_printf(s, "%s unbake offset %.17g %.17g %.17g%s", prefix, offset[0], offset[1], offset[2], suffix);
+}
+
 void sink_copy(struct sink *s, const char *path, uint64_t length) {
     char block[1 << 16];
     FILE *from = fopen(path, "rbe");

@@ -31,6 +31,8 @@ void sink_u64(struct sink *s, uint64_t value);
 void sink_float(struct sink *s, float value);
 void sink_vec3(struct sink *s, vec3 v);
 void sink_printf(struct sink *s, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* PREFIX, " unbake offset X Y Z" and SUFFIX if the offset (struct mesh) is not 0; else nothing. */
+void sink_offset(struct sink *s, const char *prefix, const double offset[3], const char *suffix);
 /* Appends the file at `path`, of `length` bytes. */
 void sink_copy(struct sink *s, const char *path, uint64_t length);
 

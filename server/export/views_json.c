@@ -21,14 +21,14 @@ static void add_lens(cJSON *frame, const struct camera *camera) {
     }
 }
 
-cJSON *views_json(const struct export_comparison *comparison, size_t count) {
+cJSON *views_json(const struct export_comparison *comparison, size_t count, const double offset[3]) {
     cJSON *root = cJSON_CreateObject(), *frames = cJSON_AddArrayToObject(root, "frames");
     for (size_t i = 0; i < count; i++) {
         cJSON *frame = cJSON_CreateObject();
         json_add_string(frame, "file_path", comparison[i].name);
         json_add_string(frame, "split", "test");
         add_lens(frame, comparison[i].camera);
-        json_add(frame, "transform_matrix", camera_transform_matrix(comparison[i].camera));
+        json_add(frame, "transform_matrix", camera_transform_matrix(comparison[i].camera, offset));
         cJSON_AddItemToArray(frames, frame);
     }
     return root;

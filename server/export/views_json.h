@@ -1,11 +1,12 @@
-/* views_json.h -- views.json: the cameras of the held-out views in the format of nerfstudio's transforms.json. */
+/* views_json.h -- views.json: the cameras of the held-out views in the format of nerfstudio's transforms.json, in the
+ * coordinates of the input. */
 #ifndef UNBAKE_EXPORT_VIEWS_JSON_H
 #define UNBAKE_EXPORT_VIEWS_JSON_H
 
 #include "common/json.h"
 #include "server/export/input.h"
 
-/* One frame per comparison, in order, with its lens parameters; the caller's. */
-cJSON *views_json(const struct export_comparison *comparison, size_t count);
+/* One frame per comparison, in order, with its lens parameters; the caller's. `offset` is that of the mesh. */
+cJSON *views_json(const struct export_comparison *comparison, size_t count, const double offset[3]);
 
 #endif

@@ -249,14 +249,7 @@ static enum status load_mesh(const char *root, const char *name, const struct re
         status = mesh_check(&scene->mesh, name, &scene->mesh_report, &own);
     if (status != STATUS_OK)
         return findings_settle(f, name, status, &own, err);
-    if (report.small_count > 0)
-        findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name, report.small_count);
-    if (scene->mesh_report.degenerate_count > 0)
-        findings_warning(f, "%s: %zu triangles have no area and were left out", name,
-                         scene->mesh_report.degenerate_count);
-    if (scene->mesh_report.duplicate_count > 0)
-        findings_warning(f, "%s: %zu triangles repeat an earlier one and were left out", name,
-                         scene->mesh_report.duplicate_count);
+    mesh_file_warn(name, &scene->mesh, &report, &scene->mesh_report, f);
     return STATUS_OK;
 }
 

@@ -56,7 +56,7 @@ static enum status add_image(const struct colmap_cursor *r, struct images *in, c
     else if (!lens)
         findings_problem(in->findings, r->name, "image %s: there is no camera %llu", clean, (unsigned long long)camera);
     else if (pose_from_matrix((const double(*)[4])m, "its pose", POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
-                              &frame.camera_from_world, &scaled, &own) != STATUS_OK)
+                              &scaled, &own) != STATUS_OK)
         findings_problem(in->findings, r->name, "image %s: %s", clean, own.message);
     else {
         if (t->frame_count == in->capacity) {

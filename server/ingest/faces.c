@@ -1,7 +1,10 @@
 /* faces.c -- see faces.h. */
 #include "server/ingest/faces.h"
 
+#include <math.h>
+
 #include "common/mem.h"
+#include "server/ingest/positions.h"
 
 struct faces *faces_new(struct mesh *mesh, const char *name, size_t triangle_limit, bool has_object_id) {
     struct faces *f = mem_calloc(1, sizeof *f);
@@ -24,6 +27,17 @@ void faces_reserve(struct faces *f, size_t wanted) {
         mesh->object_id = mem_realloc_array(mesh->object_id, f->capacity, sizeof *mesh->object_id);
 }
 
+/* Corners in single precision: as they are or, where its steps are too coarse, relative to the first. */
+static void place_corners(const struct faces *f, vec3 *corner) {
+    const double *first = f->position[0], none[3] = {0.0, 0.0, 0.0};
+    double farthest = fmax(fabs(first[0]), fmax(fabs(first[1]), fabs(first[2])));
+    const double *from = positions_step(farthest) > POSITIONS_STEP_M ? first : none;
+    for (size_t i = 0; i < f->corner_count; i++) {
+        const double *at = f->position[i];
+        corner[i] = vec3_make((float)(at[0] - from[0]), (float)(at[1] - from[1]), (float)(at[2] - from[2]));
+    }
+}
+
 enum status faces_add(struct faces *f, int64_t object_id, struct error *err) {
     struct mesh *mesh = f->mesh;
     uint32_t face = (uint32_t)mesh->face_count++;
@@ -36,7 +50,8 @@ enum status faces_add(struct faces *f, int64_t object_id, struct error *err) {
     if (made > f->limit - mesh->triangle_count)
         return error_set(err, STATUS_LIMIT, "%s has more than %zu triangles, the limit", f->name, f->limit);
     faces_reserve(f, mesh->triangle_count + made);
-    polygon_triangulate(f->position, f->corner_count, f->triangle);
+    place_corners(f, f->single);
+    polygon_triangulate(f->single, f->corner_count, f->triangle);
     for (size_t i = 0; i < made; i++) {
         size_t at = mesh->triangle_count++;
         for (int k = 0; k < 3; k++)

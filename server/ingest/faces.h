@@ -13,6 +13,7 @@
 struct faces_report {
     size_t polygon_count; /* faces with more than four corners, cut into triangles */
     size_t small_count;   /* faces with fewer than three corners, left out */
+    double step_m;        /* of the file's own precision at its farthest coordinate, where that is single; 0: finer */
 };
 
 struct faces {
@@ -21,9 +22,10 @@ struct faces {
     size_t capacity, limit; /* triangles */
     bool has_object_id;     /* whether mesh->object_id is filled */
     struct faces_report report;
-    size_t corner_count;                  /* the polygon to be added: */
-    uint32_t corner[POLYGON_MAX_CORNERS]; /* its vertices */
-    vec3 position[POLYGON_MAX_CORNERS];   /* and where they are */
+    size_t corner_count;                     /* the polygon to be added: */
+    uint32_t corner[POLYGON_MAX_CORNERS];    /* its vertices */
+    double position[POLYGON_MAX_CORNERS][3]; /* and where the file has them */
+    vec3 single[POLYGON_MAX_CORNERS];        /* work space of faces_add, with triangle */
     uint32_t triangle[POLYGON_MAX_CORNERS][3];
 };
 

@@ -28,6 +28,7 @@ static void add_mesh_facts(cJSON *facts, const struct scene *scene) {
     json_add_number(facts, "area_m2", mesh_area(mesh));
     json_add(facts, "lower_m", vec3_facts(lower));
     json_add(facts, "upper_m", vec3_facts(upper));
+    json_add(facts, "offset", cJSON_CreateDoubleArray(mesh->offset, 3));
 }
 
 static cJSON *exposure_facts(const struct scene *scene) {

@@ -10,6 +10,7 @@
 #include "common/rng.h"
 #include "server/ingest/gltf_file.h"
 #include "server/ingest/gltf_node.h"
+#include "server/ingest/positions.h"
 
 #define MAX_DEPTH 256 /* of nodes */
 #define TRIANGLES 4
@@ -21,7 +22,8 @@ struct gltf_reader {
     struct gltf_file file;
     struct mesh *mesh;
     struct faces *faces;
-    size_t vertex_capacity;
+    struct positions position;
+    size_t normal_capacity;
     bool lacks_normals; /* a primitive without normals */
     bool *visited;      /* [nodes.count]; owned */
     int64_t object_count;
@@ -66,19 +68,23 @@ static uint32_t append_vertex(struct gltf_reader *r, const struct primitive *p, 
     struct mesh *mesh = r->mesh;
     const struct affine *t = p->t;
     float value[3];
-    if (mesh->vertex_count == r->vertex_capacity) {
-        r->vertex_capacity = r->vertex_capacity ? r->vertex_capacity + r->vertex_capacity / 2 : 1024;
-        mesh->position = mem_realloc_array(mesh->position, r->vertex_capacity, sizeof *mesh->position);
-        mesh->normal = mem_realloc_array(mesh->normal, r->vertex_capacity, sizeof *mesh->normal);
+    if (mesh->vertex_count == r->normal_capacity) {
+        r->normal_capacity = r->normal_capacity ? r->normal_capacity + r->normal_capacity / 2 : 1024;
+        mesh->normal = mem_realloc_array(mesh->normal, r->normal_capacity, sizeof *mesh->normal);
     }
     gltf_read_vec3(&p->position, number, value);
-    vec3 at = apply(t->m[0], t->m[1], t->m[2], value), normal = {0.0f, 0.0f, 0.0f};
-    vec3 move = {(float)t->m[0][3], (float)t->m[1][3], (float)t->m[2][3]};
+    double at[3];
+    for (int i = 0; i < 3; i++) {
+        double turned = t->m[i][0] * (double)value[0] + t->m[i][1] * (double)value[1] + t->m[i][2] * (double)value[2];
+        r->position.single = fmax(r->position.single, fabs(turned));
+        at[i] = turned + t->m[i][3];
+    }
+    positions_append(&r->position, at);
+    vec3 normal = {0.0f, 0.0f, 0.0f};
     if (p->has_normal) {
         gltf_read_vec3(&p->normal, number, value);
         normal = apply(p->normal_matrix[0], p->normal_matrix[1], p->normal_matrix[2], value);
     }
-    mesh->position[mesh->vertex_count] = vec3_add(at, move);
     mesh->normal[mesh->vertex_count] = p->mirrored ? vec3_neg(normal) : normal;
     return (uint32_t)mesh->vertex_count++;
 }
@@ -114,7 +120,7 @@ static enum status add_triangles(struct gltf_reader *r, const struct primitive *
                 return error_set(r->err, STATUS_INPUT, "%s: %s refers to vertex %zu, but there are %zu", r->file.name,
                                  p->where, vertex, p->position.count);
             f->corner[k] = vertex_of(r, p, vertex);
-            f->position[k] = r->mesh->position[f->corner[k]];
+            memcpy(f->position[k], r->position.at[f->corner[k]], sizeof f->position[k]);
         }
         enum status status = faces_add(f, r->object_count - 1, r->err);
         if (status != STATUS_OK)
@@ -283,6 +289,8 @@ static enum status read_scene(struct gltf_reader *r) {
 
 static void finish(struct gltf_reader *r) {
     struct mesh *mesh = r->mesh;
+    r->faces->report.step_m = positions_step(r->position.single);
+    positions_settle(&r->position, mesh);
     if (r->lacks_normals) {
         mem_free(mesh->normal);
         mesh->normal = NULL;
@@ -310,6 +318,7 @@ enum status gltf_parse(const void *data, size_t size, const char *name, const ch
     if (report)
         *report = r.faces->report;
     gltf_file_release(&r.file);
+    positions_release(&r.position);
     mem_free(r.visited);
     mem_free(r.faces);
     return status;

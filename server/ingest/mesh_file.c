@@ -7,6 +7,7 @@
 #include "server/ingest/obj.h"
 #include "server/ingest/path.h"
 #include "server/ingest/ply.h"
+#include "server/ingest/positions.h"
 
 typedef enum status mesh_reader(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                                 struct faces_report *report, struct error *err);
@@ -36,6 +37,35 @@ enum status mesh_file_read(const char *path, const char *name, size_t triangle_l
                            struct faces_report *report, struct error *err) {
     mesh_reader *read = reader_of(name);
     return (read ? read : ply_read)(path, name, triangle_limit, mesh, report, err);
+}
+
+static void warn_of_place(const char *name, const struct mesh *mesh, const struct faces_report *report,
+                          struct findings *f) {
+    const double *at = mesh->offset;
+    if (at[0] != 0.0 || at[1] != 0.0 || at[2] != 0.0)
+        findings_warning(f,
+                         "%s lies far from its origin: mesh and cameras are moved by (%.0f, %.0f, %.0f) m, the offset "
+                         "of the outputs' coordinates",
+                         name, 0.0 - at[0], 0.0 - at[1], 0.0 - at[2]);
+    if (report->step_m > POSITIONS_STEP_M)
+        findings_warning(f,
+                         "%s has coordinates in single precision whose steps are up to %.2g m: export it in double "
+                         "precision or with an origin near the room",
+                         name, report->step_m);
+}
+
+void mesh_file_warn(const char *name, const struct mesh *mesh, const struct faces_report *report,
+                    const struct mesh_report *check, struct findings *f) {
+    warn_of_place(name, mesh, report, f);
+    if (report->small_count > 0)
+        findings_warning(f, "%s: %zu faces have fewer than three corners and were left out", name, report->small_count);
+    if (check->unused_count > 0)
+        findings_warning(f, "%s: %zu vertices that no face uses have impossible coordinates and were left out", name,
+                         check->unused_count);
+    if (check->degenerate_count > 0)
+        findings_warning(f, "%s: %zu triangles have no area and were left out", name, check->degenerate_count);
+    if (check->duplicate_count > 0)
+        findings_warning(f, "%s: %zu triangles repeat an earlier one and were left out", name, check->duplicate_count);
 }
 
 enum status mesh_file_has_faces(const char *path, const char *name, bool *has, struct error *err) {

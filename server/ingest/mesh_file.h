@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "server/ingest/faces.h"
+#include "server/ingest/findings.h"
 #include "server/scene/mesh.h"
 
 #define MESH_FILE_FORMATS "PLY, OBJ or glTF" /* for messages */
@@ -17,6 +18,10 @@ bool mesh_file_is_known(const char *name);
 /* As ply_read; unknown extensions are read as PLY. */
 enum status mesh_file_read(const char *path, const char *name, size_t triangle_limit, struct mesh *mesh,
                            struct faces_report *report, struct error *err);
+
+/* Warns of what was left out or changed: by the reader (report) and by mesh_check (check). */
+void mesh_file_warn(const char *name, const struct mesh *mesh, const struct faces_report *report,
+                    const struct mesh_report *check, struct findings *f);
 
 /* *has: false for a point cloud. Files that would have to be read whole to know, or are damaged, count as meshes, so
  * that reading them reports the error. Fails only on I/O errors. */

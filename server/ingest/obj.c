@@ -8,16 +8,12 @@
 #include "common/mem.h"
 #include "server/ingest/intern.h"
 #include "server/ingest/mapping.h"
+#include "server/ingest/positions.h"
 
 #define MAX_TOKEN 64 /* characters of a number or of a corner of a face */
 #define NONE UINT32_MAX
 /* Below this size there are fewer points than NONE, since each takes a line of 8 bytes, "v 0 0 0". */
 #define MAX_BYTES ((size_t)8 * (NONE - 1))
-
-struct points {
-    vec3 *at; /* owned */
-    size_t count, capacity;
-};
 
 enum label { LABEL_OBJECT, LABEL_GROUP, LABEL_MATERIAL, LABEL_COUNT };
 
@@ -26,7 +22,7 @@ struct obj_reader {
     const uint8_t *data;
     size_t size, at, line_end; /* `at` is within the line */
     size_t line, next_line;    /* numbers, from 1; a continued line counts as several */
-    struct points position, normal;
+    struct positions position, normal;
     struct faces *faces;
     bool lacks_normals;  /* a corner without normal */
     struct intern pairs; /* position and normal of each vertex of the mesh */
@@ -84,21 +80,17 @@ static size_t next_token(struct obj_reader *r, char token[MAX_TOKEN]) {
     return length;
 }
 
-static enum status read_vec3(struct obj_reader *r, struct points *points) {
+static enum status read_vec3(struct obj_reader *r, struct positions *points) {
     char token[MAX_TOKEN], *end;
-    float value[3];
+    double value[3];
     for (int i = 0; i < 3; i++) {
         if (next_token(r, token) == 0)
             return line_error(r, "three numbers are wanted");
-        value[i] = (float)strtod(token, &end);
+        value[i] = strtod(token, &end);
         if (*end != '\0' || strpbrk(token, "xX("))
             return line_error(r, "there is a value that is not a number");
     }
-    if (points->count == points->capacity) {
-        points->capacity = points->capacity ? 2 * points->capacity : 1024;
-        points->at = mem_realloc_array(points->at, points->capacity, sizeof *points->at);
-    }
-    points->at[points->count++] = (vec3){value[0], value[1], value[2]};
+    positions_append(points, value);
     return STATUS_OK;
 }
 
@@ -181,9 +173,19 @@ static enum status read_face(struct obj_reader *r) {
             return status;
         r->lacks_normals = r->lacks_normals || pair[1] == NONE;
         f->corner[f->corner_count] = vertex_of(r, pair);
-        f->position[f->corner_count++] = r->position.at[pair[0]];
+        memcpy(f->position[f->corner_count++], r->position.at[pair[0]], sizeof *f->position);
     }
     return faces_add(f, object_of_face(r), r->err);
+}
+
+static void read_comment(struct obj_reader *r) {
+    char text[128];
+    size_t length = r->line_end - r->at;
+    if (length >= sizeof text)
+        return;
+    memcpy(text, r->data + r->at, length);
+    text[length] = '\0';
+    positions_read_offset(text, r->position.offset);
 }
 
 static enum status read_line(struct obj_reader *r) {
@@ -195,7 +197,9 @@ static enum status read_line(struct obj_reader *r) {
         return read_vec3(r, &r->normal);
     if (strcmp(word, "f") == 0 || strcmp(word, "fo") == 0)
         return read_face(r);
-    if (strcmp(word, "o") == 0)
+    if (strcmp(word, "#") == 0)
+        read_comment(r);
+    else if (strcmp(word, "o") == 0)
         read_label(r, LABEL_OBJECT);
     else if (strcmp(word, "g") == 0)
         read_label(r, LABEL_GROUP);
@@ -207,15 +211,19 @@ static enum status read_line(struct obj_reader *r) {
 /* --- the mesh ------------------------------------------------------------------------------- */
 
 static void finish(struct obj_reader *r, struct mesh *mesh) {
-    mesh->vertex_count = r->pairs.count;
-    mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
+    struct positions vertices = {.capacity = r->pairs.count};
+    memcpy(vertices.offset, r->position.offset, sizeof vertices.offset);
+    vertices.at = mem_array(vertices.capacity, sizeof *vertices.at);
+    for (size_t v = 0; v < r->pairs.count; v++)
+        positions_append(&vertices, r->position.at[r->pair[v][0]]);
+    positions_release(&r->position);
     if (!r->lacks_normals)
-        mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
-    for (size_t v = 0; v < mesh->vertex_count; v++) {
-        mesh->position[v] = r->position.at[r->pair[v][0]];
-        if (mesh->normal)
-            mesh->normal[v] = r->normal.at[r->pair[v][1]];
+        mesh->normal = mem_array(r->pairs.count, sizeof *mesh->normal);
+    for (size_t v = 0; v < r->pairs.count && mesh->normal; v++) {
+        const double *n = r->normal.at[r->pair[v][1]];
+        mesh->normal[v] = vec3_make((float)n[0], (float)n[1], (float)n[2]);
     }
+    positions_settle(&vertices, mesh);
     if (r->objects.count < 2) {
         mem_free(mesh->object_id);
         mesh->object_id = NULL;
@@ -259,8 +267,8 @@ enum status obj_parse(const void *data, size_t size, const char *name, size_t tr
     intern_release(&r->labels);
     intern_release(&r->pairs);
     mem_free(r->pair);
-    mem_free(r->position.at);
-    mem_free(r->normal.at);
+    positions_release(&r->position);
+    positions_release(&r->normal);
     mem_free(r->faces);
     mem_free(r);
     return status;

@@ -28,6 +28,7 @@ struct outcome {
 struct loading {
     const char *dir;
     const struct transforms *transforms;
+    const double *offset; /* [3] of the mesh */
     uint64_t pixel_limit;
     char **path;                   /* [frame_count] of the picture, below dir; NULL where absent */
     struct photograph *photograph; /* [frame_count] */
@@ -191,7 +192,7 @@ static enum status check_size(const struct loading *l, const struct transforms_f
         status = error_set(err, STATUS_LIMIT, "the picture has %" PRIu64 " pixels, more than the limit of %" PRIu64,
                            pixels, l->pixel_limit);
     else
-        status = transforms_camera(frame, image.width, image.height, camera, err);
+        status = transforms_camera(frame, image.width, image.height, l->offset, camera, err);
     image_release(&image);
     return status;
 }
@@ -352,6 +353,7 @@ enum status photos_load(const char *dir, const char *name, const struct transfor
     struct loading l = {
         .dir = dir,
         .transforms = t,
+        .offset = scene->mesh.offset,
         .pixel_limit = pixel_limit,
         .path = mem_calloc(t->frame_count, sizeof *l.path),
         .photograph = mem_calloc(t->frame_count, sizeof *l.photograph),

@@ -14,6 +14,7 @@
 #include "common/mem.h"
 #include "server/ingest/mapping.h"
 #include "server/ingest/ply_header.h"
+#include "server/ingest/positions.h"
 
 #define MAX_TOKEN 64 /* characters of a number */
 
@@ -22,6 +23,7 @@ struct ply_reader {
     struct ply_header header;
     const char *element; /* element being read, for messages */
     uint64_t record;
+    struct positions position;
     struct error *err;
 };
 
@@ -192,24 +194,26 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
     static const char *const wanted[6] = {"x", "y", "z", "nx", "ny", "nz"};
     signed char target[PLY_MAX_PROPERTIES]; /* index of the wanted property among six; -1: none */
     memset(target, -1, sizeof target);
-    bool has_normal = true;
+    bool has_normal = true, is_single[6] = {false};
     for (int i = 0; i < 6; i++) {
         size_t k = find_property(r, e, wanted[i]);
         bool usable = k != SIZE_MAX && !r->header.property[e->first + k].is_list;
-        if (usable)
+        if (usable) {
             target[k] = (signed char)i;
-        else if (i < 3)
+            is_single[i] = r->header.format != PLY_ASCII && r->header.property[e->first + k].type == PLY_FLOAT32;
+        } else if (i < 3) {
             return error_set(r->err, STATUS_INPUT, "%s: its vertices have no property %s", r->cursor.name, wanted[i]);
-        else
+        } else {
             has_normal = false;
+        }
     }
     enum status status = begin_element(r, e);
     if (status != STATUS_OK)
         return status;
     if (e->count >= UINT32_MAX)
         return error_set(r->err, STATUS_LIMIT, "%s has %" PRIu64 " vertices, more than fit", r->cursor.name, e->count);
-    mesh->vertex_count = (size_t)e->count;
-    mesh->position = mem_array(mesh->vertex_count, sizeof *mesh->position);
+    mesh->vertex_count = r->position.capacity = (size_t)e->count;
+    r->position.at = mem_array(mesh->vertex_count, sizeof *r->position.at);
     if (has_normal)
         mesh->normal = mem_array(mesh->vertex_count, sizeof *mesh->normal);
     for (size_t i = 0; i < mesh->vertex_count; i++) {
@@ -222,7 +226,9 @@ static enum status read_vertices(struct ply_reader *r, const struct ply_element 
         if (status != STATUS_OK)
             return status;
         end_record(r);
-        mesh->position[i] = vec3_make((float)v[0], (float)v[1], (float)v[2]);
+        positions_append(&r->position, v);
+        for (int k = 0; k < 3; k++)
+            r->position.single = is_single[k] ? fmax(r->position.single, fabs(v[k])) : r->position.single;
         if (has_normal)
             mesh->normal[i] = vec3_make((float)v[3], (float)v[4], (float)v[5]);
     }
@@ -246,7 +252,7 @@ static enum status read_corners(struct ply_reader *r, const struct ply_property 
             return value_error(r, faces->mesh->vertex_count > 0 ? what : "refers to a vertex of none");
         }
         faces->corner[i] = (uint32_t)value;
-        faces->position[i] = faces->mesh->position[faces->corner[i]];
+        memcpy(faces->position[i], r->position.at[faces->corner[i]], sizeof faces->position[i]);
     }
     faces->corner_count = (size_t)count;
     return status;
@@ -351,10 +357,15 @@ enum status ply_parse(const void *data, size_t size, const char *name, size_t tr
     r->cursor = (struct ply_cursor){.name = name, .data = data, .size = size};
     r->err = err;
     enum status status = ply_header_parse(&r->cursor, &r->header, err);
+    memcpy(r->position.offset, r->header.offset, sizeof r->position.offset);
     if (status == STATUS_OK)
         status = read_body(r, faces);
-    if (status != STATUS_OK)
+    faces->report.step_m = positions_step(r->position.single);
+    if (status == STATUS_OK)
+        positions_settle(&r->position, mesh);
+    else
         mesh_release(mesh);
+    positions_release(&r->position);
     if (report)
         *report = faces->report;
     mem_free(faces);

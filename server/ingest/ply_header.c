@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "server/ingest/positions.h"
+
 #define MAX_HEADER ((size_t)1 << 20)
 
 static const struct {
@@ -132,12 +134,23 @@ static bool split_words(char *copy, char **word, size_t *words) {
     return true;
 }
 
+static void parse_comment(struct parser *p, const uint8_t *text, size_t length) {
+    char copy[128];
+    if (length >= sizeof copy)
+        return;
+    memcpy(copy, text, length);
+    copy[length] = '\0';
+    positions_read_offset(copy, p->header->offset);
+}
+
 static enum status parse_header_line(struct parser *p, const uint8_t *line, size_t length, bool *done) {
     static const char *const ignored[] = {"comment", "obj_info"};
     for (size_t i = 0; i < 2; i++) {
         size_t n = strlen(ignored[i]);
-        if (length >= n && memcmp(line, ignored[i], n) == 0 && (length == n || line[n] == ' ' || line[n] == '\t'))
-            return STATUS_OK;
+        if (length < n || memcmp(line, ignored[i], n) != 0 || (length > n && line[n] != ' ' && line[n] != '\t'))
+            continue;
+        parse_comment(p, line + n, length - n);
+        return STATUS_OK;
     }
     char copy[512], *word[6];
     size_t words;

@@ -32,6 +32,7 @@ enum ply_format { PLY_UNKNOWN, PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN };
 
 struct ply_header {
     enum ply_format format;
+    double offset[3]; /* of the comment "unbake offset X Y Z", see positions.h; 0 without it */
     size_t element_count;
     struct ply_element element[PLY_MAX_ELEMENTS];
     size_t property_count;

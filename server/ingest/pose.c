@@ -59,16 +59,14 @@ static const char *make_rotation(double m[3][3], double *scale) {
 }
 
 enum status pose_from_matrix(const double matrix[3][4], const char *what, enum pose_axes axes,
-                             struct rigid *world_from_camera, struct rigid *camera_from_world, bool *scaled,
-                             struct error *err) {
-    double m[3][3], t[3], scale = 1.0;
+                             struct exact_pose *world_from_camera, bool *scaled, struct error *err) {
+    double m[3][3], scale = 1.0;
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 4; j++)
             if (!isfinite(matrix[i][j]) || fabs(matrix[i][j]) > 1e9)
                 return error_set(err, STATUS_INPUT,
                                  "%s holds a number that is not finite or too large in row %d, column %d", what, i + 1,
                                  j + 1);
-        t[i] = matrix[i][3];
         for (int j = 0; j < 3; j++)
             m[i][j] = matrix[i][j];
     }
@@ -77,19 +75,27 @@ enum status pose_from_matrix(const double matrix[3][4], const char *what, enum p
         return error_set(err, STATUS_INPUT, "%s %s", what, fault);
     *scaled = fabs(scale - 1.0) > 1e-3;
     for (int i = 0; i < 3; i++) {
+        world_from_camera->translation[i] = matrix[i][3];
         for (int j = 0; j < 3; j++) {
             double sign = axes == POSE_RIGHT_UP_BACK && j > 0 ? -1.0 : 1.0;
-            world_from_camera->rotation[i][j] = (float)(sign * m[i][j]);
-            camera_from_world->rotation[j][i] = (float)(sign * m[i][j]);
+            world_from_camera->rotation[i][j] = sign * m[i][j];
         }
     }
-    world_from_camera->translation = vec3_make((float)t[0], (float)t[1], (float)t[2]);
-    /* in double: rigid_inverse would lose precision for a far origin */
-    double inverse[3];
-    for (int j = 0; j < 3; j++) {
-        double sign = axes == POSE_RIGHT_UP_BACK && j > 0 ? -1.0 : 1.0;
-        inverse[j] = -sign * (m[0][j] * t[0] + m[1][j] * t[1] + m[2][j] * t[2]);
-    }
-    camera_from_world->translation = vec3_make((float)inverse[0], (float)inverse[1], (float)inverse[2]);
     return STATUS_OK;
+}
+
+void pose_to_rigid(const struct exact_pose *pose, const double offset[3], struct rigid *forward, struct rigid *inverse) {
+    double t[3], back[3];
+    for (int i = 0; i < 3; i++)
+        t[i] = pose->translation[i] - offset[i];
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            forward->rotation[i][j] = (float)pose->rotation[i][j];
+            inverse->rotation[j][i] = (float)pose->rotation[i][j];
+        }
+        /* in double: rigid_inverse would lose precision for a far origin */
+        back[j] = -(pose->rotation[0][j] * t[0] + pose->rotation[1][j] * t[1] + pose->rotation[2][j] * t[2]);
+    }
+    forward->translation = vec3_make((float)t[0], (float)t[1], (float)t[2]);
+    inverse->translation = vec3_make((float)back[0], (float)back[1], (float)back[2]);
 }

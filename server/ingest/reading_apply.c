@@ -1,6 +1,8 @@
 /* reading_apply.c -- see reading_apply.h. */
 #include "server/ingest/reading_apply.h"
 
+#include <string.h>
+
 #include "common/mem.h"
 
 /* --- poses ---------------------------------------------------------------------------------- */
@@ -9,35 +11,46 @@ static bool is_opengl(enum matrix_axes axes) { return axes == AXES_OPENGL || axe
 static bool is_inverse(enum matrix_axes axes) { return axes == AXES_OPENCV_INVERSE || axes == AXES_OPENGL_INVERSE; }
 
 /* The pose of a camera whose y and z axes point the other way. */
-static struct rigid flip(const struct rigid *m) {
-    struct rigid out = *m;
+static void flip(struct exact_pose *m) {
     for (int i = 0; i < 3; i++)
         for (int j = 1; j < 3; j++)
-            out.rotation[i][j] = -m->rotation[i][j];
+            m->rotation[i][j] = -m->rotation[i][j];
+}
+
+static struct exact_pose inverse_of(const struct exact_pose *m) {
+    struct exact_pose out;
+    for (int i = 0; i < 3; i++) {
+        out.translation[i] = 0.0;
+        for (int j = 0; j < 3; j++) {
+            out.rotation[i][j] = m->rotation[j][i];
+            out.translation[i] -= m->rotation[j][i] * m->translation[j];
+        }
+    }
     return out;
 }
 
-struct rigid reading_reinterpret(const struct rigid *world_from_camera, enum matrix_axes told, enum matrix_axes meant) {
-    struct rigid m = *world_from_camera;
+struct exact_pose reading_reinterpret(const struct exact_pose *world_from_camera, enum matrix_axes told,
+                                      enum matrix_axes meant) {
+    struct exact_pose m = *world_from_camera;
     if (told == meant || meant == AXES_OF_FORMAT)
         return m;
     if (is_opengl(told))
-        m = flip(&m);
+        flip(&m);
     if (is_inverse(told) != is_inverse(meant)) /* the file's matrix, read the other way round */
-        m = rigid_inverse(&m);
-    return is_opengl(meant) ? flip(&m) : m;
+        m = inverse_of(&m);
+    if (is_opengl(meant))
+        flip(&m);
+    return m;
 }
 
 /* Gives photograph i the pose of frame i + shift. */
 static void shift_poses(struct transforms *t, int shift) {
     if (shift == 0)
         return;
-    struct rigid *from = mem_array(t->frame_count, sizeof *from), *to = mem_array(t->frame_count, sizeof *to);
+    struct exact_pose *pose = mem_array(t->frame_count, sizeof *pose);
     size_t kept = 0;
-    for (size_t i = 0; i < t->frame_count; i++) {
-        from[i] = t->frame[i].world_from_camera;
-        to[i] = t->frame[i].camera_from_world;
-    }
+    for (size_t i = 0; i < t->frame_count; i++)
+        pose[i] = t->frame[i].world_from_camera;
     for (size_t i = 0; i < t->frame_count; i++) {
         long other = (long)i + shift;
         struct transforms_frame *frame = &t->frame[i];
@@ -45,22 +58,18 @@ static void shift_poses(struct transforms *t, int shift) {
             transforms_frame_release(frame);
             continue;
         }
-        frame->world_from_camera = from[other];
-        frame->camera_from_world = to[other];
+        frame->world_from_camera = pose[other];
         t->frame[kept++] = *frame;
     }
     t->frame_count = kept;
-    mem_free(from);
-    mem_free(to);
+    mem_free(pose);
 }
 
 void reading_apply_frames(const struct reading *r, struct transforms *t) {
     for (size_t i = 0; i < t->frame_count; i++) {
         struct transforms_frame *frame = &t->frame[i];
-        if (r->axes != AXES_OF_FORMAT && r->axes != t->axes) {
+        if (r->axes != AXES_OF_FORMAT && r->axes != t->axes)
             frame->world_from_camera = reading_reinterpret(&frame->world_from_camera, t->axes, r->axes);
-            frame->camera_from_world = rigid_inverse(&frame->world_from_camera);
-        }
         if (r->ignores_exposures) {
             frame->exposure_source = EXPOSURE_UNKNOWN;
             frame->exposure = 0.0;
@@ -73,6 +82,10 @@ void reading_apply_frames(const struct reading *r, struct transforms *t) {
 
 void reading_apply_mesh(const struct reading *r, struct mesh *mesh) {
     float scale = (float)r->scale;
+    double offset[3];
+    for (int i = 0; i < 3; i++)
+        offset[i] = (double)r->mesh_axes.sign[i] * mesh->offset[r->mesh_axes.axis[i]] * r->scale + 0.0; /* not -0 */
+    memcpy(mesh->offset, offset, sizeof offset);
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         mesh->position[i] = vec3_scale(signed_axes_apply(&r->mesh_axes, mesh->position[i]), scale);
         if (mesh->normal)

@@ -11,7 +11,9 @@ void reading_apply_frames(const struct reading *reading, struct transforms *t);
 /* Axes and scale. */
 void reading_apply_mesh(const struct reading *reading, struct mesh *mesh);
 
-/* The camera-to-world motion, with our axes, of a pose that was read as `told` and means `meant`. */
-struct rigid reading_reinterpret(const struct rigid *world_from_camera, enum matrix_axes told, enum matrix_axes meant);
+/* The camera-to-world motion, with our axes, of a pose that was read as `told` and means `meant`; in the file's
+ * coordinates, since the inverse of a pose depends on the origin. */
+struct exact_pose reading_reinterpret(const struct exact_pose *world_from_camera, enum matrix_axes told,
+                                      enum matrix_axes meant);
 
 #endif

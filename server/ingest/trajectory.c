@@ -69,7 +69,7 @@ static void add_frame(struct transforms *t, double m[4][4], const struct lens *l
     if (!is_finite(m)) {
         (*lost_count)++;
     } else if (pose_from_matrix((const double(*)[4])m, "the matrix", POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
-                                &frame.camera_from_world, &scaled, &err) != STATUS_OK) {
+                                &scaled, &err) != STATUS_OK) {
         findings_problem(f, name, "%s: %s", place, err.message);
     } else {
         t->frame[t->frame_count++] = frame;

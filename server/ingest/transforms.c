@@ -9,7 +9,6 @@
 #include "common/image.h"
 #include "common/mem.h"
 #include "server/ingest/path.h"
-#include "server/ingest/pose.h"
 
 /* State of reading a file. */
 struct context {
@@ -167,7 +166,7 @@ static void read_lens(struct context *c, struct lens *lens) {
 }
 
 enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
-                              struct camera *camera, struct error *err) {
+                              const double offset[3], struct camera *camera, struct error *err) {
     const struct lens *lens = &frame->lens;
     double stated_width = isnan(lens->width) ? width : lens->width;
     double stated_height = isnan(lens->height) ? height : lens->height;
@@ -199,9 +198,8 @@ enum status transforms_camera(const struct transforms_frame *frame, uint32_t wid
         .fy = (float)fy,
         .cx = (float)cx,
         .cy = (float)cy,
-        .world_from_camera = frame->world_from_camera,
-        .camera_from_world = frame->camera_from_world,
     };
+    pose_to_rigid(&frame->world_from_camera, offset, &camera->world_from_camera, &camera->camera_from_world);
     for (int i = 0; i < 6; i++)
         camera->k[i] = (float)lens->k[i];
     for (int i = 0; i < 2; i++)
@@ -238,7 +236,7 @@ static void read_pose(struct context *c, struct transforms_frame *frame) {
     struct error err;
     bool scaled = false;
     if (pose_from_matrix((const double(*)[4])m, "transform_matrix", POSE_RIGHT_UP_BACK, &frame->world_from_camera,
-                         &frame->camera_from_world, &scaled, &err) != STATUS_OK)
+                         &scaled, &err) != STATUS_OK)
         problem(c, "%s", err.message);
     c->scaled_count += scaled;
 }

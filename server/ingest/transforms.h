@@ -14,6 +14,7 @@
 #include "common/json.h"
 #include "common/reading.h"
 #include "server/ingest/findings.h"
+#include "server/ingest/pose.h"
 #include "server/scene/camera.h"
 
 #define TRANSFORMS_MAX_FRAMES 20000
@@ -40,7 +41,7 @@ struct transforms_frame {
     char *file, *mask; /* clean paths (path_clean); mask may be NULL; owned */
     bool is_test;
     struct lens lens;
-    struct rigid world_from_camera, camera_from_world;
+    struct exact_pose world_from_camera;
     enum exposure_source exposure_source;
     double exposure; /* 0 if unknown */
 };
@@ -60,10 +61,10 @@ void transforms_read(const cJSON *root, const char *name, struct transforms *t, 
 void transforms_release(struct transforms *t);
 void transforms_frame_release(struct transforms_frame *frame);
 
-/* The camera of a frame whose picture is width x height pixels. STATUS_INPUT when the file states another size or an
- * invalid lens. */
+/* The camera of a frame whose picture is width x height pixels, in coordinates whose origin lies at `offset` in the
+ * file's (that of struct mesh). STATUS_INPUT when the file states another size or an invalid lens. */
 enum status transforms_camera(const struct transforms_frame *frame, uint32_t width, uint32_t height,
-                              struct camera *camera, struct error *err);
+                              const double offset[3], struct camera *camera, struct error *err);
 
 /* Pixel value per radiance from the camera's settings: seconds x ISO / 100 / f-number^2. Missing (0) factors except
  * the time count as 1. */

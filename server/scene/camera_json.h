@@ -5,7 +5,8 @@
 #include "common/json.h"
 #include "server/scene/camera.h"
 
-/* Four rows of four: camera to world, x right, y up, looking along -z, metres; the caller's. */
-cJSON *camera_transform_matrix(const struct camera *camera);
+/* Four rows of four: camera to world, x right, y up, looking along -z, metres, in the coordinates of the input, whose
+ * origin lies at -offset (struct mesh); the caller's. */
+cJSON *camera_transform_matrix(const struct camera *camera, const double offset[3]);
 
 #endif

@@ -89,19 +89,6 @@ static enum status check_input(const struct mesh *mesh, const char *name, struct
                          "mesh %s: %zu triangles and %zu vertices, at most %zu "
                          "and %u can be used",
                          name, mesh->triangle_count, mesh->vertex_count, MESH_MAX_TRIANGLES, UINT32_MAX - 1);
-    for (size_t v = 0; v < mesh->vertex_count; v++) {
-        vec3 p = mesh->position[v];
-        if (!vec3_is_finite(p))
-            return error_set(err, STATUS_INPUT,
-                             "mesh %s: vertex %zu: a coordinate is not a finite "
-                             "number",
-                             name, v);
-        if (fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))) > MESH_MAX_COORDINATE_M)
-            return error_set(err, STATUS_INPUT,
-                             "mesh %s: vertex %zu at (%g, %g, %g) is farther than "
-                             "%g m from the origin",
-                             name, v, (double)p.x, (double)p.y, (double)p.z, (double)MESH_MAX_COORDINATE_M);
-    }
     for (size_t t = 0; t < mesh->triangle_count; t++)
         for (int c = 0; c < 3; c++)
             if (mesh->index[t][c] >= mesh->vertex_count)
@@ -109,6 +96,59 @@ static enum status check_input(const struct mesh *mesh, const char *name, struct
                                  "mesh %s: face %u: vertex index %u, but there "
                                  "are %zu vertices",
                                  name, mesh->face[t], mesh->index[t][c], mesh->vertex_count);
+    return STATUS_OK;
+}
+
+static bool is_usable(vec3 p) {
+    return vec3_is_finite(p) && fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))) <= MESH_MAX_COORDINATE_M;
+}
+
+static enum status unusable_vertex(const struct mesh *mesh, const char *name, size_t vertex, struct error *err) {
+    vec3 p = mesh->position[vertex];
+    if (!vec3_is_finite(p))
+        return error_set(err, STATUS_INPUT, "mesh %s: vertex %zu: a coordinate is not a finite number", name, vertex);
+    return error_set(err, STATUS_INPUT, "mesh %s: vertex %zu at (%g, %g, %g) is farther than %g m from the origin",
+                     name, vertex, mesh->offset[0] + (double)p.x, mesh->offset[1] + (double)p.y,
+                     mesh->offset[2] + (double)p.z, (double)MESH_MAX_COORDINATE_M);
+}
+
+/* Drops the unusable vertices, none of which a triangle may use, and renumbers the others. */
+static void drop_vertices(struct mesh *mesh) {
+    uint32_t *number = mem_array(mesh->vertex_count, sizeof *number);
+    size_t kept = 0;
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        number[v] = (uint32_t)kept;
+        if (!is_usable(mesh->position[v]))
+            continue;
+        mesh->position[kept] = mesh->position[v];
+        if (mesh->normal)
+            mesh->normal[kept] = mesh->normal[v];
+        kept++;
+    }
+    for (size_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++)
+            mesh->index[t][c] = number[mesh->index[t][c]];
+    mesh->vertex_count = kept;
+    mem_free(number);
+}
+
+/* Files of some programs have vertices without coordinates that no face uses. */
+static enum status check_vertices(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err) {
+    size_t unusable = 0, worst = SIZE_MAX;
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        unusable += !is_usable(mesh->position[v]);
+    if (unusable == 0)
+        return STATUS_OK;
+    for (size_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++) {
+            uint32_t v = mesh->index[t][c];
+            if (v < worst && !is_usable(mesh->position[v]))
+                worst = v;
+        }
+    if (worst != SIZE_MAX)
+        return unusable_vertex(mesh, name, worst, err);
+    drop_vertices(mesh);
+    report->unused_count = unusable;
     return STATUS_OK;
 }
 
@@ -211,6 +251,8 @@ static void repair_normals(struct mesh *mesh) {
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err) {
     struct mesh_report found = {0};
     enum status status = check_input(mesh, name, err);
+    if (status == STATUS_OK)
+        status = check_vertices(mesh, name, &found, err);
     if (status != STATUS_OK)
         return status;
     drop_unfit(mesh, &found);

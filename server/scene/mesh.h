@@ -21,17 +21,21 @@ struct mesh {
                               * ascending; owned */
     int64_t *object_id;   /* [triangle_count] the input's object_id, or NULL; owned */
     size_t face_count;    /* faces of the input, the dropped ones included */
+    double offset[3]; /* metres, whole; a position plus this is where the input has it. 0 unless the input lies so far
+                       * from its origin that single precision would blur it (server/ingest/positions.h) */
 };
 
 struct mesh_report {
     size_t degenerate_count; /* triangles without area, dropped */
+    size_t unused_count;     /* vertices of no triangle, not finite or too far away, dropped */
     size_t duplicate_count;  /* triangles on the same three positions as an earlier one, dropped */
 };
 
 void mesh_release(struct mesh *mesh);
 
-/* Checks indices and coordinates (STATUS_INPUT names the first bad face or vertex by its number, from 0), then drops
- * degenerate and duplicate triangles in place, keeping the order. Of two coincident triangles a ray hits either, so
+/* Checks indices and the coordinates of vertices in use (STATUS_INPUT names the first bad face or vertex by its number,
+ * from 0), then drops bad vertices that no triangle uses and degenerate and duplicate triangles, in place, keeping the
+ * order. Of two coincident triangles a ray hits either, so
  * only the first can be measured. Normals are normalised; zero or non-finite ones are replaced by the mean of the
  * adjacent faces'. Fails when no triangle is left. `name` is for messages; report may be NULL. */
 enum status mesh_check(struct mesh *mesh, const char *name, struct mesh_report *report, struct error *err);

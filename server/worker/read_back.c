@@ -14,17 +14,29 @@
 /* What a mesh has whatever the order of its triangles and vertices, and however it is turned about the origin. */
 struct sums {
     size_t triangle_count;
-    double area;    /* m^2 */
-    double squares; /* of the corners' distances from the origin, m^2 */
+    double area;       /* m^2 */
+    double squares;    /* mean of the corners' squared distances from their centre, m^2 */
+    double distance_m; /* of that centre from the input's origin */
 };
 
 static struct sums sums_of(const struct mesh *mesh) {
     struct sums sums = {.triangle_count = mesh->triangle_count, .area = mesh_area(mesh)};
+    double centre[3] = {0.0, 0.0, 0.0}, squares = 0.0, count = 3.0 * (double)mesh->triangle_count;
     for (size_t t = 0; t < mesh->triangle_count; t++)
         for (int c = 0; c < 3; c++) {
             vec3 p = mesh->position[mesh->index[t][c]];
-            sums.squares += (double)p.x * (double)p.x + (double)p.y * (double)p.y + (double)p.z * (double)p.z;
+            squares += (double)p.x * (double)p.x + (double)p.y * (double)p.y + (double)p.z * (double)p.z;
+            centre[0] += (double)p.x / count;
+            centre[1] += (double)p.y / count;
+            centre[2] += (double)p.z / count;
         }
+    double far[3];
+    sums.squares = squares / count;
+    for (int i = 0; i < 3; i++) {
+        sums.squares -= centre[i] * centre[i];
+        far[i] = mesh->offset[i] + centre[i];
+    }
+    sums.distance_m = sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2]);
     return sums;
 }
 
@@ -37,7 +49,9 @@ static enum status compare(const char *name, const struct mesh *found_mesh, cons
     if (found.triangle_count != wanted.triangle_count)
         return error_set(err, STATUS_CORRUPT, "%s: read back, it has %zu triangles, not %zu", name,
                          found.triangle_count, wanted.triangle_count);
-    if (!near(found.area, wanted.area) || !near(found.squares, wanted.squares))
+    double apart = fabs(found.distance_m - wanted.distance_m);
+    bool is_moved = !(apart <= 1e-5 * sqrt(wanted.squares) + 1e-6 * fmin(wanted.distance_m, 1e3));
+    if (!near(found.area, wanted.area) || !near(found.squares, wanted.squares) || is_moved)
         return error_set(err, STATUS_CORRUPT, "%s: read back, its %zu triangles lie elsewhere: %g m2 in place of %g",
                          name, found.triangle_count, found.area, wanted.area);
     return STATUS_OK;

@@ -25,7 +25,7 @@ static void check_frame(const struct transforms_frame *frame) {
     struct error err = {.message = ""};
     const char *file = frame->file;
     MUST(file[0] != '\0' && file[0] != '/' && strncmp(file, "../", 3) != 0 && !strstr(file, "/../"));
-    if (transforms_camera(frame, 64, 48, &camera, &err) != STATUS_OK) {
+    if (transforms_camera(frame, 64, 48, (double[3]){0.0}, &camera, &err) != STATUS_OK) {
         MUST(err.message[0] != '\0');
         return;
     }

@@ -61,9 +61,11 @@ static void check_frames(const struct transforms *t) {
     CHECK(a->lens.model == CAMERA_OPENCV && a->lens.fl_x == 500 && a->lens.fl_y == 510 && a->lens.cy == 241);
     CHECK(a->lens.k[0] == -0.1 && a->lens.k[1] == 0.02 && a->lens.p[0] == 0.001 && a->lens.p[1] == -0.002);
     CHECK(c->lens.model == CAMERA_OPENCV_FISHEYE && c->lens.fl_y == 50 && c->lens.k[0] == 0.01 && c->lens.width == 64);
-    CHECK_NEAR(c->world_from_camera.translation.x, 1, 0); /* -R^T t */
+    CHECK_NEAR(c->world_from_camera.translation[0], 1, 0); /* -R^T t */
     /* x_camera = R x_world + t for the first of the file */
-    vec3 p = rigid_point(&b->camera_from_world, (vec3){0.5f, 4.0f, 7.0f});
+    struct rigid forward, inverse;
+    pose_to_rigid(&b->world_from_camera, (double[3]){0.0}, &forward, &inverse);
+    vec3 p = rigid_point(&inverse, (vec3){0.5f, 4.0f, 7.0f});
     CHECK_NEAR(p.x, 1.5, 1e-6);
     CHECK_NEAR(p.y, 2.0 + 7.0, 1e-5);
     CHECK_NEAR(p.z, 3.0 - 4.0, 1e-5);

@@ -159,6 +159,7 @@ static void test_report(const char *dir, const struct export_input *in) {
     test_means(cJSON_GetObjectItem(report, "segments"), in);
     CHECK(cJSON_GetArraySize(cJSON_GetObjectItem(report, "files")) == 19);
     CHECK(cJSON_GetNumberValue(cJSON_GetObjectItem(report, "seed")) == 1.0);
+    CHECK(cJSON_GetNumberValue(cJSON_GetArrayItem(cJSON_GetObjectItem(report, "offset"), 1)) == in->mesh->offset[1]);
     cJSON_Delete(report);
     mem_free(path);
     path = file_join(dir, "report.html");
@@ -183,6 +184,7 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
     enum status status = ply_read(path, "scene.ply", 1 << 20, &mesh, NULL, &err);
     CHECK_THAT(status == STATUS_OK, "%s", err.message);
     CHECK(mesh.triangle_count == wanted->triangle_count && mesh.normal != NULL);
+    CHECK(memcmp(mesh.offset, wanted->offset, sizeof mesh.offset) == 0);
     for (size_t t = 0; t < mesh.triangle_count; t++)
         for (int k = 0; k < 3; k++)
             CHECK(memcmp(&mesh.position[mesh.index[t][k]], &wanted->position[wanted->index[t][k]], sizeof(vec3)) == 0);
@@ -191,7 +193,7 @@ static void test_mesh(const char *dir, const struct mesh *wanted) {
 }
 
 /* views.json reads back as the camera that it was made from. */
-static void test_views(const char *dir, const struct camera *wanted) {
+static void test_views(const char *dir, const double offset[3], const struct camera *wanted) {
     struct error err;
     struct findings findings = {.problems = cJSON_CreateArray()};
     struct transforms transforms;
@@ -201,7 +203,7 @@ static void test_views(const char *dir, const struct camera *wanted) {
     CHECK(json_read(path, 1 << 20, &tree, &err) == STATUS_OK);
     transforms_read(tree, "views.json", &transforms, &findings);
     CHECK(findings.problem_count == 0 && transforms.frame_count == 1);
-    CHECK(transforms_camera(&transforms.frame[0], wanted->width, wanted->height, &camera, &err) == STATUS_OK);
+    CHECK(transforms_camera(&transforms.frame[0], wanted->width, wanted->height, offset, &camera, &err) == STATUS_OK);
     CHECK_STRING(transforms.frame[0].file, "images/003.exr");
     CHECK(camera.model == wanted->model && camera.fx == wanted->fx && camera.fy == wanted->fy);
     CHECK(camera.cx == wanted->cx && camera.cy == wanted->cy);
@@ -323,6 +325,7 @@ int main(void) {
     test_margin();
     test_comparison();
     CHECK(room_init(&room, 256, 15.0f, 15.0f, pool, &err) == STATUS_OK);
+    memcpy(room.mesh.offset, (double[3]){500000.0, -4100000.0, 0.0}, sizeof room.mesh.offset);
     size_t texels = (size_t)room.atlas.width * room.atlas.height;
     float *count = mem_calloc(texels, sizeof *count), *spread = mem_calloc(texels, sizeof *spread);
     for (size_t i = 0; i < texels; i++)
@@ -378,7 +381,7 @@ int main(void) {
     CHECK_STRING(heard.last, "report.html");
     test_textures(dir, &in);
     test_mesh(dir, &room.mesh);
-    test_views(dir, &camera);
+    test_views(dir, room.mesh.offset, &camera);
     test_report(dir, &in);
     test_environment(dir, &in, &heard);
     test_left_out(dir, pool);

@@ -17,6 +17,7 @@
 #include "server/export/pictures.h"
 #include "server/export/sink.h"
 #include "server/ingest/mesh_file.h"
+#include "server/worker/read_back.h"
 #include "tests/check.h"
 
 struct glb {
@@ -284,6 +285,43 @@ static void test_round(const char *dir, const char *name, const struct export_in
     mem_free(path);
 }
 
+/* A mesh far from the origin of its input comes back there, turned upright by glTF alone. */
+static void test_far(const char *dir, struct export_input *in, struct mesh *room, const struct parts *parts) {
+    static const double far[3] = {600000.0, -4100000.0, 105.0};
+    static const struct {
+        const char *name;
+        vec3 up;
+        int axis[3], sign[3]; /* of the room's axes in the file */
+    } table[] = {
+        {"scene.obj", {0, 1, 0}, {0, 1, 2}, {1, 1, 1}},    {"scene.glb", {0, 1, 0}, {0, 1, 2}, {1, 1, 1}},
+        {"scene.glb", {0, -1, 0}, {0, 1, 2}, {1, -1, -1}}, {"scene.glb", {0, 0, 1}, {0, 2, 1}, {1, 1, -1}},
+        {"scene.glb", {0, 0, -1}, {0, 2, 1}, {1, -1, 1}},  {"scene.glb", {1, 0, 0}, {1, 0, 2}, {-1, 1, 1}},
+        {"scene.glb", {-1, 0, 0}, {1, 0, 2}, {1, -1, 1}},
+    };
+    memcpy(room->offset, far, sizeof far);
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        struct error err = {.message = ""};
+        struct mesh mesh;
+        char *path = file_join(dir, table[i].name);
+        in->up = table[i].up;
+        for (size_t f = 0; f < FORMATS_COUNT; f++)
+            CHECK(strcmp(formats[f].name, table[i].name) != 0 || formats[f].write(dir, in, parts, &err) == STATUS_OK);
+        CHECK_THAT(mesh_file_read(path, table[i].name, 1 << 20, &mesh, NULL, &err) == STATUS_OK, "%s", err.message);
+        vec3 a = mesh.position[mesh.index[0][0]], b = room->position[room->index[parts->order[0]][0]];
+        const float found[3] = {a.x, a.y, a.z}, own[3] = {b.x, b.y, b.z};
+        for (int k = 0; k < 3; k++)
+            CHECK_NEAR(mesh.offset[k] + (double)found[k],
+                       table[i].sign[k] * (far[table[i].axis[k]] + (double)own[table[i].axis[k]]), 1e-5);
+        CHECK_THAT(read_back(path, table[i].name, room, &err) == STATUS_OK, "case %zu: %s", i, err.message);
+        room->offset[0] += 1.0; /* elsewhere */
+        CHECK(read_back(path, table[i].name, room, &err) == STATUS_CORRUPT);
+        room->offset[0] -= 1.0;
+        mesh_release(&mesh);
+        mem_free(path);
+    }
+    memset(room->offset, 0, sizeof room->offset);
+}
+
 static void test_same_bytes(const char *dir, const struct export_input *in, const struct parts *parts) {
     struct error err;
     struct buf once, twice;
@@ -452,6 +490,8 @@ int main(void) {
     CHECK(glb_write(glb, &in, &parts, png, "/nowhere", &err) == STATUS_OK);
     test_round(dir, "scene.obj", &in, &parts);
     test_round(dir, "scene.glb", &in, &parts);
+    test_far(dir, &in, &room.mesh, &parts);
+    in.up = (vec3){0.0f, 1.0f, 0.0f};
     test_same_bytes(dir, &in, &parts);
     test_picture(dir, &room, &in, &parts);
     test_failures(dir, &in, &parts);

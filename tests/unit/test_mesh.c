@@ -32,7 +32,7 @@ static void refuses(struct mesh mesh, const char *wanted) {
 }
 
 static void test_refused(void) {
-    static const uint32_t good[1][3] = {{0, 1, 2}}, flat[1][3] = {{0, 4, 1}};
+    static const uint32_t good[1][3] = {{0, 1, 3}}, flat[1][3] = {{0, 4, 1}};
     static const uint32_t far_index[2][3] = {{0, 1, 2}, {0, 7, 2}};
     vec3 bad[5];
     refuses(make(square, 5, good, 0), "no faces");

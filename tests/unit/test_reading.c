@@ -75,24 +75,25 @@ static void test_assignments(void) {
 /* A camera at (1, 2, 3) that looks along +x with z up, as each convention writes it. */
 static void test_poses(void) {
     /* Columns: right, down, forward. */
-    const struct rigid truth = {.rotation = {{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}}, .translation = {1, 2, 3}};
+    const struct exact_pose truth = {.rotation = {{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}}, .translation = {1, 2, 3}};
     const enum matrix_axes all[] = {AXES_OPENCV, AXES_OPENGL, AXES_OPENCV_INVERSE, AXES_OPENGL_INVERSE};
     for (size_t told = 0; told < 4; told++)
         for (size_t meant = 0; meant < 4; meant++) {
             /* Read wrongly and then rightly is the truth again. */
-            struct rigid wrong = reading_reinterpret(&truth, all[meant], all[told]);
-            struct rigid right = reading_reinterpret(&wrong, all[told], all[meant]);
+            struct exact_pose wrong = reading_reinterpret(&truth, all[meant], all[told]);
+            struct exact_pose right = reading_reinterpret(&wrong, all[told], all[meant]);
             for (int i = 0; i < 3; i++)
                 for (int j = 0; j < 3; j++)
-                    CHECK(fabsf(right.rotation[i][j] - truth.rotation[i][j]) < 1e-6f);
-            CHECK(vec3_length(vec3_sub(right.translation, truth.translation)) < 1e-5f);
+                    CHECK_NEAR(right.rotation[i][j], truth.rotation[i][j], 1e-12);
+            for (int i = 0; i < 3; i++)
+                CHECK_NEAR(right.translation[i], truth.translation[i], 1e-12);
         }
     /* What is an OpenCV camera-to-world matrix, read as OpenGL's, looks back and is upside down. */
-    struct rigid backwards = reading_reinterpret(&truth, AXES_OPENCV, AXES_OPENGL);
-    CHECK(backwards.rotation[0][2] == -1.0f && backwards.rotation[2][1] == 1.0f && backwards.translation.x == 1.0f);
+    struct exact_pose backwards = reading_reinterpret(&truth, AXES_OPENCV, AXES_OPENGL);
+    CHECK(backwards.rotation[0][2] == -1.0 && backwards.rotation[2][1] == 1.0 && backwards.translation[0] == 1.0);
     /* Read as world-to-camera, the origin is elsewhere: -R^T t. */
-    struct rigid inverse = reading_reinterpret(&truth, AXES_OPENCV, AXES_OPENCV_INVERSE);
-    CHECK(inverse.translation.x == 2.0f && inverse.translation.y == 3.0f && inverse.translation.z == -1.0f);
+    struct exact_pose inverse = reading_reinterpret(&truth, AXES_OPENCV, AXES_OPENCV_INVERSE);
+    CHECK(inverse.translation[0] == 2.0 && inverse.translation[1] == 3.0 && inverse.translation[2] == -1.0);
 }
 
 static void test_mesh(void) {
@@ -114,9 +115,11 @@ static void test_mesh(void) {
     }
     vec3 position[3] = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}};
     uint32_t index[1][3] = {{0, 1, 2}};
-    struct mesh mesh = {.vertex_count = 3, .position = position, .triangle_count = 1, .index = index};
+    struct mesh mesh = {
+        .offset = {10, 20, 30}, .vertex_count = 3, .position = position, .triangle_count = 1, .index = index};
     reading_apply_mesh(&reading, &mesh);
     CHECK(position[2].y == 0.0f && position[2].z == 1.0f && index[0][1] == 1);
+    CHECK(mesh.offset[0] == 5.0 && mesh.offset[1] == -15.0 && mesh.offset[2] == 10.0);
     reading.mesh_axes = (struct signed_axes){.axis = {0, 1, 2}, .sign = {1, 1, -1}};
     reading_apply_mesh(&reading, &mesh);
     CHECK(position[2].z == -0.5f && index[0][1] == 2); /* its front is still its front */
@@ -128,14 +131,14 @@ static void test_shift(void) {
     struct transforms t = {.frame_count = 3, .frame = mem_calloc(3, sizeof *t.frame)};
     for (int i = 0; i < 3; i++) {
         t.frame[i].file = mem_printf("%d.png", i);
-        t.frame[i].world_from_camera.translation.x = (float)i;
+        t.frame[i].world_from_camera.translation[0] = i;
     }
     struct reading reading = reading_default();
     reading.shift = 1;
     reading_apply_frames(&reading, &t);
     CHECK(t.frame_count == 2);
     CHECK_STRING(t.frame[1].file, "1.png");
-    CHECK(t.frame[1].world_from_camera.translation.x == 2.0f);
+    CHECK(t.frame[1].world_from_camera.translation[0] == 2.0);
     transforms_release(&t);
 }
 
