@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/buf.h"
 #include "common/mem.h"
 #include "common/utf8.h"
 
@@ -42,8 +43,9 @@ struct reading reading_copy(const struct reading *reading) {
 
 static enum status parse_path(const cJSON *value, char **path, struct error *err) {
     const char *text = cJSON_GetStringValue(value);
-    if (!text || !*text || !utf8_is_name(text))
-        return error_set(err, STATUS_INPUT, "%s must be the name of a file in the bundle", value->string);
+    if (!text || !*text || strlen(text) > READING_MAX_PATH || !utf8_is_name(text))
+        return error_set(err, STATUS_INPUT, "%s must be the name of a file in the bundle, of at most %d bytes",
+                         value->string, READING_MAX_PATH);
     *path = mem_strdup(text);
     return STATUS_OK;
 }
@@ -175,6 +177,36 @@ cJSON *reading_json(const struct reading *r) {
     if (r->ignores_exposures)
         json_add_string(json, "exposures", "ignored");
     return json;
+}
+
+/* A word for a shell, in quotes where it needs them. */
+static void put_word(struct buf *out, const char *text) {
+    static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+./:,";
+    if (text[strspn(text, plain)] == '\0') {
+        buf_puts(out, text);
+        return;
+    }
+    buf_puts(out, "'");
+    for (; *text; text++) {
+        if (*text == '\'')
+            buf_puts(out, "'\\''");
+        else
+            buf_append(out, text, 1);
+    }
+    buf_puts(out, "'");
+}
+
+char *reading_words(const cJSON *object) {
+    struct buf words;
+    const cJSON *member;
+    buf_init(&words, 65536);
+    cJSON_ArrayForEach(member, object) {
+        char *value = cJSON_IsString(member) ? mem_strdup(member->valuestring) : json_text(member);
+        buf_printf(&words, "%s%s=", words.length ? " " : "", member->string);
+        put_word(&words, value);
+        mem_free(value);
+    }
+    return buf_detach(&words);
 }
 
 /* --- axes ---------------------------------------------------------------------------------- */

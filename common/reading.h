@@ -24,6 +24,7 @@
 #include "common/vec.h"
 
 #define READING_MAX_SHIFT 10
+#define READING_MAX_PATH 1000 /* bytes */
 
 /* What a file's pose matrices mean: camera-to-world, or world-to-camera (inverse); with camera axes x right, y down,
  * z forward (OpenCV, COLMAP) or x right, y up, z back (OpenGL, nerfstudio). */
@@ -56,6 +57,9 @@ enum status reading_parse(const cJSON *json, struct reading *reading, struct err
 enum status reading_parse_assignment(const char *text, cJSON *object, struct error *err);
 /* Only the members that differ from the default; the caller's. */
 cJSON *reading_json(const struct reading *reading);
+/* The object as the words of a command line that reading_parse_assignment takes, quoted for a shell:
+ * mesh_axes='x -z y' scale=0.001. The caller's (mem_free). */
+char *reading_words(const cJSON *object);
 
 vec3 signed_axes_apply(const struct signed_axes *axes, vec3 v);
 bool signed_axes_is_mirror(const struct signed_axes *axes);

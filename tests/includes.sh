@@ -76,7 +76,7 @@ own 'webp/' common/webp.c
 own 'seccomp\.h' server/worker/confine_calls.c
 
 # Paths in the data folder are made in one place. (Of the engine's files only worker knows the names.)
-paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
+paths=$(grep -nE 'file_join\([^"]*, "|"(%s/)?(scenes|jobs|uploads|trash)/[%a-zX]|%s/(out|files|archive|previews)/|"(checkpoint\.db|worker\.log|state\.db|admin\.sock)' \
     server/*.c server/{http,net,uploads,data,store,job,worker,admin}/*.[ch] | grep -vE '^server/data/layout\.|/manual\.c')
 [ -z "$paths" ] || { printf 'only server/data/layout.c makes paths in the data folder:\n%s\n' "$paths"; bad=1; }
 

@@ -60,6 +60,12 @@ char *layout_archive(const char *work_dir) { return in(work_dir, "archive"); }
 
 char *layout_files(const char *work_dir) { return in(work_dir, "files"); }
 
+char *layout_previews(const char *work_dir) { return in(work_dir, "previews"); }
+
+char *layout_preview(const char *work_dir, const char *name) {
+    return in_folder(work_dir, "previews", mem_strdup(name));
+}
+
 char *layout_checkpoint(const char *work_dir) { return in(work_dir, "checkpoint.db"); }
 
 char *layout_checkpoint_journal(const char *work_dir) { return in(work_dir, "checkpoint.db-journal"); }

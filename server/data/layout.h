@@ -4,7 +4,8 @@
  *   DATA/reserve         room that is given up on a full disk (store/reserve.c)
  *   DATA/lock            locked by the daemon (folder.h)
  *   DATA/admin.sock      on which the daemon answers its administrator (server/admin)
- *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; job.json, worker.log: of its check
+ *   DATA/scenes/ID/      archive: the bundle as it was uploaded; files/: unpacked; previews/NAME: pictures
+ *                        that its check drew; job.json, worker.log: of its check
  *   DATA/jobs/N/         job.json: the worker's order; worker.log; checkpoint.db; out/NAME: outputs
  *   DATA/uploads/ID      an upload that is not a scene yet
  *   DATA/trash/          what is being removed (trash.h), and files that no restart needs
@@ -40,6 +41,8 @@ char *layout_order(const char *work_dir);
 char *layout_log(const char *work_dir);
 char *layout_archive(const char *work_dir);
 char *layout_files(const char *work_dir);
+char *layout_previews(const char *work_dir);
+char *layout_preview(const char *work_dir, const char *name);
 char *layout_checkpoint(const char *work_dir);
 char *layout_checkpoint_journal(const char *work_dir);
 char *layout_out(const char *work_dir);

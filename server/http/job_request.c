@@ -14,6 +14,7 @@
 #include "server/http/body.h"
 #include "server/http/retention.h"
 #include "server/http/problem.h"
+#include "server/job/fit.h"
 
 #define PRIORITY_MAX 100
 #define LABELS_MAX 32
@@ -161,4 +162,15 @@ void job_request_settings(const struct job_request *w, struct settings *settings
         }
     }
     cJSON_Delete(problems);
+}
+
+struct response *job_request_fit(const struct request *r, const struct scene_row *scene,
+                                 const struct settings *settings) {
+    struct error err;
+    cJSON *remedy;
+    if (settings_is(settings, "fit", "ignore") || fit_check(scene, &remedy, &err) == STATUS_OK)
+        return NULL;
+    cJSON *members = cJSON_CreateObject();
+    json_add(members, "remedy", remedy ? remedy : cJSON_CreateNull());
+    return problem_full(r, problem_status(err.status), err.message, err.hint, members);
 }

@@ -33,4 +33,9 @@ void job_request_release(struct job_request *w);
  * "settings." before them. */
 void job_request_settings(const struct job_request *w, struct settings *settings, cJSON *params);
 
+/* NULL where mesh and photographs of the scene fit, as far as is known, or the job takes them as they are; else 409, with
+ * the remedy. */
+struct response *job_request_fit(const struct request *r, const struct scene_row *scene,
+                                 const struct settings *settings);
+
 #endif

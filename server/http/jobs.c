@@ -175,6 +175,8 @@ struct response *jobs_add(struct api *api, struct request *r) {
         reply = problem_invalid(r, "the job is invalid", params);
         params = NULL;
     }
+    if (!reply)
+        reply = job_request_fit(r, &scene, &settings);
     if (!reply && !dry_run)
         reply = space_check_room(api, r, 0);
     if (!reply && !dry_run)

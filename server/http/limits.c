@@ -44,7 +44,7 @@ static struct response *check_pledge(struct api *api, const struct request *r, u
                    api->config.user_pledge_percent, (unsigned long long)(share >> 20)));
 }
 
-struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes) {
+struct response *limits_check_checks(struct api *api, const struct request *r) {
     size_t checks, most = api->config.user_max_checks;
     struct error err;
     if (!limits_bind(r))
@@ -55,7 +55,12 @@ struct response *limits_check_upload(struct api *api, const struct request *r, u
         return refuse(
             r, 429, "user_max_checks", "wait until some of them are checked",
             mem_printf("%zu of your scenes wait to be checked already; the limit of one user is %zu", checks, most));
-    return check_pledge(api, r, bytes);
+    return NULL;
+}
+
+struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes) {
+    struct response *refusal = limits_check_checks(api, r);
+    return refusal || !limits_bind(r) ? refusal : check_pledge(api, r, bytes);
 }
 
 struct response *limits_check_stream(struct api *api, const struct request *r) {

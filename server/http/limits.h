@@ -12,6 +12,8 @@ bool limits_bind(const struct request *r);
 /* NULL; or the refusal of an upload of `bytes`, 0 where its length is not known. Under api->folder.scene_mutex where it must hold:
  * two at once would both find room. */
 struct response *limits_check_upload(struct api *api, const struct request *r, uint64_t bytes);
+/* The same for one more check of a scene. */
+struct response *limits_check_checks(struct api *api, const struct request *r);
 /* The same for an event stream. */
 struct response *limits_check_stream(struct api *api, const struct request *r);
 

@@ -27,7 +27,7 @@ static const struct route table[] = {
     {METHOD_DELETE, "/v1/session", ROUTE_PUBLIC, session_delete, 0, ROUTE_AT_ONCE, ""},
     {METHOD_GET, "/v1/settings", ROUTE_VIEWER, system_settings, 0, ROUTE_QUICK, ""},
     {METHOD_GET, "/v1/scenes", ROUTE_VIEWER, scenes_list, 0, ROUTE_QUICK, "limit cursor"},
-    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, ROUTE_SLOW, "name"},
+    {METHOD_POST, "/v1/scenes", ROUTE_USER, scenes_add, ROUTE_BODY_UPLOAD, ROUTE_SLOW, "name reading"},
     {METHOD_GET, "/v1/scenes/{scene}", ROUTE_VIEWER, scenes_get, 0, ROUTE_QUICK, ""},
     {METHOD_PATCH, "/v1/scenes/{scene}", ROUTE_USER, scenes_patch, ROUTE_BODY_JSON, ROUTE_QUICK, ""},
     {METHOD_DELETE, "/v1/scenes/{scene}", ROUTE_USER, scenes_delete, 0, ROUTE_SLOW, "dry_run"},

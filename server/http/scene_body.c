@@ -4,9 +4,11 @@
 #include <string.h>
 #include <strings.h>
 
+#include "common/mem.h"
 #include "common/utf8.h"
 #include "server/http/limits.h"
 #include "server/http/problem.h"
+#include "server/http/scene_reading.h"
 #include "server/http/space.h"
 #include "server/net/field.h"
 #include "server/uploads/upload.h"
@@ -34,6 +36,8 @@ struct response *scene_body_begin(struct api *api, struct request *r) {
     uint64_t length = r->content_length > 0 ? (uint64_t)r->content_length : 0;
     struct error err;
     struct response *refusal = check_request(r);
+    if (!refusal)
+        mem_free(scene_reading_query(r, &refusal));
     if (!refusal)
         refusal = limits_check_upload(api, r, length);
     if (!refusal)

@@ -11,8 +11,10 @@
 #include "server/http/body.h"
 #include "server/http/handlers.h"
 #include "server/http/problem.h"
+#include "server/http/limits.h"
 #include "server/http/retention.h"
 #include "server/http/scene_body.h"
+#include "server/http/scene_reading.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
@@ -77,6 +79,9 @@ struct response *scenes_add(struct api *api, struct request *r) {
     struct scene_row row;
     bool existed = false;
     enum status status = STATUS_OK;
+    char *reading = scene_reading_query(r, &refusal);
+    if (refusal)
+        return refusal;
     pthread_mutex_lock(&api->folder.scene_mutex);
     /* Not only when the body began: its length may have been unknown, and others have come meanwhile. */
     refusal = space_check_share(api, r, id, upload_bytes(r->upload));
@@ -86,6 +91,9 @@ struct response *scenes_add(struct api *api, struct request *r) {
         status = store_scene_add(api->store, id, given ? given : name, upload_bytes(r->upload), r->caller.user_id,
                                  &existed, &err);
     pthread_mutex_unlock(&api->folder.scene_mutex);
+    if (!refusal && status == STATUS_OK && reading)
+        status = store_scene_give_reading(api->store, &r->caller, id, reading, &err);
+    mem_free(reading);
     if (refusal)
         return refusal;
     if (status == STATUS_OK)
@@ -99,24 +107,26 @@ struct response *scenes_add(struct api *api, struct request *r) {
     return reply;
 }
 
-/* What a PATCH asks for, checked; or *refusal. `body` keeps the name. */
-static void read_patch(const struct request *r, cJSON **body, const char **name, struct retention *retention,
+/* What a PATCH asks for, checked; or *refusal. `body` keeps the name, *reading is the caller's. */
+static void read_patch(const struct request *r, cJSON **body, struct scene_patch *patch, char **reading,
                        struct response **refusal) {
-    *name = NULL;
     *body = body_object(r, refusal);
     if (!*body)
         return;
     cJSON *params = cJSON_CreateArray();
     for (const cJSON *member = (*body)->child; member; member = member->next) {
         if (strcmp(member->string, "name") == 0) {
-            *name = cJSON_GetStringValue(member);
-            if (!*name || !**name || strlen(*name) > API_NAME_MAX_BYTES || !utf8_is_name(*name))
+            const char *name = patch->name = cJSON_GetStringValue(member);
+            if (!name || !*name || strlen(name) > API_NAME_MAX_BYTES || !utf8_is_name(name))
                 problem_param(params, "name", NULL, "must be text of 1 to %d bytes without control characters",
                               API_NAME_MAX_BYTES);
-        } else if (!retention_read(retention, member, params)) {
-            problem_param(params, member->string, "known: name, pinned, expires_at", "is unknown");
+        } else if (strcmp(member->string, "reading") == 0) {
+            *reading = scene_reading_text(member, params);
+        } else if (!retention_read(&patch->retention, member, params)) {
+            problem_param(params, member->string, "known: name, reading, pinned, expires_at", "is unknown");
         }
     }
+    patch->reading = *reading;
     if (cJSON_GetArraySize(params) > 0)
         *refusal = problem_invalid(r, "the change is invalid", params);
     else
@@ -129,10 +139,11 @@ static int64_t owner_of(const struct request *r) { return r->caller.role == ROLE
 struct response *scenes_patch(struct api *api, struct request *r) {
     struct scene_row row;
     struct error err;
-    struct retention retention = {0};
+    struct scene_patch patch = {0};
     struct response *reply = NULL;
     cJSON *body = NULL;
-    const char *name, *match = request_field(r, "If-Match");
+    char *reading = NULL;
+    const char *match = request_field(r, "If-Match");
     char tag[SHA256_HEX_SIZE + 2];
     if (!auth_scene(api, r, ACCESS_CHANGE, &row, &reply))
         return reply;
@@ -140,9 +151,14 @@ struct response *scenes_patch(struct api *api, struct request *r) {
     if (match && !field_etag_listed(match, tag, false))
         reply = problem_full(r, 412, "the scene is not as If-Match says", "GET it and try again", NULL);
     if (!reply)
-        read_patch(r, &body, &name, &retention, &reply);
-    if (!reply && store_scene_patch(api->store, &r->caller, row.id, name, &retention, &err) != STATUS_OK)
+        read_patch(r, &body, &patch, &reading, &reply);
+    if (!reply && reading && row.state != SCENE_CHECKING)
+        reply = limits_check_checks(api, r);
+    if (!reply && store_scene_patch(api->store, &r->caller, row.id, &patch, &err) != STATUS_OK)
         reply = problem_from(r, &err);
+    if (!reply && reading)
+        scheduler_wake(api->scheduler);
+    mem_free(reading);
     char id[SCENE_ID_SIZE];
     memcpy(id, row.id, sizeof id);
     scene_row_release(&row);

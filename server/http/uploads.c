@@ -21,6 +21,7 @@
 #include "server/http/limits.h"
 #include "server/http/problem.h"
 #include "server/http/retention.h"
+#include "server/http/scene_reading.h"
 #include "server/http/space.h"
 #include "server/http/views.h"
 #include "server/net/field.h"
@@ -28,6 +29,7 @@
 #include "server/uploads/upload_writer.h"
 
 #define METADATA_MAX 1000 /* bytes; it is given back in a field */
+#define METADATA_HINT "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits"
 
 enum checksum { CHECKSUM_NONE, CHECKSUM_SHA1, CHECKSUM_SHA256 };
 
@@ -116,7 +118,9 @@ struct response *uploads_options(struct api *api, struct request *r) {
 
 /* Takes a pair of Upload-Metadata that we know; the others are kept but mean nothing here. */
 static bool take_pair(struct upload_row *row, const char *key, size_t key_length, const char *value,
-                      size_t value_length) {
+                      size_t value_length, struct error *err) {
+    error_set(err, STATUS_INPUT, "Upload-Metadata is not a list of keys with values in base64");
+    error_hint(err, METADATA_HINT);
     char bytes[METADATA_MAX + 1];
     size_t used;
     if (!base64_decode(value, value_length, bytes, METADATA_MAX, &used))
@@ -127,6 +131,10 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
         if (!field_is_sha256(bytes) || !is_text)
             return false;
         memcpy(row->sha256, bytes, SCENE_ID_SIZE);
+    } else if (key_length == 7 && memcmp(key, "reading", 7) == 0) {
+        mem_free(row->reading);
+        row->reading = is_text ? scene_reading_parse(bytes, used, "the reading", err) : NULL;
+        return row->reading != NULL;
     } else if ((key_length == 4 && memcmp(key, "name", 4) == 0) ||
                (key_length == 8 && memcmp(key, "filename", 8) == 0 && !row->name)) {
         if (!is_text || used == 0 || used > API_NAME_MAX_BYTES || !utf8_is_name(bytes))
@@ -139,6 +147,7 @@ static bool take_pair(struct upload_row *row, const char *key, size_t key_length
 
 static struct response *read_metadata(const struct request *r, struct upload_row *row) {
     const char *text = request_field(r, "Upload-Metadata");
+    struct error err;
     row->metadata = mem_strdup(text ? text : "");
     if (strlen(row->metadata) > METADATA_MAX)
         return problem(r, 400, "Upload-Metadata is longer than %d bytes", METADATA_MAX);
@@ -147,11 +156,8 @@ static struct response *read_metadata(const struct request *r, struct upload_row
         size_t value = key + strspn(at + key, " "), end = length;
         while (end > value && at[end - 1] == ' ')
             end--;
-        if (key == 0 || !take_pair(row, at, key, at + value, end > value ? end - value : 0))
-            return problem_full(
-                r, 400, "Upload-Metadata is not a list of keys with values in base64",
-                "name has 1 to 200 bytes of UTF-8 without control characters, sha256 has 64 lower-case hex digits",
-                NULL);
+        if (key == 0 || !take_pair(row, at, key, at + value, end > value ? end - value : 0, &err))
+            return problem_full(r, 400, err.message, err.hint, NULL);
         at += length;
         at += *at == ',';
         at += strspn(at, " ");

@@ -107,6 +107,21 @@ cJSON *view_job(const struct job *job, const struct caller *who) {
     return v;
 }
 
+/* What the check found, and where its pictures are. */
+static void add_facts(cJSON *v, const struct scene_row *row) {
+    cJSON *facts = cJSON_Parse(row->facts), *preview;
+    cJSON_ArrayForEach(preview, cJSON_GetObjectItemCaseSensitive(facts, "previews")) {
+        const char *name = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(preview, "name"));
+        char *encoded = name ? target_encode(name, false) : NULL;
+        char *href = encoded ? mem_printf("/v1/scenes/%s/preview/%s", row->id, encoded) : NULL;
+        if (href)
+            json_add_string(preview, "href", href);
+        mem_free(href);
+        mem_free(encoded);
+    }
+    json_add(v, "facts", facts ? facts : cJSON_CreateNull());
+}
+
 cJSON *view_scene(const struct scene_row *row) {
     cJSON *v = cJSON_CreateObject();
     json_add_string(v, "id", row->id);
@@ -119,7 +134,8 @@ cJSON *view_scene(const struct scene_row *row) {
     json_add_bool(v, "pinned", row->is_pinned);
     add_time(v, "expires_at", row->expires_ms);
     add_text(v, "problems", row->problems);
-    add_text(v, "facts", row->facts);
+    add_text(v, "reading", row->reading);
+    add_facts(v, row);
     char path[128];
     snprintf(path, sizeof path, "/v1/scenes/%s", row->id);
     json_add_string(cJSON_AddObjectToObject(v, "links"), "self", path);
@@ -135,6 +151,7 @@ cJSON *view_upload(const struct upload_row *row) {
     json_add_int(v, "offset", (int64_t)row->received);
     json_add_string(v, "sha256", or_null(row->sha256));
     json_add_string(v, "scene", or_null(row->scene_id));
+    add_text(v, "reading", row->reading ? row->reading : "");
     add_time(v, "created_at", row->created_ms);
     add_time(v, "updated_at", row->updated_ms);
     json_add_bool(v, "pinned", row->is_pinned);

@@ -9,6 +9,7 @@
 #include "common/log.h"
 #include "common/mem.h"
 #include "server/data/layout.h"
+#include "server/job/fit.h"
 #include "server/job/housekeeping.h"
 #include "server/job/memory.h"
 #include "server/job/oom.h"
@@ -35,7 +36,7 @@ static cJSON *new_order(const char *kind, const struct scheduler_config *config,
 }
 
 static enum status order_job(struct attempt *a, const struct scheduler_config *config, const struct job *job,
-                             int thread_count, struct error *err) {
+                             const struct scene_row *row, int thread_count, struct error *err) {
     cJSON *settings;
     enum status status = json_parse(job->settings, strlen(job->settings), "the job's settings", &settings, err);
     if (status != STATUS_OK)
@@ -48,6 +49,7 @@ static enum status order_job(struct attempt *a, const struct scheduler_config *c
     cJSON *order = new_order("reconstruct", config, thread_count);
     json_add_string(order, "scene_id", job->scene_id);
     json_add_string(order, "scene", files);
+    json_add(order, "reading", fit_reading(row));
     json_add_string(order, "name", job->name);
     json_add_int(order, "job_id", job->id);
     json_add_int(order, "attempt", a->number);
@@ -73,6 +75,7 @@ void attempt_empty(struct attempt *a) {
     mem_free(a->end_message);
     mem_free(a->end_hint);
     mem_free(a->settings);
+    mem_free(a->reading);
     cJSON_Delete(a->problems);
     cJSON_Delete(a->facts);
     cJSON_Delete(a->untaken);
@@ -80,12 +83,22 @@ void attempt_empty(struct attempt *a) {
     *a = (struct attempt){.worker = {.pid_fd = -1, .pipe_fd = -1}};
 }
 
-/* A job whose scene was rejected is started only so that it fails, as its user must be told. */
-static enum status check_scene(struct store *store, const char *scene_id, struct error *err) {
-    struct scene_row row;
-    enum status status = store_scene_get(store, scene_id, &row, err);
-    if (status == STATUS_OK && row.state != SCENE_READY) {
-        cJSON *problems = cJSON_Parse(row.problems);
+/* Whether the job was told to take a scene whose mesh and photographs do not fit. */
+static bool ignores_fit(const char *settings) {
+    cJSON *given = cJSON_Parse(settings);
+    const char *word = cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(given, "fit"));
+    bool ignores = word && strcmp(word, "ignore") == 0;
+    cJSON_Delete(given);
+    return ignores;
+}
+
+/* A job whose scene was rejected, or does not fit, is started only so that it fails, as its user must be told. *row is
+ * the caller's in any case. */
+static enum status check_scene(struct store *store, const struct job *job, struct scene_row *row, struct error *err) {
+    const char *scene_id = job->scene_id;
+    enum status status = store_scene_get(store, scene_id, row, err);
+    if (status == STATUS_OK && row->state != SCENE_READY) {
+        cJSON *problems = cJSON_Parse(row->problems);
         const char *first =
             cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(cJSON_GetArrayItem(problems, 0), "reason"));
         error_set(err, STATUS_INPUT, "the scene %.12s was rejected%s%.300s", scene_id, first ? ": " : "",
@@ -93,8 +106,9 @@ static enum status check_scene(struct store *store, const char *scene_id, struct
         status = error_hint(err, "`unbake scenes show %.12s`, or GET /v1/scenes/%.12s, lists its problems.", scene_id,
                             scene_id);
         cJSON_Delete(problems);
+    } else if (status == STATUS_OK && !ignores_fit(job->settings) && fit_check(row, NULL, err) != STATUS_OK) {
+        status = err->status = STATUS_INPUT;
     }
-    scene_row_release(&row);
     return status;
 }
 
@@ -132,6 +146,7 @@ static enum status enter_false_start(struct store *store, int64_t job_id, int nu
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err) {
     struct job job;
+    struct scene_row scene = {0};
     struct error why = {0};
     int number;
     enum status status = store_job_start(store, job_id, &number, err);
@@ -156,16 +171,17 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
         a->thread_count = thread_count;
         a->memory_step = job.memory_step;
         a->oom_kills = oom_kills("");
-        status = check_scene(store, job.scene_id, &why);
+        status = check_scene(store, &job, &scene, &why);
     }
     if (status == STATUS_OK) /* what it has written itself does not stop a job that has begun */
         status = store_share_check(store, &(struct share){config->user_max_bytes, job.owner_id, NULL, job_id}, 0, &why);
     if (status == STATUS_OK)
         status = restart(a, store, &job, &why);
     if (status == STATUS_OK)
-        status = order_job(a, config, &job, thread_count, &why);
+        status = order_job(a, config, &job, &scene, thread_count, &why);
     if (status == STATUS_OK)
         status = supervisor_start(&a->worker, config->worker_binary, a->dir, &why);
+    scene_row_release(&scene);
     job_release(&job);
     if (status == STATUS_OK) {
         a->phase = ATTEMPT_ALIVE;
@@ -178,9 +194,10 @@ enum status attempt_start_job(struct attempt *a, const struct scheduler_config *
     return enter_false_start(store, job_id, number, &why, err);
 }
 
-enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, const struct unchecked *scene,
-                                int thread_count, struct error *err) {
+enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                                const struct unchecked *scene, int thread_count, struct error *err) {
     struct error why = {0};
+    struct scene_row row;
     const char *scene_id = scene->id;
     *a = (struct attempt){.owner_id = scene->owner_id,
                           .worker = {.pid_fd = -1, .pipe_fd = -1},
@@ -190,7 +207,13 @@ enum status attempt_start_check(struct attempt *a, const struct scheduler_config
     snprintf(a->scene_id, sizeof a->scene_id, "%s", scene_id);
     cJSON *order = new_order("check", config, thread_count);
     json_add_string(order, "scene_id", scene_id);
-    enum status status = file_make_dirs(a->dir, &why);
+    enum status status = store_scene_get(store, scene_id, &row, &why);
+    if (status == STATUS_OK) {
+        a->reading = mem_strdup(row.reading);
+        json_add(order, "reading", cJSON_Parse(row.reading));
+        status = file_make_dirs(a->dir, &why);
+    }
+    scene_row_release(&row);
     housekeeping_drop_temporary(a->dir); /* the daemon may have been killed in the middle of an earlier check */
     if (status == STATUS_OK)
         status = write_order(a->dir, order, &why);

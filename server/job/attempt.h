@@ -26,6 +26,7 @@ struct attempt {
     double charged_sec; /* CPU time that was entered for that user */
     int number;         /* fences what is entered for the job */
     char scene_id[SCENE_ID_SIZE];
+    char *reading;           /* with which a scene is checked, JSON; owned; NULL for a job */
     uint64_t user_max_bytes; /* as scheduler_config has it, for the check of a scene */
     char *dir;
     struct worker worker;
@@ -57,8 +58,8 @@ struct attempt {
 enum status attempt_start_job(struct attempt *a, const struct scheduler_config *config, struct store *store,
                               struct counters *counters, int64_t job_id, int thread_count, struct error *err);
 /* Starts the check of a scene, which is in `checking` and stays there if this fails. */
-enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, const struct unchecked *scene,
-                                int thread_count, struct error *err);
+enum status attempt_start_check(struct attempt *a, const struct scheduler_config *config, struct store *store,
+                                const struct unchecked *scene, int thread_count, struct error *err);
 
 /* Enters the CPU time since the last call for the job's owner. Where the store fails, it keeps it and enters
  * it later. */

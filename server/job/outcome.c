@@ -145,16 +145,21 @@ static enum status settle_job(const struct attempt *a, struct store *store, cons
     return store_job_crash(store, a->job_id, a->number, v->reason, v->hint, a->memory_step, err);
 }
 
-/* What the archive was unpacked to: a check that was killed could not tidy up. A ready scene needs it,
- * of another only the archive is kept. */
-static void remove_unpacked(const struct attempt *a, struct trash *trash) {
+static void remove_folder(const struct attempt *a, struct trash *trash, char *(*layout)(const char *work_dir)) {
     struct error err;
-    char *scene = trash ? layout_scene(NULL, a->scene_id) : mem_strdup(a->dir), *files = layout_files(scene);
-    enum status status = trash ? trash_take(trash, files, &err) : file_remove_tree(files, &err);
+    char *scene = trash ? layout_scene(NULL, a->scene_id) : mem_strdup(a->dir), *path = layout(scene);
+    enum status status = trash ? trash_take(trash, path, &err) : file_remove_tree(path, &err);
     if (status != STATUS_OK)
         log_warning("scene %.12s: %s", a->scene_id, err.message);
-    mem_free(files);
+    mem_free(path);
     mem_free(scene);
+}
+
+/* What the archive was unpacked to, and the pictures of it: a check that was killed could not tidy up. A ready scene
+ * needs them, of another only the archive is kept. */
+static void remove_unpacked(const struct attempt *a, struct trash *trash) {
+    remove_folder(a, trash, layout_files);
+    remove_folder(a, trash, layout_previews);
 }
 
 static void add_problem(struct attempt *a, const char *reason, const char *hint) {
@@ -192,6 +197,16 @@ static enum status settle_size(struct attempt *a, struct store *store, struct er
     return STATUS_OK;
 }
 
+/* What a rejected scene keeps of the facts: what there is to say of it, but nothing that goes with its files. */
+static char *facts_of_rejected(const struct attempt *a) {
+    cJSON *facts = a->facts ? cJSON_Duplicate(a->facts, true) : cJSON_CreateObject();
+    cJSON_DeleteItemFromObjectCaseSensitive(facts, "fit");
+    cJSON_DeleteItemFromObjectCaseSensitive(facts, "previews");
+    char *text = json_text(facts);
+    cJSON_Delete(facts);
+    return text;
+}
+
 static bool is_good(const struct attempt *a, const struct verdict *v) {
     return v->outcome == OUTCOME_OK && cJSON_GetArraySize(a->problems) == 0 && a->facts;
 }
@@ -206,7 +221,7 @@ static enum status settle_check(struct attempt *a, struct store *store, struct t
     char *text;
     if (is_good(a, v)) {
         text = json_text(a->facts);
-        status = store_scene_ready(store, a->scene_id, text, err);
+        status = store_scene_ready(store, a->scene_id, a->reading, text, err);
     } else {
         bool waits = v->outcome == OUTCOME_BLOCKED; /* the content is not at fault */
         remove_unpacked(a, trash);
@@ -218,9 +233,11 @@ static enum status settle_check(struct attempt *a, struct store *store, struct t
                         waits ? "It is checked again when there is more room." : NULL);
         if (a->problems_left_out > 0)
             add_left_out(a);
+        char *facts = facts_of_rejected(a);
         text = json_text(a->problems);
-        status = waits ? store_scene_postpone(store, a->scene_id, text, err)
-                       : store_scene_reject(store, a->scene_id, text, err);
+        status = waits ? store_scene_postpone(store, a->scene_id, a->reading, text, err)
+                       : store_scene_reject(store, a->scene_id, a->reading, text, facts, err);
+        mem_free(facts);
     }
     mem_free(text);
     return status;

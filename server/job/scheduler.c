@@ -197,7 +197,7 @@ static void start_checks(struct scheduler *s) {
             continue;
         status = checks_next(&s->checks, s->store, slots, s->slot_count - s->job_slots, &next, &err);
         if (status == STATUS_OK)
-            status = attempt_start_check(&slots[i], &s->config, &next, s->config.thread_count, &err);
+            status = attempt_start_check(&slots[i], &s->config, s->store, &next, s->config.thread_count, &err);
     }
     if (status != STATUS_OK && status != STATUS_NOT_FOUND)
         retry_later(s, "cannot check a scene", &err);

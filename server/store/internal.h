@@ -103,6 +103,13 @@ struct count_limits; /* store.h */
 /* Inside a transaction: STATUS_LIMIT unless one more job of this owner (0: nobody) may be queued. */
 enum status store_queue_check(struct store *store, int64_t owner_id, const struct count_limits *limits,
                               struct error *err);
+/* scene_reading.c, inside a transaction: gives the scene a reading for user owner_id (-1: whom no other's jobs hinder) as
+ * store_scene_patch has it; a check that is under way with the same one goes on. */
+enum status store_scene_set_reading(struct store *store, const char *id, int64_t owner_id, const char *reading,
+                                    struct error *err);
+/* Whether the scene is to be read otherwise than a check has read it; `reading` NULL: that does not matter. */
+enum status store_scene_is_overtaken(struct store *store, const char *id, const char *reading, int64_t *is_so,
+                                     struct error *err);
 /* Inside a transaction: STATUS_CONFLICT unless the job runs its attempt `attempt`. */
 enum status store_fence(struct store *store, int64_t job_id, int attempt, struct error *err);
 

@@ -2,7 +2,7 @@
  *
  *      (upload) ──> checking ──> ready
  *                     ▲  └─────> rejected
- *                     └────────────┘ (uploaded again)
+ *                     └────────────┘ (rejected: uploaded again; either: to be read otherwise)
  *
  * One in `checking` that has problems waits for room on the disk.
  *
@@ -30,7 +30,7 @@
 /* One who shared it and gave it up leaves it without a name for its readers. */
 #define COLUMNS                                                                                                        \
     "scenes.id, ifnull(shown.name, substr(scenes.id, 1, 12)), state, bytes, " CREATED ", problems,"                    \
-    " facts, users.name, pinned, " SCENE_EXPIRES ", disk_bytes"
+    " facts, users.name, pinned, " SCENE_EXPIRES ", disk_bytes, reading"
 /* What user ?2 may read where not all (?1); see caller_access_job. */
 #define IS_READABLE                                                                                                    \
     "(?1 OR EXISTS (SELECT 1 FROM scene_owners WHERE scene_id = scenes.id AND user_id = ?2)"                           \
@@ -49,6 +49,7 @@ static void fill(struct scene_row *row, sqlite3_stmt *stmt) {
         .is_pinned = sqlite3_column_int(stmt, 8) != 0,
         .expires_ms = sqlite3_column_int64(stmt, 9),
         .disk_bytes = sqlite3_column_int64(stmt, 10),
+        .reading = sql_dup(stmt, 11),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
 }
@@ -58,6 +59,7 @@ void scene_row_release(struct scene_row *row) {
     mem_free(row->owner);
     mem_free(row->problems);
     mem_free(row->facts);
+    mem_free(row->reading);
     *row = (struct scene_row){0};
 }
 
@@ -106,9 +108,9 @@ enum status store_scene_add(struct store *store, const char *id, const char *nam
 }
 
 /* The end of a check. */
-static enum status conclude(struct store *store, const char *id, enum scene_state to, const char *problems,
-                            const char *facts, struct error *err) {
-    int64_t state = -1;
+static enum status conclude(struct store *store, const char *id, const char *reading, enum scene_state to,
+                            const char *problems, const char *facts, struct error *err) {
+    int64_t state = -1, overtaken = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
         return status;
@@ -119,6 +121,8 @@ static enum status conclude(struct store *store, const char *id, enum scene_stat
         status = error_set(err, STATUS_CONFLICT, "scene %s is %s, not being checked", id,
                            scene_state_name((enum scene_state)state));
     if (status == STATUS_OK)
+        status = store_scene_is_overtaken(store, id, reading, &overtaken, err);
+    if (status == STATUS_OK && !overtaken)
         status = sql_run(&store->sql, err,
                          "UPDATE scenes SET state = ?1, problems = ?2, facts = ?3,"
                          " disk_bytes = iif(?1 = ?5, disk_bytes, -1) WHERE id = ?4",
@@ -126,16 +130,19 @@ static enum status conclude(struct store *store, const char *id, enum scene_stat
     return store_end(store, status, 0, err);
 }
 
-enum status store_scene_ready(struct store *store, const char *id, const char *facts, struct error *err) {
-    return conclude(store, id, SCENE_READY, "[]", facts, err);
+enum status store_scene_ready(struct store *store, const char *id, const char *reading, const char *facts,
+                              struct error *err) {
+    return conclude(store, id, reading, SCENE_READY, "[]", facts, err);
 }
 
-enum status store_scene_reject(struct store *store, const char *id, const char *problems, struct error *err) {
-    return conclude(store, id, SCENE_REJECTED, problems, "{}", err);
+enum status store_scene_reject(struct store *store, const char *id, const char *reading, const char *problems,
+                               const char *facts, struct error *err) {
+    return conclude(store, id, reading, SCENE_REJECTED, problems, facts, err);
 }
 
-enum status store_scene_postpone(struct store *store, const char *id, const char *problems, struct error *err) {
-    return conclude(store, id, SCENE_CHECKING, problems, "{}", err);
+enum status store_scene_postpone(struct store *store, const char *id, const char *reading, const char *problems,
+                                 struct error *err) {
+    return conclude(store, id, reading, SCENE_CHECKING, problems, "{}", err);
 }
 
 enum status store_scene_check_again(struct store *store, struct error *err) {
@@ -240,8 +247,9 @@ static enum status is_others_too(struct store *store, const char *id, int64_t ow
                          "SELECT 1 FROM scene_owners WHERE scene_id = ? AND user_id <> ? LIMIT 1", "ti", id, owner_id);
 }
 
-enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
-                              const struct retention *retention, struct error *err) {
+enum status store_scene_patch(struct store *store, const struct caller *who, const char *id,
+                              const struct scene_patch *patch, struct error *err) {
+    const struct retention *retention = &patch->retention;
     int64_t others = 0;
     enum status status = store_begin(store, err);
     if (status != STATUS_OK)
@@ -257,11 +265,13 @@ enum status store_scene_patch(struct store *store, const struct caller *who, con
                          (int)retention->pin, (int)retention->sets_expiry, retention->expires_ms, id);
     if (status == STATUS_OK && sql_changes(&store->sql) == 0)
         status = not_found(id, err);
-    if (status == STATUS_OK && name)
+    if (status == STATUS_OK && patch->reading)
+        status = store_scene_set_reading(store, id, sees_all(who) ? NOT_A_USER : who->user_id, patch->reading, err);
+    if (status == STATUS_OK && patch->name)
         status = sql_run(&store->sql, err,
                          "UPDATE scene_owners SET name = ?3 FROM scenes WHERE scenes.id = ?4 AND scene_id = ?4"
                          " AND user_id = " SHOWN_OWNER,
-                         "nitt", (int)sees_all(who), user_of(who), name, id);
+                         "nitt", (int)sees_all(who), user_of(who), patch->name, id);
     return store_end(store, status, 0, err);
 }
 

@@ -206,6 +206,10 @@ static const char step_15[] =
     "ALTER TABLE webhooks ADD COLUMN at_ms INTEGER NOT NULL DEFAULT 0;"
     "CREATE INDEX outbox_by_job ON outbox (job_id);";
 
-const char *const schema_steps[] = {step_1, step_2,  step_3,  step_4,  step_5,  step_6,  step_7, step_8,
-                                    step_9, step_10, step_11, step_12, step_13, step_14, step_15};
+/* How a scene is to be read, as its users give it (common/reading.h), from the upload on. */
+static const char step_16[] = "ALTER TABLE scenes ADD COLUMN reading TEXT NOT NULL DEFAULT '{}';"
+                              "ALTER TABLE uploads ADD COLUMN reading TEXT NOT NULL DEFAULT '';";
+
+const char *const schema_steps[] = {step_1, step_2,  step_3,  step_4,  step_5,  step_6,  step_7,  step_8,
+                                    step_9, step_10, step_11, step_12, step_13, step_14, step_15, step_16};
 const int schema_version = (int)(sizeof schema_steps / sizeof schema_steps[0]);

@@ -71,6 +71,7 @@ struct scene_row {
     int64_t created_ms; /* when that owner sent it */
     char *problems;     /* JSON array text: [{"file","reason"}]; "[]" if none */
     char *facts;        /* JSON object text: what the check found; "{}" before */
+    char *reading;      /* JSON object text: how it is to be read, as was given (common/reading.h) */
     bool is_pinned;
     int64_t expires_ms; /* Unix time as of now, 0: never; see retention.h */
 };
@@ -81,9 +82,13 @@ void scene_row_release(struct scene_row *row);
  * not his to know), and nothing else changes, but one that was rejected or waits for room is checked again. */
 enum status store_scene_add(struct store *store, const char *id, const char *name, uint64_t bytes, int64_t owner_id,
                             bool *existed, struct error *err);
-/* What it takes of the disk was entered before. */
-enum status store_scene_ready(struct store *store, const char *id, const char *facts, struct error *err);
-enum status store_scene_reject(struct store *store, const char *id, const char *problems, struct error *err);
+/* The end of a check, which read the scene as `reading` says (NULL: as it is to be read now). Where it is to be read
+ * otherwise by now, nothing is entered: it stays in `checking` and is checked again. What a ready one takes of the disk
+ * was entered before; of a rejected one, `facts` may have warnings. */
+enum status store_scene_ready(struct store *store, const char *id, const char *reading, const char *facts,
+                              struct error *err);
+enum status store_scene_reject(struct store *store, const char *id, const char *reading, const char *problems,
+                               const char *facts, struct error *err);
 /* As who sees all and owns nothing. */
 enum status store_scene_get(struct store *store, const char *id, struct scene_row *row, struct error *err);
 /* The row whose id is or begins with `prefix` (4 to 64 hex digits) among those that `who` (NULL: all)
@@ -94,10 +99,19 @@ enum status store_scene_find(struct store *store, const struct caller *who, cons
  * first page). rows[limit] out. */
 enum status store_scene_list(struct store *store, const struct caller *who, const char *cursor, size_t limit,
                              struct scene_row *rows, size_t *count, char next_cursor[128], struct error *err);
-/* NULL leaves the name, which is changed for the owner that `who` sees. STATUS_CONFLICT when others own it, too, and
- * could lose it by this; not for an admin. */
-enum status store_scene_patch(struct store *store, const struct caller *who, const char *id, const char *name,
-                              const struct retention *retention, struct error *err);
+struct scene_patch {
+    const char *name; /* NULL leaves it; changed for the owner that `who` sees */
+    struct retention retention;
+    const char *reading; /* JSON object text; NULL leaves it */
+};
+/* A new reading puts the scene back into `checking`, also where it is the same and the check has ended. STATUS_CONFLICT
+ * when others own it, too, and could lose it by this, or have jobs on it that have not ended and would read it otherwise;
+ * not for an admin. And for anybody while a job that has begun with it has not ended. */
+enum status store_scene_patch(struct store *store, const struct caller *who, const char *id,
+                              const struct scene_patch *patch, struct error *err);
+/* The same for a reading that comes with an upload: one that the scene has already changes nothing. */
+enum status store_scene_give_reading(struct store *store, const struct caller *who, const char *id, const char *reading,
+                                     struct error *err);
 /* Ends the ownership of user owner_id (-1: everybody's); where nobody owns it any more, the scene
  * goes: *is_gone, and the caller removes the files. STATUS_CONFLICT while it is being checked or a
  * job that is not terminal (of that owner, where others stay) uses it. Terminal jobs keep its id. A
@@ -114,7 +128,8 @@ enum status store_scene_unchecked(struct store *store, const struct unchecked *s
                                   struct unchecked *list, size_t *count, struct error *err);
 /* A check that found too little room, as `problems` says: the scene stays in `checking`, can be removed
  * while it waits, and is no next one before store_scene_check_again, which makes all of them so. */
-enum status store_scene_postpone(struct store *store, const char *id, const char *problems, struct error *err);
+enum status store_scene_postpone(struct store *store, const char *id, const char *reading, const char *problems,
+                                 struct error *err);
 enum status store_scene_check_again(struct store *store, struct error *err);
 
 /* --- jobs -------------------------------------------------------------------------------- */
@@ -180,7 +195,7 @@ enum status store_job_retry(struct store *store, int64_t id, int max_attempts, c
 enum status store_job_extend(struct store *store, int64_t id, int max_attempts, const char *settings,
                              const struct count_limits *limits, struct error *err);
 
-/* What the scheduler does; `attempt` fences: STATUS_CONFLICT when another one is present. A request
+/* What the scheduler does. A job whose scene is being checked does not start; `attempt` fences: STATUS_CONFLICT when another one is present. A request
  * to cancel, recorded before, wins over every end; one to pause over going back to the queue. */
 enum status store_job_start(struct store *store, int64_t id, int *attempt, struct error *err);
 enum status store_job_succeed(struct store *store, int64_t id, int attempt, struct error *err);
@@ -366,6 +381,7 @@ struct upload_row {
     char *owner;                  /* a user's name; "" for nobody */
     char *name;                   /* for the scene */
     char *metadata;               /* as the client gave it: Upload-Metadata */
+    char *reading;                /* for the scene, as scene_row has it; "" or NULL: not said */
     char sha256[SCENE_ID_SIZE];   /* what the client says the whole will have; "" if it does not */
     uint64_t length, received;    /* bytes; `received` are on disk */
     char boot[UPLOAD_BOOT_SIZE];  /* see store_upload_begin */
@@ -375,7 +391,7 @@ struct upload_row {
 };
 void upload_row_release(struct upload_row *row);
 
-/* A new row with nothing received; id, owner_id, name, metadata, sha256, length and boot are taken from *row.
+/* A new row with nothing received; id, owner_id, name, metadata, reading, sha256, length and boot are taken from *row.
  * `hash`: the state of an empty hash. The limits are those of unfinished ones. */
 enum status store_upload_add(struct store *store, const struct upload_row *row, const void *hash, size_t hash_size,
                              const struct count_limits *limits, struct error *err);

@@ -281,8 +281,16 @@ enum status store_job_start(struct store *store, int64_t id, int *attempt, struc
     enum status status = job_begin(store, id, &now, err);
     if (status != STATUS_OK)
         return status;
+    int64_t is_unchecked = 0;
     if (now.state != JOB_QUEUED)
         status = forbidden(&now, "started", err);
+    if (status == STATUS_OK)
+        status =
+            sql_int(&store->sql, 0, &is_unchecked, err,
+                    "SELECT 1 FROM jobs JOIN scenes ON scenes.id = scene_id WHERE jobs.id = ? AND scenes.state < ?",
+                    "in", id, (int)SCENE_READY);
+    if (is_unchecked)
+        status = error_set(err, STATUS_CONFLICT, "the scene of job %lld is being checked", (long long)id);
     if (status == STATUS_OK) {
         now.attempt++;
         status = move(store, &now, JOB_RUNNING, "", "", err);

@@ -9,7 +9,7 @@
 
 #define COLUMNS                                                                                                        \
     "id, name, metadata, sha256, length, received, boot, scene_id, created_ms, updated_ms, hash,"                      \
-    " owner_id, (SELECT name FROM users WHERE users.id = owner_id), pinned, " UPLOAD_EXPIRES
+    " owner_id, (SELECT name FROM users WHERE users.id = owner_id), pinned, " UPLOAD_EXPIRES ", reading"
 
 static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
     *row = (struct upload_row){
@@ -23,6 +23,7 @@ static void fill(struct upload_row *row, sqlite3_stmt *stmt) {
         .updated_ms = sqlite3_column_int64(stmt, 9),
         .is_pinned = sqlite3_column_int(stmt, 13) != 0,
         .expires_ms = sqlite3_column_int64(stmt, 14),
+        .reading = sql_dup(stmt, 15),
     };
     snprintf(row->id, sizeof row->id, "%s", sql_text(stmt, 0));
     snprintf(row->sha256, sizeof row->sha256, "%s", sql_text(stmt, 3));
@@ -34,6 +35,7 @@ void upload_row_release(struct upload_row *row) {
     mem_free(row->owner);
     mem_free(row->name);
     mem_free(row->metadata);
+    mem_free(row->reading);
     *row = (struct upload_row){0};
 }
 
@@ -69,9 +71,9 @@ enum status store_upload_add(struct store *store, const struct upload_row *row, 
     if (status == STATUS_OK)
         status = sql_run(&store->sql, err,
                          "INSERT INTO uploads (id, owner_id, name, metadata, sha256, length, hash, boot,"
-                         " created_ms, updated_ms) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                         "titttibtii", row->id, row->owner_id, row->name, row->metadata, row->sha256,
-                         (int64_t)row->length, hash, hash_size, row->boot, now, now);
+                         " created_ms, updated_ms, reading) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                         "titttibtiit", row->id, row->owner_id, row->name, row->metadata, row->sha256,
+                         (int64_t)row->length, hash, hash_size, row->boot, now, now, row->reading ? row->reading : "");
     return store_end(store, status, STORE_NOTHING_CHANGED, err);
 }
 

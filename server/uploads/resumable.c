@@ -24,6 +24,18 @@
 
 /* --- from an upload to a scene ----------------------------------------------------------- */
 
+/* The reading that the upload said. Where jobs keep the scene from it, it stays as it was, which its owner can see of it:
+ * the content has come all the same. */
+static enum status give_reading(struct resumables *r, const struct upload_row *row, const char *scene_id,
+                                struct error *err) {
+    const struct caller owner = {.user_id = row->owner_id, .role = ROLE_USER};
+    enum status status = store_scene_give_reading(r->config.store, &owner, scene_id, row->reading, err);
+    if (status != STATUS_CONFLICT)
+        return status;
+    log_info("upload %s: scene %.12s stays read as it is: %s", row->id, scene_id, err->message);
+    return STATUS_OK;
+}
+
 /* The file is, or was about to be, at its place among the scenes. */
 static enum status place(struct resumables *r, const struct upload_row *row, const char *scene_id, struct error *err) {
     struct folder *folder = r->config.folder;
@@ -38,6 +50,8 @@ static enum status place(struct resumables *r, const struct upload_row *row, con
     if (status == STATUS_OK)
         status = store_scene_add(r->config.store, scene_id, row->name, row->length, row->owner_id, &existed, err);
     pthread_mutex_unlock(&folder->scene_mutex);
+    if (status == STATUS_OK && row->reading && *row->reading)
+        status = give_reading(r, row, scene_id, err);
     mem_free(path);
     return status == STATUS_OK ? store_upload_finish(r->config.store, row->id, scene_id, err) : status;
 }

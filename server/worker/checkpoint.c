@@ -191,7 +191,7 @@ static enum status read_commit(struct checkpoint *c, char note[512], struct erro
     c->program = sql_dup(stmt, 3);
     sqlite3_reset(stmt);
     if (!same) {
-        snprintf(note, 512, "the checkpoint belongs to another scene or other settings");
+        snprintf(note, 512, "the checkpoint belongs to another scene, another reading of it or other settings");
         return STATUS_OK;
     }
     status = read_arrays(c, err);

@@ -2,7 +2,7 @@
  * the id of a scene that is ready and its data folder; then reads commands, one a line, and answers each "ok" or
  * with an error's message:
  *
- *   start JOB | succeed JOB ATTEMPT | fail JOB ATTEMPT | stop JOB ATTEMPT
+ *   start JOB | succeed JOB ATTEMPT | fail JOB ATTEMPT | stop JOB ATTEMPT | ready FACTS (of the scene)
  *
  * Ends with its input. */
 #include "tests/api/rig.h"
@@ -11,6 +11,8 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
     char word[16];
     long long job;
     int attempt = 0;
+    if (strncmp(line, "ready ", 6) == 0)
+        return store_scene_ready(rig->store, RIG_SCENE, NULL, line + 6, err);
     int count = sscanf(line, "%15s %lld %d", word, &job, &attempt);
     if (count == 2 && strcmp(word, "start") == 0)
         return store_job_start(rig->store, job, &attempt, err);
@@ -26,7 +28,7 @@ static enum status obey(struct rig *rig, const char *line, struct error *err) {
 int main(void) {
     struct rig rig;
     struct error err;
-    char line[256];
+    char line[4096];
     rig_start(&rig, &rig_patient, 15);
     rig_scene(&rig);
     printf("http://127.0.0.1:%u %s %s\n", listener_port(rig.listener), RIG_SCENE, rig.dir);

@@ -181,7 +181,7 @@ static inline void rig_scene(struct rig *rig) {
     bool existed;
     rig_must(store_scene_add(rig->store, RIG_SCENE, "room", 10, 0, &existed, &err), &err, "store_scene_add");
     if (!existed)
-        rig_must(store_scene_ready(rig->store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
+        rig_must(store_scene_ready(rig->store, RIG_SCENE, NULL, "{}", &err), &err, "store_scene_ready");
 }
 
 /* A queued job on it. */

@@ -38,7 +38,7 @@ static int64_t make_job(enum thing thing, int64_t owner) {
     rig_must(store_scene_add(rig.store, scenes[thing], "room", 10, owner, &existed, &err), &err, "scene");
     rig_must(store_scene_get(rig.store, scenes[thing], &row, &err), &err, "scene");
     if (row.state == SCENE_CHECKING) /* `existed` tells only of the owner's own */
-        rig_must(store_scene_ready(rig.store, scenes[thing], "{}", &err), &err, "scene");
+        rig_must(store_scene_ready(rig.store, scenes[thing], NULL, "{}", &err), &err, "scene");
     scene_row_release(&row);
     struct job_new job = {.scene_id = scenes[thing],
                           .name = "job",

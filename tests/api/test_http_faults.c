@@ -90,7 +90,7 @@ static void unused_scene(void) {
     bool existed;
     snprintf(scene, sizeof scene, "%08x%s", ++number, RIG_SCENE + 8);
     rig_must(store_scene_add(rig.store, scene, "room", 10, 0, &existed, &err), &err, "store_scene_add");
-    rig_must(store_scene_ready(rig.store, scene, "{}", &err), &err, "store_scene_ready");
+    rig_must(store_scene_ready(rig.store, scene, NULL, "{}", &err), &err, "store_scene_ready");
 }
 
 static void rig_scene_again(void) { strcpy(scene, RIG_SCENE); }

@@ -79,7 +79,7 @@ static void test_checks(int64_t user) {
     rig_must(store_scene_add(rig.store, RIG_SCENE, "room", 10, user, &existed, &err), &err, "store_scene_add");
     expect(anna, 1000, 429, "user_max_checks");
     expect(chief, 1000, 201, "");
-    rig_must(store_scene_ready(rig.store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
+    rig_must(store_scene_ready(rig.store, RIG_SCENE, NULL, "{}", &err), &err, "store_scene_ready");
     expect(anna, 1000, 201, "");
 }
 

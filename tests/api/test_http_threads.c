@@ -225,7 +225,7 @@ static void *client(void *user) {
     snprintf(path, sizeof path, "/v1/scenes/%s", scene);
     must(200, "GET", path, "", "", 0);
     must(200, "PATCH", path, JSON, "{\"pinned\":true}", 15);
-    rig_must(store_scene_ready(rig.store, scene, "{}", &err), &err, "store_scene_ready");
+    rig_must(store_scene_ready(rig.store, scene, NULL, "{}", &err), &err, "store_scene_ready");
     must(204, "DELETE", path, "", "", 0);
     upload(number);
     jobs(big_scene, number);

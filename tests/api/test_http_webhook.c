@@ -38,7 +38,7 @@ int main(void) {
     rig_must(store_token_add(rig.store, "chief", ROLE_ADMIN, chief, &id, &err), &err, "token");
     rig_must(store_token_find(rig.store, anna, &who, &err), &err, "token");
     rig_must(store_scene_add(rig.store, RIG_SCENE, "room", 10, who.user_id, &existed, &err), &err, "store_scene_add");
-    rig_must(store_scene_ready(rig.store, RIG_SCENE, "{}", &err), &err, "store_scene_ready");
+    rig_must(store_scene_ready(rig.store, RIG_SCENE, NULL, "{}", &err), &err, "store_scene_ready");
 
     expect(anna, "POST /v1/jobs", JOB(HOOK("whsec_c2hvcnQgYnV0IGxvbmc=")), 422, "base64 of 24 to 64 bytes",
            "token=abc");

@@ -97,7 +97,7 @@ static void start_daemon(void) {
     put_file("reserve", ""); /* or 16 MiB would be put there each time */
     must(store_open(&lab.store, lab.dir, &err), &err);
     must(store_scene_add(lab.store, SCENE, "room", 10, 0, &existed, &err), &err);
-    must(store_scene_ready(lab.store, SCENE, "{\"triangle_count\":12}", &err), &err);
+    must(store_scene_ready(lab.store, SCENE, NULL, "{\"triangle_count\":12}", &err), &err);
     put_file("scenes/" SCENE "/archive", "0123456789");
     add_jobs(&err);
     add_upload(&err);

@@ -115,7 +115,7 @@ static inline void rig_start(void) {
         exit(1);
     OK(store_open(&store, dir, &err));
     OK(store_scene_add(store, SCENE_A, "scene", 1, 0, &existed, &err));
-    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
 }
 
 static inline int64_t add_job(const char *settings, const char *webhook) {

@@ -32,7 +32,7 @@ static inline void drop_dir(char *dir) {
 static inline void add_ready_scene(struct store *store, const char *id) {
     bool existed;
     OK(store_scene_add(store, id, "room", 10, 0, &existed, &err));
-    OK(store_scene_ready(store, id, "{}", &err));
+    OK(store_scene_ready(store, id, NULL, "{}", &err));
 }
 
 static inline int64_t add_job(struct store *store, const char *scene, int priority) {

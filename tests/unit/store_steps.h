@@ -39,11 +39,11 @@ static enum status next_unchecked(void) {
     size_t count;
     return store_scene_unchecked(store, NULL, 0, 1, &one, &count, &err);
 }
-static enum status postpone(void) { return store_scene_postpone(store, SCENE_A, "[{\"file\":\"a\"}]", &err); }
+static enum status postpone(void) { return store_scene_postpone(store, SCENE_A, NULL, "[{\"file\":\"a\"}]", &err); }
 static enum status check_again(void) { return store_scene_check_again(store, &err); }
-static enum status reject(void) { return store_scene_reject(store, SCENE_A, "[{\"file\":\"a\"}]", &err); }
-static enum status ready(void) { return store_scene_ready(store, SCENE_A, "{}", &err); }
-static enum status other_ready(void) { return store_scene_ready(store, SCENE_B, "{}", &err); }
+static enum status reject(void) { return store_scene_reject(store, SCENE_A, NULL, "[{\"file\":\"a\"}]", "{}", &err); }
+static enum status ready(void) { return store_scene_ready(store, SCENE_A, NULL, "{}", &err); }
+static enum status other_ready(void) { return store_scene_ready(store, SCENE_B, NULL, "{}", &err); }
 static enum status get_scene(void) {
     struct scene_row row;
     enum status status = store_scene_get(store, SCENE_A, &row, &err);
@@ -67,9 +67,13 @@ static enum status list_scenes(void) {
     return status;
 }
 static enum status patch_scene(void) {
-    return store_scene_patch(store, &alice, SCENE_A, "named", &(struct retention){.sets_expiry = true, .expires_ms = 1},
-                             &err);
+    const struct scene_patch patch = {.name = "named", .retention = {.sets_expiry = true, .expires_ms = 1}};
+    return store_scene_patch(store, &alice, SCENE_A, &patch, &err);
 }
+static enum status read_scene_otherwise(void) {
+    return store_scene_patch(store, &alice, SCENE_A, &(struct scene_patch){.reading = "{\"axes\":\"opencv\"}"}, &err);
+}
+static enum status conclude_overtaken(void) { return store_scene_ready(store, SCENE_A, "{}", "{}", &err); }
 static enum status access_scene(void) {
     enum access access;
     return store_scene_access(store, &(struct caller){.user_id = 77, .role = ROLE_USER}, SCENE_A, &access, &err);
@@ -420,6 +424,9 @@ static const struct step {
     STEP(check_again),
     STEP(reject),
     STEP(add_scene),
+    STEP(ready),
+    STEP(read_scene_otherwise),
+    STEP(conclude_overtaken),
     STEP(ready),
     STEP(other_ready),
     STEP(get_scene),

@@ -171,12 +171,12 @@ static bool check_once(bool is_sql, long n, bool stays) {
     snprintf(id, sizeof id, "%08lx%.56s", ++number, SCENE_A);
     add_scene(id);
     strike(is_sql, n, stays);
-    enum status status = attempt_start_check(&a, &config, unchecked(id), 1, n % 3 ? &why : NULL);
+    enum status status = attempt_start_check(&a, &config, store, unchecked(id), 1, n % 3 ? &why : NULL);
     bool struck = lift();
     if (status != STATUS_OK) {
         CHECK_THAT(struck && !has_child() && count_descriptors() == before, "call %ld: something is left", n);
         CHECK((n % 3 == 0 || *why.message) && scene_state(id) == SCENE_CHECKING);
-        OK(attempt_start_check(&a, &config, unchecked(id), 1, &err));
+        OK(attempt_start_check(&a, &config, store, unchecked(id), 1, &err));
     }
     hear_to_the_end(&a);
     strike(is_sql, n, stays);
@@ -203,13 +203,67 @@ static void check_rejected(void) {
         int64_t number;
         bool replayed;
         OK(store_job_add(store, &new, 1000, &number, &replayed, &err));
-        OK(store_scene_reject(store, id, problems[i], &err));
+        OK(store_scene_reject(store, id, NULL, problems[i], "{}", &err));
         OK(attempt_start_job(&a, &config, store, &figures, number, 1, &err));
         OK(store_job_get(store, number, &job, &err));
         CHECK(a.phase == ATTEMPT_EMPTY && job.state == JOB_FAILED && strstr(job.hint, "problems"));
         CHECK_THAT(strstr(job.reason, i ? "was rejected: it is empty" : "was rejected"), "%s", job.reason);
         job_release(&job);
     }
+}
+
+static void check_order(const struct attempt *a, const char *part) {
+    struct buf text;
+    char *path = file_join(a->dir, "job.json");
+    buf_init(&text, 1 << 20);
+    OK(file_read(path, &text, &err));
+    CHECK_THAT(strstr(buf_text(&text), part), "%s is not in %s", part, buf_text(&text));
+    buf_release(&text);
+    mem_free(path);
+}
+
+static int64_t add_job_on(const char *scene, const char *settings) {
+    struct job_new new = {.scene_id = scene, .name = "job", .labels = "{}", .settings = settings, .max_attempts = 3};
+    int64_t id = 0;
+    bool replayed;
+    OK(store_job_add(store, &new, 1000, &id, &replayed, &err));
+    return id;
+}
+
+/* The check is told how the scene was said to be read, jobs what the check has made of that. One whose mesh and
+ * photographs do not fit is for no job, but for one that was told to take it. */
+static void check_fit(void) {
+    static const char facts[] = "{\"fit\":{\"verdict\":\"no\",\"evidence\":[\"it hangs upside down\"],"
+                                "\"remedy\":{\"mesh_axes\":\"x -z y\"},\"remedy_text\":\"the mesh is y-up\"},"
+                                "\"reading\":{\"axes\":\"opencv\",\"scale\":2}}";
+    char id[SCENE_ID_SIZE];
+    struct attempt a = {0};
+    struct job job;
+    snprintf(id, sizeof id, "cccc%.60s", SCENE_A);
+    add_scene(id);
+    OK(store_scene_patch(store, NULL, id, &(struct scene_patch){.reading = "{\"axes\":\"opencv\"}"}, &err));
+    OK(attempt_start_check(&a, &config, store, unchecked(id), 1, &err));
+    check_order(&a, "\"reading\":{\"axes\":\"opencv\"}");
+    settle(&a);
+    int64_t number = add_job_on(id, "{}");
+    OK(attempt_start_job(&a, &config, store, &figures, number, 1, &err));
+    check_order(&a, "\"reading\":{\"axes\":\"opencv\"}");
+    settle(&a);
+
+    OK(store_scene_patch(store, NULL, id, &(struct scene_patch){.reading = "{\"axes\":\"opencv\"}"}, &err));
+    OK(store_scene_ready(store, id, NULL, facts, &err));
+    number = add_job_on(id, "{}");
+    OK(attempt_start_job(&a, &config, store, &figures, number, 1, &err));
+    OK(store_job_get(store, number, &job, &err));
+    CHECK(a.phase == ATTEMPT_EMPTY && job.state == JOB_FAILED);
+    CHECK_THAT(strstr(job.reason, "do not fit: it hangs upside down"), "%s", job.reason);
+    CHECK_THAT(strstr(job.hint, "the mesh is y-up: `unbake scenes set ccccaaaaaaaa mesh_axes='x -z y'`"), "%s",
+               job.hint);
+    job_release(&job);
+    number = add_job_on(id, "{\"fit\":\"ignore\"}");
+    OK(attempt_start_job(&a, &config, store, &figures, number, 1, &err));
+    check_order(&a, "\"reading\":{\"axes\":\"opencv\",\"scale\":2}");
+    settle(&a);
 }
 
 /* A retry from a stage that needs a new checkpoint does not begin with the old one: where that cannot be removed, the
@@ -285,13 +339,13 @@ static void check_unpacked(void) {
         snprintf(id, sizeof id, "ffff%04x%.56s", (unsigned)i, SCENE_A);
         add_scene(id);
         char *files = mem_printf("%s/scenes/%s/files", dir, id);
-        OK(attempt_start_check(&a, &config, unchecked(id), 1, &err));
+        OK(attempt_start_check(&a, &config, store, unchecked(id), 1, &err));
         hear_to_the_end(&a);
         if (i == 0)
             strike_system("unlinkat", 1, true);
         OK(outcome_settle(&a, store, NULL, &figures, &err));
         CHECK(lift() == (i == 0) && scene_state(id) == SCENE_REJECTED && (access(files, F_OK) == 0) == (i == 0));
-        CHECK(log_count("cannot remove") == 1 && log_count(files) == (i == 0));
+        CHECK(log_count("cannot remove") == 2 && log_count(files) == (i == 0)); /* and the pictures */
         mem_free(files);
     }
 }
@@ -310,6 +364,7 @@ int main(int argc, char **argv) {
     strike_all(end_once);
     strike_all(check_once);
     check_rejected();
+    check_fit();
     check_restart();
     check_left_behind();
     check_unpacked();

@@ -71,7 +71,7 @@ static void test_turns(struct daemon *d) {
     for (int i = 0; i < 6; i++) {
         OK(checks_next(&checks, d->store, slots, 2, &next, &err));
         CHECK_THAT(strcmp(next.id, id_of(wanted[i])) == 0, "turn %d: %.8s", i, next.id);
-        OK(store_scene_ready(d->store, next.id, "{}", &err));
+        OK(store_scene_ready(d->store, next.id, NULL, "{}", &err));
     }
     CHECK(checks_next(&checks, d->store, slots, 2, &next, &err) == STATUS_NOT_FOUND);
 

@@ -60,7 +60,7 @@ int main(int argc, char **argv) {
     daemon_begin(&d, argc, argv);
     OK(store_open(&d.store, d.dir, &err)); /* all of it is there when the scheduler begins */
     OK(store_scene_add(d.store, SCENE_A, "scene", 1, ANNA, &existed, &err));
-    OK(store_scene_ready(d.store, SCENE_A, "{}", &err));
+    OK(store_scene_ready(d.store, SCENE_A, NULL, "{}", &err));
     int64_t hanging[12], quick;
     for (int i = 0; i < 12; i++)
         hanging[i] = add_job(&d, ANNA, "http://127.0.0.1/hang");

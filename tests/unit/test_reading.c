@@ -142,7 +142,23 @@ static void test_shift(void) {
     transforms_release(&t);
 }
 
+/* What a shell takes from the words is what they were made of. */
+static void test_words(void) {
+    cJSON *object = cJSON_Parse("{\"mesh_axes\":\"x -z y\",\"scale\":0.001,\"mesh\":\"a'b.ply\"}"),
+          *again = cJSON_CreateObject();
+    char *words = reading_words(object);
+    CHECK_STRING(words, "mesh_axes='x -z y' scale=0.001 mesh='a'\\''b.ply'");
+    CHECK(reading_parse_assignment("mesh_axes=x -z y", again, NULL) == STATUS_OK);
+    CHECK(reading_parse_assignment("scale=0.001", again, NULL) == STATUS_OK);
+    CHECK(reading_parse_assignment("mesh=a'b.ply", again, NULL) == STATUS_OK);
+    CHECK(cJSON_Compare(object, again, true));
+    mem_free(words);
+    cJSON_Delete(again);
+    cJSON_Delete(object);
+}
+
 int main(void) {
+    test_words();
     test_round_trip();
     test_faults();
     test_assignments();

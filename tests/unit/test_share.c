@@ -129,7 +129,7 @@ static void check_scene(const char *id, int64_t owner, int64_t second, uint64_t 
     OK(store_scene_add(store, id, "scene", 16 * KIB, owner, &existed, &err));
     if (second >= 0)
         OK(store_scene_add(store, id, "scene", 16 * KIB, second, &existed, &err));
-    OK(attempt_start_check(&a, &with, unchecked(id), 1, &err));
+    OK(attempt_start_check(&a, &with, store, unchecked(id), 1, &err));
     settle(&a);
     OK(store_scene_get(store, id, row, &err));
     mem_free(folder);

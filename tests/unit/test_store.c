@@ -210,7 +210,7 @@ static void check_order(struct queue *q) {
         OK(store_job_start(store, next, &attempt, &err));
     }
     IS(store_job_next(store, 0, &next, &err), STATUS_NOT_FOUND);
-    OK(store_scene_reject(store, SCENE_B, "[]", &err));
+    OK(store_scene_reject(store, SCENE_B, NULL, "[]", "{}", &err));
     OK(store_job_next(store, 0, &next, &err));
     CHECK(next == waits);
     OK(store_job_pause(store, q->young, &err));

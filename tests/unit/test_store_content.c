@@ -27,15 +27,15 @@ static void test_scenes(void) {
     OK(store_scene_unchecked(store, waiting, 1, 2, waiting, &count, &err));
     CHECK(count == 0);
     IS(store_scene_delete(store, SCENE_A, -1, false, &is_gone, &err), STATUS_CONFLICT);
-    OK(store_scene_reject(store, SCENE_A, "[{\"file\":\"a\",\"reason\":\"b\"}]", &err));
-    IS(store_scene_ready(store, SCENE_A, "{}", &err), STATUS_CONFLICT);
+    OK(store_scene_reject(store, SCENE_A, NULL, "[{\"file\":\"a\",\"reason\":\"b\"}]", "{}", &err));
+    IS(store_scene_ready(store, SCENE_A, NULL, "{}", &err), STATUS_CONFLICT);
     OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err)); /* checked again */
     CHECK(existed);
     OK(store_scene_get(store, SCENE_A, &row, &err));
     CHECK(row.state == SCENE_CHECKING && row.bytes == 10);
     CHECK_STRING(row.problems, "[]");
     scene_row_release(&row);
-    OK(store_scene_ready(store, SCENE_A, "{\"n\":1}", &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{\"n\":1}", &err));
     OK(store_scene_add(store, SCENE_A, "other name", 10, 0, &existed, &err));
     OK(store_scene_get(store, SCENE_A, &row, &err));
     CHECK(row.state == SCENE_READY);
@@ -50,7 +50,7 @@ static void test_scenes(void) {
     IS(store_scene_find(store, NULL, "aaaa%", &row, &err), STATUS_NOT_FOUND);
     OK(store_scene_add(store, SCENE_C, "odd", 1, 0, &existed, &err));
     IS(store_scene_find(store, NULL, "aaaa", &row, &err), STATUS_CONFLICT);
-    OK(store_scene_reject(store, SCENE_C, "[]", &err));
+    OK(store_scene_reject(store, SCENE_C, NULL, "[]", "{}", &err));
     OK(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err));
 
     OK(store_scene_add(store, SCENE_B, "two", 1, 0, &existed, &err));
@@ -102,6 +102,83 @@ static void test_share(void) {
     drop_dir(dir);
 }
 
+#define OPENCV "{\"axes\":\"opencv\"}"
+
+static enum status read_as(struct store *store, const struct caller *who, const char *reading) {
+    return store_scene_patch(store, who, SCENE_A, &(struct scene_patch){.reading = reading}, &err);
+}
+
+static void check_scene(struct store *store, enum scene_state state, const char *reading, const char *facts) {
+    struct scene_row row;
+    OK(store_scene_get(store, SCENE_A, &row, &err));
+    CHECK_THAT(row.state == state, "%s", scene_state_name(row.state));
+    CHECK_STRING(row.reading, reading);
+    CHECK_STRING(row.facts, facts);
+    scene_row_release(&row);
+}
+
+/* A scene that is to be read otherwise is checked again; a check counts for the reading that it had. */
+static void test_reading(void) {
+    char *dir = fresh_dir();
+    struct store *store;
+    bool existed;
+    OK(store_open(&store, dir, &err));
+    OK(store_scene_add(store, SCENE_A, "one", 10, 0, &existed, &err));
+    check_scene(store, SCENE_CHECKING, "{}", "{}");
+    OK(store_scene_ready(store, SCENE_A, "{}", "{\"n\":1}", &err));
+    OK(read_as(store, NULL, OPENCV));
+    check_scene(store, SCENE_CHECKING, OPENCV, "{}");
+    OK(store_scene_ready(store, SCENE_A, "{}", "{\"n\":1}", &err)); /* overtaken */
+    OK(store_scene_reject(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", "{}", &err));
+    OK(store_scene_postpone(store, SCENE_A, "{}", "[{\"file\":\"a\"}]", &err));
+    check_scene(store, SCENE_CHECKING, OPENCV, "{}");
+    OK(store_scene_reject(store, SCENE_A, OPENCV, "[{\"file\":\"a\"}]", "{\"warnings\":[\"w\"]}", &err));
+    check_scene(store, SCENE_REJECTED, OPENCV, "{\"warnings\":[\"w\"]}");
+    OK(read_as(store, NULL, OPENCV)); /* the same, once more */
+    check_scene(store, SCENE_CHECKING, OPENCV, "{}");
+    OK(store_scene_ready(store, SCENE_A, OPENCV, "{\"n\":2}", &err));
+
+    /* One that comes with the same content counts as well, where it is another. */
+    const struct caller nobody = {.role = ROLE_USER};
+    OK(store_scene_give_reading(store, &nobody, SCENE_A, OPENCV, &err));
+    check_scene(store, SCENE_READY, OPENCV, "{\"n\":2}");
+    OK(store_scene_give_reading(store, &nobody, SCENE_A, "{}", &err));
+    check_scene(store, SCENE_CHECKING, "{}", "{}");
+    store_close(store);
+    drop_dir(dir);
+}
+
+/* A job reads its scene in one way to its end, and others' jobs find it as it was when they were queued. */
+static void test_reading_and_jobs(void) {
+    char *dir = fresh_dir(), token[TOKEN_SIZE];
+    struct store *store;
+    struct caller alice, admin = {.role = ROLE_ADMIN};
+    int64_t id, job;
+    int attempt;
+    OK(store_open(&store, dir, &err));
+    OK(store_token_add(store, "alice", ROLE_USER, token, &id, &err));
+    OK(store_token_find(store, token, &alice, &err));
+    add_ready_scene(store, SCENE_A);
+    job = add_job(store, SCENE_A, 0); /* nobody's */
+    IS(read_as(store, &alice, OPENCV), STATUS_CONFLICT);
+    CHECK_THAT(strstr(err.message, "another user") && *err.hint, "%s", err.message);
+    OK(read_as(store, &admin, OPENCV));
+    IS(store_job_start(store, job, &attempt, &err), STATUS_CONFLICT); /* while it is checked */
+    OK(store_scene_ready(store, SCENE_A, OPENCV, "{}", &err));
+    OK(store_job_start(store, job, &attempt, &err));
+    IS(read_as(store, &admin, "{}"), STATUS_CONFLICT);
+    CHECK_THAT(strstr(err.message, "has begun") && strstr(err.hint, "Cancel"), "%s", err.message);
+    OK(store_job_stop(store, job, attempt, "", &err)); /* it waits, with a checkpoint */
+    IS(read_as(store, &admin, "{}"), STATUS_CONFLICT);
+    IS(store_scene_give_reading(store, &alice, SCENE_A, "{}", &err), STATUS_CONFLICT);
+    check_scene(store, SCENE_READY, OPENCV, "{}");
+    OK(store_job_cancel(store, job, &err));
+    OK(read_as(store, &alice, "{}"));
+    check_scene(store, SCENE_CHECKING, "{}", "{}");
+    store_close(store);
+    drop_dir(dir);
+}
+
 /* A scene is kept as long after its last owner has sent it as after the first. */
 static void test_sent_again(void) {
     char *dir = fresh_dir(), *path = file_join(dir, "state.db");
@@ -112,7 +189,7 @@ static void test_sent_again(void) {
     OK(store_open(&store, dir, &err));
     OK(store_keep(store, 1000, 0, 1000, &err));
     OK(store_scene_add(store, SCENE_A, "one", 10, 1, &existed, &err));
-    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
     store_close(store);
     CHECK(sqlite3_open(path, &db) == SQLITE_OK);
     CHECK(sqlite3_exec(db, "UPDATE scenes SET created_ms = 5000; UPDATE scene_owners SET created_ms = 5000", NULL, NULL,
@@ -371,7 +448,7 @@ static void test_expired_no_more(void) {
     bool existed;
     OK(store_job_cancel(store, id, &err));
     OK(store_scene_add(store, SCENE_B, "b", 10, 0, &existed, &err));
-    OK(store_scene_ready(store, SCENE_B, "{}", &err));
+    OK(store_scene_ready(store, SCENE_B, NULL, "{}", &err));
     struct upload_row row = {
         .id = "00112233445566778899aabbccddeeff", .name = (char[]){"u"}, .metadata = (char[]){""}, .length = 9};
     OK(store_upload_add(store, &row, "0000", 4, &(struct count_limits){9, 9}, &err));
@@ -381,7 +458,7 @@ static void test_expired_no_more(void) {
     const struct job_patch patch = {.priority = INT_MIN, .shared = -1, .retention = pinned};
     OK(store_job_patch(store, id, -1, &patch, &err));
     OK(store_upload_keep(store, row.id, &pinned, &err));
-    OK(store_scene_patch(store, NULL, SCENE_A, NULL, &pinned, &err));
+    OK(store_scene_patch(store, NULL, SCENE_A, &(struct scene_patch){NULL, pinned, NULL}, &err));
     used = add_job(store, SCENE_B, 0);
     for (size_t i = 0; i < count; i++) {
         IS(store_expired_delete(store, &list[i], later, &err), STATUS_CONFLICT);
@@ -439,6 +516,8 @@ static void test_output_digest(void) {
 int main(void) {
     test_scenes();
     test_share();
+    test_reading();
+    test_reading_and_jobs();
     test_sent_again();
     test_events();
     test_outbox();

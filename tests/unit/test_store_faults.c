@@ -87,8 +87,8 @@ static void check_refusals(void) {
     IS(store_job_delete(store, 77, &err), STATUS_NOT_FOUND);
     IS(store_event_add(store, 77, 1, EVENT_LOG, "{}", &err), STATUS_NOT_FOUND);
     IS(store_event_list(store, 77, 0, 9, no_event, NULL, &err), STATUS_OK);
-    IS(store_scene_ready(store, SCENE_C, "{}", &err), STATUS_NOT_FOUND);
-    IS(store_scene_patch(store, NULL, SCENE_C, "x", &(struct retention){0}, &err), STATUS_NOT_FOUND);
+    IS(store_scene_ready(store, SCENE_C, NULL, "{}", &err), STATUS_NOT_FOUND);
+    IS(store_scene_patch(store, NULL, SCENE_C, &(struct scene_patch){.name = "x"}, &err), STATUS_NOT_FOUND);
     IS(store_scene_delete(store, SCENE_C, -1, false, &is_gone, &err), STATUS_NOT_FOUND);
     IS(store_scene_list(store, NULL, "yesterday", 1, scenes, &count, cursor, &err), STATUS_INPUT);
     IS(store_upload_list(store, NULL, "", "yesterday", 1, &row, &count, cursor, &err), STATUS_INPUT);

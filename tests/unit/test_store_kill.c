@@ -43,7 +43,7 @@ static void child(const char *dir, int first_key, int fd) {
         store_scene_add(store, SCENE, "s", 1, 0, &existed, &err) != STATUS_OK)
         _exit(2);
     if (!existed)
-        store_scene_ready(store, SCENE, "{}", &err);
+        store_scene_ready(store, SCENE, NULL, "{}", &err);
     for (int key = first_key; key < KEYS_MAX; key++) {
         char text[32];
         snprintf(text, sizeof text, "key-%d", key);

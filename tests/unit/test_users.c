@@ -177,7 +177,7 @@ static void test_names(void) {
     OK(store_scene_add(store, SCENE_A, "secret of alice", 1, alice->user_id, &existed, &err));
     OK(store_scene_add(store, SCENE_A, "kitchen", 1, bob->user_id, &existed, &err));
     OK(store_scene_add(store, SCENE_A, "hall", 1, carol->user_id, &existed, &err));
-    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
     check_name(store, alice, "secret of alice", "alice");
     check_name(store, bob, "kitchen", "bob");
     check_name(store, carol, "hall", "carol");
@@ -185,8 +185,8 @@ static void test_names(void) {
     check_name(store, &admin, "secret of alice", "alice");
     check_name(store, NULL, "secret of alice", "alice");
 
-    OK(store_scene_patch(store, bob, SCENE_A, "his kitchen", &as_is, &err));
-    OK(store_scene_patch(store, &admin, SCENE_A, "hers", &as_is, &err));
+    OK(store_scene_patch(store, bob, SCENE_A, &(struct scene_patch){"his kitchen", as_is, NULL}, &err));
+    OK(store_scene_patch(store, &admin, SCENE_A, &(struct scene_patch){"hers", as_is, NULL}, &err));
     check_name(store, alice, "hers", "alice");
     check_name(store, bob, "his kitchen", "bob");
     check_name(store, carol, "hall", "carol");
@@ -260,9 +260,9 @@ static void test_lists(void) {
     alice = add_user(store, "alice");
     bob = add_user(store, "bob");
     OK(store_scene_add(store, SCENE_A, "a", 1, alice.user_id, &existed, &err));
-    OK(store_scene_ready(store, SCENE_A, "{}", &err));
+    OK(store_scene_ready(store, SCENE_A, NULL, "{}", &err));
     OK(store_scene_add(store, SCENE_C, "c", 1, bob.user_id, &existed, &err));
-    OK(store_scene_ready(store, SCENE_C, "{}", &err));
+    OK(store_scene_ready(store, SCENE_C, NULL, "{}", &err));
     CHECK(scenes_seen(store, &alice) == 1 && scenes_seen(store, &bob) == 1 && scenes_seen(store, &admin) == 2);
     OK(store_scene_find(store, &alice, "aaaa", &row, &err)); /* ambiguous only among one's own */
     CHECK_STRING(row.id, SCENE_A);
@@ -298,15 +298,16 @@ static void test_lists(void) {
     CHECK(!existed && scenes_seen(store, &bob) == 2);
     const struct retention past = {.sets_expiry = true, .expires_ms = 1}, pin = {.pin = KEEP_PIN_ON},
                            loose = {.pin = KEEP_PIN_OFF};
-    OK(store_scene_patch(store, &alice, SCENE_A, "mine", &pin, &err));
-    IS(store_scene_patch(store, &bob, SCENE_A, NULL, &loose, &err), STATUS_CONFLICT);
-    IS(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err), STATUS_CONFLICT);
-    OK(store_scene_patch(store, &admin, SCENE_A, NULL, &loose, &err));
+    OK(store_scene_patch(store, &alice, SCENE_A, &(struct scene_patch){"mine", pin, NULL}, &err));
+    IS(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err), STATUS_CONFLICT);
+    IS(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, past, NULL}, &err), STATUS_CONFLICT);
+    OK(store_scene_patch(store, &admin, SCENE_A, &(struct scene_patch){NULL, loose, NULL}, &err));
     IS(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, first, &err));
     OK(store_scene_delete(store, SCENE_A, alice.user_id, false, &is_gone, &err));
     CHECK(!is_gone && scenes_seen(store, &alice) == 0 && scenes_seen(store, &bob) == 2);
-    OK(store_scene_patch(store, &bob, SCENE_A, NULL, &past, &err)); /* it is his alone now */
+    OK(store_scene_patch(store, &bob, SCENE_A, &(struct scene_patch){NULL, past, NULL},
+                         &err)); /* it is his alone now */
     IS(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err), STATUS_CONFLICT);
     OK(store_job_cancel(store, second, &err));
     OK(store_scene_delete(store, SCENE_A, bob.user_id, false, &is_gone, &err));
