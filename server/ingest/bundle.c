@@ -11,12 +11,11 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/archive.h"
-#include "server/ingest/colmap.h"
 #include "server/ingest/mesh_file.h"
 #include "server/ingest/path.h"
 #include "server/ingest/photos.h"
 #include "server/ingest/reading_apply.h"
-#include "server/ingest/trajectory.h"
+#include "server/ingest/source/sources.h"
 #include "server/ingest/transforms.h"
 
 struct bundle_limits bundle_default_limits(void) {
@@ -70,60 +69,28 @@ static enum status find_root(const char *dir, char **root, struct error *err) {
     return status;
 }
 
-/* --- transforms -------------------------------------------------------------------------- */
-
-static enum status load_transforms(const char *root, const char *name, struct transforms *t, struct findings *f,
-                                   struct error *err) {
-    struct buf text;
-    struct stat info;
-    buf_init(&text, TRANSFORMS_MAX_BYTES);
-    char *path = file_join(root, name);
-    cJSON *tree = NULL;
-    struct error own;
-    enum status status;
-    if (stat(path, &info) != 0)
-        status = error_set_errno(&own, errno, "cannot look at %s", name);
-    else if (S_ISDIR(info.st_mode))
-        status = error_set(&own, STATUS_INPUT, "%s is a folder", name);
-    else if (info.st_size > TRANSFORMS_MAX_BYTES)
-        status = error_set(&own, STATUS_LIMIT, "%s is larger than %zu bytes", name, (size_t)TRANSFORMS_MAX_BYTES);
-    else
-        status = file_read(path, &text, &own);
-    if (status == STATUS_OK)
-        status = json_parse(buf_text(&text), text.length, name, &tree, &own);
-    if (status == STATUS_OK)
-        transforms_read(tree, name, t, f);
-    else
-        status = findings_settle(f, name, status, &own, err);
-    cJSON_Delete(tree);
-    mem_free(path);
-    buf_release(&text);
-    return status;
-}
+/* --- cameras ----------------------------------------------------------------------------- */
 
 static void tell_no_cameras(const char *name, struct findings *f) {
     struct error own;
-    error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s at its top, nor poses of another kind", name);
+    error_set(&own, STATUS_INPUT, "no cameras: the bundle has no %s, nor poses of another kind", name);
     error_hint(&own, "nerfstudio and instant-ngp write one; COLMAP, ScanNet and NICE-SLAM's Replica are read, too");
     findings_error(f, name, &own);
 }
 
-/* Without a transforms.json, reads poses of another format and sets *name to their file. */
-static enum status load_cameras(const char *root, char **name, struct transforms *t, struct findings *f,
-                                struct error *err) {
+/* The cameras of the file that was chosen, or of whatever source the bundle is; sets *match. */
+static enum status load_cameras(const struct listing *l, const char *chosen, struct source_match *match,
+                                struct transforms *t, struct findings *f, struct error *err) {
     *t = (struct transforms){0};
-    if (file_is_in(root, *name))
-        return load_transforms(root, *name, t, f, err);
-    bool is_default = strcmp(*name, BUNDLE_TRANSFORMS) == 0;
-    char *colmap = is_default ? colmap_find(root) : NULL;
-    const char *trajectory = is_default ? trajectory_find(root) : NULL;
-    if (!colmap && !trajectory) {
-        tell_no_cameras(*name, f);
+    *match = sources_find(l, chosen);
+    if (!match->source && chosen && listing_find(l, "", chosen)) /* of another name */
+        *match = (struct source_match){&source_nerfstudio, mem_strdup(""), mem_strdup(chosen)};
+    if (!match->source) {
+        tell_no_cameras(chosen ? chosen : BUNDLE_TRANSFORMS, f);
         return STATUS_OK;
     }
-    mem_free(*name);
-    *name = colmap ? colmap : mem_strdup(trajectory);
-    return colmap ? colmap_read(root, colmap, t, f, err) : trajectory_read(root, trajectory, t, f, err);
+    struct source_place place = {l, match->base, match->found};
+    return match->source->read(&place, t, f, err);
 }
 
 /* --- mesh -------------------------------------------------------------------------------- */
@@ -304,27 +271,35 @@ static enum status sum_up(const struct findings *f, struct error *err) {
     return error_set(err, STATUS_INPUT, "%zu problems; the first: %s: %s", f->problem_count, file, reason);
 }
 
+/* The file of cameras that the reading names, cleaned, the caller's; NULL: none is named. */
+static enum status clean_choice(const char *given, char **chosen, struct error *err) {
+    *chosen = NULL;
+    enum status status = given ? path_clean(given, chosen, err) : STATUS_OK;
+    if (status == STATUS_OK && given && (*chosen)[0] == '\0')
+        status = error_set(err, STATUS_INPUT, "\"%s\" is no name of a file", given);
+    return status;
+}
+
 enum status bundle_load(const char *dir, const struct reading *given, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err) {
     struct findings f = {.problems = problems};
-    struct transforms t;
-    char *root = NULL, *mesh = NULL, *name = NULL;
+    struct transforms t = {0};
+    struct listing listing = {0};
+    struct source_match match = {0};
+    char *root = NULL, *mesh = NULL, *chosen = NULL;
     struct reading reading = given ? *given : reading_default();
-    const char *transforms = reading.transforms;
     *scene = (struct scene){0};
-    enum status status = path_clean(transforms ? transforms : BUNDLE_TRANSFORMS, &name, err);
-    if (status == STATUS_OK && name[0] == '\0')
-        status = error_set(err, STATUS_INPUT, "\"%s\" is no name of a file", transforms);
+    enum status status = clean_choice(reading.transforms, &chosen, err);
     if (status == STATUS_OK)
         status = find_root(dir, &root, err);
-    if (status != STATUS_OK) {
-        mem_free(name);
-        return status;
-    }
-    status = load_cameras(root, &name, &t, &f, err);
-    bool has_frames = f.problem_count == 0 || t.frame_count > 0;
+    if (status == STATUS_OK)
+        status = listing_read(&listing, root, err);
+    if (status == STATUS_OK)
+        status = load_cameras(&listing, chosen, &match, &t, &f, err);
     if (status != STATUS_OK)
         goto out;
+    const char *name = match.found ? match.found : chosen ? chosen : BUNDLE_TRANSFORMS;
+    bool has_frames = f.problem_count == 0 || t.frame_count > 0;
     reading_apply_frames(&reading, &t);
     if (reading.mesh)
         status = choose_mesh(root, reading.mesh, &mesh, &f, err);
@@ -337,6 +312,8 @@ enum status bundle_load(const char *dir, const struct reading *given, const stru
     if (status == STATUS_OK && f.problem_count > 0)
         status = sum_up(&f, err);
     if (status == STATUS_OK) {
+        scene->source = mem_strdup(match.source->name);
+        scene->named_count = t.named_count;
         check_frames_meet_mesh(scene, &f);
         move_warnings(&f, scene);
     }
@@ -345,8 +322,10 @@ out:
         scene_release(scene);
     findings_release(&f);
     transforms_release(&t);
+    source_match_release(&match);
+    listing_release(&listing);
     mem_free(mesh);
     mem_free(root);
-    mem_free(name);
+    mem_free(chosen);
     return status;
 }

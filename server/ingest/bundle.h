@@ -1,8 +1,8 @@
 /* bundle.h -- turns an upload into a scene. Runs in workers only, never in the daemon.
  *
- * A bundle is a folder with transforms.json (transforms.h), a COLMAP reconstruction (colmap.h) or poses as text
- * (trajectory.h), the photographs they name, and a mesh (mesh_file.h): the key `mesh`; else ply_file_path if it has
- * faces; else the only PLY with faces at the top level; else the only file of another mesh format there. */
+ * A bundle is a folder with cameras of some source (source/sources.h), the photographs that they name, and a mesh
+ * (mesh_file.h): the key `mesh`; else ply_file_path if it has faces; else the only PLY with faces at the top level; else
+ * the only file of another mesh format there. */
 #ifndef UNBAKE_INGEST_BUNDLE_H
 #define UNBAKE_INGEST_BUNDLE_H
 
@@ -33,7 +33,8 @@ enum status bundle_unpack(const char *archive, const char *dir, const struct bun
 
 /* Reads an unpacked bundle: cameras, mesh, photographs. Collects as many problems as possible, each an object
  * {"file", "reason"} with an optional "hint", in the array `problems`; then returns STATUS_INPUT with a summary in
- * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). On success the scene is the caller's (scene_release); otherwise it is empty. */
+ * *err. Other statuses are failures of the machine. `reading` says how it is to be read (NULL: as the bundle says). On
+ * success the scene is the caller's (scene_release); otherwise it is empty. */
 enum status bundle_load(const char *dir, const struct reading *reading, const struct bundle_limits *limits,
                         struct parallel *pool, struct scene *scene, cJSON *problems, struct error *err);
 

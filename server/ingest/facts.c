@@ -64,6 +64,8 @@ cJSON *facts_of(const struct scene *scene) {
         pixel_count += (uint64_t)p->camera.width * p->camera.height;
     }
     add_mesh_facts(facts, scene);
+    json_add_string(facts, "source", scene->source);
+    json_add_int(facts, "named_count", (int64_t)scene->named_count);
     json_add_int(facts, "frame_count", (int64_t)scene->photograph_count);
     json_add_int(facts, "train_count", (int64_t)(scene->photograph_count - test_count));
     json_add_int(facts, "test_count", (int64_t)test_count);

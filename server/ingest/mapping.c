@@ -32,7 +32,7 @@ enum status mapping_open(struct mapping *m, const char *path, const char *name, 
 }
 
 void mapping_close(struct mapping *m) {
-    if (m->data)
+    if (m->data && !m->is_borrowed)
         munmap(m->data, m->size);
     *m = (struct mapping){0};
 }

@@ -3,6 +3,7 @@
 #ifndef UNBAKE_INGEST_MAPPING_H
 #define UNBAKE_INGEST_MAPPING_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "common/error.h"
@@ -10,6 +11,7 @@
 struct mapping {
     void *data; /* NULL: nothing is mapped */
     size_t size;
+    bool is_borrowed; /* not mapped here: nothing to undo */
 };
 
 /* `name` and `kind` ("a PLY file") are for messages; an empty file is STATUS_INPUT. */

@@ -11,6 +11,7 @@ void scene_release(struct scene *scene) {
     for (size_t i = 0; i < scene->warning_count; i++)
         mem_free(scene->warning[i]);
     mem_free(scene->warning);
+    mem_free(scene->source);
     *scene = (struct scene){0};
 }
 

@@ -12,6 +12,8 @@ struct scene {
     struct mesh_report mesh_report; /* what was dropped of it */
     size_t photograph_count;
     struct photograph *photograph; /* [photograph_count]; owned */
+    char *source;       /* kind of capture: "COLMAP"; NULL in scenes that were not read from a bundle; owned */
+    size_t named_count; /* frames that its files name, of which the photographs are those that can be used */
     size_t warning_count;
     char **warning; /* [warning_count] sentences for the user; owned */
 };

@@ -1,6 +1,6 @@
 /* test_colmap.c -- COLMAP's files of cameras and images. The first byte of the input chooses text or
  * binary and which of the two it is; the other is a good one. */
-#include "server/ingest/colmap.h"
+#include "server/ingest/source/colmap_images.h"
 
 #include "common/mem.h"
 #include "tests/fuzz/fuzz.h"

@@ -1,12 +1,11 @@
 /* COLMAP's files: text and binary say the same; what is refused names the file and the place. */
-#include "server/ingest/colmap.h"
-
-#include <sys/stat.h>
+#include "server/ingest/source/colmap_images.h"
 
 #include "common/buf.h"
-#include "common/file.h"
 #include "common/mem.h"
+#include "server/ingest/source/sources.h"
 #include "tests/check.h"
+#include "tests/unit/source_rig.h"
 
 #define CAMERAS                                                                                                        \
     "# Camera list\n7 PINHOLE 640 480 500 510 320 240\n\n3 OPENCV 640 480 500 510 321 241 -0.1 0.02 "                  \
@@ -136,8 +135,8 @@ static void test_refused(void) {
     };
     static const char *const problems[][2] = {
         {"1 1 0 0 0 0 0 0 8 a.png\n\n", "image a.png: there is no camera 8"},
-        {"1 0 0 0 0 0 0 0 7 a.png\n\n", "image a.png: its pose holds a number that is not finite"},
-        {"1 1 0 0 0 inf 0 0 7 a.png\n\n", "image a.png: its pose holds a number that is not finite"},
+        {"1 0 0 0 0 0 0 0 7 a.png\n\n", "image a.png: the pose holds a number that is not finite"},
+        {"1 1 0 0 0 inf 0 0 7 a.png\n\n", "image a.png: the pose holds a number that is not finite"},
         {"1 1 0 0 0 0 0 0 7 ../a.png\n\n", "leads out"},
     };
     struct error err;
@@ -195,10 +194,10 @@ static void test_many(void) {
     CHECK_STRING(err.message, "cameras.txt has more than 20000 cameras");
     struct colmap_cameras *c = cameras_of(CAMERAS, &err);
     CHECK(colmap_images_parse(text.data, text.length, "images.txt", false, c, "", &t, &f, &err) == STATUS_INPUT);
-    CHECK_STRING(err.message, "images.txt has more than 20000 images");
+    CHECK_STRING(err.message, "images.txt has more than 20000 frames");
     transforms_release(&t);
     CHECK(colmap_images_parse(binary.data, binary.length, "images.bin", true, c, "", &t, &f, &err) == STATUS_INPUT);
-    CHECK_STRING(err.message, "images.bin has more than 20000 images");
+    CHECK_STRING(err.message, "images.bin has more than 20000 frames");
     transforms_release(&t);
     colmap_cameras_free(c);
     buf_release(&binary);
@@ -210,35 +209,20 @@ static void test_many(void) {
 
 /* Which files are taken, and that photographs are looked for in images/. */
 static void test_folder(void) {
-    char dir[] = "/tmp/unbake-colmap-XXXXXX";
-    static const char *const name[] = {"sparse/images.txt", "sparse/cameras.txt", "sparse/0/images.bin"};
-    struct error err;
-    struct findings f = {.problems = cJSON_CreateArray()};
-    struct transforms t;
-    CHECK(mkdtemp(dir) != NULL && colmap_find(dir) == NULL);
-    char *inner = file_join(dir, "sparse/0"), *images = file_join(dir, "images");
-    CHECK(file_make_dirs(inner, NULL) == STATUS_OK);
-    for (size_t i = 0; i < 3; i++) {
-        char *path = file_join(dir, name[i]);
-        const char *text = i == 1 ? CAMERAS : IMAGES;
-        CHECK(file_replace(path, text, strlen(text), NULL) == STATUS_OK);
-        mem_free(path);
-    }
-    char *found = colmap_find(dir); /* sparse/0 has no cameras */
-    CHECK_STRING(found, "sparse/images.txt");
-    CHECK(colmap_read(dir, found, &t, &f, &err) == STATUS_OK && t.frame_count == 3);
-    CHECK_STRING(t.frame[0].file, "a.png");
-    transforms_release(&t);
-    CHECK(mkdir(images, 0700) == 0);
-    CHECK(colmap_read(dir, found, &t, &f, &err) == STATUS_OK && f.problem_count == 0);
-    check_frames(&t);
-    transforms_release(&t);
-    mem_free(found);
-    mem_free(images);
-    mem_free(inner);
-    cJSON_Delete(f.problems);
-    findings_release(&f);
-    CHECK(file_remove_tree(dir, NULL) == STATUS_OK);
+    struct source_rig r;
+    source_rig_start(&r, "COLMAP");
+    source_rig_put(&r, "sparse/images.txt", IMAGES);
+    source_rig_put(&r, "sparse/cameras.txt", CAMERAS);
+    source_rig_put(&r, "sparse/0/images.bin", IMAGES); /* without cameras */
+    source_rig_read(&r);
+    CHECK_STRING(r.match.found, "sparse/images.txt");
+    CHECK(r.t.frame_count == 3);
+    CHECK_STRING(r.t.frame[0].file, "a.png");
+    source_rig_put(&r, "images/a.png", "");
+    source_rig_read(&r);
+    CHECK_STRING(r.problems, "[]");
+    check_frames(&r.t);
+    source_rig_stop(&r);
 }
 
 int main(void) {

@@ -9,7 +9,7 @@
 #include "common/file.h"
 #include "common/mem.h"
 #include "server/ingest/bundle.h"
-#include "server/ingest/trajectory.h"
+#include "server/ingest/listing.h"
 #include "tests/check.h"
 
 static char dir[] = "/tmp/unbake-test-listing-XXXXXX";
@@ -50,13 +50,11 @@ static enum status list_bundle(struct error *err) {
     return status;
 }
 
-static enum status list_poses(struct error *err) {
-    struct transforms t;
-    struct findings f = {.problems = cJSON_CreateArray()};
-    enum status status = trajectory_read(dir, "pose", &t, &f, err);
-    transforms_release(&t);
-    cJSON_Delete(f.problems);
-    findings_release(&f);
+static enum status list_files(struct error *err) {
+    struct listing l;
+    enum status status = listing_read(&l, dir, err);
+    CHECK(status != STATUS_OK || (l.count == 4 && l.folder_count == 3));
+    listing_release(&l);
     return status;
 }
 
@@ -108,7 +106,7 @@ int main(void) {
     put("intrinsic/intrinsic_color.txt", "7 0 4 0\n0 7 3 0\n0 0 1 0\n0 0 0 1\n");
     put("mesh.ply", "ply\n");
     check_fails("a scene", list_bundle, STATUS_INPUT);
-    check_fails("poses", list_poses, STATUS_OK);
+    check_fails("its files", list_files, STATUS_OK);
     check_fails("an upload", list_upload, STATUS_OK);
     check_fails("the size", size_of_all, STATUS_OK);
     check_fails("removal", remove_all, STATUS_OK);

@@ -1,5 +1,5 @@
 /* colmap_cursor.c -- see colmap_cursor.h. */
-#include "server/ingest/colmap_cursor.h"
+#include "server/ingest/source/colmap_cursor.h"
 
 #include <math.h>
 #include <stdlib.h>

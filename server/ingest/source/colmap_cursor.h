@@ -1,6 +1,6 @@
 /* colmap_cursor.h -- reads a COLMAP file as bytes (.bin, little-endian) or as lines of words (.txt). */
-#ifndef UNBAKE_INGEST_COLMAP_CURSOR_H
-#define UNBAKE_INGEST_COLMAP_CURSOR_H
+#ifndef UNBAKE_INGEST_SOURCE_COLMAP_CURSOR_H
+#define UNBAKE_INGEST_SOURCE_COLMAP_CURSOR_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* colmap_cameras.c -- see colmap_cameras.h. */
-#include "server/ingest/colmap_cameras.h"
+#include "server/ingest/source/colmap_cameras.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 
 #include "common/image.h"
 #include "common/mem.h"
-#include "server/ingest/colmap_cursor.h"
+#include "server/ingest/source/colmap_cursor.h"
 
 #define MAX_PARAMETERS 12
 

@@ -1,74 +1,40 @@
-/* colmap.c -- see colmap.h. Counts in a file are checked against its size. */
-#include "server/ingest/colmap.h"
-
-#include <math.h>
-#include <stdlib.h>
+/* colmap.c -- a COLMAP reconstruction (colmap.github.io/format.html), .bin or .txt; .bin is preferred, as in COLMAP.
+ *
+ * Its poses are world-to-camera, with our axes. Its unit of length is arbitrary and must be that of the mesh, which
+ * comes from the same reconstruction. Photographs are sorted by name; names are relative to images/ if that folder
+ * exists. Counts in a file are checked against its size. */
 #include <string.h>
 
-#include "common/file.h"
 #include "common/mem.h"
-#include "server/ingest/colmap_cursor.h"
-#include "server/ingest/mapping.h"
 #include "server/ingest/path.h"
-#include "server/ingest/pose.h"
+#include "server/ingest/source/colmap_cursor.h"
+#include "server/ingest/source/colmap_images.h"
+#include "server/ingest/source/frame_list.h"
 
 /* --- images --------------------------------------------------------------------------------- */
 
 struct images {
     const struct colmap_cameras *cameras;
     const char *prefix; /* of names: "images/" or "" */
-    struct transforms *t;
-    size_t capacity;
-    struct findings *findings;
+    struct frame_list list;
 };
-
-/* World-to-camera, q = w x y z and t, to a camera-to-world matrix. */
-static void invert(const double q[4], const double t[3], double m[3][4]) {
-    double n = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    double w = q[0] * n, x = q[1] * n, y = q[2] * n, z = q[3] * n;
-    const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
-                            {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
-                            {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++)
-            m[i][j] = r[j][i];
-        m[i][3] = -(r[0][i] * t[0] + r[1][i] * t[1] + r[2][i] * t[2]);
-    }
-}
 
 /* A faulty frame is left out with a problem; STATUS_INPUT for too many. */
 static enum status add_image(const struct colmap_cursor *r, struct images *in, const double pose[7], uint64_t camera,
                              const char *name) {
-    struct transforms *t = in->t;
-    struct error own;
-    char *clean = NULL, *full = mem_printf("%s%s", in->prefix, name);
-    size_t number = t->named_count++;
     const struct lens *lens = colmap_cameras_find(in->cameras, (uint32_t)camera);
-    struct transforms_frame frame = {.number = number, .exposure_source = EXPOSURE_UNKNOWN};
-    double m[3][4];
-    bool scaled;
-    invert(pose, pose + 4, m);
+    double rotation[3][3], m[3][4];
+    char *full = mem_printf("%s%s", in->prefix, name), *place = mem_printf("image %s", full);
     enum status status = STATUS_OK;
-    if (number == TRANSFORMS_MAX_FRAMES)
-        status = error_set(r->err, STATUS_INPUT, "%s has more than %d images", r->name, TRANSFORMS_MAX_FRAMES);
-    else if (path_clean(full, &clean, &own) != STATUS_OK)
-        findings_error(in->findings, r->name, &own);
-    else if (!lens)
-        findings_problem(in->findings, r->name, "image %s: there is no camera %llu", clean, (unsigned long long)camera);
-    else if (pose_from_matrix((const double(*)[4])m, "its pose", POSE_RIGHT_DOWN_FORWARD, &frame.world_from_camera,
-                              &scaled, &own) != STATUS_OK)
-        findings_problem(in->findings, r->name, "image %s: %s", clean, own.message);
-    else {
-        if (t->frame_count == in->capacity) {
-            in->capacity = in->capacity ? 2 * in->capacity : 64;
-            t->frame = mem_realloc_array(t->frame, in->capacity, sizeof *t->frame);
-        }
-        frame.lens = *lens;
-        frame.file = clean;
-        clean = NULL;
-        t->frame[t->frame_count++] = frame;
+    rotation_from_quaternion(pose[0], pose[1], pose[2], pose[3], rotation);
+    pose_invert(rotation, pose + 4, m);
+    if (lens) {
+        status = frame_list_add(&in->list, m, lens, full, place, NULL, r->err);
+    } else {
+        in->list.t->named_count++;
+        findings_problem(in->list.findings, r->name, "%s: there is no camera %llu", place, (unsigned long long)camera);
     }
-    mem_free(clean);
+    mem_free(place);
     mem_free(full);
     return status;
 }
@@ -125,72 +91,66 @@ static enum status read_images_text(struct colmap_cursor *r, struct images *in) 
     return STATUS_OK;
 }
 
-static int by_file(const void *a, const void *b) {
-    const struct transforms_frame *x = a, *y = b;
-    int order = strcmp(x->file, y->file);
-    return order ? order : (x->number > y->number) - (x->number < y->number);
-}
-
 enum status colmap_images_parse(const void *data, size_t size, const char *name, bool binary,
                                 const struct colmap_cameras *cameras, const char *prefix, struct transforms *t,
                                 struct findings *f, struct error *err) {
     struct colmap_cursor r = {.name = name, .data = data, .size = size, .err = err};
-    struct images in = {.cameras = cameras, .prefix = prefix, .t = t, .findings = f};
-    *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
+    struct images in = {.cameras = cameras, .prefix = prefix};
+    in.list = frame_list_make(t, name, AXES_OPENCV_INVERSE, f);
     enum status status = binary ? read_images_binary(&r, &in) : read_images_text(&r, &in);
-    if (t->frame_count > 1)
-        qsort(t->frame, t->frame_count, sizeof *t->frame, by_file);
+    frame_list_finish(&in.list);
+    frame_list_sort(t);
     return status;
 }
 
 /* --- files ---------------------------------------------------------------------------------- */
 
-char *colmap_find(const char *root) {
+static char *recognise(const struct listing *l, const char *base) {
     static const char *const folders[] = {"", "sparse/0/", "sparse/", "colmap/sparse/0/", "dense/sparse/"};
     static const char *const kinds[] = {"bin", "txt"};
     for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
         for (size_t k = 0; k < 2; k++) {
             char *images = mem_printf("%simages.%s", folders[i], kinds[k]);
             char *cameras = mem_printf("%scameras.%s", folders[i], kinds[k]);
-            bool found = file_is_in(root, images) && file_is_in(root, cameras);
+            const struct listed_file *file = listing_find(l, base, images);
+            bool found = file && listing_find(l, base, cameras);
             mem_free(cameras);
-            if (found)
-                return images;
             mem_free(images);
+            if (found)
+                return mem_strdup(file->path);
         }
     }
     return NULL;
 }
 
-enum status colmap_read(const char *root, const char *images, struct transforms *t, struct findings *f,
-                        struct error *err) {
-    const char *base = path_base(images);
+static enum status read(const struct source_place *place, struct transforms *t, struct findings *f, struct error *err) {
+    const char *images = place->found, *base = path_base(images);
+    const struct listing *l = place->listing;
     bool binary = strcmp(path_extension(images), "bin") == 0;
     char *cameras = mem_printf("%.*scameras.%s", (int)(base - images), images, binary ? "bin" : "txt");
-    char *path = file_join(root, cameras);
-    const char *prefix = file_is_in(root, "images") ? "images/" : "";
+    char *prefix = mem_printf("%s%s", place->base, listing_has_folder(l, place->base, "images") ? "images/" : "");
     struct colmap_cameras *found = NULL;
     struct mapping file;
     struct error own = {0};
     *t = (struct transforms){.axes = AXES_OPENCV_INVERSE};
-    enum status status = mapping_open(&file, path, cameras, "a file of cameras", &own);
+    enum status status = listing_open(l, cameras, "a file of cameras", &file, &own);
     if (status == STATUS_OK) {
         found = colmap_cameras_parse(file.data, file.size, cameras, binary, &own);
         status = found ? STATUS_OK : own.status;
     }
     mapping_close(&file);
-    mem_free(path);
     enum status result = findings_settle(f, cameras, status, &own, err);
     if (found) {
-        path = file_join(root, images);
-        status = mapping_open(&file, path, images, "a file of images", &own);
+        status = listing_open(l, images, "a file of images", &file, &own);
         if (status == STATUS_OK)
             status = colmap_images_parse(file.data, file.size, images, binary, found, prefix, t, f, &own);
         mapping_close(&file);
-        mem_free(path);
         result = findings_settle(f, images, status, &own, err);
     }
     colmap_cameras_free(found);
+    mem_free(prefix);
     mem_free(cameras);
     return result;
 }
+
+const struct source source_colmap = {"COLMAP", recognise, read};

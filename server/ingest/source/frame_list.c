@@ -1,0 +1,144 @@
+/* frame_list.c -- see frame_list.h. */
+#include "server/ingest/source/frame_list.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/mem.h"
+#include "server/ingest/path.h"
+
+#define MAX_NUMBERS_BYTES ((size_t)1 << 16) /* of a small file of numbers */
+
+/* --- frames ----------------------------------------------------------------------------------- */
+
+struct frame_list frame_list_make(struct transforms *t, const char *name, enum matrix_axes axes, struct findings *f) {
+    bool is_opengl = axes == AXES_OPENGL || axes == AXES_OPENGL_INVERSE;
+    *t = (struct transforms){.axes = axes};
+    return (struct frame_list){
+        .t = t, .name = name, .axes = is_opengl ? POSE_RIGHT_UP_BACK : POSE_RIGHT_DOWN_FORWARD, .findings = f};
+}
+
+static bool is_finite(double m[3][4]) {
+    for (int i = 0; i < 12; i++)
+        if (!isfinite(m[i / 4][i % 4]))
+            return false;
+    return true;
+}
+
+enum status frame_list_add(struct frame_list *in, double m[3][4], const struct lens *lens, const char *file,
+                           const char *place, struct transforms_frame **frame, struct error *err) {
+    struct transforms *t = in->t;
+    struct transforms_frame made = {.number = t->named_count, .lens = *lens, .exposure_source = EXPOSURE_UNKNOWN};
+    struct error own;
+    bool scaled;
+    if (frame)
+        *frame = NULL;
+    if (t->named_count == TRANSFORMS_MAX_FRAMES)
+        return error_set(err, STATUS_INPUT, "%s has more than %d frames", in->name, TRANSFORMS_MAX_FRAMES);
+    t->named_count++;
+    if (in->may_be_lost && !is_finite(m)) {
+        in->lost_count++;
+        return STATUS_OK;
+    }
+    if (path_clean(file, &made.file, &own) != STATUS_OK) {
+        findings_problem(in->findings, in->name, "%s: %s", place, own.message);
+        return STATUS_OK;
+    }
+    if (pose_from_matrix((const double(*)[4])m, "the pose", in->axes, &made.world_from_camera, &scaled, &own) !=
+        STATUS_OK) {
+        findings_problem(in->findings, in->name, "%s: %s", place, own.message);
+        mem_free(made.file);
+        return STATUS_OK;
+    }
+    if (t->frame_count == in->capacity) {
+        in->capacity = in->capacity ? 2 * in->capacity : 64;
+        t->frame = mem_realloc_array(t->frame, in->capacity, sizeof *t->frame);
+    }
+    t->frame[t->frame_count++] = made;
+    if (frame)
+        *frame = &t->frame[t->frame_count - 1];
+    return STATUS_OK;
+}
+
+void frame_list_finish(const struct frame_list *in) {
+    if (in->lost_count > 0)
+        findings_warning(in->findings, "%s: %zu poses are not finite and were left out", in->name, in->lost_count);
+}
+
+static int by_file(const void *a, const void *b) {
+    const struct transforms_frame *x = a, *y = b;
+    int order = strcmp(x->file, y->file);
+    return order ? order : (x->number > y->number) - (x->number < y->number);
+}
+
+void frame_list_sort(struct transforms *t) {
+    if (t->frame_count > 1)
+        qsort(t->frame, t->frame_count, sizeof *t->frame, by_file);
+}
+
+/* --- geometry --------------------------------------------------------------------------------- */
+
+struct lens lens_pinhole(double width, double height, double fx, double fy, double cx, double cy) {
+    return (struct lens){.model = CAMERA_OPENCV,
+                         .width = width,
+                         .height = height,
+                         .fl_x = fx,
+                         .fl_y = fy,
+                         .cx = cx,
+                         .cy = cy,
+                         .angle_x = NAN,
+                         .angle_y = NAN};
+}
+
+void rotation_from_quaternion(double w, double x, double y, double z, double r[3][3]) {
+    double n = 1.0 / sqrt(w * w + x * x + y * y + z * z);
+    w *= n, x *= n, y *= n, z *= n;
+    r[0][0] = 1 - 2 * (y * y + z * z), r[0][1] = 2 * (x * y - z * w), r[0][2] = 2 * (x * z + y * w);
+    r[1][0] = 2 * (x * y + z * w), r[1][1] = 1 - 2 * (x * x + z * z), r[1][2] = 2 * (y * z - x * w);
+    r[2][0] = 2 * (x * z - y * w), r[2][1] = 2 * (y * z + x * w), r[2][2] = 1 - 2 * (x * x + y * y);
+}
+
+void rotation_from_axis_angle(const double v[3], double r[3][3]) {
+    double angle = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    double s = angle > 0.0 ? sin(0.5 * angle) / angle : 0.0; /* the quaternion's vector part per v */
+    rotation_from_quaternion(cos(0.5 * angle), s * v[0], s * v[1], s * v[2], r);
+}
+
+void pose_at_centre(double r[3][3], const double centre[3], double m[3][4]) {
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            m[i][j] = r[j][i];
+        m[i][3] = centre[i];
+    }
+}
+
+void pose_invert(double r[3][3], const double t[3], double m[3][4]) {
+    double centre[3];
+    for (int i = 0; i < 3; i++)
+        centre[i] = -(r[0][i] * t[0] + r[1][i] * t[1] + r[2][i] * t[2]);
+    pose_at_centre(r, centre, m);
+}
+
+/* --- numbers ---------------------------------------------------------------------------------- */
+
+bool numbers_parse(const char *text, size_t count, double *value) {
+    for (size_t i = 0; i < count; i++) {
+        char *end;
+        value[i] = strtod(text, &end);
+        if (end == text)
+            return false;
+        text = end + strspn(end, " \t\r\n,");
+    }
+    return *text == '\0';
+}
+
+enum status numbers_read(const struct listing *l, const char *path, size_t count, const char *what, double *value,
+                         struct error *err) {
+    char *text;
+    enum status status = listing_text(l, path, MAX_NUMBERS_BYTES, &text, err);
+    if (status == STATUS_OK && !numbers_parse(text, count, value))
+        status = error_set(err, STATUS_INPUT, "%s: expected the %zu numbers of %s", path, count, what);
+    mem_free(text);
+    return status;
+}
